@@ -54,7 +54,7 @@ def test_its_deviations_are_those_of_the_whole_inverse() -> None:
 
     time = jittered(4, 60)
     spline = SmoothingSpline.fit(time, np.sin(time) + 0.01 * np.cos(50 * time))
-    h, count = spline.spacing, int((time[-1] - time[0]) / spline.spacing) + 6
+    h, count = spline.design.spacing, int((time[-1] - time[0]) / spline.design.spacing) + 6
     knots = time[0] + h * (np.arange(count + 6) - 5)
     basis = BSpline(knots, np.eye(count), 5)
     bent = np.diff(np.eye(count), 3, axis=0)

@@ -120,7 +120,7 @@ class Line:
             bent = clock.second_derivative(length) if directly else -clock.wide_gradient(speed)
             load = mass * (GRAVITY - bent)
             discretization = clock.curvature(load)
-            if clock.acceleration_std is not None:
+            if mass and clock.acceleration_std is not None:
                 load_std = mass * np.abs(pace) * clock.acceleration_std
         tension = load if load is not None else signals.tension
         missing, zero = np.full_like(time, np.nan), np.zeros_like(time)

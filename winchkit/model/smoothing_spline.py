@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 
-__all__ = ["SmoothingSpline"]
+__all__ = ["Design", "SmoothingSpline"]
 
 _DEGREE = 5
 _PENALTY = np.array([-1.0, 3.0, -3.0, 1.0])
@@ -37,13 +37,63 @@ _MOST_KNOTS = 200_000
 
 
 @dataclass(frozen=True)
-class SmoothingSpline:
-    """Linear smoother over given times, with the weight that suits one signal."""
+class Design:
+    """B-splines over an even grid of knots at given times."""
 
     time: Array
     """(n,), s, increasing."""
     spacing: float
     """Of the knots, s."""
+
+    @cached_property
+    def count(self) -> int:
+        """Number of coefficients."""
+        return int((self.time[-1] - self.time[0]) / self.spacing) + 1 + _DEGREE
+
+    @cached_property
+    def _position(self) -> tuple[NDArray[np.intp], Array]:
+        """First coefficient that acts on every sample, and its place between two knots, 0 to 1."""
+        place = (self.time - self.time[0]) / self.spacing
+        cell = np.minimum(place.astype(np.intp), self.count - 1 - _DEGREE)
+        return cell, place - cell
+
+    def basis(self, derivative: int) -> tuple[NDArray[np.intp], Array]:
+        """First coefficient and the six weights of every sample, (n,) and (n, 6)."""
+        first, place = self._position
+        values = np.ones((len(place), 1))
+        for degree in range(1, _DEGREE + 1 - derivative):
+            padded = np.pad(values, ((0, 0), (1, 1)))
+            k = np.arange(degree + 1)
+            rising, falling = place[:, None] + degree - k, k + 1 - place[:, None]
+            values = (rising * padded[:, :-1] + falling * padded[:, 1:]) / degree
+        for _ in range(derivative):
+            padded = np.pad(values, ((0, 0), (1, 1)))
+            values = (padded[:, :-1] - padded[:, 1:]) / self.spacing
+        return first, values
+
+    @cached_property
+    def values(self) -> tuple[NDArray[np.intp], Array]:
+        """First coefficient and weights of the signal itself."""
+        return self.basis(0)
+
+    @cached_property
+    def gram(self) -> Array:
+        """Lower band of B'B, (6, count)."""
+        first, weights = self.values
+        band = np.zeros((_DEGREE + 1, self.count))
+        for row in range(_DEGREE + 1):
+            for column in range(row + 1):
+                products = weights[:, row] * weights[:, column]
+                band[row - column] += np.bincount(first + column, products, self.count)
+        return band
+
+
+@dataclass(frozen=True)
+class SmoothingSpline:
+    """Linear smoother over given times, with the weight that suits one signal."""
+
+    design: Design
+    """Times and knots."""
     weight: float
     """Of the penalty, relative to the squared residuals."""
     noise: float
@@ -78,16 +128,21 @@ class SmoothingSpline:
         step = float(np.min(np.diff(levels))) if len(levels) > 1 else 0.0
         least = max(step**2 / 12, (1e-12 * float(np.ptp(signal))) ** 2, 1e-300)
 
+        design = Design(time, spacing)
+
+        def reml(weight: float) -> tuple[float, float]:
+            return cls(design, weight, 1.0)._reml(signal, least)
+
         def criterion(log_weight: float) -> float:
-            return cls(time, spacing, float(np.exp(log_weight)), 1.0)._reml(signal, least)[0]
+            return reml(float(np.exp(log_weight)))[0]
 
         grid = [criterion(value) for value in _LOG_WEIGHTS]
         best = int(np.argmin(grid))
         bounds = _LOG_WEIGHTS[max(0, best - 1)], _LOG_WEIGHTS[min(len(grid) - 1, best + 1)]
         found = minimize_scalar(criterion, bounds=bounds, method="bounded", options={"xatol": 0.1})
         weight = float(np.exp(found.x))
-        deviance, variance = cls(time, spacing, weight, 1.0)._reml(signal, least)
-        return cls(time, spacing, weight, float(np.sqrt(variance)), deviance)
+        deviance, variance = reml(weight)
+        return cls(design, weight, float(np.sqrt(variance)), deviance)
 
     def smoothed(self, signal: Array, derivative: int = 0) -> Array:
         """Smoothed signal or one of its derivatives at the samples.
@@ -129,7 +184,7 @@ class SmoothingSpline:
         σ² w' (B'B + λ D'D)⁻¹ w with the band of the inverse by Takahashi's recursion.
         """
         inverse = self._inverse_band
-        first, weights = self._basis(derivative)
+        first, weights = self.design.basis(derivative)
         total = np.zeros(len(first))
         for row in range(_DEGREE + 1):
             for column in range(row, _DEGREE + 1):
@@ -143,63 +198,29 @@ class SmoothingSpline:
         return np.asarray(self.noise * np.sqrt(np.maximum(total, 0.0)))
 
     @cached_property
-    def _count(self) -> int:
-        """Number of coefficients."""
-        return int((self.time[-1] - self.time[0]) / self.spacing) + 1 + _DEGREE
-
-    @cached_property
-    def _position(self) -> tuple[NDArray[np.intp], Array]:
-        """First coefficient that acts on every sample, and its place between two knots, 0 to 1."""
-        place = (self.time - self.time[0]) / self.spacing
-        cell = np.minimum(place.astype(np.intp), self._count - 1 - _DEGREE)
-        return cell, place - cell
-
-    def _basis(self, derivative: int) -> tuple[NDArray[np.intp], Array]:
-        """First coefficient and the six weights of every sample, (n,) and (n, 6)."""
-        first, place = self._position
-        values = np.ones((len(place), 1))
-        for degree in range(1, _DEGREE + 1 - derivative):
-            padded = np.pad(values, ((0, 0), (1, 1)))
-            k = np.arange(degree + 1)
-            rising, falling = place[:, None] + degree - k, k + 1 - place[:, None]
-            values = (rising * padded[:, :-1] + falling * padded[:, 1:]) / degree
-        for _ in range(derivative):
-            padded = np.pad(values, ((0, 0), (1, 1)))
-            values = (padded[:, :-1] - padded[:, 1:]) / self.spacing
-        return first, values
-
-    @cached_property
-    def _values(self) -> tuple[NDArray[np.intp], Array]:
-        return self._basis(0)
-
-    @cached_property
     def _factor(self) -> Array:
         """Lower band of the Cholesky factor of B'B + λ D'D, (6, count)."""
         from scipy.linalg import cholesky_banded
 
-        first, weights = self._values
-        band = np.zeros((_DEGREE + 1, self._count))
-        for row in range(_DEGREE + 1):
-            for column in range(row + 1):
-                products = weights[:, row] * weights[:, column]
-                band[row - column] += np.bincount(first + column, products, self._count)
+        count = self.design.count
+        band = self.design.gram.copy()
         for row in range(len(_PENALTY)):
             for column in range(row + 1):
-                rows = slice(column, self._count - len(_PENALTY) + 1 + column)
+                rows = slice(column, count - len(_PENALTY) + 1 + column)
                 band[row - column, rows] += self.weight * _PENALTY[row] * _PENALTY[column]
         return np.asarray(cholesky_banded(band, lower=True))
 
     def _coefficients(self, signal: Array) -> Array:
         from scipy.linalg import cho_solve_banded
 
-        first, weights = self._values
-        right = np.zeros(self._count)
+        first, weights = self.design.values
+        right = np.zeros(self.design.count)
         for k in range(_DEGREE + 1):
-            right += np.bincount(first + k, weights[:, k] * signal, self._count)
+            right += np.bincount(first + k, weights[:, k] * signal, self.design.count)
         return np.asarray(cho_solve_banded((self._factor, True), right))
 
     def _at_samples(self, coefficients: Array, derivative: int) -> Array:
-        first, weights = self._values if derivative == 0 else self._basis(derivative)
+        first, weights = self.design.values if derivative == 0 else self.design.basis(derivative)
         return np.asarray(sum(weights[:, k] * coefficients[first + k] for k in range(_DEGREE + 1)))
 
     def _reml(self, signal: Array, least: float) -> tuple[float, float]:
@@ -212,14 +233,14 @@ class SmoothingSpline:
         free = len(signal) - len(_PENALTY) + 1
         variance = max(squares / free, least)
         determinant = 2 * float(np.sum(np.log(self._factor[0])))
-        penalised = self._count - len(_PENALTY) + 1
+        penalised = self.design.count - len(_PENALTY) + 1
         value = free * np.log(variance) + squares / variance + determinant
         return float(value - penalised * np.log(self.weight)), variance
 
     @cached_property
     def _inverse_band(self) -> Array:
         """Band of the inverse of B'B + λ D'D: entry (j, d) of row j and column j + d."""
-        count, reach = self._count, _DEGREE
+        count, reach = self.design.count, _DEGREE
         lower = self._factor / self._factor[0]
         pivots = self._factor[0] ** -2
         out = np.zeros((count + reach, reach + 1))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
@@ -38,9 +39,39 @@ class _Recorded:
     """Outputs of a run with the standard deviation of their noise."""
 
     run: Run
-    outputs: dict[str, Array]
-    noise: dict[str, float]
-    """Of outputs whose noise is above their resolution."""
+    profile: WinchProfile
+
+    @cached_property
+    def outputs(self) -> dict[str, Array]:
+        """Measured outputs, interpolated where NaN."""
+        return {name: bridged(self.run[name]) for name in OUTPUTS if name in self.run}
+
+    @cached_property
+    def local(self) -> dict[str, float]:
+        """Noise of every output from differences of neighbours: not less than its noise."""
+        return {name: local_noise(values) for name, values in self.outputs.items()}
+
+    @cached_property
+    def noise(self) -> dict[str, float]:
+        """The same, or that of the residual if it is smaller; of outputs finer than their noise."""
+        line = Line(self.profile)
+        load = _known(self.run, "load")
+        mass = self.run.load_mass if load is None else None
+        angle = bridged(self.run["motor_angle"])
+        signals = Signals(self.run.time, angle, load, mass, _known(self.run, "tension"))
+        nominal = line.predict(line.motion(signals))
+        out = {}
+        for name, values in self.outputs.items():
+            own = self.local[name]
+            if name in nominal:
+                own = min(own, local_noise(values - nominal[name]))
+            if own > resolution(values) and len(np.unique(values)) >= _LEAST_ROWS:
+                out[name] = own
+        return out
+
+
+def _known(run: Run, name: str) -> Array | None:
+    return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
 
 
 def without_copies(
@@ -72,7 +103,7 @@ def without_copies(
     differences of neighbours; an output whose resolution exceeds its noise shows nothing, since
     independent recordings are rounded alike.
     """
-    recorded = [_recorded(run, profile) for run in runs]
+    recorded = [_Recorded(run, profile) for run in runs]
     # The longer one is kept; of equal ones the finer one, which has more different values.
     order = sorted(range(len(runs)), key=lambda i: (-len(runs[i]), -_levels(recorded[i])))
     kept: list[int] = []
@@ -96,63 +127,42 @@ def _finding(run: Run, kept: Run, share: float) -> Finding:
     return Finding(COPIES, run.name, "time", share, text)
 
 
-def _recorded(run: Run, profile: WinchProfile) -> _Recorded:
-    line = Line(profile)
-    load = bridged(run["load"]) if "load" in run and np.isfinite(run["load"]).any() else None
-    tension = bridged(run["tension"]) if "tension" in run else None
-    signals = Signals(
-        run.time,
-        bridged(run["motor_angle"]),
-        load,
-        run.load_mass if load is None else None,
-        tension,
-    )
-    nominal = line.predict(line.motion(signals))
-    outputs = {name: bridged(run[name]) for name in OUTPUTS if name in run}
-    noise = {}
-    for name, values in outputs.items():
-        own = local_noise(values)
-        if name in nominal:
-            own = min(own, local_noise(values - nominal[name]))
-        if own > resolution(values) and len(np.unique(values)) >= _LEAST_ROWS:
-            noise[name] = own
-    return _Recorded(run, outputs, noise)
-
-
 def _levels(recorded: _Recorded) -> int:
     return sum(len(np.unique(values)) for values in recorded.outputs.values())
 
 
 def _copied_share(longer: _Recorded, shorter: _Recorded) -> float:
     """Share of the shorter run's rows that the longer one has; zero where it is no copy."""
-    # A rounded copy has a resolution; the noise is that of the one that has none.
-    noise = {**shorter.noise, **longer.noise}
-    shared = [name for name in OUTPUTS if name in longer.outputs and name in shorter.outputs]
-    decisive = [name for name in shared if name in noise]
-    if not decisive:
+    names = [name for name in OUTPUTS if name in longer.outputs and name in shorter.outputs]
+    if not names:
         return 0.0
     every = max(1, round(shorter.run.interval / longer.run.interval))
     for first in range(every):
-        share = _agreement(longer, shorter, noise, decisive, slice(first, None, every))
-        if share:
-            return share
+        count, differences = _differences(longer, shorter, names, slice(first, None, every))
+        if count < max(_LEAST_ROWS, _LEAST_OVERLAP * len(shorter.run)):
+            continue
+        if any(differences[n] > _DEPENDENT * longer.local[n] for n in names):
+            continue
+        # A rounded copy has a resolution; the noise is that of the one that has none.
+        noise = {**shorter.noise, **longer.noise}
+        if noise and all(differences[n] <= _DEPENDENT * noise[n] for n in names if n in noise):
+            return count / len(shorter.run)
     return 0.0
 
 
-def _agreement(
-    longer: _Recorded, shorter: _Recorded, noise: dict[str, float], names: list[str], rows: slice
-) -> float:
-    whole = {name: longer.outputs[name][rows] for name in names}
-    count, other = len(shorter.run), len(whole[names[0]])
-    lag = _lag(whole[names[-1]], shorter.outputs[names[-1]])
+def _differences(
+    longer: _Recorded, shorter: _Recorded, names: list[str], rows: slice
+) -> tuple[int, dict[str, float]]:
+    """Shared rows, and the median absolute difference of every output there, less an offset."""
+    count, other = len(shorter.run), len(longer.outputs[names[0]][rows])
+    lag = _lag(longer.outputs[names[-1]][rows], shorter.outputs[names[-1]])
     start, stop = max(0, lag), min(other, lag + count)
-    if stop - start < max(_LEAST_ROWS, _LEAST_OVERLAP * count):
-        return 0.0
-    for name in names:
-        difference = whole[name][start:stop] - shorter.outputs[name][start - lag : stop - lag]
-        if np.median(np.abs(difference - np.median(difference))) > _DEPENDENT * noise[name]:
-            return 0.0
-    return (stop - start) / count
+    out = {}
+    for name in names if stop > start else []:
+        part = shorter.outputs[name][start - lag : stop - lag]
+        difference = longer.outputs[name][rows][start:stop] - part
+        out[name] = float(np.median(np.abs(difference - np.median(difference))))
+    return stop - start, out
 
 
 def _lag(whole: Array, part: Array) -> int:
