@@ -17,7 +17,7 @@ import numpy as np
 from robot_poses.truth import GRAVITY, HOME, Noise, Row, Truth, Vector, csv, poses, turn
 from winchkit.arrays import Array
 
-__all__ = ["BASE", "MASS", "Beyond", "Case", "Seen", "profile_text", "record"]
+__all__ = ["BASE", "MASS", "Beyond", "Case", "Seen", "balanced", "profile_text", "record"]
 
 Beyond = Callable[[int, Row], float]
 Seen = Callable[[Row], Row]
@@ -66,7 +66,7 @@ def record(
     again = case.repeats if repeats is None else repeats
     rng, silent = np.random.default_rng(seed), Noise(0, 0, 0, 0, 0, 0, 0)
     made = poses(case.truth, count, seed, box=box, tilt=tilt, noise=silent)
-    rows = [_pulled(case, row, random.Random(seed * 1000 + n)) for n, row in enumerate(made)]
+    rows = [balanced(case, row, random.Random(seed * 1000 + n)) for n, row in enumerate(made)]
     shown = [case.seen(row) if case.seen else row for row in (*rows, *rows[:again])]
     astray = _wander(len(shown), noise.wander, rng)
     seen = [_seen(row, noise, rng, off) for row, off in zip(shown, astray, strict=True)]
@@ -99,7 +99,7 @@ def _lengths(point: Sequence[float]) -> str:
     return "[" + ", ".join(f'"{x!r} m"' for x in point) + "]"
 
 
-def _pulled(case: Case, row: Row, rng: random.Random) -> Row:
+def balanced(case: Case, row: Row, rng: random.Random) -> Row:
     """A row with balanced tensions, and the motor angles that go with them."""
     start = np.array([rng.uniform(25.0, 80.0) for _ in range(8)])
     slope, down = _slope(case.truth, row), np.array([0.0, 0.0, -case.mass * GRAVITY])

@@ -6,15 +6,17 @@ Rows of :mod:`robot_poses.truth` as such an instrument shows them; nothing is sh
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robot_poses.truth import HOME, Row, Vector, turn
+from robot_poses.hidden import Case, balanced
+from robot_poses.truth import HOME, Noise, Row, Vector, csv, poses, turn
 from winchkit.arrays import Array
 
-__all__ = ["Station", "about"]
+__all__ = ["Station", "about", "observed"]
 
 _ZERO: Vector = (0.0, 0.0, 0.0)
 
@@ -31,7 +33,7 @@ class Station:
     reflector: Vector = _ZERO
     """On the platform, m."""
     ppm: float = 0.0
-    """Scale about the instrument, which stands three metres from the robot."""
+    """Scale about the origin of its frame."""
     turns_rotation: bool = True
     """Whether the angles are measured in the same frame; an IMU's are not."""
     tracker: float = 2e-5
@@ -51,12 +53,12 @@ class Station:
     def show(self, rows: Sequence[Row], seed: int) -> list[Row]:
         """Readings of the rows' true poses with the instrument's noise."""
         rng, turned, home = np.random.default_rng(seed), self.rotation, np.array(HOME)
-        stand, out = home + np.array((3.0, 0.0, 0.0)), []
+        out = []
         for row in rows:
             platform = np.array(turn(*row.angles))
             seen = np.array(row.position) + platform @ np.array(self.reflector)
-            seen = stand + (1 + self.ppm * 1e-6) * (seen - stand)
             seen = home + np.array(self.shift) + turned @ (seen - home)
+            seen = (1 + self.ppm * 1e-6) * seen
             shown = turned @ platform if self.turns_rotation else platform
             x, y, z = (seen + rng.normal(0, self.tracker, 3)).tolist()
             a, b, c = (np.array(_angles(shown)) + rng.normal(0, self.imu, 3)).tolist()
@@ -70,6 +72,34 @@ def about(angle: float, point: Vector = _ZERO, axis: Vector = (1.0, 2.0, 3.0)) -
     home = np.array(HOME)
     x, y, z = (turned @ (home - point) - (home - point)).tolist()
     return Station(angle, axis, (x, y, z))
+
+
+def observed(
+    case: Case,
+    station: Station,
+    *,
+    count: int = 60,
+    repeats: int | None = None,
+    seed: int = 1,
+    angles: bool = True,
+    tension: bool = True,
+) -> str:
+    """A run of a robot with something hidden, as the instrument shows it."""
+    again = case.repeats if repeats is None else repeats
+    rows = [
+        balanced(case, row, random.Random(seed * 1000 + n))
+        for n, row in enumerate(poses(case.truth, count, seed, noise=Noise(0, 0, 0, 0, 0, 0, 0)))
+    ]
+    rng = np.random.default_rng(seed + 77)
+    shown = [
+        replace(
+            row,
+            motor_angle=tuple((np.array(row.motor_angle) + rng.normal(0, 1e-4, 8)).tolist()),
+            tension=tuple((np.array(row.tension) + rng.normal(0, 0.3, 8)).tolist()),
+        )
+        for row in station.show([*rows, *rows[:again]], seed)
+    ]
+    return csv(shown, angles=angles, tension=tension)
 
 
 def _angles(rotation: Array) -> Vector:

@@ -26,6 +26,10 @@ INTERFACE = {
     "home-length": {"length": "m"},
     "payload-mass": {"mass_error": "kg"},
     "payload-centre": {"x": "m", "y": "m", "z": "m"},
+    "tracker-frame": {"x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad"},
+    "reflector-offset": {"x": "m", "y": "m", "z": "m"},
+    "tracker-scale": {"scale_error": "1"},
+    "imu-mounting": {"rx": "rad", "ry": "rad", "rz": "rad"},
 }
 WINCH = """
 [line.winch.drum]

@@ -12,6 +12,7 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.placement import at_line
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot, approximate_forces, robot_of, rotation_of
+from winchkit.model.robot.tracker import reading_of
 from winchkit.schema.profiles.robot import HomeSpec, LineSpec, PlatformSpec, RobotProfile
 from winchkit.schema.profiles.winch import (
     CableSpec,
@@ -85,4 +86,5 @@ def _shown(robot: Robot) -> dict[str, Array]:
         bare.structure(pose), robot.weight(pose), np.full(len(robot.names), _MIDDLE)
     )
     by_drum = robot.lengths_at(bare.motor_angles(pose), force)
-    return {"cable_length": (by_drum - robot.lengths(pose))[:, 0], "tension": force[:, 0]}
+    seen = pose if robot.tracker is None else reading_of(robot.tracker, pose)
+    return {"cable_length": (by_drum - robot.lengths(seen))[:, 0], "tension": force[:, 0]}

@@ -116,16 +116,20 @@ def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
     """
     lines: dict[str, list[Modifier]] = {line.name: [] for line in profile.line}
     payload: list[Modifier] = []
+    tracker: list[Modifier] = []
     for term in terms:
         modifier, place = term.modifier(), line_of_effect(term.effect)
         if term.effect.stage is Stage.PAYLOAD:
             payload.append(modifier)
             continue
+        if term.effect.stage is Stage.TRACKER:
+            tracker.append(modifier)
+            continue
         for name in [place] if place else lines:
             lines[name].append(modifier)
             if offset := term.values.get(HOME + name):
                 lines[name].append(Modifier(Stage.HOME_LENGTH, _Longer(offset)))
-    return robot_of(profile, list(lines.values()), payload)
+    return robot_of(profile, list(lines.values()), payload, tracker)
 
 
 class _Longer:

@@ -65,9 +65,11 @@ class Stage(IntEnum):
     """Value: cable of a robot's line at home, m."""
     PAYLOAD = 16
     """Value: the :class:`~winchkit.schema.profiles.robot.PlatformSpec` of a robot."""
+    TRACKER = 17
+    """Value: the :class:`~winchkit.model.robot.tracker.Tracker` that measures a robot's poses."""
 
 
-ROBOT_STAGES = frozenset({Stage.LINE_PLACE, Stage.HOME_LENGTH, Stage.PAYLOAD})
+ROBOT_STAGES = frozenset({Stage.LINE_PLACE, Stage.HOME_LENGTH, Stage.PAYLOAD, Stage.TRACKER})
 """Stages of effects that only a robot can have."""
 
 

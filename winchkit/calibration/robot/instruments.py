@@ -15,12 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.model.robot import Pose, Robot, rotation_of
+from winchkit.model.robot import Pose, Robot
 from winchkit.model.robot.constraints import rotation_residual
-from winchkit.model.robot.rotation import rotation_vector
-from winchkit.model.robot.tracker import Tracker, reading_of, registered
+from winchkit.model.robot.tracker import Tracker, declared_tracker, reading_of, registered
 from winchkit.runs.poses import Measured
-from winchkit.schema.profiles.instruments import FrameSpec, InstrumentSpec
 
 __all__ = [
     "LARGEST_SCALE",
@@ -60,14 +58,7 @@ class Instruments:
         """Whether the tracker shows the platform's pose in the base frame and nothing is free."""
         if self.free:
             return False
-        return all(
-            not np.any(t.shift)
-            and not np.any(t.turn)
-            and not np.any(t.offset)
-            and t.scale == 0
-            and t.mounting is None
-            for t in self.trackers
-        )
+        return all(tracker.is_trivial for tracker in self.trackers)
 
     def session_of(self, measured: Measured) -> NDArray[np.intp]:
         """Index of the session of each pose, (p,); −1 where it is another session."""
@@ -101,7 +92,7 @@ def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
         Numbers of what was not measured are not free.
     """
     spec = robot.profile.instrument
-    tracker = _tracker(robot, spec)
+    tracker = robot.tracker or declared_tracker(robot.profile)
     free = {
         name
         for name, value in (
@@ -118,33 +109,6 @@ def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
         free -= {"mounting"}
     sessions = tuple(dict.fromkeys(measured.sessions))
     return Instruments(frozenset(free), sessions, (tracker,) * len(sessions))
-
-
-def _tracker(robot: Robot, spec: InstrumentSpec) -> Tracker:
-    """Values of the file, with zero for what is unknown."""
-    tracker, home = Tracker.at(robot.home.position), robot.home.position[0]
-    of_tracker, own = spec.tracker, spec.imu.mounting if spec.imu else spec.tracker.mounting
-    scale = 0.0 if isinstance(of_tracker.scale, str) else of_tracker.scale
-    shift, turn = np.zeros(3), np.zeros(3)
-    if isinstance(of_tracker.frame, FrameSpec):
-        turned = rotation_of(*of_tracker.frame.rotation)
-        shift = np.array(of_tracker.frame.position) + (1 + scale) * (turned @ home) - home
-        turn = rotation_vector(turned)
-    offset = (
-        np.zeros(3) if isinstance(of_tracker.reflector, str) else np.array(of_tracker.reflector)
-    )
-    mounting = None
-    if not isinstance(own, str) and any(own):
-        mounting = rotation_vector(rotation_of(*own))
-    return replace(
-        tracker,
-        shift=shift,
-        turn=turn,
-        offset=offset,
-        scale=scale,
-        mounting=mounting,
-        turns_rotation=spec.imu is None,
-    )
 
 
 def registered_instruments(

@@ -20,6 +20,7 @@ from winchkit.effects.placement import (
     with_home_lengths,
 )
 from winchkit.effects.term import Term
+from winchkit.model.stages import Stage
 from winchkit.schema.profiles.robot import PRIORS
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
@@ -38,6 +39,10 @@ _PARTS = {
     "swivel-radius": "a line with a swivel_radius",
     "layer-thickness": "a drum that winds in layers",
     "guide-offset": "a [guide] in a line's winch",
+}
+_OF_TRACKER = {
+    "position": "platform_x, platform_y, platform_z [m]",
+    "angles": "platform_roll, platform_pitch, platform_yaw [rad]",
 }
 _OUTSIDE_LINES = {"tension": "LINE.tension [N] of the load cells", "temperature": "a temperature"}
 
@@ -59,6 +64,10 @@ def lacking(effect: Effect, dataset: RobotDataset) -> list[str]:
         out.append(_OUTSIDE_LINES["tension"])
     if "tension" in effect.outputs and not dataset.has_balance:
         out.append("tensions that carry the platform's weight")
+    if effect.stage is Stage.TRACKER:
+        kind = "angles" if base_of(effect) == "imu-mounting" else "position"
+        if not np.isfinite(getattr(dataset.measured, kind)).any():
+            out.append(_OF_TRACKER[kind])
     if "temperature" in effect.needs and not np.isfinite(dataset.measured.temperature).all():
         out.append(_OUTSIDE_LINES["temperature"])
     return out

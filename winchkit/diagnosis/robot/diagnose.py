@@ -8,7 +8,7 @@ first missing part of the model.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,7 +25,7 @@ from winchkit.diagnosis.diagnose import (
 )
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.intervals import spread_of
+from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, Where, plain_step
 from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.candidates import GEOMETRY
@@ -40,6 +40,8 @@ from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_sele
 from winchkit.diagnosis.verdict.decision import Judgement, judge
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.term import Term
+from winchkit.model.stages import Stage
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
@@ -115,7 +117,10 @@ class RobotSelection:
     @cached_property
     def initial_model(self) -> FittedModel:
         """The profile's own effects fitted, with the geometry of the file."""
-        first, noise = self.file_engine.fit_with_noise(self.file_engine.initial_model)
+        start = self.file_engine.initial_model
+        for index in reversed(self.preparation.found):
+            start = start.without(index)
+        first, noise = self.file_engine.fit_with_noise(start)
         return FittedModel(
             self.file_engine.regression, first, noise, self.file_engine.regression.groups
         )
@@ -170,6 +175,9 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     if selection.geometry_is_free and verdict in ("adequate", "explained"):
         verdict = "explained"
         steps = (_geometry_step(engine, reported, outputs["cable_length"]), *steps)
+    if preparation.found:
+        verdict = "explained" if verdict == "adequate" else verdict
+        steps = (*_registered_steps(selection, outputs), *steps)
     diagnosis = RobotDiagnosis(
         verdict=verdict,
         outputs=outputs,
@@ -182,10 +190,49 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
         unexplained_share=judgement.share,
         where=_places(selection) if selection.result.lack_of_fit else (),
         next_runs=next_pose_runs(engine.regression, reported.final.hypothesis, pairs_of(sets)),
-        notes=(*preparation.dataset.notes, *missing_pose_excitation(preparation), *judgement.notes),
+        notes=(
+            *preparation.dataset.notes,
+            *missing_pose_excitation(preparation),
+            *judgement.notes,
+            *_datum_notes(steps),
+        ),
         geometry=geometry,
     )
     return RobotAnswer(selection, sets, diagnosis)
+
+
+_SAME_AS = {
+    "tracker-frame": "all exit points and the home pose moved together the other way",
+    "reflector-offset": "all anchor points and the home pose moved together the other way",
+}
+
+
+def _datum_notes(steps: Sequence[Step]) -> list[str]:
+    """The datum by which a named frame or offset is no effect of the robot, in words."""
+    named = {effect for step in steps for effect in step.effects}
+    return [
+        f"{effect}: datum is the robot's home pose with its points; {same} are the same to all "
+        "measurements. Fixed points of the frame or the platform, measured with the tracker, "
+        "distinguish the two"
+        for effect, same in _SAME_AS.items()
+        if effect in named
+    ]
+
+
+def _registered_steps(
+    selection: RobotSelection, outputs: Mapping[str, OutputFit]
+) -> tuple[Step, ...]:
+    """Effects of the tracker that were registered before the selection, as additions."""
+    engine, reported = selection.engine, selection.judgement.reported
+    spread = spread_of(engine.regression, reported.final, reported.noise, engine.regression.blocks)
+    own = estimates(engine.regression, reported.final, spread)
+    output = outputs.get("platform_position", outputs["cable_length"])
+    before, after = output.heldout_rms_before, output.heldout_rms_after
+    gain = 1 - (after / before) ** 2 if before else 0.0
+    return tuple(
+        Step((term.effect.id,), {term.effect.id: values}, gain)
+        for term, values in (own[index] for index in selection.preparation.found)
+    )
 
 
 def _places(selection: RobotSelection) -> tuple[Where, ...]:
@@ -256,7 +303,7 @@ def diagnose_robot(
     result = stepwise_selection(file_engine)
     if added := result.final.hypothesis.terms[file_engine.n_initial_terms :]:
         # Poses estimated from inconsistent cable lengths are tilted, which unbalances tensions.
-        file_engine = preparation.file_geometry(added[:1])
+        file_engine = preparation.file_geometry(_inconsistent(added))
         result = stepwise_selection(file_engine)
     judgement = judge(file_engine, result)
     if judgement.verdict in ("adequate", "explained") and not _geometry_is_off(
@@ -266,6 +313,13 @@ def diagnose_robot(
             RobotSelection(preparation, file_engine, file_engine, result, judgement), "file"
         )
     return _concluded(preparation, preparation.free_geometry(), file_engine)
+
+
+def _inconsistent(added: Sequence[Term]) -> tuple[Term, ...]:
+    """Effects of the tracker and the first other effect, beside which poses are estimated again."""
+    tracker = [term for term in added if term.effect.stage is Stage.TRACKER]
+    others = [term for term in added if term.effect.stage is not Stage.TRACKER]
+    return (*tracker, *others[:1])
 
 
 def _geometry_explains_far_more(preparation: Preparation, file_engine: PoseSelection) -> bool:

@@ -52,6 +52,7 @@ from winchkit.model.robot.constraints import (
 )
 from winchkit.model.robot.pose_estimation import start_pose as completed
 from winchkit.model.robot.robot import standing
+from winchkit.model.robot.tracker import tracked_position, tracked_rotation
 from winchkit.model.stages import At, Stage
 
 __all__ = ["POSED", "Equations", "start_pose"]
@@ -107,8 +108,8 @@ class Equations:
         force = self.forces(robot)
         out = {
             "rope": closure_residual(length, self._by_drum(robot, force)),
-            "position": pose.position - measured.position,
-            "rotation": self._rotation,
+            "position": self._position(robot),
+            "rotation": self._rotation(robot),
             "swivel": self._swivel(robot),
             "gauge": length - measured.cable_length,
         }
@@ -145,10 +146,16 @@ class Equations:
         pose, measured = self.pose, self.dataset.measured
         length = by_pose(sensitivities(robot.geometry, pose.position, pose.rotation))
         swivel = by_pose(swivel_sensitivities(robot.geometry, pose.position, pose.rotation))
+        if robot.tracker is None:
+            place = position(pose, measured.position).by_pose
+            turned = rotation_by_pose(pose.rotation, measured.angles)
+        else:
+            place = tracked_position(robot.tracker, pose, measured.position).by_pose
+            turned = tracked_rotation(robot.tracker, pose, measured.angles).by_pose
         return {
             "rope": length,
-            "position": position(pose, measured.position).by_pose,
-            "rotation": rotation_by_pose(pose.rotation, measured.angles),
+            "position": place,
+            "rotation": turned,
             "swivel": swivel,
             "gauge": length,
         }
@@ -180,8 +187,19 @@ class Equations:
                     out[kind][:, lines, index] = own[:, lines]
         return out
 
+    def _position(self, robot: Robot) -> Array:
+        measured = self.dataset.measured.position
+        if robot.tracker is None:
+            return np.asarray(self.pose.position - measured)
+        return tracked_position(robot.tracker, self.pose, measured).residual
+
+    def _rotation(self, robot: Robot) -> Array:
+        if robot.tracker is None:
+            return self._own_rotation
+        return tracked_rotation(robot.tracker, self.pose, self.dataset.measured.angles).residual
+
     @cached_property
-    def _rotation(self) -> Array:
+    def _own_rotation(self) -> Array:
         return rotation_residual(self.pose.rotation, self.dataset.measured.angles)
 
     def _swivel(self, robot: Robot) -> Array:

@@ -22,6 +22,7 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.results import OutputFit
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
+from winchkit.model.robot.rotation import rotation_by, skew
 
 __all__ = [
     "UNITS",
@@ -66,8 +67,9 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
     """
     at_pose, to_place = _maps(regression)
     known = _measured_coordinates(residuals)
+    residuals = _in_base(regression, residuals)
     moved = np.where(known, np.concatenate([residuals["position"], residuals["rotation"]], 1), 0.0)
-    by = regression.slope()["rope"]
+    by = _slope(regression)
     closure = residuals["rope"] - (by @ moved[..., None])[..., 0]
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
@@ -86,7 +88,7 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
 def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     """Rms of the errors by the noise of the instruments alone, by output, SI."""
     at_pose, to_place = _maps(regression)
-    sigma, by = noise.sigma, regression.slope()["rope"]
+    sigma, by = noise.sigma, _slope(regression)
     here = regression.residuals(())
     pose = np.repeat([sigma["position"] ** 2, sigma["rotation"] ** 2], 3) * _measured_coordinates(
         here
@@ -183,6 +185,36 @@ def _held_out(model: FittedModel) -> Errors:
     return errors_of(regression, out)
 
 
+def _slope(regression: PoseRegression) -> Array:
+    """Derivatives of the lengths by the observed point and the rotation, (p, n, 6).
+
+    The platform's origin is c = u − R o with the observed point u and its place o on the platform.
+    """
+    by, tracker = regression.slope()["rope"], regression.tracker
+    if tracker is None or not np.any(tracker.offset):
+        return by
+    lever = regression.equations.pose.rotation @ tracker.offset
+    out = by.copy()
+    out[..., 3:] += by[..., :3] @ skew(lever)
+    return out
+
+
+def _in_base(regression: PoseRegression, residuals: Mapping[str, Array]) -> Mapping[str, Array]:
+    """Residuals of positions and rotations turned from the tracker's into the base frame."""
+    tracker = regression.tracker
+    if tracker is None:
+        return residuals
+    back = rotation_by(tracker.turn).T
+    out = {**residuals, "position": residuals["position"] @ back.T / (1 + tracker.scale)}
+    if tracker.turns_rotation:
+        out["rotation"] = np.where(
+            np.isfinite(residuals["rotation"]).all(axis=1, keepdims=True),
+            residuals["rotation"] @ back.T,
+            residuals["rotation"],
+        )
+    return out
+
+
 def _measured_coordinates(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
     """Which of the six coordinates of each pose were measured, (p, 6)."""
     both = np.concatenate([residuals["position"], residuals["rotation"]], axis=1)
@@ -192,7 +224,7 @@ def _measured_coordinates(residuals: Mapping[str, Array]) -> NDArray[np.bool_]:
 def _maps(regression: PoseRegression) -> tuple[Array, Array]:
     """Per pose the projection of closures beside the unmeasured coordinates (p, n, n), and the map
     from closures to positions (p, 3, n)."""
-    by = regression.slope()["rope"]
+    by = _slope(regression)
     by = np.where(np.isfinite(by), by, 0.0)
     free = by * ~_measured_coordinates(regression.residuals(()))[:, None, :]
     undone = free @ np.linalg.pinv(free, rcond=1e-9)

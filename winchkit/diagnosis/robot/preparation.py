@@ -20,6 +20,7 @@ from winchkit.diagnosis.robot.candidates import candidates_at, priors_of_geometr
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.engine import PoseSelection
 from winchkit.diagnosis.robot.prior import GeometryPrior
+from winchkit.diagnosis.robot.registration import Registration, registration_of
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.variance_components import (
     START,
@@ -34,6 +35,7 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.placement import base_of
 from winchkit.effects.term import Term
+from winchkit.model.stages import Stage
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
@@ -85,7 +87,9 @@ def fitted_point(
         The linearisation point and the fitted effects.
     """
     found = adjusted(dataset, terms, sigma, geometry)
-    return LinearizationPoint(dataset, found.pose, sigma, found.geometry), found.terms
+    instruments = tuple(t for t in found.terms if t.effect.stage is Stage.TRACKER)
+    point = LinearizationPoint(dataset, found.pose, sigma, found.geometry, instruments)
+    return point, found.terms
 
 
 def estimated_noise(
@@ -186,6 +190,8 @@ class Preparation:
         The geometry with the priors of a calibration.
     guess : tuple of Term
         The effect that explains most, beside which a free geometry is fitted.
+    registration : Registration, optional
+        Effects of the tracker in the initial model.
     """
 
     dataset: RobotDataset
@@ -194,11 +200,20 @@ class Preparation:
     noise: PoseNoise
     prior: tuple[GeometryPrior, ...]
     guess: tuple[Term, ...] = ()
+    registration: Registration | None = None
 
     @cached_property
     def own(self) -> tuple[Term, ...]:
-        """The profile's own effects at their file values."""
-        return robot_terms(self.dataset.robot, self.catalogue)
+        """The profile's own effects at their file values, and those of the registration."""
+        terms = self.registration.terms if self.registration else ()
+        return (*robot_terms(self.dataset.robot, self.catalogue), *terms)
+
+    @property
+    def found(self) -> range:
+        """Indices of the effects that the registration found, in the initial model."""
+        count = len(self.registration.found) if self.registration else 0
+        first = len(self.own) - (len(self.registration.terms) if self.registration else 0)
+        return range(first, first + count)
 
     def engine(
         self, geometry: Sequence[GeometryPrior], beside: tuple[Term, ...] = ()
@@ -252,6 +267,8 @@ def prepare_selection(
     """
     dataset = prepare_poses(runs, profile)
     own = robot_terms(profile, catalogue)
+    registration = registration_of(dataset, own, catalogue)
+    dataset, own = registration.dataset, (*own, *registration.terms)
     prior = tuple(priors_of_geometry(dataset, catalogue, fitted=False))
     there = {term.effect.id for term in own}
     candidates = tuple(candidates_at(dataset, catalogue))
@@ -260,7 +277,9 @@ def prepare_selection(
     if not balanced(dataset, noise):
         dataset = replace(dataset, balanced=False)
         candidates = tuple(candidates_at(dataset, catalogue))
-    return Preparation(dataset, catalogue, candidates, noise, prior).with_guess()
+    return Preparation(
+        dataset, catalogue, candidates, noise, prior, registration=registration
+    ).with_guess()
 
 
 def calibrated_on(profile: RobotProfile, runs: Sequence[Run]) -> bool:

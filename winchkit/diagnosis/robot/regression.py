@@ -28,6 +28,7 @@ from winchkit.diagnosis.robot.prior import GeometryPrior, profile_with_geometry
 from winchkit.effects.effect import Effect
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot
+from winchkit.model.robot.tracker import Tracker
 from winchkit.model.stages import At, Stage
 from winchkit.schema.profiles.robot import RobotProfile
 
@@ -54,12 +55,15 @@ class LinearizationPoint:
         Standard deviation per type of measurement, SI.
     geometry : tuple of GeometryPrior
         Numbers of the geometry that are nuisance parameters.
+    instruments : tuple of Term
+        Effects of the tracker at which the derivatives by the pose are taken.
     """
 
     dataset: RobotDataset
     pose: Pose
     sigma: Mapping[str, float]
     geometry: tuple[GeometryPrior, ...] = ()
+    instruments: tuple[Term, ...] = ()
 
     @cached_property
     def profile(self) -> RobotProfile:
@@ -86,6 +90,7 @@ class PoseRegression(Regression):
         self.point = point
         self.dataset: RobotDataset = point.dataset
         self.robot = point.robot()
+        self._at_slope = point.robot(point.instruments) if point.instruments else self.robot
         self.equations = Equations(point.dataset, point.pose, self.robot)
         self._start = self.equations.residuals(self.robot)
         self._zeros = instrument_zeros(self._start, self.dataset)
@@ -237,7 +242,12 @@ class PoseRegression(Regression):
 
     def slope(self) -> dict[str, Array]:
         """Derivatives of the residuals by the pose."""
-        return self.equations.by_pose(self.robot)
+        return self.equations.by_pose(self._at_slope)
+
+    @property
+    def tracker(self) -> Tracker | None:
+        """Tracker at which the derivatives by the pose are taken."""
+        return self._at_slope.tracker
 
     def _zeroed(self, kind: str, values: Array) -> Array:
         return values + self._zeros[kind] if kind in self._zeros else values

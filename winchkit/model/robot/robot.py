@@ -22,6 +22,7 @@ from winchkit.model.robot.kinematics import (
     lengths,
     structure_matrix,
 )
+from winchkit.model.robot.tracker import Tracker, declared_tracker
 from winchkit.model.robot.wrench import gravity_wrench
 from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
 from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
@@ -53,6 +54,8 @@ class Robot:
     """Mass and centre of mass."""
     modifiers: tuple[tuple[Modifier, ...], ...]
     """Per line, in the stages of a winch."""
+    tracker: Tracker | None = None
+    """Instrument that measures poses; None where it shows them in the base frame."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -229,6 +232,7 @@ def robot_of(
     profile: RobotProfile,
     modifiers: Sequence[Sequence[Modifier]] = (),
     payload: Sequence[Modifier] = (),
+    tracker: Sequence[Modifier] = (),
 ) -> Robot:
     """Build the robot that a profile declares, with modifiers per line and of its platform.
 
@@ -241,6 +245,8 @@ def robot_of(
         ``winchkit.effects.robot_with_effects`` applies the profile's own effects.
     payload : sequence, optional
         Modifiers of the platform.
+    tracker : sequence, optional
+        Modifiers of the instrument that measures poses.
 
     Returns
     -------
@@ -248,10 +254,11 @@ def robot_of(
         Kinematic model of the robot.
     """
     home, geometry = home_of(profile), geometry_of(profile)
+    shown = _tracker(profile, tracker)
     own = tuple(tuple(m) for m in modifiers) or ((),) * len(profile.line)
     if not any(own) and not payload:
         there = lengths(geometry, home.position, home.rotation)[0]
-        return Robot(profile, geometry, home, there, profile.platform, own)
+        return Robot(profile, geometry, home, there, profile.platform, own, shown)
     exits, anchors = geometry.exit_point.copy(), geometry.anchor_point.copy()
     radii, offsets = geometry.swivel_radius.copy(), np.zeros(len(own))
     # Effects of place do not depend on motion: one line at rest serves all.
@@ -271,7 +278,17 @@ def robot_of(
     for modifier in payload:
         platform = modifier.apply(platform, rest)
     lines = tuple(tuple(m for m in stages if m.stage not in ROBOT_STAGES) for stages in own)
-    return Robot(profile, geometry, home, there, platform, lines)
+    return Robot(profile, geometry, home, there, platform, lines, shown)
+
+
+def _tracker(profile: RobotProfile, modifiers: Sequence[Modifier]) -> Tracker | None:
+    """The tracker of a robot's file with its effects; None where it shows the pose itself."""
+    found = declared_tracker(profile)
+    if modifiers:
+        rest = standing(Line(_winches(profile)[0]), np.zeros(1))
+        for modifier in sorted(modifiers, key=lambda m: m.order):
+            found = modifier.apply(found, rest)
+    return None if found.is_trivial else found
 
 
 def standing(

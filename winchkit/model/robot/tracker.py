@@ -36,10 +36,19 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.model.robot.constraints import Constraint, rotation_residual
 from winchkit.model.robot.kinematics import Pose
-from winchkit.model.robot.rotation import angle_rates, rotation_by, rotation_vector, skew
+from winchkit.model.robot.rotation import (
+    angle_rates,
+    rotation_by,
+    rotation_of,
+    rotation_vector,
+    skew,
+)
+from winchkit.schema.profiles.instruments import FrameSpec
+from winchkit.schema.profiles.robot import RobotProfile
 
 __all__ = [
     "Tracker",
+    "declared_tracker",
     "left_jacobian",
     "pose_behind",
     "reading_of",
@@ -81,11 +90,37 @@ class Tracker:
         return cls(np.asarray(home).reshape(3), np.zeros(3), np.zeros(3), np.zeros(3))
 
     @property
+    def is_trivial(self) -> bool:
+        """Whether it shows the platform's pose in the base frame."""
+        numbers = (self.shift, self.turn, self.offset, self.scale)
+        return self.mounting is None and not any(np.any(number) for number in numbers)
+
+    @property
     def frame_in_base(self) -> tuple[Array, Array]:
         """Position (3,) and rotation (3, 3) of the base frame in the tracker's, scale included."""
         turned = rotation_by(self.turn)
         origin = self.home + self.shift - (1 + self.scale) * (turned @ self.home)
         return origin, turned
+
+
+def declared_tracker(profile: RobotProfile) -> Tracker:
+    """The tracker with the numbers of a robot's file, and zero for those that are unknown."""
+    spec = profile.instrument
+    own = spec.imu.mounting if spec.imu else spec.tracker.mounting
+    home = np.array(profile.home.position)
+    tracker = replace(Tracker.at(home), turns_rotation=spec.imu is None)
+    if not isinstance(spec.tracker.scale, str):
+        tracker = replace(tracker, scale=spec.tracker.scale)
+    if isinstance(spec.tracker.frame, FrameSpec):
+        turned = rotation_of(*spec.tracker.frame.rotation)
+        shift = np.array(spec.tracker.frame.position) - home
+        shift = shift + (1 + tracker.scale) * (turned @ home)
+        tracker = replace(tracker, shift=shift, turn=rotation_vector(turned))
+    if not isinstance(spec.tracker.reflector, str):
+        tracker = replace(tracker, offset=np.array(spec.tracker.reflector))
+    if not isinstance(own, str) and any(own):
+        tracker = replace(tracker, mounting=rotation_vector(rotation_of(*own)))
+    return tracker
 
 
 def left_jacobian(vector: Array) -> Array:
@@ -290,8 +325,6 @@ def _mounted(start: Tracker, pose: Pose, angles: Array) -> Tracker:
     whole = np.all(np.isfinite(angles), axis=1) & np.all(np.isfinite(pose.rotation), axis=(1, 2))
     if not np.any(whole):
         return start
-    from winchkit.model.robot.rotation import rotation_of
-
     bare = replace(start, mounting=None)
     shown = reading_of(bare, Pose(pose.position[whole], pose.rotation[whole])).rotation
     mean = np.mean(np.swapaxes(shown, 1, 2) @ rotation_of(*angles[whole].T), axis=0)
