@@ -97,7 +97,11 @@ def _has_begun(path: Path) -> bool:
 def _format_of(path: str | Path) -> str:
     suffix = Path(path).suffix.lower()
     if suffix not in SUFFIXES:
-        message = f"'{suffix}' is no format of a run; use one of {', '.join(SUFFIXES)}"
+        known = ", ".join(SUFFIXES)
+        message = (
+            f"'{suffix}' is no format of a run; use one of {known}, or `winchkit import` for files "
+            "of other programs"
+        )
         raise RunError(Fault(message, str(path)))
     return suffix
 

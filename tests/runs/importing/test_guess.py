@@ -13,6 +13,7 @@ from winchkit.runs.columns import POSE_DIMENSIONS
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.consistency import likely_counts, ratio_of
+from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.guess import guess_columns
@@ -320,3 +321,23 @@ def test_stamps() -> None:
     assert epoch_unit(np.array([1.7e12, 1.7e12 + 10])) == "ms"
     assert epoch_unit(np.array([0.0, 0.01, 0.02])) is None
     assert epoch_unit(np.array([46000.0, 46000.0000001, 46000.0000002])) == "excel"
+
+
+@pytest.mark.parametrize("unit", ["V", "counts", "LSB"])
+def test_the_output_of_an_amplifier_or_converter_needs_a_factor(unit: str, tmp_path: Path) -> None:
+    m = motion()
+    columns = {"t [s]": m.time, "angle [rad]": m.angle, f"load cell [{unit}]": m.tension / 80}
+    (question,) = guess(tmp_path / "log.csv", columns).questions
+    assert question.options == ('--column "tension=load cell*FACTOR [N]"',)
+    answers = Answers(columns=(read_column("tension=load cell*80 [N]"),))
+    found = guess(tmp_path / "log.csv", columns, answers)
+    assert not found.questions
+    assert of(found, "tension").factor == pytest.approx(80.0)
+
+
+def test_numbers_as_people_write_them() -> None:
+    assert number("−1.5", ".") == -1.5
+    assert number("1\u202f234,5", ",") == 1234.5
+    assert number("1'234.5", ".") == 1234.5
+    assert number("1.234,5", ",") == 1234.5
+    assert number("1,234", ".") is None

@@ -272,6 +272,9 @@ def _answered(guess: Guess, answers: Answers) -> Answers:
     if len(own) == 1 and "[UNIT]" in own[0]:
         unit = _until("  unit", lambda text: _column(own[0].replace("[UNIT]", f"[{text}]")))
         return replace(answers, columns=(*answers.columns, unit))
+    if len(own) == 1 and "FACTOR" in own[0]:
+        factor = _until("  factor", lambda text: _column(own[0].replace("FACTOR", text)))
+        return replace(answers, columns=(*answers.columns, factor))
     if any("COLUMN" in text for text in own):
         text = _until(f"  CHANNEL=COLUMN [UNIT] (e.g. {own[0]})", _column)
         return replace(answers, columns=(*answers.columns, text))

@@ -24,11 +24,14 @@ _PERMITTED: dict[str, tuple[str, ...]] = {
     "time": ("time",),
     "motor_angle": ("angle", COUNTS),
     "motor_velocity": ("angular speed", COUNT_RATE),
-    "motor_torque": ("torque", "current", SHARE),
-    "tension": ("force", "mass", BRIDGE),
-    "load": ("force", "mass", BRIDGE),
+    "motor_torque": ("torque", "current", SHARE, "voltage", COUNTS),
+    "tension": ("force", "mass", BRIDGE, "voltage", COUNTS),
+    "load": ("force", "mass", BRIDGE, "voltage", COUNTS),
+    "cable_length": ("length", "voltage", COUNTS),
 }
-"""Dimensions that a column of a channel may have, where they are not that of the channel alone."""
+"""Dimensions that a column of a channel may have, where they are not that of the channel alone.
+
+The output of an amplifier (V) or converter (counts) needs a factor that only the user knows."""
 
 
 def permitted(channel: str) -> tuple[str, ...]:

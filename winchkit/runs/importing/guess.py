@@ -203,7 +203,10 @@ def _settle_unit(
     """Factor of a known unit; units without an SI value need a constant."""
     answers, dimension = work.answers, unit.dimension
     item.unit = unit.text
-    if dimension in {COUNTS, COUNT_RATE}:
+    if dimension == "voltage" or (dimension == COUNTS and item.base != "motor_angle"):
+        if item.candidate.rank == 0 and scale != 1.0:
+            item.settle(scale, unit.text, "given", "--column")
+    elif dimension in {COUNTS, COUNT_RATE}:
         if answers.counts_per_turn:
             text = f"{answers.counts_per_turn:g} counts per turn"
             item.settle(_TURN / answers.counts_per_turn * scale, unit.text, "given", text)
@@ -376,7 +379,13 @@ def _ask_units(work: _Work) -> None:
         name, channel, unit = item.column.source, item.candidate.channel, item.candidate.unit
         dimension = unit.dimension if unit is not None else ""
         own = f'--column "{channel}={name} [UNIT]"'
-        if dimension in {COUNTS, COUNT_RATE} or (item.base == "motor_angle" and _is_counted(item)):
+        if dimension == "voltage" or (dimension == COUNTS and item.base != "motor_angle"):
+            one = next(iter(UNITS[column_dimension(item.base) or "ratio"]))
+            text = f"'{name}' ({channel}) is in {item.column.unit}: how many {one} is 1?"
+            work.questions.append(Question(text, (f'--column "{channel}={name}*FACTOR [{one}]"',)))
+        elif dimension in {COUNTS, COUNT_RATE} or (
+            item.base == "motor_angle" and _is_counted(item)
+        ):
             _ask(work, f"'{name}' is in counts: how many in a motor turn?", "counts_per_turn", own)
         elif dimension == SHARE:
             _ask(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ __all__ = ["has_angle", "metadata_of", "read_mapped", "run_of"]
 
 _OWN = ("load_mass", "length_zeroed", "programme")
 """Metadata that winchkit uses, in a file that has its names."""
+_MOST, _LONGEST = 40, 200
+"""Lines above the header that are kept, and their characters."""
 _DIGITS = 12
 """Decimals of a time in seconds: differences of stamps have no more."""
 
@@ -74,7 +77,7 @@ def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
     table = guess.table
     own = {
         key if key in _OWN else f"source {_one_line(key)}": _one_line(value)
-        for key, value in table.metadata.items()
+        for key, value in islice(table.metadata.items(), _MOST)
         if value
     }
     return {
@@ -86,7 +89,7 @@ def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
 
 
 def _one_line(text: str) -> str:
-    return " ".join(text.replace(":", " ").split())
+    return " ".join(text.replace(":", " ").split())[:_LONGEST]
 
 
 def has_angle(streams: Streams) -> bool:

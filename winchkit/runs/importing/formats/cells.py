@@ -25,6 +25,8 @@ _GROUPED = {
     ",": re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+", re.ASCII),
 }
 """Separators of thousands, which are certain only before a decimal sign of the other kind."""
+_ODD = re.compile("[\u00a0\u202f\u2009']")
+"""Blanks and apostrophes that separate thousands."""
 _INFINITE = re.compile(r"[+-]?(inf|infinity|1\.#inf|∞)", re.IGNORECASE)
 
 
@@ -49,7 +51,7 @@ def number(cell: str, decimal: str) -> float | None:
     float, optional
         Infinite values are as in the file.
     """
-    text = cell.strip().strip('"').strip()
+    text = _ODD.sub("", cell.strip().strip('"').strip()).replace("−", "-")
     if (_COMMA if decimal == "," else _POINT).fullmatch(text):
         return float(text.replace(",", ".") if decimal == "," else text)
     if _GROUPED[decimal].fullmatch(text):
