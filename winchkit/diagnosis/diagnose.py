@@ -13,6 +13,7 @@ from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
+from winchkit.diagnosis.regression.conditioning import fit_quality, value_covariance
 from winchkit.diagnosis.regression.cross_validation import held_out
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
@@ -23,6 +24,7 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import attributions, harmonics
 from winchkit.diagnosis.results import (
     CandidateScore,
+    Closest,
     Diagnosis,
     Estimate,
     Step,
@@ -35,6 +37,7 @@ from winchkit.diagnosis.selection.stepwise import (
     stepwise_selection,
 )
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.verdict.combination import combination_of_set, combination_of_term
 from winchkit.diagnosis.verdict.decision import (
     Judgement,
     output_fits,
@@ -42,10 +45,10 @@ from winchkit.diagnosis.verdict.decision import (
     withheld,
 )
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
+from winchkit.diagnosis.verdict.plausibility import implausible
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.location import located
-from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -278,10 +281,15 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
     if sets:
         judgement = reweighted_judgement(engine, judgement)
         reported = judgement.reported
+    sets, steps, closest = _plausible(engine, reported, sets)
+    if closest:
+        names = ", ".join(dict.fromkeys(f"{each.effect}: {each.reason}" for each in closest))
+        judgement = withheld(engine, result, 1.0, f"closest, but not named: {names}")
+        reported, pairs = judgement.reported, []
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,
-        steps=steps_of(engine, reported, sets) if sets else (),
+        steps=steps,
         candidates=candidates_of(engine, result),
         detectable=detectable(
             result.scores, DetectionThreshold(engine.penalty_per_parameter, result.threshold)
@@ -297,8 +305,43 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
         sanity=engine.regression.dataset.sanity,
         used_share=engine.regression.dataset.used_share,
         caveats=engine.regression.dataset.caveats,
+        fit=fit_quality(engine.regression, reported.final, reported.noise),
+        closest=closest,
     )
     return WinchAnswer(engine, reported, diagnosis, sets, pairs)
+
+
+def _plausible(
+    engine: TimeSeriesSelection, result: SelectionResult, sets: Sequence[EquivalenceSet]
+) -> tuple[list[EquivalenceSet], tuple[Step, ...], tuple[Closest, ...]]:
+    """Sets without members whose values cannot be, their steps, and the effects of empty sets.
+
+    Where a set has no other member, nothing is named: the other effects were fitted beside it.
+    """
+    dataset, found = engine.regression.dataset, list(sets)
+    if not found:
+        return [], (), ()
+    steps = steps_of(engine, result, found, dataset)
+    kept, closest = [], []
+    for equivalence, step in zip(found, steps, strict=True):
+        reasons = {
+            term.effect.id: implausible(term, step.parameters[term.effect.id], dataset.profile)
+            for term in equivalence.terms
+        }
+        possible = [effect for effect, reason in reasons.items() if reason is None]
+        if possible:
+            kept.append(equivalence.only(possible))
+        else:
+            closest += [
+                Closest(effect, step.parameters[effect], reason)
+                for effect, reason in reasons.items()
+                if reason is not None
+            ]
+    if closest:
+        return [], (), tuple(closest)
+    if all(a.effects == b.effects for a, b in zip(found, kept, strict=True)):
+        return found, steps, ()
+    return kept, steps_of(engine, result, kept, dataset), ()
 
 
 def _closest(
@@ -324,7 +367,10 @@ def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelect
 
 
 def steps_of(
-    engine: SelectionEngine, result: SelectionResult, sets: Sequence[EquivalenceSet]
+    engine: SelectionEngine,
+    result: SelectionResult,
+    sets: Sequence[EquivalenceSet],
+    dataset: Dataset | None = None,
 ) -> tuple[Step, ...]:
     """Every addition with its equivalence set, values and held-out gain.
 
@@ -336,36 +382,41 @@ def steps_of(
         Result of the selection.
     sets
         Equivalence set of every addition.
+    dataset
+        Runs of the winch, for combinations that have a name; None for a robot.
     """
-    final, noise = result.final, result.noise
-    gains = _gains(engine, final, noise)
-    spread = spread_of(engine.regression, final, noise, engine.regression.blocks)
-    own = estimates(engine.regression, final, spread)
+    final, noise, regression = result.final, result.noise, engine.regression
     out = []
+    spread = spread_of(regression, final, noise, regression.blocks)
+    own = estimates(regression, final, spread)[engine.n_initial_terms :]
+    covariance = value_covariance(regression, final, noise)
     for equivalence, gain, (term, values) in zip(
-        sets, gains, own[engine.n_initial_terms :], strict=True
+        sets, _gains(engine, final, noise), own, strict=True
     ):
-        parameters = {term.effect.id: values} | {
-            rival.effect.id: _values_only(rival.effect.id, equivalence)
-            for rival in equivalence.terms
-            if rival.effect.id != term.effect.id
+        parameters = {
+            member.effect.id: values
+            if member.effect.id == term.effect.id
+            else _values_of_rival(engine, result, fitted)
+            for member, fitted in zip(equivalence.terms, equivalence.fits, strict=True)
         }
-        ordered = {effect: parameters[effect] for effect in equivalence.effects}
-        out.append(Step(equivalence.effects, ordered, gain, equivalence.angles))
+        combination = combination_of_set(equivalence.terms, parameters, dataset)
+        if combination is None and equivalence.term.effect.id == term.effect.id:
+            combination = combination_of_term(term, covariance)
+        out.append(
+            Step(equivalence.effects, parameters, gain, equivalence.angles, combination=combination)
+        )
     return tuple(out)
 
 
-def _values_only(effect_id: str, equivalence: EquivalenceSet) -> dict[str, Estimate]:
-    """Values of a rival, without intervals."""
-    term = next(t for t in equivalence.terms if t.effect.id == effect_id)
-    names = {
-        p.name for p in (*Coordinates(term.effect).amplitudes, *Coordinates(term.effect).shapes)
-    }
-    return {
-        p.name: Estimate(term.values[p.name], float("nan"), p.unit)
-        for p in term.effect.parameters
-        if p.name in names or p.whole
-    }
+def _values_of_rival(
+    engine: SelectionEngine, result: SelectionResult, fitted: Fit
+) -> dict[str, Estimate]:
+    """Values of the last effect of a rival's fit, with their uncertainty."""
+    regression, noise = engine.regression, result.noise
+    # The reported model may have other weights than those of the comparison.
+    fitted = engine.refit(fitted.hypothesis, noise)
+    spread = spread_of(regression, fitted, noise, regression.blocks)
+    return estimates(regression, fitted, spread)[-1][1]
 
 
 def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:

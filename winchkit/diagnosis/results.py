@@ -14,10 +14,14 @@ from winchkit.runs.sanity.finding import Finding
 
 __all__ = [
     "CandidateScore",
+    "Closest",
+    "Combination",
     "Comparison",
+    "Correlation",
     "Detectable",
     "Diagnosis",
     "Estimate",
+    "FitQuality",
     "NextRun",
     "OutputError",
     "OutputFit",
@@ -116,6 +120,58 @@ class OutputFit:
 
 
 @dataclass(frozen=True)
+class Combination:
+    """The combination of parameters that the data determine, SI."""
+
+    name: str
+    """In words where it has a name, otherwise its formula."""
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Correlation of two fitted values."""
+
+    a: str
+    """``effect.parameter``, or a nuisance parameter."""
+    b: str
+    value: float
+
+
+@dataclass(frozen=True)
+class FitQuality:
+    """How well the data determine the values of the reported model."""
+
+    correlations: tuple[Correlation, ...]
+    """Pairs above 0.5 in size, largest first."""
+    condition: float
+    """Condition number of the whitened derivatives with columns of unit length."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Dictionary that the command prints."""
+        return {
+            "correlations": [vars(pair) for pair in self.correlations],
+            "condition": self.condition,
+        }
+
+
+@dataclass(frozen=True)
+class Closest:
+    """An effect that would explain the residual with values that cannot be."""
+
+    effect: str
+    parameters: Mapping[str, Estimate]
+    reason: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Dictionary that the command prints."""
+        parameters = {name: vars(estimate) for name, estimate in self.parameters.items()}
+        return {"effect": self.effect, "parameters": parameters, "reason": self.reason}
+
+
+@dataclass(frozen=True)
 class Step:
     """One addition to the model, with the effects that these runs cannot distinguish from it."""
 
@@ -126,6 +182,8 @@ class Step:
     """Angle between the signatures of the first effect and of the others, rad."""
     whole: bool = False
     """Whether all effects apply together, as for a robot's geometry, instead of one of them."""
+    combination: Combination | None = None
+    """What the data determine of an equivalence set or of strongly correlated parameters."""
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""
@@ -138,6 +196,7 @@ class Step:
             "parameters": parameters,
             "heldout_gain": self.heldout_gain,
             "angles": dict(self.angles),
+            "combination": vars(self.combination) if self.combination else None,
         }
 
 
@@ -212,6 +271,10 @@ class Diagnosis:
     """Codes of what these runs cannot exclude; the verdict is one of four with or without them."""
     interrupted: bool = False
     """Whether the search was interrupted: errors and candidates are known, the verdict is not."""
+    fit: FitQuality | None = None
+    """Of the reported model; None without unknowns."""
+    closest: tuple[Closest, ...] = ()
+    """Effects that are not named since their values cannot be."""
 
     @property
     def empirical(self) -> tuple[str, ...]:
@@ -240,6 +303,8 @@ class Diagnosis:
             "sanity": [finding.to_json() for finding in self.sanity],
             "used_share": dict(self.used_share),
             "caveats": list(self.caveats),
+            "fit": None if self.fit is None else self.fit.to_json(),
+            "closest": [closest.to_json() for closest in self.closest],
             "notes": list(self.notes),
         }
 
@@ -302,6 +367,7 @@ def _step(step: Step) -> dict[str, Any]:
         "parameters": parameters,
         "heldout_gain": step.heldout_gain,
         "angles": dict(step.angles),
+        "combination": vars(step.combination) if step.combination else None,
         "whole": step.whole,
     }
 

@@ -163,7 +163,7 @@ def card(effect: Effect) -> str:
     ]
     lines = [effect.id, ""]
     lines += [_paragraph(title, text) for title, text in paragraphs if text]
-    lines += ["", "Parameters", *_table(effect), "", *_drawing(effect)]
+    lines += ["", "Parameters", *_table(effect), *_plausible(effect), "", *_drawing(effect)]
     return "\n".join(lines)
 
 
@@ -250,6 +250,28 @@ def _table(effect: Effect) -> list[str]:
     ]
 
 
+def _plausible(effect: Effect) -> list[str]:
+    """Ranges of values that a real machine can have, with their reasons."""
+    lines = []
+    for p in effect.parameters:
+        if p.plausible is not None:
+            of = f" of {p.plausible.of}" if p.plausible.of else ""
+            unit = "" if p.unit == "1" or of else f" {p.unit}"
+            above = p.plausible.high == inf
+            ends = "from {:g}" if above else "{:g} to {:g}"
+            text = ends.format(p.plausible.low, p.plausible.high) + unit + of
+            lines.append(
+                fill(
+                    f"plausible {p.name}: {text} ({p.plausible.reason})",
+                    width=_COLUMNS,
+                    initial_indent="  ",
+                    subsequent_indent="    ",
+                    break_on_hyphens=False,
+                )
+            )
+    return lines
+
+
 def parameter_kind(effect: Effect, parameter: Parameter) -> str:
     """Kind of a parameter: an amplitude, a phase, a shape, a whole order, or fixed.
 
@@ -314,4 +336,5 @@ def _parameter_data(parameter: Parameter, kind: str) -> dict[str, Any]:
         "low": parameter.low,
         "high": parameter.high,
         "kind": kind,
+        "plausible": None if parameter.plausible is None else vars(parameter.plausible),
     }

@@ -23,6 +23,7 @@ __all__ = [
     "Need",
     "Parameter",
     "Placement",
+    "Plausible",
     "Values",
     "order_per_turn",
     "told_apart",
@@ -35,6 +36,20 @@ Need = Literal[
 ]  # fmt: skip
 Output = Literal["cable_length", "tension", "motor_torque"]
 Placement = Literal["one", "all", "platform"]
+
+
+@dataclass(frozen=True)
+class Plausible:
+    """Range of values that a real machine can have, and its reason."""
+
+    low: float
+    """Lowest value, in the parameter's unit or as a share of ``of``."""
+    high: float
+    """Highest value."""
+    reason: str
+    """Reason of the range, in words."""
+    of: str = ""
+    """Number of the profile that the range is relative to, such as ``drum.winding_radius``."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +74,8 @@ class Parameter:
     """Fitted as 1/value, since the null is infinite (stiffnesses)."""
     grid: tuple[float, ...] = ()
     """Coarse grid of a shape for the scores."""
+    plausible: Plausible | None = None
+    """Range of real machines; None where the bounds are all that is known."""
     whole: bool = False
     """A whole number (an order): scanned over the grid, not refined."""
     over: str = ""

@@ -23,6 +23,7 @@ from winchkit.report.words.numbers import (
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
+    combination_text,
     estimate_text,
     interval_text,
     listed,
@@ -32,6 +33,7 @@ from winchkit.report.words.vocabulary import (
 __all__ = [
     "bar",
     "candidates",
+    "correlations",
     "detectable",
     "equivalence",
     "figures",
@@ -208,6 +210,31 @@ def equivalence(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
             "at 0° they are proportional."
         )
         out.append(table(caption, head, rows, words=3))
+        if step.combination is not None:
+            text = combination_text(step.combination)
+            out.append(element("p", f"Determined whichever of them is true: {text}."))
+    return join(out)
+
+
+def correlations(diagnosis: Diagnosis) -> Markup:
+    """Correlations of fitted values above 0.5, and what the data determine of them."""
+    fit, out = diagnosis.fit, []
+    if fit is None or not diagnosis.steps:
+        return Markup("")
+    if fit.correlations:
+        rows = [
+            [element("code", pair.a), element("code", pair.b), significant(pair.value, 2)]
+            for pair in fit.correlations
+        ]
+        caption = (
+            "Correlations of fitted values above 0.5; the condition number of the fit is "
+            f"{significant(fit.condition, 2)}."
+        )
+        out.append(table(caption, ["value", "with", "correlation"], rows, words=2))
+    for step in diagnosis.steps:
+        if step.combination is not None and len(step.effects) == 1:
+            text = combination_text(step.combination)
+            out.append(element("p", f"Best determined combination: {text}."))
     return join(out)
 
 

@@ -28,6 +28,7 @@ from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
     clause,
+    combination_text,
     estimate_text,
     interval_text,
     parameter_name,
@@ -64,6 +65,7 @@ def report_text(answer: Answer) -> str:
         _errors(diagnosis.outputs, grown=bool(diagnosis.steps), data=diagnosis.data),
         _ladder(answer),
         _confusion(diagnosis),
+        _correlations(diagnosis),
         _places(answer),
         _next(diagnosis),
         paragraph(changes_text(diagnosis)) if not diagnosis.interrupted else [],
@@ -211,7 +213,28 @@ def _confusion(diagnosis: Diagnosis) -> list[str]:
             own = next(name for name in step.effects if name not in step.angles)
             rows.append([f"{own} / {effect}", f"{degrees(angle):.1f}° between signatures"])
     head = f"cannot be distinguished with these {diagnosis.data}"
-    return [head, *aligned(rows, words=2)] if rows else []
+    lines = [head, *aligned(rows, words=2)] if rows else []
+    determined = [
+        combination_text(step.combination) for step in diagnosis.steps if step.combination
+    ]
+    if determined:
+        lines.append("determined by the data")
+        lines += [line for text in determined for line in paragraph(text, "  ", "    ")]
+    return lines
+
+
+def _correlations(diagnosis: Diagnosis) -> list[str]:
+    """Correlated values of named effects, and the condition number."""
+    if diagnosis.fit is None or not diagnosis.steps or not diagnosis.fit.correlations:
+        return []
+    pairs = [
+        f"{pair.a} and {pair.b} {significant(pair.value, 2)}"
+        for pair in diagnosis.fit.correlations[:_FEW]
+    ]
+    more = len(diagnosis.fit.correlations) - len(pairs)
+    text = "; ".join(pairs) + (f"; {more} more in --json" if more else "")
+    condition = f"; condition number {significant(diagnosis.fit.condition, 2)}"
+    return ["correlation of fitted values", *paragraph(text + condition, "  ", "    ")]
 
 
 def _places(answer: Answer) -> list[str]:

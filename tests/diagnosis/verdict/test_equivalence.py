@@ -42,7 +42,15 @@ def test_a_radius_and_a_ratio_are_one_set_on_a_grooved_drum() -> None:
     found = answer("radius", (10.0, 25.0))
     assert found.verdict == "explained"
     (step,) = found.steps
-    assert set(step.effects) == {"drum-radius", "gear-ratio"}
+    # In the order of the catalogue, whichever of the two the selection took.
+    assert step.effects == ("drum-radius", "gear-ratio")
+    for values in step.parameters.values():
+        (estimate,) = values.values()
+        assert estimate.interval is not None
+        assert estimate.interval[0] < estimate.value < estimate.interval[1]
+        assert 0.0 < estimate.std < 0.1 * abs(estimate.value)
+    assert step.combination is not None
+    assert step.combination.name == "cable per motor turn"
     (angle,) = step.angles.values()
     assert angle < 0.01
     # The same length by either: Δr/r = −e/(1 + e), with the lead of the grooves in between.

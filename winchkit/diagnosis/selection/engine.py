@@ -220,6 +220,11 @@ class SelectionEngine(ABC):
         """Reduction of χ² required per parameter: ln n, as in the BIC."""
         return float(np.log(self.regression.n_observations))
 
+    def place_in_catalogue(self, effect_id: str) -> int:
+        """Number of a candidate in the order of the catalogue; after the last for another one."""
+        ids = [effect.id for effect in self._candidates]
+        return ids.index(effect_id) if effect_id in ids else len(ids)
+
     def grouped(self, folds: Folds) -> bool:
         """Whether folds are the groups of programme and load, of which there are two at least."""
         return folds is self.regression.groups and len(set(self.regression.group_of_run)) > 1

@@ -14,7 +14,7 @@ Hansen, P. R., Lunde, A., Nason, J. M. (2011). Econometrica 79, 453-497.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,14 +107,29 @@ _SIGN_FLIPS = 2000
 
 @dataclass(frozen=True)
 class EquivalenceSet:
-    """Equivalence set of one addition, the effect with the fewest parameters first."""
+    """Equivalence set of one addition, in an order that does not depend on noise.
+
+    Effects with the fewest parameters first, of these the ones that the data do not reject against
+    the best of them (Δχ² < 9), in the order of the catalogue.
+    """
 
     term: Term
     effects: tuple[str, ...]
     terms: tuple[Term, ...]
     """Each member with its fitted values, in the same order."""
+    fits: tuple[Fit, ...]
+    """Fit of each member beside all other effects."""
     angles: dict[str, float]
     """Angle between its signature and each rival's, rad."""
+
+    def only(self, effects: Collection[str]) -> EquivalenceSet:
+        """The same set without other members than ``effects``."""
+        kept = [i for i, effect in enumerate(self.effects) if effect in effects]
+        terms, fits = [self.terms[i] for i in kept], [self.fits[i] for i in kept]
+        own = self.term if self.term in terms else terms[0]
+        names = tuple(term.effect.id for term in terms)
+        angles = {name: self.angles[name] for name in names if name in self.angles}
+        return EquivalenceSet(own, names, tuple(terms), tuple(fits), angles)
 
 
 def equivalence_set(
@@ -133,8 +148,8 @@ def equivalence_set(
 
     Returns
     -------
-    Confusion
-        Members ordered by number of parameters, then by χ².
+    EquivalenceSet
+        Members with their fits.
 
     Notes
     -----
@@ -160,8 +175,8 @@ def equivalence_set(
     ]
     blocks = engine.regression.blocks
     own_losses = held_out(engine.regression, final, noise, blocks)
-    members: list[tuple[int, float, Term]] = [(n_parameters, final.chi_square, own)]
     least = base.chi_square - _LEAST_SHARE * (base.chi_square - final.chi_square)
+    members: list[_Member] = [(n_parameters, own, final)]
     for rival in rivals:
         trial = exchange.trial(rival, final.chi_square + _DELTA_CHI_SQUARE, least)
         fitted = trial.fit
@@ -177,15 +192,35 @@ def equivalence_set(
             within_delta = fitted.chi_square < final.chi_square + _DELTA_CHI_SQUARE
             joins = within_delta or _sign_flip_p_value(rival_losses - own_losses) > _LEVEL
         if joins or _reduces_to(engine, fitted, final, base, index):
-            members.append((n_rival_parameters, fitted.chi_square, term))
-    ordered = [term for _, _, term in sorted(members, key=lambda m: (m[0], round(m[1], 3)))]
+            members.append((n_rival_parameters, term, fitted))
+    members = _ordered(engine, members)
+    ordered = [term for _, term, _ in members]
     projected = engine.projected(base, noise)
     angles = {
         term.effect.id: _angle(projected, own.effect.id, term.effect.id)
         for term in ordered
         if term.effect.id != own.effect.id
     }
-    return EquivalenceSet(own, tuple(t.effect.id for t in ordered), tuple(ordered), angles)
+    fits = tuple(fitted for _, _, fitted in members)
+    return EquivalenceSet(own, tuple(t.effect.id for t in ordered), tuple(ordered), fits, angles)
+
+
+_Member = tuple[int, Term, Fit]
+"""Number of parameters, the effect with its values, and the fit."""
+
+
+def _ordered(engine: SelectionEngine, members: Sequence[_Member]) -> list[_Member]:
+    """Members in the order of :class:`EquivalenceSet`."""
+    least: dict[int, float] = {}
+    for count, _, fitted in members:
+        least[count] = min(least.get(count, np.inf), fitted.chi_square)
+
+    def key(member: _Member) -> tuple[int, bool, int]:
+        count, term, fitted = member
+        worse = fitted.chi_square > least[count] + _DELTA_CHI_SQUARE
+        return count, worse, engine.place_in_catalogue(term.effect.id)
+
+    return sorted(members, key=key)
 
 
 def _richer_law_joins(

@@ -3,7 +3,7 @@
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 
@@ -17,7 +17,14 @@ EFFECT = Effect(
     stage=Stage.CABLE,
     parameters=(
         Parameter(
-            "axial_stiffness", "N", null=np.inf, typical=2e5, low=1e3, high=np.inf, reciprocal=True
+            "axial_stiffness",
+            "N",
+            null=np.inf,
+            typical=2e5,
+            low=1e3,
+            high=np.inf,
+            reciprocal=True,
+            plausible=Plausible(5000.0, float("inf"), "a fibre cable of 1 mm has 10 kN"),
         ),
     ),
     apply=apply,

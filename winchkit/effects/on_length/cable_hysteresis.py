@@ -3,7 +3,7 @@
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.derivatives import with_turning_points
 from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
@@ -36,7 +36,15 @@ EFFECT = Effect(
     stage=Stage.CABLE,
     parameters=(
         Parameter("stiffness", "N", null=2e5, typical=2e5, low=1e3, high=1e9, role="shape"),
-        Parameter("fraction", "1", null=0.0, typical=0.05, low=0.0, high=0.9),
+        Parameter(
+            "fraction",
+            "1",
+            null=0.0,
+            typical=0.05,
+            low=0.0,
+            high=0.9,
+            plausible=Plausible(0.0, 0.5, "a cable loses less than half of its elastic force"),
+        ),
         Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed"),
     ),
     apply=apply,

@@ -5,7 +5,7 @@ from math import cos
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.line import GRAVITY
 from winchkit.model.stages import At, Stage
 
@@ -26,7 +26,17 @@ def apply(length: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="cable-sag",
     stage=Stage.CABLE,
-    parameters=(Parameter("mass_per_length", "kg/m", null=0.0, typical=0.14, low=0.0, high=50.0),),
+    parameters=(
+        Parameter(
+            "mass_per_length",
+            "kg/m",
+            null=0.0,
+            typical=0.14,
+            low=0.0,
+            high=50.0,
+            plausible=Plausible(0.0, 20.0, "a steel cable of 70 mm has 20 kg/m"),
+        ),
+    ),
     apply=apply,
     outputs=("cable_length",),
     what="The cable's own weight bends it; the straight distance is shorter than the cable.",

@@ -1,7 +1,7 @@
 """cable-thermal: thermal expansion of the cable."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 _AT_DECLARED_LENGTH = 20.0
@@ -16,7 +16,17 @@ def apply(length: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="cable-thermal",
     stage=Stage.CABLE,
-    parameters=(Parameter("expansion", "1/K", null=0.0, typical=1.1e-5, low=-1e-4, high=1e-4),),
+    parameters=(
+        Parameter(
+            "expansion",
+            "1/K",
+            null=0.0,
+            typical=1.1e-5,
+            low=-1e-4,
+            high=1e-4,
+            plausible=Plausible(-2e-05, 0.0001, "UHMWPE −1.2e-5, steel 1.1e-5, polyamide 8e-5 1/K"),
+        ),
+    ),
     apply=apply,
     outputs=("cable_length",),
     what="The cable expands (steel) or shrinks (HMPE) as it warms.",

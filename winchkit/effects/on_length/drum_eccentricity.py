@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Path, Stage
 
 
@@ -19,7 +19,20 @@ EFFECT = Effect(
     id="drum-eccentricity",
     stage=Stage.WOUND,
     parameters=(
-        Parameter("eccentricity", "m", null=0.0, typical=2e-4, low=0.0, high=0.02),
+        Parameter(
+            "eccentricity",
+            "m",
+            null=0.0,
+            typical=2e-4,
+            low=0.0,
+            high=0.02,
+            plausible=Plausible(
+                0.0,
+                0.1,
+                "a drum that runs out by a tenth of its radius is bent",
+                of="drum.winding_radius",
+            ),
+        ),
         Parameter("phase", "rad", null=0.0, typical=1.0),
     ),
     apply=apply,

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.drum import Archimedean, Grooved, Spiral, Squared
 from winchkit.model.stages import At, Stage
 
@@ -17,7 +17,22 @@ def apply(drum: LayeredDrum, at: At, values: Values) -> LayeredDrum:
 EFFECT = Effect(
     id="drum-radius",
     stage=Stage.DRUM,
-    parameters=(Parameter("radius_error", "m", null=0.0, typical=5e-4, low=-0.02, high=0.02),),
+    parameters=(
+        Parameter(
+            "radius_error",
+            "m",
+            null=0.0,
+            typical=5e-4,
+            low=-0.02,
+            high=0.02,
+            plausible=Plausible(
+                -0.2,
+                0.2,
+                "wear, machining and a compressed cable are per cent of the radius",
+                of="drum.winding_radius",
+            ),
+        ),
+    ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
     what="The winding radius differs from the profile: machining, cable compression, a wrong r.",

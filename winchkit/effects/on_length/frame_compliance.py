@@ -3,7 +3,7 @@
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 
@@ -17,7 +17,16 @@ EFFECT = Effect(
     stage=Stage.FRAME,
     parameters=(
         Parameter(
-            "stiffness", "N/m", null=np.inf, typical=2e5, low=100.0, high=np.inf, reciprocal=True
+            "stiffness",
+            "N/m",
+            null=np.inf,
+            typical=2e5,
+            low=100.0,
+            high=np.inf,
+            reciprocal=True,
+            plausible=Plausible(
+                1000.0, float("inf"), "a frame that gives by 1 mm under 1 N is not fixed"
+            ),
         ),
     ),
     apply=apply,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.recurrence import play
 from winchkit.model.stages import At, Path, Stage
 
@@ -55,7 +55,15 @@ EFFECT = Effect(
     stage=Stage.DRUM_ANGLE,
     parameters=(
         Parameter("gap", "rad", null=0.0, typical=4e-3, low=0.0, high=0.2),
-        Parameter("held", "1", null=1.0, typical=0.5, low=0.0, high=1.0),
+        Parameter(
+            "held",
+            "1",
+            null=1.0,
+            typical=0.5,
+            low=0.0,
+            high=1.0,
+            plausible=Plausible(0.0, 1.0, "a share of the torque"),
+        ),
         Parameter("start", "1", null=0.0, typical=0.25, low=-0.5, high=0.5, role="fixed"),
     ),
     apply=apply,

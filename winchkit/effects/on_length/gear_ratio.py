@@ -1,6 +1,6 @@
 """gear-ratio: the gear ratio differs from the profile."""
 
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Path, Stage
 
 
@@ -13,7 +13,19 @@ def apply(path: Path, at: At, values: Values) -> Path:
 EFFECT = Effect(
     id="gear-ratio",
     stage=Stage.DRUM_ANGLE,
-    parameters=(Parameter("ratio_error", "1", null=0.0, typical=5e-3, low=-0.5, high=1.0),),
+    parameters=(
+        Parameter(
+            "ratio_error",
+            "1",
+            null=0.0,
+            typical=5e-3,
+            low=-0.5,
+            high=1.0,
+            plausible=Plausible(
+                -0.2, 0.25, "a rounded ratio or belt slip is per cent; more is another gearbox"
+            ),
+        ),
+    ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
     what="The ratio of the gearbox or belt differs from the profile: a rounded or wrong number.",

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.drum import Archimedean, Drum, Spiral
 from winchkit.model.stages import At, Stage
 
@@ -17,7 +17,19 @@ def apply(drum: Drum, at: At, values: Values) -> Drum:
 EFFECT = Effect(
     id="layer-thickness",
     stage=Stage.DRUM,
-    parameters=(Parameter("thickness_error", "m", null=0.0, typical=1e-4, low=-0.005, high=0.005),),
+    parameters=(
+        Parameter(
+            "thickness_error",
+            "m",
+            null=0.0,
+            typical=1e-4,
+            low=-0.005,
+            high=0.005,
+            plausible=Plausible(
+                -1.0, 1.0, "a layer is between nothing and two cables thick", of="cable.diameter"
+            ),
+        ),
+    ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
     what="The layer growth differs from the profile: the cable flattens or nests.",

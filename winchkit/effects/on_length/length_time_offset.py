@@ -1,7 +1,7 @@
 """length-time-offset: delay of the length instrument."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.derivatives import shifted
 from winchkit.model.stages import At, Stage
 
@@ -14,7 +14,17 @@ def apply(length: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="length-time-offset",
     stage=Stage.LENGTH_INSTRUMENT,
-    parameters=(Parameter("delay", "s", null=0.0, typical=0.02, low=-2.0, high=2.0),),
+    parameters=(
+        Parameter(
+            "delay",
+            "s",
+            null=0.0,
+            typical=0.02,
+            low=-2.0,
+            high=2.0,
+            plausible=Plausible(-1.0, 1.0, "buses and filters delay by less than a second"),
+        ),
+    ),
     apply=apply,
     outputs=("cable_length",),
     what="The length instrument filters, or its time stamps are later than the drive's.",

@@ -3,7 +3,7 @@
 from math import sin
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.line import GRAVITY
 from winchkit.model.stages import At, Stage
 
@@ -17,7 +17,17 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="cable-weight",
     stage=Stage.CABLE_WEIGHT,
-    parameters=(Parameter("mass_per_length", "kg/m", null=0.0, typical=0.14, low=0.0, high=50.0),),
+    parameters=(
+        Parameter(
+            "mass_per_length",
+            "kg/m",
+            null=0.0,
+            typical=0.14,
+            low=0.0,
+            high=50.0,
+            plausible=Plausible(0.0, 20.0, "a steel cable of 70 mm has 20 kg/m"),
+        ),
+    ),
     apply=apply,
     outputs=("tension", "motor_torque"),
     what="The weight of the free cable adds to the tension towards the winch.",

@@ -3,7 +3,7 @@
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 _LIMITS = 0.3, 0.5, 0.7, 0.85, 0.95
@@ -18,7 +18,10 @@ EFFECT = Effect(
     id="cell-clipping",
     stage=Stage.CELL,
     parameters=(
-        Parameter("share", "1", null=0.0, typical=0.5, low=0.0, high=1.0),
+        Parameter(
+            "share", "1", null=0.0, typical=0.5, low=0.0, high=1.0,
+            plausible=Plausible(0.0, 1.0, "one is a full stop"),
+        ),
         Parameter(
             "limit", "N", null=300.0, typical=300.0, low=1e-3, high=1e7,
             role="shape", grid=_LIMITS, over="tension",

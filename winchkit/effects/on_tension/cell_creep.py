@@ -1,7 +1,7 @@
 """cell-creep: the reading keeps changing after a step of the load."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.recurrence import first_order_lag
 from winchkit.model.stages import At, Stage
 
@@ -23,7 +23,15 @@ EFFECT = Effect(
     id="cell-creep",
     stage=Stage.CELL,
     parameters=(
-        Parameter("fraction", "1", null=0.0, typical=1e-3, low=-0.1, high=0.1),
+        Parameter(
+            "fraction",
+            "1",
+            null=0.0,
+            typical=1e-3,
+            low=-0.1,
+            high=0.1,
+            plausible=Plausible(-0.05, 0.05, "OIML R60: 0.03 %, a plastic mount some per cent"),
+        ),
         Parameter(
             "time_constant",
             "s",

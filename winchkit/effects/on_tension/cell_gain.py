@@ -1,7 +1,7 @@
 """cell-gain: the load cell's span is wrong."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 
@@ -13,7 +13,21 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="cell-gain",
     stage=Stage.CELL,
-    parameters=(Parameter("gain_error", "1", null=0.0, typical=0.01, low=-0.9, high=10.0),),
+    parameters=(
+        Parameter(
+            "gain_error",
+            "1",
+            null=0.0,
+            typical=0.01,
+            low=-0.9,
+            high=10.0,
+            plausible=Plausible(
+                -0.5,
+                1.0,
+                "a span is per cent off; a factor of two is a second cable or another unit",
+            ),
+        ),
+    ),
     apply=apply,
     outputs=("tension",),
     what="The cell's span is wrong: calibration, mounting angle, a parallel load path.",

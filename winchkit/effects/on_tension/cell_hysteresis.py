@@ -3,7 +3,7 @@
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.derivatives import with_turning_points
 from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
@@ -31,7 +31,15 @@ EFFECT = Effect(
     id="cell-hysteresis",
     stage=Stage.CELL,
     parameters=(
-        Parameter("fraction", "1", null=0.0, typical=2e-3, low=0.0, high=0.2),
+        Parameter(
+            "fraction",
+            "1",
+            null=0.0,
+            typical=2e-3,
+            low=0.0,
+            high=0.2,
+            plausible=Plausible(0.0, 0.1, "data sheets: 0.05 %, a sticking mount up to a tenth"),
+        ),
         Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed"),
     ),
     apply=apply,

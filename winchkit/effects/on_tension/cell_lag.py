@@ -1,7 +1,7 @@
 """cell-lag: low-pass filter of the load cell's amplifier."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.recurrence import first_order_lag
 from winchkit.model.stages import At, Stage
 
@@ -14,7 +14,17 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="cell-lag",
     stage=Stage.CELL,
-    parameters=(Parameter("time_constant", "s", null=0.0, typical=0.05, low=0.0, high=10.0),),
+    parameters=(
+        Parameter(
+            "time_constant",
+            "s",
+            null=0.0,
+            typical=0.05,
+            low=0.0,
+            high=10.0,
+            plausible=Plausible(0.0, 2.0, "filters of amplifiers settle within seconds"),
+        ),
+    ),
     apply=apply,
     outputs=("tension",),
     what="The cell's amplifier low-passes its reading, which delays and smooths it.",

@@ -1,7 +1,7 @@
 """pulley-capstan: the cable slides around a pulley that does not turn."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.friction import capstan_ratio
 from winchkit.model.stages import At, Stage
 
@@ -14,7 +14,17 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="pulley-capstan",
     stage=Stage.PULLEY,
-    parameters=(Parameter("friction", "1", null=0.0, typical=0.02, low=0.0, high=1.0),),
+    parameters=(
+        Parameter(
+            "friction",
+            "1",
+            null=0.0,
+            typical=0.02,
+            low=0.0,
+            high=1.0,
+            plausible=Plausible(0.0, 0.6, "cables on metal and plastics 0.05 to 0.6"),
+        ),
+    ),
     apply=apply,
     outputs=("tension", "motor_torque"),
     what="A stuck pulley or an eyelet: friction grows with the angle of wrap.",

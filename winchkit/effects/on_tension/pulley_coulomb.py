@@ -1,7 +1,7 @@
 """pulley-coulomb: Coulomb friction of each pulley's bearing."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.friction import coulomb_ratio
 from winchkit.model.stages import At, Stage
 
@@ -14,7 +14,17 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="pulley-coulomb",
     stage=Stage.PULLEY,
-    parameters=(Parameter("friction", "1", null=0.0, typical=0.02, low=0.0, high=0.5),),
+    parameters=(
+        Parameter(
+            "friction",
+            "1",
+            null=0.0,
+            typical=0.02,
+            low=0.0,
+            high=0.5,
+            plausible=Plausible(0.0, 0.3, "bearings 0.001 to 0.02, a stuck sheave 0.3"),
+        ),
+    ),
     apply=apply,
     outputs=("tension", "motor_torque"),
     what="Bearing friction in proportion to the force on the bearing, equal on all pulleys.",

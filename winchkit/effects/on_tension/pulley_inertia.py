@@ -3,7 +3,7 @@
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 
@@ -15,7 +15,17 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="pulley-inertia",
     stage=Stage.PULLEY,
-    parameters=(Parameter("equivalent_mass", "kg", null=0.0, typical=0.5, low=0.0, high=1e4),),
+    parameters=(
+        Parameter(
+            "equivalent_mass",
+            "kg",
+            null=0.0,
+            typical=0.5,
+            low=0.0,
+            high=1e4,
+            plausible=Plausible(0.0, 200.0, "a steel sheave of 1 m has 100 kg at its rim"),
+        ),
+    ),
     apply=apply,
     outputs=("tension", "motor_torque"),
     what="The cable accelerates the inertia of the pulleys, which are equal.",

@@ -1,7 +1,7 @@
 """gear-efficiency: the gearbox loses a share of the power."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 
@@ -13,7 +13,17 @@ def apply(torque: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="gear-efficiency",
     stage=Stage.GEARBOX,
-    parameters=(Parameter("efficiency", "1", null=1.0, typical=0.9, low=0.05, high=1.0),),
+    parameters=(
+        Parameter(
+            "efficiency",
+            "1",
+            null=1.0,
+            typical=0.9,
+            low=0.05,
+            high=1.0,
+            plausible=Plausible(0.2, 1.0, "a worm gear has 0.3"),
+        ),
+    ),
     apply=apply,
     outputs=("motor_torque",),
     what="Tooth friction in proportion to the load: more motor torque winding in, less paying out.",

@@ -1,7 +1,7 @@
 """rotor-inertia: inertia of the rotor."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 
@@ -13,7 +13,16 @@ def apply(torque: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="rotor-inertia",
     stage=Stage.MOTOR,
-    parameters=(Parameter("inertia", "kg m^2", null=0.0, typical=1e-4, low=0.0),),
+    parameters=(
+        Parameter(
+            "inertia",
+            "kg m^2",
+            null=0.0,
+            typical=1e-4,
+            low=0.0,
+            plausible=Plausible(0.0, 1.0, "rotors of motors up to 100 kW are below 1 kg m²"),
+        ),
+    ),
     apply=apply,
     outputs=("motor_torque",),
     what="Inertia of rotor, brake, coupling and gearbox input.",

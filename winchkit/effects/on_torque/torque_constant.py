@@ -1,7 +1,7 @@
 """torque-constant: the drive's torque scale is wrong."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 
@@ -13,7 +13,19 @@ def apply(torque: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="torque-constant",
     stage=Stage.TORQUE_CONSTANT,
-    parameters=(Parameter("gain_error", "1", null=0.0, typical=0.03, low=-0.9, high=10.0),),
+    parameters=(
+        Parameter(
+            "gain_error",
+            "1",
+            null=0.0,
+            typical=0.03,
+            low=-0.9,
+            high=10.0,
+            plausible=Plausible(
+                -0.5, 0.5, "temperature, tolerance, and peak for rms values (√2) are within ±50 %"
+            ),
+        ),
+    ),
     apply=apply,
     outputs=("motor_torque",),
     what="The drive's torque constant or rated torque is wrong, or the magnets are warm.",

@@ -1,7 +1,7 @@
 """torque-lag: low-pass filter of the drive's reported torque."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.recurrence import first_order_lag
 from winchkit.model.stages import At, Stage
 
@@ -14,7 +14,17 @@ def apply(torque: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="torque-lag",
     stage=Stage.TORQUE_SIGNAL,
-    parameters=(Parameter("time_constant", "s", null=0.0, typical=0.02, low=0.0, high=10.0),),
+    parameters=(
+        Parameter(
+            "time_constant",
+            "s",
+            null=0.0,
+            typical=0.02,
+            low=0.0,
+            high=10.0,
+            plausible=Plausible(0.0, 1.0, "current loops and filters settle within a second"),
+        ),
+    ),
     apply=apply,
     outputs=("motor_torque",),
     what="The drive low-passes its torque signal, which delays and smooths it.",

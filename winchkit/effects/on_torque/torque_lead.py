@@ -1,7 +1,7 @@
 """torque-lead: the recorded torque is the commanded one, ahead of the motor's torque."""
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.derivatives import shifted
 from winchkit.model.stages import At, Stage
 
@@ -14,7 +14,17 @@ def apply(torque: Array, at: At, values: Values) -> Array:
 EFFECT = Effect(
     id="torque-lead",
     stage=Stage.TORQUE_SIGNAL,
-    parameters=(Parameter("lead", "s", null=0.0, typical=5e-3, low=0.0, high=2.0),),
+    parameters=(
+        Parameter(
+            "lead",
+            "s",
+            null=0.0,
+            typical=5e-3,
+            low=0.0,
+            high=2.0,
+            plausible=Plausible(0.0, 0.5, "a drive follows its command within half a second"),
+        ),
+    ),
     apply=apply,
     outputs=("motor_torque",),
     what="The record has the commanded torque (0x6074), not the actual one (0x6077), which follows "

@@ -50,6 +50,7 @@ def sections(
                 f"Effects that cannot be distinguished with these {diagnosis.data}",
                 tables.equivalence(diagnosis, effects),
             ),
+            section("correlations", "Correlation of fitted values", tables.correlations(diagnosis)),
             section(
                 "detectable",
                 f"Effects that are detectable with these {diagnosis.data}",

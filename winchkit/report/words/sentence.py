@@ -84,6 +84,8 @@ def sentence(diagnosis: Diagnosis) -> str:
         return " ".join(part for part in parts if part)
     if diagnosis.verdict == "partly":
         return _unexplained(diagnosis, "Partly explained by known effects, none of which is named")
+    if diagnosis.closest:
+        return f"{_closest(diagnosis)} {_unexplained(diagnosis, 'Nothing is named')}"
     return _unexplained(diagnosis, "Unexplained by any known effect")
 
 
@@ -302,6 +304,12 @@ def _in_one(name: str, output: OutputFit) -> str:
     if output.noise_rms is None:
         return text
     return f"{text} (noise {quantity(output.noise_rms, output.unit)})"
+
+
+def _closest(diagnosis: Diagnosis) -> str:
+    """The effects that would explain the residual, and why they are not named."""
+    parts = [f"{clause(each.effect)}, but {each.reason}" for each in diagnosis.closest]
+    return f"Closest: {'; '.join(parts)}."
 
 
 def _unexplained(diagnosis: Diagnosis, opening: str) -> str:

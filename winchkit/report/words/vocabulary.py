@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import isfinite
 
-from winchkit.diagnosis.results import Estimate
+from winchkit.diagnosis.results import Combination, Estimate
 from winchkit.report.words.numbers import between, with_std
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "VARIABLE_NAMES",
     "VERDICT_NAMES",
     "clause",
+    "combination_text",
     "estimate_text",
     "interval_text",
     "kind",
@@ -155,6 +156,12 @@ def estimate_text(parameter: str, estimate: Estimate) -> str:
     if parameter == "order":
         return f"order {estimate.value:.0f}"
     return f"{parameter_name(parameter)} = {with_std(estimate.value, estimate.std, unit)}"
+
+
+def combination_text(combination: Combination) -> str:
+    """What the data determine: ``cable per motor turn = 18.7042 ± 0.0014 mm``."""
+    unit = "" if combination.unit == "1" else combination.unit
+    return f"{combination.name} = {with_std(combination.value, combination.std, unit)}"
 
 
 def interval_text(parameter: str, estimate: Estimate) -> str:

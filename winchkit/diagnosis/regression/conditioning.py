@@ -1,0 +1,123 @@
+"""Covariance of fitted values, their correlations, and the condition number of a fit.
+
+References
+----------
+Belsley, D. A., Kuh, E., Welsch, R. E. (1980). Regression Diagnostics. Wiley, ch. 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.results import Correlation, FitQuality
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
+
+__all__ = ["ValueCovariance", "fit_quality", "value_covariance"]
+
+_SHOWN = 0.5
+_STEP = 1e-4
+
+
+@dataclass(frozen=True)
+class ValueCovariance:
+    """Covariance of the values of a linearised fit, SI.
+
+    Attributes
+    ----------
+    names : tuple of str
+        ``effect.parameter`` of every fitted value, after the nuisance parameters.
+    matrix : ndarray of shape (n_values, n_values)
+        Covariance; initial states are free and left out.
+    condition : float
+        Condition number of the whitened derivatives with columns of unit length.
+    """
+
+    names: tuple[str, ...]
+    matrix: Array
+    condition: float
+
+
+def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCovariance:
+    """Covariance of the nuisance parameters and values of a fit.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    noise
+        Noise variance.
+    """
+    whitened = fit.jacobian * noise.inverse_sigma(regression)[:, None]
+    length = np.sqrt(np.sum(whitened**2, axis=0))
+    there = np.flatnonzero(length > 0.0)
+    scaled = whitened[:, there] / length[there]
+    values, vectors = np.linalg.eigh(scaled.T @ scaled)
+    floor = 1e-12 * float(values[-1]) if len(values) else 0.0
+    inverse = (vectors / np.maximum(values, floor)) @ vectors.T
+    covariance = np.zeros((len(length), len(length)))
+    covariance[np.ix_(there, there)] = inverse / np.outer(length[there], length[there])
+    names, slopes = _slopes(regression, fit)
+    condition = np.sqrt(values[-1] / max(float(values[0]), floor)) if len(values) else np.nan
+    return ValueCovariance(names, slopes @ covariance @ slopes.T, float(condition))
+
+
+def fit_quality(regression: Regression, fit: Fit, noise: Noise) -> FitQuality | None:
+    """Correlations above 0.5 and condition number of a fit; None without unknowns."""
+    covariance = value_covariance(regression, fit, noise)
+    if not covariance.names:
+        return None
+    std = np.sqrt(np.maximum(np.diag(covariance.matrix), 0.0))
+    pairs = [
+        Correlation(a, covariance.names[j], float(covariance.matrix[i, j] / (std[i] * std[j])))
+        for i, a in enumerate(covariance.names)
+        for j in range(i + 1, len(covariance.names))
+        if std[i] > 0.0 and std[j] > 0.0
+    ]
+    shown = [pair for pair in pairs if abs(pair.value) > _SHOWN]
+    return FitQuality(tuple(sorted(shown, key=lambda p: -abs(p.value))), covariance.condition)
+
+
+def _slopes(regression: Regression, fit: Fit) -> tuple[tuple[str, ...], Array]:
+    """Names of all values, and their derivatives by the vector of unknowns."""
+    count = regression.nuisance_columns.shape[1]
+    names = ["length offset"] * int(regression.fits_offset)
+    names += ["discretisation correction"] * int(regression.fits_discretization)
+    names += [f"nuisance {index + 1}" for index in range(len(names), count)]
+    rows = [np.eye(len(fit.vector))[index] for index in range(count)]
+    at = count
+    for term in fit.hypothesis.terms:
+        coordinates = Coordinates(term.effect)
+        part = slice(at, at + len(coordinates))
+        at += len(coordinates)
+        for name, slope in _derivatives(coordinates, term, fit.vector[part]):
+            row = np.zeros(len(fit.vector))
+            row[part] = slope
+            names.append(f"{term.label}.{name}")
+            rows.append(row)
+    return tuple(names), np.array(rows).reshape(len(rows), len(fit.vector))
+
+
+def _derivatives(
+    coordinates: Coordinates, term: Term, vector: Array
+) -> Iterator[tuple[str, Array]]:
+    """Derivatives of an effect's values by its coordinates, the larger of both sides."""
+    here = coordinates.values(vector, term.values)
+    sides = []
+    for step in (_STEP, -_STEP):
+        moved = [
+            coordinates.values(vector + step * unit, term.values) for unit in np.eye(len(vector))
+        ]
+        sides.append([{n: (m[n] - here[n]) / step for n in coordinates.names} for m in moved])
+    for name in coordinates.names:
+        pairs = [(up[name], down[name]) for up, down in zip(*sides, strict=True)]
+        yield name, np.array([max(pair, key=abs) for pair in pairs])

@@ -1,0 +1,150 @@
+"""The combination of parameters that the data determine, where single ones are uncertain.
+
+Members of an equivalence set explain the same change; each parameter alone depends on which member
+is true, and the change does not. Strongly correlated parameters of one effect are told as the
+eigenvector of the smallest eigenvalue of their correlation matrix.
+
+References
+----------
+Belsley, D. A., Kuh, E., Welsch, R. E. (1980). Regression Diagnostics. Wiley, ch. 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite, pi
+
+import numpy as np
+
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.regression.conditioning import ValueCovariance
+from winchkit.diagnosis.results import Combination, Estimate
+from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
+from winchkit.model.line import Line
+
+__all__ = ["combination_of_set", "combination_of_term"]
+
+_STRONG = 0.9
+_WINDING = frozenset({"drum-radius", "gear-ratio"})
+"""Effects of which the data determine the cable per motor turn."""
+
+
+def combination_of_set(
+    terms: Sequence[Term],
+    parameters: Mapping[str, Mapping[str, Estimate]],
+    dataset: Dataset | None,
+) -> Combination | None:
+    """What the data determine of an equivalence set, whichever member is true.
+
+    Parameters
+    ----------
+    terms
+        Members.
+    parameters
+        Their fitted values.
+    dataset
+        Runs of a winch; None for a robot.
+
+    Returns
+    -------
+    Combination or None
+        The cable per motor turn, mean over the runs, for a wrong radius or ratio. Otherwise the sum
+        of all amplitudes, each over its fitted value, which is one. None for a single effect, and
+        where a member has more than one amplitude.
+    """
+    ids = {term.effect.id for term in terms}
+    if len(ids) < 2:
+        return None
+    sole = [_sole_amplitude(term.effect) for term in terms]
+    if ids >= _WINDING and dataset is not None:
+        known = next(i for i, term in enumerate(terms) if term.effect.id in _WINDING)
+        (estimate,) = parameters[terms[known].effect.id].values()
+        return _cable_per_motor_turn(terms[known], estimate.std, dataset)
+    if any(parameter is None for parameter in sole):
+        return None
+    pairs = [
+        (parameter, parameters[term.effect.id][parameter.name])
+        for term, parameter in zip(terms, sole, strict=True)
+        if parameter is not None
+    ]
+    if not all(estimate.value - p.null and isfinite(estimate.value) for p, estimate in pairs):
+        return None
+    name = " + ".join(_share(p, estimate) for p, estimate in pairs)
+    parameter, first = pairs[0]
+    size = first.value if parameter.reciprocal else first.value - parameter.null
+    return Combination(name, 1.0, abs(first.std / size), "1")
+
+
+def combination_of_term(term: Term, covariance: ValueCovariance) -> Combination | None:
+    """Best determined combination of an effect's strongly correlated parameters; None if there are
+    none.
+
+    The correlation matrix of the parameters that correlate above 0.9 with another one of the effect
+    has an eigenvector of the smallest eigenvalue; it is scaled to a coefficient of one for the
+    first parameter.
+    """
+    polar = term.effect.polar or ()
+    fitted = [name for name in Coordinates(term.effect).names if name not in polar]
+    index = {name: covariance.names.index(f"{term.label}.{name}") for name in fitted}
+    variance = np.diag(covariance.matrix)
+    known = [name for name in fitted if variance[index[name]] > 0.0]
+    rows = [index[name] for name in known]
+    std = np.sqrt(variance[rows])
+    correlation = covariance.matrix[np.ix_(rows, rows)] / np.outer(std, std)
+    strong = np.any(np.abs(correlation - np.eye(len(rows))) > _STRONG, axis=1)
+    chosen = np.flatnonzero(strong)
+    if len(chosen) < 2:
+        return None
+    _, vectors = np.linalg.eigh(correlation[np.ix_(chosen, chosen)])
+    weights = vectors[:, 0] / std[chosen]
+    if abs(vectors[0, 0]) < 1e-6:
+        return None
+    weights = weights / weights[0]
+    names = [known[i] for i in chosen]
+    own = covariance.matrix[np.ix_([rows[i] for i in chosen], [rows[i] for i in chosen])]
+    formula = names[0] + "".join(
+        f" {'+' if weight > 0 else '−'} {abs(weight):.3g} · {name}"
+        for name, weight in zip(names[1:], weights[1:], strict=True)
+    )
+    value = sum(weight * term.values[name] for name, weight in zip(names, weights, strict=True))
+    deviation = float(np.sqrt(max(weights @ own @ weights, 0.0)))
+    return Combination(formula, float(value), deviation, term.effect.parameter(names[0]).unit)
+
+
+def _cable_per_motor_turn(term: Term, std: float, dataset: Dataset) -> Combination:
+    """Mean change of the cable length per motor turn over these runs, with one of the members."""
+    (name,) = Coordinates(term.effect).names
+    moved = Term(term.effect, {**term.values, name: term.values[name] + std})
+    value, beside = (_length_per_turn(each, dataset) for each in (term, moved))
+    return Combination("cable per motor turn", value, abs(beside - value), "m")
+
+
+def _length_per_turn(term: Term, dataset: Dataset) -> float:
+    """Slope of the predicted cable length over the motor turns, an offset per run, m."""
+    line = Line(dataset.profile, (term.modifier(),))
+    products = squares = 0.0
+    for recording in dataset.recordings:
+        turns = recording.smooth.at.motor_angle / (2 * pi)
+        turns = turns - turns.mean()
+        products += float(turns @ line.predict(recording.smooth)["cable_length"])
+        squares += float(turns @ turns)
+    return abs(products / squares) if squares else 0.0
+
+
+def _sole_amplitude(effect: Effect) -> Parameter | None:
+    """The amplitude of an effect that has no other fitted parameter."""
+    coordinates = Coordinates(effect)
+    return coordinates.amplitudes[0] if len(coordinates) == 1 else None
+
+
+def _share(parameter: Parameter, estimate: Estimate) -> str:
+    """An amplitude over its fitted value; a stiffness the other way round."""
+    unit = "" if estimate.unit == "1" else f" {estimate.unit}"
+    if parameter.reciprocal:
+        return f"({estimate.value:.4g}{unit})/{parameter.name}"
+    if parameter.null:
+        size = estimate.value - parameter.null
+        return f"({parameter.name} − {parameter.null:g})/({size:.4g}{unit})"
+    return f"{parameter.name}/({estimate.value:.4g}{unit})"

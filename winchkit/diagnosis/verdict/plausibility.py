@@ -1,0 +1,85 @@
+"""Plausibility of fitted values: values at a bound of the fit, or beyond what a machine can have.
+
+A value beyond its range means that the effect imitates another cause, mostly a wrong input: the
+sign or unit of a channel, the torque constant, or gravity. Such an effect is no explanation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import isfinite
+from operator import attrgetter
+
+from winchkit.diagnosis.results import Estimate
+from winchkit.effects.effect import Parameter
+from winchkit.effects.term import Term
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["implausible"]
+
+_ROUNDING = 1e-6
+_CHECK = "check sign, unit, torque constant, gravity"
+
+
+def implausible(
+    term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None
+) -> str | None:
+    """Reason why the values of an effect cannot be; None where they can.
+
+    Parameters
+    ----------
+    term
+        The effect.
+    values
+        Its fitted values.
+    profile
+        Profile of the winch, for ranges that are relative to one of its numbers; None for a robot.
+
+    Notes
+    -----
+    A value is beyond its plausible range where its whole 95 % interval is. Where an effect declares
+    no range, a value at a bound of the fit other than the null is beyond it. A value that the data
+    do not determine (NaN standard deviation) is not judged.
+    """
+    return next(_reasons(term, values, profile), None)
+
+
+def _reasons(
+    term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None
+) -> Iterator[str]:
+    for name, estimate in values.items():
+        parameter = term.effect.parameter(name)
+        if parameter.whole or not (isfinite(estimate.value) and isfinite(estimate.std)):
+            continue
+        shown = f"{name} = {_text(estimate.value, parameter)}"
+        known = _range(parameter, profile)
+        if known is None:
+            bounds = [b for b in (parameter.low, parameter.high) if b != parameter.null]
+            size = abs(parameter.typical - parameter.null) if isfinite(parameter.null) else 1.0
+            if any(abs(estimate.value - b) <= _ROUNDING * max(size, abs(b)) for b in bounds):
+                yield f"{shown} is at a bound of the fit: {_CHECK}"
+            continue
+        low, high, reason = known
+        bottom, top = estimate.interval or (estimate.value, estimate.value)
+        if max(top, estimate.value) < low or min(bottom, estimate.value) > high:
+            ends = f"{_text(low, parameter)} to {_text(high, parameter)}"
+            yield f"{shown} is beyond the plausible range ({ends}; {reason}): {_CHECK}"
+
+
+def _range(parameter: Parameter, profile: WinchProfile | None) -> tuple[float, float, str] | None:
+    """Plausible range of a parameter in its unit, with its reason; None where none is known."""
+    declared = parameter.plausible
+    if declared is None:
+        return None
+    size = 1.0
+    if declared.of:
+        number = None if profile is None else attrgetter(declared.of)(profile)
+        if number is None:
+            return None
+        size = float(number)
+    return declared.low * size, declared.high * size, declared.reason
+
+
+def _text(value: float, parameter: Parameter) -> str:
+    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+    return f"{value:.4g}{unit}".replace("-", "−")
