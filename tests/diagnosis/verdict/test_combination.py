@@ -21,7 +21,7 @@ DATASET = prepare([made(0, GROOVED, ride=Ride(samples=200))], GROOVED)
 
 
 def test_radius_and_ratio_have_one_cable_per_motor_turn() -> None:
-    """On a grooved drum a turn of the helix, by Pythagoras; whichever of the two is listed first."""
+    """On a grooved drum a turn of the helix, by Pythagoras, whichever of the two is first."""
     radius = term("drum-radius", radius_error=3e-4)
     turn = hypot(2 * pi * 0.0603, 0.005) / 20.4
     ratio = term("gear-ratio", ratio_error=hypot(2 * pi * 0.06, 0.005) / 20.4 / turn - 1)

@@ -11,6 +11,7 @@ from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term, with_channel
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.verdict.plausibility import implausible
+from winchkit.effects.effect import Effect
 from winchkit.report.text import report_text
 
 
@@ -49,7 +50,7 @@ def test_an_undetermined_value_is_not_judged() -> None:
 
 
 @pytest.mark.parametrize("effect", list(CATALOGUE), ids=lambda effect: effect.id)
-def test_ranges_hold_the_null_and_the_typical_value_and_have_a_reason(effect) -> None:  # type: ignore[no-untyped-def]
+def test_ranges_hold_the_null_and_the_typical_value_and_have_a_reason(effect: Effect) -> None:
     for p in effect.parameters:
         if p.plausible is not None:
             assert p.plausible.reason

@@ -1,7 +1,7 @@
 """The combination of parameters that the data determine, where single ones are uncertain.
 
 Members of an equivalence set explain the same change; each parameter alone depends on which member
-is true, and the change does not. Strongly correlated parameters of one effect are told as the
+is true, and the change does not. Strongly correlated parameters of one effect are given as the
 eigenvector of the smallest eigenvalue of their correlation matrix.
 
 References

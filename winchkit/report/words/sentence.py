@@ -84,9 +84,8 @@ def sentence(diagnosis: Diagnosis) -> str:
         return " ".join(part for part in parts if part)
     if diagnosis.verdict == "partly":
         return _unexplained(diagnosis, "Partly explained by known effects, none of which is named")
-    if diagnosis.closest:
-        return f"{_closest(diagnosis)} {_unexplained(diagnosis, 'Nothing is named')}"
-    return _unexplained(diagnosis, "Unexplained by any known effect")
+    opening = "Nothing is named" if diagnosis.closest else "Unexplained by any known effect"
+    return _closest(diagnosis) + _unexplained(diagnosis, opening)
 
 
 def changes_text(diagnosis: Diagnosis) -> str:
@@ -307,9 +306,11 @@ def _in_one(name: str, output: OutputFit) -> str:
 
 
 def _closest(diagnosis: Diagnosis) -> str:
-    """The effects that would explain the residual, and why they are not named."""
+    """The effects that would explain the residual, and why they are not named; or nothing."""
+    if not diagnosis.closest:
+        return ""
     parts = [f"{clause(each.effect)}, but {each.reason}" for each in diagnosis.closest]
-    return f"Closest: {'; '.join(parts)}."
+    return f"Closest: {'; '.join(parts)}. "
 
 
 def _unexplained(diagnosis: Diagnosis, opening: str) -> str:
