@@ -84,6 +84,16 @@ def test_a_wrong_load_is_blamed_once(factor: float, words: str) -> None:
     assert words in finding.text
 
 
+@pytest.mark.parametrize("name", OUTPUTS)
+@pytest.mark.parametrize("factor", [-1.0, 1000.0])
+def test_without_a_load_either_of_tension_and_torque_may_be_wrong(name: str, factor: float) -> None:
+    run = scaled(made(3, load_mass=10.0), name, factor)
+    found = sign_and_scale([replace(run, metadata={})], GROOVED)
+    assert {f.channel for f in found} == set(OUTPUTS)
+    (own,) = (f for f in found if f.channel == name)
+    assert own.value == pytest.approx(factor, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("effect", "values"),
     [

@@ -223,3 +223,17 @@ def test_velocity_against_angle(change: Callable[[Array], Array], code: str, wor
     findings = [f for f in inspect_run(Run("r", time, channels)) if f.channel == "motor_velocity"]
     assert [f.code for f in findings] == ([code] if code else [])
     assert all(word in f.text for f in findings)
+
+
+def test_a_jerk_is_no_spike() -> None:
+    """One sample of acceleration is in the angle and in the force."""
+    time = np.arange(COUNT) / RATE
+    random = np.random.default_rng(3)
+    angle = np.where(time > 10, 5.0 * (time - 10), 0.0)
+    force = 98 + random.normal(0, 0.3, COUNT)
+    force[int(10 * RATE)] += 20
+    channels = {"motor_angle": Channel(angle, "rad"), "tension": Channel(force, "N")}
+    assert not found(Run("r", time, channels), "outliers")
+    force[int(20 * RATE)] += 20
+    (finding,) = found(Run("r", time, channels), "outliers")
+    assert finding.text.startswith("1 of ")

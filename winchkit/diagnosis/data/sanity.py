@@ -12,7 +12,7 @@ from winchkit.model.stages import OUTPUTS
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
-from winchkit.runs.sanity.outliers import outlier_mask
+from winchkit.runs.sanity.outliers import outlier_masks
 from winchkit.runs.sanity.quantisation import resolution
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -20,7 +20,6 @@ __all__ = ["ALARMING", "caveats", "findings", "resolutions", "without_outliers"]
 
 ALARMING = frozenset({"inverted-sign", "wrong-factor"})
 """Codes of findings with which effects of a winch are not looked for."""
-_CHANNELS = ("motor_angle", "motor_velocity", "load", *OUTPUTS)
 
 
 def findings(runs: Sequence[Run], profile: WinchProfile) -> tuple[Finding, ...]:
@@ -47,8 +46,7 @@ def resolutions(runs: Sequence[Run]) -> dict[str, float]:
 
 def without_outliers(run: Run) -> Run:
     """The run with NaN in place of single spikes, so that these are not compared."""
-    spikes = {name: outlier_mask(run[name]) for name in _CHANNELS if name in run}
-    hit = {name: mask for name, mask in spikes.items() if mask.any()}
+    hit = outlier_masks(run)
     if not hit:
         return run
     channels: dict[str, Channel] = dict(run.channels)

@@ -57,15 +57,15 @@ def sign_and_scale(runs: Sequence[Run], profile: WinchProfile) -> list[Finding]:
         Value: slope of measured over predicted. Where tension and torque of a run are wrong by the
         same factor, the load is.
     """
-    wrong: dict[tuple[str, str, str], list[tuple[str, Slope]]] = {}
+    wrong: dict[tuple[str, str, str, str], list[tuple[str, Slope]]] = {}
     for run in runs:
-        for channel, slope in _suspects(_slopes(run, profile)).items():
+        for (channel, other), slope in _suspects(run, _slopes(run, profile)).items():
             code = "inverted-sign" if slope.value < 0 else "wrong-factor"
             known = named_factor(slope) if _outside(abs(slope.value)) else ""
-            wrong.setdefault((channel, code, known), []).append((run.name, slope))
+            wrong.setdefault((channel, other, code, known), []).append((run.name, slope))
     out = []
-    for (channel, code, known), found in wrong.items():
-        text = _text(channel, code, known, _mean([slope for _, slope in found]))
+    for (channel, other, code, known), found in wrong.items():
+        text = _text(channel, code, known, _mean([slope for _, slope in found]), other)
         out += [Finding(code, name, channel, slope.value, text) for name, slope in found]
     for run in runs:
         out += _passivity(run, profile)
@@ -127,16 +127,33 @@ def _slopes(run: Run, profile: WinchProfile) -> dict[str, Slope]:
     return out
 
 
-def _suspects(slopes: Mapping[str, Slope]) -> dict[str, Slope]:
-    """Channels with a wrong sign or scale; the load where tension and torque agree on one."""
+def _suspects(run: Run, slopes: Mapping[str, Slope]) -> dict[tuple[str, str], Slope]:
+    """Channels with a wrong sign or scale, and the channel that may be wrong instead.
+
+    The load where tension and torque agree on one; tension or torque where no load is known, since
+    the one is predicted from the other.
+    """
     wrong = {name: s for name, s in slopes.items() if _is_wrong(s)}
     if len(wrong) == 2:
         tension, torque = wrong["tension"], wrong["motor_torque"]
         ratio = tension.value / torque.value
         if 1 / _EQUAL < ratio < _EQUAL:
-            size = tension.value**2
-            return {"load": Slope(1 / tension.value, tension.std / size)}
-    return wrong
+            return {("load", ""): _reciprocal(tension)}
+    if "motor_torque" in wrong and "tension" in run and not _knows_load(run):
+        torque = wrong["motor_torque"]
+        return {
+            ("motor_torque", "tension"): torque,
+            ("tension", "motor_torque"): _reciprocal(torque),
+        }
+    return {(name, ""): slope for name, slope in wrong.items()}
+
+
+def _knows_load(run: Run) -> bool:
+    return "load" in run or run.load_mass is not None
+
+
+def _reciprocal(slope: Slope) -> Slope:
+    return Slope(1 / slope.value, slope.std / slope.value**2)
 
 
 def _is_wrong(slope: Slope) -> bool:
@@ -228,12 +245,12 @@ def _mean(slopes: Sequence[Slope]) -> Slope:
     return Slope(float(values.mean()), float(np.sqrt(np.mean(stds**2) / len(stds))))
 
 
-def _text(channel: str, code: str, known: str, slope: Slope) -> str:
-    what = (
-        "its slope over that which tension and torque need"
-        if channel == "load"
-        else ("the slope over the prediction")
-    )
+def _text(channel: str, code: str, known: str, slope: Slope, other: str) -> str:
+    what = "the slope over the prediction"
+    if channel == "load":
+        what = "the slope over that which tension and torque need"
+    if other:
+        what = f"the slope over the prediction with '{other}', of which either may be wrong,"
     beside = f"{what} is {slope_text(slope)}"
     if code == "inverted-sign":
         unit = f", and the unit wrong by {known}" if known else ""

@@ -39,6 +39,7 @@ def inspect_run(run: Run) -> list[Finding]:
         kind = name.rpartition(".")[2]
         if kind in CHANNEL_DIMENSIONS and np.isfinite(run[name]).any():
             out += _channel(run, name, is_instrument=kind in _INSTRUMENTS)
+    out += outliers(run)
     for winch in run.winches():
         out += velocity_consistency(run, winch)
     return out
@@ -53,4 +54,3 @@ def _channel(run: Run, name: str, *, is_instrument: bool) -> Iterator[Finding]:
     yield from repeated_values(run, name)
     if is_instrument:
         yield from saturated(run, name)
-    yield from outliers(run, name)

@@ -2,29 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.runs.run import Run
+from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import size
 
-__all__ = ["outlier_mask", "outliers"]
+__all__ = ["outlier_mask", "outlier_masks", "outliers"]
 
-_LIMIT = 10.0
+_LIMIT = 12.0
 """Local standard deviations: beyond 8 in none of 10¹⁵ Gaussian samples, and room for tails."""
 _AGREEMENT = 0.25
 """Largest range of the four neighbours, in deviations of the sample."""
+_SAME_EVENT = 3.0
+"""Local standard deviations of another channel at the same time, with which a peak is physical."""
 _WINDOW = 50
 _MAD = 0.6745
 
 
 def outlier_mask(values: Array) -> NDArray[np.bool_]:
-    """Samples that are spikes.
+    """Samples of one channel that are spikes.
 
     Parameters
     ----------
@@ -37,50 +38,96 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
 
     Notes
     -----
-    The deviation from the median of two neighbours on each side exceeds ten local standard
+    The deviation from the median of two neighbours on each side exceeds twelve local standard
     deviations (of the deviations, by their median over 50 samples), and the neighbours agree within
     a quarter of it. A peak that lasts two samples, or a step, is none.
     """
-    out = np.zeros(len(values), dtype=bool)
-    rows = np.flatnonzero(np.isfinite(values))
-    known = values[rows]
-    if len(known) < _WINDOW:
-        return out
-    around = np.stack([known[:-4], known[1:-3], known[3:-1], known[4:]])
-    deviation = np.abs(known[2:-2] - np.median(around, axis=0))
-    agreement = np.ptp(around, axis=0)
-    local = _local(deviation)
-    # Neighbours that are equal in a quantised or held channel have a local deviation of zero.
-    floor = float(np.sqrt(np.mean(np.minimum(deviation, np.quantile(deviation, 0.95)) ** 2)))
-    far = deviation > _LIMIT * np.maximum(local, floor)
-    out[rows[2:-2][far & (agreement < _AGREEMENT * deviation)]] = True
+    return _spikes(values)[0]
+
+
+def outlier_masks(run: Run) -> dict[str, NDArray[np.bool_]]:
+    """Spikes of every channel of a run that no other channel of the same winch shares.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+
+    Returns
+    -------
+    dict of (n,) array of bool
+        Channels with at least one spike. A peak of the force that lasts one sample, as at a jerk,
+        appears in the angle, the tension, the load or the torque at the same time: it is none.
+    """
+    names = [name for name in run if name.rpartition(".")[2] in CHANNEL_DIMENSIONS]
+    found = {name: _spikes(run[name]) for name in names}
+    out = {}
+    for name, (spikes, _) in found.items():
+        winch = name.rpartition(".")[0]
+        if not spikes.any():
+            continue
+        beside = [
+            shared
+            for other, (_, shared) in found.items()
+            if other != name and other.rpartition(".")[0] in {"", winch}
+        ]
+        alone = spikes & ~_within_one(beside) if beside else spikes
+        if alone.any():
+            out[name] = alone
     return out
 
 
-def outliers(run: Run, name: str) -> Iterator[Finding]:
-    """Spikes of a channel; value: largest deviation."""
-    values = run[name]
-    spikes = outlier_mask(values)
-    count = int(np.count_nonzero(spikes))
-    if count == 0:
-        return
-    good = ~spikes & np.isfinite(values)
-    between = np.interp(np.flatnonzero(spikes), np.flatnonzero(good), values[good])
-    largest = float(np.max(np.abs(values[spikes] - between)))
-    yield Finding(
-        "outliers",
-        run.name,
-        name,
-        largest,
-        f"{count} of {len(values)} samples are spikes of up to "
-        f"{size(largest, run.channels[name].unit)}; they are not compared",
-    )
+def outliers(run: Run) -> Iterator[Finding]:
+    """Spikes of the channels; value: largest deviation."""
+    for name, spikes in outlier_masks(run).items():
+        values = run[name]
+        good = ~spikes & np.isfinite(values)
+        between = np.interp(np.flatnonzero(spikes), np.flatnonzero(good), values[good])
+        largest = float(np.max(np.abs(values[spikes] - between)))
+        yield Finding(
+            "outliers",
+            run.name,
+            name,
+            largest,
+            f"{np.count_nonzero(spikes)} of {len(values)} samples are spikes of up to "
+            f"{size(largest, run.channels[name].unit)}; they are not compared",
+        )
+
+
+def _spikes(values: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Spikes, and samples whose deviation is large enough to be the same event."""
+    out, event = np.zeros(len(values), dtype=bool), np.zeros(len(values), dtype=bool)
+    rows = np.flatnonzero(np.isfinite(values))
+    known = values[rows]
+    if len(known) < _WINDOW:
+        return out, event
+    around = np.stack([known[:-4], known[1:-3], known[3:-1], known[4:]])
+    deviation = np.abs(known[2:-2] - np.median(around, axis=0))
+    # Neighbours that are equal in a quantised or held channel have a local deviation of zero.
+    floor = float(np.sqrt(np.mean(np.minimum(deviation, np.quantile(deviation, 0.95)) ** 2)))
+    scale = np.maximum(_local(deviation), floor)
+    agree = np.ptp(around, axis=0) < _AGREEMENT * deviation
+    out[rows[2:-2][(deviation > _LIMIT * scale) & agree]] = True
+    event[rows[2:-2][deviation > _SAME_EVENT * scale]] = True
+    return out, event
+
+
+def _within_one(masks: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
+    """Samples of which one or a neighbour is in one of the masks."""
+    union: NDArray[np.bool_] = np.any(np.stack(masks), axis=0)
+    out = union.copy()
+    out[1:] |= union[:-1]
+    out[:-1] |= union[1:]
+    return out
 
 
 def _local(deviation: Array) -> Array:
     """Standard deviation from the median of the deviations in blocks, the larger of two blocks."""
-    count = max(1, len(deviation) // _WINDOW)
-    edges = np.linspace(0, len(deviation), count + 1).astype(int)
-    medians = np.array([np.median(deviation[a:b]) for a, b in pairwise(edges)])
+    count = len(deviation) // _WINDOW
+    if count == 0:
+        return np.full(len(deviation), float(np.median(deviation)) / _MAD)
+    blocks = deviation[: count * _WINDOW].reshape(count, _WINDOW)
+    medians = np.median(blocks, axis=1)
     wide = np.maximum(medians, np.maximum(np.append(medians[1:], 0), np.append(0, medians[:-1])))
-    return np.repeat(wide / _MAD, np.diff(edges))
+    local = np.repeat(wide / _MAD, _WINDOW)
+    return np.append(local, np.full(len(deviation) - len(local), local[-1]))
