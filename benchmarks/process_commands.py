@@ -49,7 +49,7 @@ class Commands:
     def __init__(self, bench_file: Path, log: Path, fault: str, speed: float) -> None:
         self._bench_file, self._log, self._fault = bench_file, log, fault
         self._terminal: int | None = None
-        log.unlink(missing_ok=True)  # that of the case before would count as begun
+        log.unlink(missing_ok=True)  # the log of the case before is not this one
         self._logger = _start("log", "-b", bench_file, "-o", log, "--replace", "--json")
         self._jog: subprocess.Popen[bytes] | None = None
         self._words = ("jog", "A", "-b", bench_file)
