@@ -21,8 +21,8 @@ VARIABLE = "WINCHKIT_REAL"
 def folder() -> Path | None:
     """Where the data are, if they are anywhere."""
     beside = [parent / "shared" / "data" / "real" for parent in Path(__file__).resolve().parents]
-    told = os.environ.get(VARIABLE)
-    for place in [Path(told)] if told else beside:
+    given = os.environ.get(VARIABLE)
+    for place in [Path(given)] if given else beside:
         if (place / "openarm-j4" / "collect.csv").is_file():
             return place
     return None

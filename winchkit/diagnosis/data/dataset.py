@@ -16,6 +16,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.copies import COPIES, without_copies
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
 from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
+from winchkit.diagnosis.data.outlying_repeats import outlying_repeat
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, even_instants
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, without_outliers
@@ -53,6 +54,7 @@ class Filtering:
 
 
 NO_REPEATS = "no-repeats"
+OUTLYING = "outlying-repeat"
 ROUNDED_ALIKE = "noise-floor-implausible"
 _ZEROED = ("cable_length", "tension")
 """Outputs whose instrument may be zeroed before a run."""
@@ -125,7 +127,7 @@ class Dataset:
     @property
     def caveats(self) -> tuple[str, ...]:
         """Codes of what these runs cannot exclude: suspect channels first, then their repeats."""
-        limits = [f.code for f in self.sanity if f.code in (COPIES, ROUNDED_ALIKE)]
+        limits = [f.code for f in self.sanity if f.code in (COPIES, OUTLYING, ROUNDED_ALIKE)]
         return tuple(
             dict.fromkeys(
                 [*caveats(self.sanity), *limits, *([] if self.repeated else [NO_REPEATS])]
@@ -188,13 +190,18 @@ def prepare(
         runs = [_of_fast_count(run, decimation.factor if decimation else 1) for run in runs]
     filtering = Filtering(band, kept_cut_offs, decimation)
     dataset = assemble(runs, profile, filtering)
+    left_out = []
+    while (outlying := _outlying(dataset)) is not None:
+        left_out.append(outlying[1])
+        runs = [run for index, run in enumerate(runs) if index != outlying[0]]
+        dataset = assemble(runs, profile, filtering)
     anew = [zeroed_anew(output, _repeat_differences(dataset, output)) for output in _ZEROED]
     zeroed = [finding for finding in anew if finding is not None]
     factor = 1 if decimation is None else decimation.factor
     return replace(
         dataset,
         notes=tuple(notes),
-        sanity=(*copied, *sanity, *zeroed, *rounded_alike(dataset, resolution)),
+        sanity=(*copied, *left_out, *sanity, *zeroed, *rounded_alike(dataset, resolution)),
         zeroed_anew=frozenset(finding.channel for finding in zeroed),
         resolution=resolution,
         decimation_factor=factor,
@@ -237,12 +244,39 @@ def _repeat_differences(dataset: Dataset, output: str) -> list[Array]:
         warmth = [float(np.mean(values)) for values in known if values is not None]
         if warmth and np.ptp(warmth) > _EQUAL_TEMPERATURE:
             continue
-        errors = [
+        out += list(contrasts(_aligned_errors(dataset, group, output))[1])
+    return out
+
+
+def _aligned_errors(dataset: Dataset, group: Repeats, output: str) -> Array:
+    """Residuals of repeats on corresponding samples, (m, n); NaN where not compared."""
+    own = [dataset.recordings[run] for run in group.runs]
+    return np.array(
+        [
             np.where(r.valid[output], r.measured[output] - r.nominal[output], np.nan)[rows]
             for r, rows in zip(own, group.rows, strict=True)
         ]
-        out += list(contrasts(np.array(errors))[1])
-    return out
+    )
+
+
+def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
+    """A run that differs from its repeats, and the finding on it."""
+    for group in dataset.repeated:
+        for output in dataset.outputs:
+            if not all(output in dataset.recordings[run].measured for run in group.runs):
+                continue
+            found = outlying_repeat(_aligned_errors(dataset, group, output))
+            if found is None:
+                continue
+            run, unit = group.runs[found.index], OUTPUT_UNITS[output]
+            text = (
+                f"differs by {size(found.rms, unit)} rms from its repeats, these by "
+                f"{size(found.usual, unit)} from each other: another zero, load or setting that is "
+                "not recorded; left out"
+            )
+            name = dataset.recordings[run].name
+            return run, Finding(OUTLYING, name, output, found.rms, text)
+    return None
 
 
 def assemble(

@@ -16,6 +16,8 @@ _CAVEATS = {
     "no-repeats": "no run repeats another: an effect outside the catalogue counts as noise and "
     "cannot be excluded",
     "repeats-are-copies": "a run is a copy of another one and shows no noise: it was left out",
+    "outlying-repeat": "a run differs from its repeats by something that is not recorded: it was "
+    "left out",
     "noise-floor-implausible": "repeats agree to better than the resolution of an instrument: "
     "errors below the noise of its rounding cannot be excluded",
 }
