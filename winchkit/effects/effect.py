@@ -140,6 +140,8 @@ class Effect:
     """Whether the range of a motion distinguishes it from the effect that it approaches."""
     possible: Callable[[Values], bool] | None = None
     """Whether a combination of values is valid, beyond the bounds of each."""
+    single: Effect | None = None
+    """Of a harmonic series: the effect of one order, see :mod:`winchkit.effects.series`."""
     on_robot: frozenset[Placement] = frozenset()
     """Places on a robot at rest: ``one`` line, ``all`` lines alike, both, or the ``platform``;
     empty for an effect that needs a motion."""
@@ -158,6 +160,16 @@ class Effect:
         if self.memory and self.carry is None:
             return "it has memory and no function for its next state (Effect.carry)"
         return ""
+
+    @property
+    def polar_pairs(self) -> tuple[tuple[str, str], ...]:
+        """Amplitudes with their phases: several in a harmonic series."""
+        if self.polar is None:
+            return ()
+        size, phase = self.polar
+        names = [p.name for p in self.parameters]
+        numbers = [name.removeprefix(size) for name in names if name.startswith(size)]
+        return tuple((size + n, phase + n) for n in numbers)
 
     def parameter(self, name: str) -> Parameter:
         """A parameter by name.

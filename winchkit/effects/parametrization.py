@@ -27,8 +27,8 @@ class Coordinates:
     effect: Effect
 
     @cached_property
-    def _polar(self) -> tuple[str, ...]:
-        return self.effect.polar or ()
+    def _polar(self) -> frozenset[str]:
+        return frozenset(name for pair in self.effect.polar_pairs for name in pair)
 
     @cached_property
     def amplitudes(self) -> tuple[Parameter, ...]:
@@ -66,14 +66,11 @@ class Coordinates:
     def vector(self, values: Mapping[str, float]) -> Array:
         """Coordinates of values, shape (len,)."""
         out = [_to_coordinate(p, values[p.name]) for p in self._fitted]
-        if self._polar:
-            size, phase = (values[name] for name in self._polar)
-            scale = self.effect.parameter(self._polar[0]).typical
-            for index, parameter in enumerate(self._fitted):
-                if parameter.name == self._polar[0]:
-                    out[index] = size * cos(phase) / scale
-                elif parameter.name == self._polar[1]:
-                    out[index] = size * sin(phase) / scale
+        place = {p.name: index for index, p in enumerate(self._fitted)}
+        for size, phase in self.effect.polar_pairs:
+            amplitude = values[size] / self.effect.parameter(size).typical
+            out[place[size]] = amplitude * cos(values[phase])
+            out[place[phase]] = amplitude * sin(values[phase])
         return np.array(out)
 
     def values(self, vector: Array, base: Mapping[str, float]) -> dict[str, float]:
@@ -83,8 +80,7 @@ class Coordinates:
         for parameter in self._fitted:
             if parameter.name not in self._polar:
                 out[parameter.name] = _to_value(parameter, at[parameter.name])
-        if self._polar:
-            size, phase = self._polar
+        for size, phase in self.effect.polar_pairs:
             scale = self.effect.parameter(size).typical
             out[size] = min(scale * hypot(at[size], at[phase]), self.effect.parameter(size).high)
             out[phase] = atan2(at[phase], at[size])
@@ -135,10 +131,9 @@ class Coordinates:
             return [dict(probe) for probe in self.effect.probes]
         out: list[dict[str, float]] = []
         for parameter in self.amplitudes:
-            if not self._polar or parameter.name not in self._polar:
+            if parameter.name not in self._polar:
                 out.append({parameter.name: parameter.typical})
-        if self._polar:
-            size, phase = self._polar
+        for size, phase in self.effect.polar_pairs:
             typical = self.effect.parameter(size).typical
             out += [{size: typical, phase: 0.0}, {size: typical, phase: np.pi / 2}]
         return out

@@ -33,6 +33,7 @@ from winchkit.diagnosis.selection.starting_values import (
 )
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.series import harmonic_series, orders_of
 from winchkit.effects.term import Term
 
 __all__ = [
@@ -68,12 +69,10 @@ def _is_present(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
     for term in hypothesis.terms:
         if effect.id in term.effect.contains:
             return True
-        if term.effect.id == effect.id:
-            orders = [p.name for p in effect.parameters if p.whole]
-            if not effect.repeatable or all(
-                term.values[name] == item.candidate.shape.get(name) for name in orders
-            ):
-                return True
+        if term.effect.id == effect.id and (
+            not effect.repeatable or item.candidate.shape.get("order") in orders_of(term)
+        ):
+            return True
     return False
 
 
@@ -168,6 +167,7 @@ class SelectionEngine(ABC):
         self.on_trial: Callable[[str], None] = lambda effect: None
         self._optima: dict[Hashable, Hypothesis] = {}
         self._refits: list[tuple[Hypothesis, Noise, Fit]] = []
+        self._new_orders(initial_model)
         self.signatures = self._signatures(initial_model)
 
     @abstractmethod
@@ -234,6 +234,14 @@ class SelectionEngine(ABC):
         absent = (effect for effect in self._candidates if effect.id not in there)
         return signatures(self.regression, present, absent)
 
+    def _new_orders(self, present: Hypothesis) -> bool:
+        """Extend the grids of candidates by orders in the residual; False where there are none."""
+        return False
+
+    def further_orders(self, fitted: Fit, effect: Effect, noise: Noise) -> tuple[Term, ...]:
+        """Further orders of a fit's last effect that its residual contains; none by default."""
+        return ()
+
     def update_signatures(self, present: Hypothesis) -> None:
         """Compute the signatures beside another model.
 
@@ -241,7 +249,9 @@ class SelectionEngine(ABC):
         does.
         """
         self._last_projected = LastValue()
-        grown = updated_signatures(self.regression, present, self.signatures)
+        grown = None
+        if not self._new_orders(present):
+            grown = updated_signatures(self.regression, present, self.signatures)
         if grown is None:
             del self.signatures  # Both together would double the peak memory.
             grown = self._signatures(present)
@@ -371,7 +381,26 @@ class SelectionEngine(ABC):
             if best is not None and not longer.criterion < best.criterion:
                 break
             best = longer if np.isfinite(longer.criterion) else best
-        return best or longer
+        return self._with_further_orders(best or longer, present, noise)
+
+    def _with_further_orders(self, trial: Trial, present: Fit, noise: Noise) -> Trial:
+        """The trial with all orders of its effect as one series, where its criterion is lower."""
+        hypothesis = trial.fit.hypothesis
+        own = hypothesis.terms[-1]
+        if not own.effect.repeatable or not trial.criterion < self.criterion(present):
+            return trial
+        added = range(self.n_initial_terms, len(hypothesis.terms))
+        same = [i for i in added if hypothesis.terms[i].effect.id == own.effect.id]
+        further = self.further_orders(trial.fit, own.effect, noise)
+        if len(same) + len(further) < 2:
+            return trial
+        series = harmonic_series([*(hypothesis.terms[i] for i in reversed(same)), *further])
+        for index in reversed(same):
+            hypothesis = hypothesis.without(index)
+        hypothesis = hypothesis.with_term(series, self.regression.n_runs)
+        fitted = self.refit(hypothesis, noise)
+        longer = Trial(fitted, self.criterion(fitted))
+        return min(trial, longer, key=lambda one: one.criterion)
 
     def _starts(
         self, hypothesis: Hypothesis, present: Fit, item: Score, inverse_sigma: Array

@@ -15,13 +15,23 @@ from winchkit.diagnosis.regression.gls import CoarseProblem, Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit_test
 from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
+from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.orders import (
+    further_orders,
+    has_orders,
+    periodogram,
+    with_orders,
+)
 from winchkit.effects.effect import Effect
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 
 __all__ = ["TimeSeriesSelection"]
 
 _LARGEST_EXTRAPOLATION = 0.2
+_MOST_PEAKS = 12
 
 
 class TimeSeriesSelection(SelectionEngine):
@@ -83,6 +93,49 @@ class TimeSeriesSelection(SelectionEngine):
             self.regression, present, noise.inverse_sigma(self.regression)
         )
         return lack_of_fit_test(self.regression, left, present.jacobian, noise)
+
+    def _new_orders(self, present: Hypothesis) -> bool:
+        """Extend the grids of effects with an order by the significant orders of the residual.
+
+        The noise is the residual's own power per band, so that a line is significant only where it
+        exceeds everything else in its band.
+        """
+        orders = [effect for effect in self._candidates if has_orders(effect)]
+        if not orders:
+            return False
+        regression = self.regression
+        vector = regression.vector(present)
+        unknowns = regression.jacobian(vector, present) if len(vector) else np.zeros((0, 0))
+        residual = regression.residual(present)
+        if unknowns.shape[1]:
+            residual = partialled_out(unknowns, residual)
+        noise = noise_saturated(regression, residual, np.zeros((regression.n_rows, 0)))
+        inverse_sigma = noise.inverse_sigma(regression)
+        grown = {}
+        for effect in orders:
+            scan = periodogram(regression, present, effect, residual, inverse_sigma)
+            new = set(
+                scan.peaks(Coordinates(effect).n_parameters * self.penalty_per_parameter)[
+                    :_MOST_PEAKS
+                ]
+            )
+            if not new <= set(map(int, effect.parameter("order").grid)):
+                grown[effect.id] = with_orders(effect, new)
+        self._candidates = tuple(grown.get(e.id, e) for e in self._candidates)
+        return bool(grown)
+
+    def further_orders(self, fitted: Fit, effect: Effect, noise: Noise) -> tuple[Term, ...]:
+        """Further orders of a fit's last effect that its residual contains."""
+        if not has_orders(effect):
+            return ()
+        least = self.penalty_per_parameter * Coordinates(effect).n_parameters
+        return further_orders(
+            self.regression,
+            fitted,
+            effect,
+            noise.inverse_sigma(self.regression),
+            least,
+        )
 
     @property
     def _thermal_signatures(self) -> Array:

@@ -1,0 +1,282 @@
+"""Spectrum of a residual over the motor angle: least-squares periodogram at whole orders.
+
+Every order from 1 to half the samples per turn is scanned for an effect whose change of an output
+is ``E(t) sin(kθ + p)``: cogging (E constant), ripple of the torque constant (E in proportion to the
+torque), transmission error of a gear. The inner products with the whitened residual are exact; the
+squared lengths of the columns are those under the noise variance at the local frequency k θ'/2π.
+
+References
+----------
+Scargle, J. D. (1982). Studies in astronomical time series analysis II. Astrophys. J. 263, 835-853.
+Pati, Y. C., Rezaiifar, R., Krishnaprasad, P. S. (1993). Orthogonal matching pursuit. Asilomar.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.spectrum import to_time
+from winchkit.diagnosis.regression.base import Segment
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.projection import orthonormal
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.effects.effect import Effect
+from winchkit.effects.empirical import EMPIRICAL
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.series import orders_of
+from winchkit.effects.term import Term
+
+__all__ = ["Periodogram", "further_orders", "has_orders", "periodogram", "with_orders"]
+
+_LEVEL = 0.01
+_MOST_ORDERS = 1000
+_MOST_IN_SERIES = 24
+_CELLS = 32
+_RATES = 200
+_TURN = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class Periodogram:
+    """Decrease of χ² by a sine of each order, approximately χ²(2) where there is none.
+
+    Attributes
+    ----------
+    orders : ndarray of shape (n,)
+        1, 2, … up to half the samples per turn; empty where no run has a whole turn.
+    power : ndarray of shape (n,)
+        Decrease of χ² by each; zero beyond the band of the comparison.
+    """
+
+    orders: NDArray[np.intp]
+    power: Array
+
+    @property
+    def threshold(self) -> float:
+        """Power that the largest of all scanned orders exceeds by chance in 1 % of cases."""
+        scanned = max(1, int(np.count_nonzero(self.power)))
+        return 2.0 * float(np.log(scanned / _LEVEL))
+
+    def peaks(self, least: float) -> tuple[int, ...]:
+        """Orders above ``least`` and the threshold, largest power first."""
+        order = np.argsort(-self.power)
+        above = order[self.power[order] > max(least, self.threshold)]
+        return tuple(int(self.orders[index]) for index in above)
+
+
+def has_orders(effect: Effect) -> bool:
+    """Whether an effect may stand several times with whole orders per motor turn."""
+    names = {p.name for p in effect.parameters if p.whole}
+    return effect.polar is not None and names == {"order"} and effect.id not in EMPIRICAL
+
+
+def with_orders(effect: Effect, orders: Collection[int]) -> Effect:
+    """The effect with further orders in its grid."""
+    parameters = tuple(
+        replace(p, grid=tuple(sorted({*p.grid, *map(float, orders)}))) if p.whole else p
+        for p in effect.parameters
+    )
+    return replace(effect, parameters=parameters)
+
+
+def periodogram(
+    regression: TimeSeriesRegression,
+    hypothesis: Hypothesis,
+    effect: Effect,
+    residual: Array,
+    inverse_sigma: Array,
+) -> Periodogram:
+    """Periodogram of a residual over the orders of an effect.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    hypothesis
+        Model beside which the effect is added.
+    effect
+        Effect with an order, see :func:`has_orders`.
+    residual
+        Measured minus predicted, shape (n_rows,).
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+
+    Returns
+    -------
+    Periodogram
+        Outputs are summed; runs are added with their phases.
+    """
+    count = _orders_per_turn(regression)
+    if not count or regression.missing_needs(effect):
+        return Periodogram(np.arange(0), np.zeros(0))
+    outputs = sorted(regression.outputs_of(effect.stage) & set(regression.outputs))
+    envelopes = _envelopes(regression, hypothesis, effect, outputs)
+    weight = inverse_sigma**2
+    power = np.zeros(count)
+    for output in outputs:
+        products, lengths = np.zeros(count, dtype=np.complex128), np.zeros(count)
+        for segment, envelope in zip(regression.segments, envelopes, strict=True):
+            if segment.output == output and envelope.any():
+                own = weight[segment.rows]
+                products += _products(
+                    regression, segment, own * residual[segment.rows], envelope, count
+                )
+                lengths += _squared_lengths(regression, segment, own, envelope, count)
+        known = lengths > 0
+        power[known] += np.abs(products[known]) ** 2 / lengths[known]
+    return Periodogram(np.arange(1, count + 1), power)
+
+
+def _products(
+    regression: TimeSeriesRegression, segment: Segment, weighted: Array, envelope: Array, count: int
+) -> NDArray[np.complex128]:
+    """Inner products of weighted rows of one segment with E exp(ikθ), k from 1 to ``count``.
+
+    The samples are summed within cells of the turn, a small part of the shortest period each.
+    """
+    angle = regression.dataset.recordings[segment.run].signals.motor_angle
+    cells = _CELLS * count
+    cell = np.floor(angle * (cells / _TURN)).astype(np.int64) % cells
+    summed = np.bincount(
+        cell, to_time(segment.band.gain * weighted, segment.band) * envelope, cells
+    )
+    middle = np.exp(0.5j * _TURN / cells * np.arange(1, count + 1))
+    return np.asarray(np.conj(np.fft.rfft(summed)[1 : count + 1]) * middle)
+
+
+def _squared_lengths(
+    regression: TimeSeriesRegression, segment: Segment, weight: Array, envelope: Array, count: int
+) -> Array:
+    """Squared lengths of the whitened columns E sin(kθ), k from 1 to ``count``, approximately."""
+    signals = regression.dataset.recordings[segment.run].signals
+    rate = np.abs(np.gradient(signals.motor_angle, signals.time)) / _TURN
+    edges = np.linspace(0.0, float(np.max(rate)), _RATES + 1)
+    size, _ = np.histogram(rate, edges, weights=envelope**2 / 2)
+    middle = (edges[1:] + edges[:-1]) / 2
+    spectrum = np.append(segment.band.gain**2 * weight, 0.0)
+    row = np.outer(np.arange(1, count + 1), middle * 2 * segment.band.count / segment.band.rate)
+    return np.asarray(spectrum[np.minimum(row, len(spectrum) - 1).astype(np.intp)] @ size)
+
+
+def further_orders(
+    regression: TimeSeriesRegression,
+    fitted: Fit,
+    effect: Effect,
+    inverse_sigma: Array,
+    least: float,
+) -> tuple[Term, ...]:
+    """Further orders of an effect that the residual of a fit contains.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fitted
+        The fit; its orders of the effect are excluded.
+    effect
+        Effect with an order.
+    inverse_sigma
+        1/σ of every row, shape (n_rows,).
+    least
+        Least decrease of χ² by an order: its penalty.
+
+    Returns
+    -------
+    tuple of Term
+        Orders with their values by linear approximation, the most certain first.
+
+    Notes
+    -----
+    Orthogonal matching pursuit: the order of the largest power is added, all unknowns are
+    projected out of the residual, and the residual is scanned again.
+    """
+    hypothesis = fitted.hypothesis
+    basis = orthonormal(fitted.jacobian * inverse_sigma[:, None])
+    whitened = fitted.residual * inverse_sigma
+    whitened = whitened - basis @ (basis.T @ whitened)
+    coordinates, before = Coordinates(effect), regression.change(hypothesis)
+    present = (orders_of(term) for term in hypothesis.terms if term.effect.id == effect.id)
+    excluded = {order for orders in present for order in orders}
+    known = inverse_sigma > 0
+    found: list[Term] = []
+    while len(found) < _MOST_IN_SERIES:
+        unweighted = np.divide(whitened, inverse_sigma, out=np.zeros_like(whitened), where=known)
+        scan = periodogram(regression, hypothesis, effect, unweighted, inverse_sigma)
+        order = next((k for k in scan.peaks(least) if k not in excluded), None)
+        if order is None:
+            break
+        excluded.add(order)
+        base = {**effect.null, "order": float(order)}
+        columns = np.empty((regression.n_rows, 2))
+        for place, step in enumerate(coordinates.usual_steps()):
+            term = Term(effect, {**base, **step})
+            there = regression.change(hypothesis.with_term(term, regression.n_runs))
+            columns[:, place] = (there - before) * inverse_sigma
+        projected = columns - basis @ (basis.T @ columns)
+        amplitudes, *_ = np.linalg.lstsq(projected, whitened, rcond=None)
+        explained = projected @ amplitudes
+        if float(explained @ explained) < max(least, scan.threshold):
+            continue
+        found.append(Term(effect, coordinates.values(np.asarray(amplitudes, np.float64), base)))
+        basis = np.hstack([basis, orthonormal(projected)])
+        whitened = whitened - explained
+    return tuple(found)
+
+
+def _envelopes(
+    regression: TimeSeriesRegression,
+    hypothesis: Hypothesis,
+    effect: Effect,
+    outputs: Collection[str],
+) -> list[Array]:
+    """E(t) of a change E(t) sin(kθ + p) per segment, of any phase; zero where not compared.
+
+    It is computed from the change by order 1 at both phases, in phase with the angle or, for an
+    effect whose torque is the derivative of its angle, in quadrature.
+    """
+    before = regression.change(hypothesis, outputs)
+    waves = []
+    for step in Coordinates(effect).usual_steps():
+        term = Term(effect, {**effect.null, "order": 1.0, **step})
+        after = regression.change(hypothesis.with_term(term, regression.n_runs), outputs)
+        change = np.zeros(regression.n_rows)
+        for rows in regression.rows_of(outputs):
+            change[rows] = after[rows] - before[rows]
+        waves.append(regression.in_time(change))
+    out = []
+    for segment, sine, cosine in zip(regression.segments, *waves, strict=True):
+        recording = regression.dataset.recordings[segment.run]
+        angle, valid = recording.signals.motor_angle, recording.valid[segment.output]
+        own, other = np.sin(angle), np.cos(angle)
+        pair = (sine * own + cosine * other, sine * other - cosine * own)
+        in_phase, quadrature = (np.where(valid, envelope, 0.0) for envelope in pair)
+        larger = float(in_phase @ in_phase) >= float(quadrature @ quadrature)
+        out.append(in_phase if larger else quadrature)
+    return out
+
+
+def _orders_per_turn(regression: TimeSeriesRegression) -> int:
+    """Half the samples per turn, where the motor moves most slowly for a whole turn; else zero.
+
+    Zero also where no run covers a whole turn: periods are not observed there.
+    """
+    steps = []
+    for recording in regression.dataset.recordings:
+        angle = recording.signals.motor_angle
+        own = np.abs(np.diff(angle))
+        # A map of a whole turn ends one step before its beginning.
+        if float(np.ptp(angle)) + 2 * float(np.median(own)) >= _TURN:
+            steps.append(own)
+    if not steps:
+        return 0
+    step = np.sort(np.concatenate(steps))
+    step = step[step > 0]
+    within = np.cumsum(step)
+    last = min(int(np.searchsorted(within, _TURN)), len(step) - 1)
+    return int(min(_TURN / step[last] / 2, _MOST_ORDERS))
