@@ -30,8 +30,10 @@ __all__ = [
     "Where",
     "effect_and_line",
     "plain_step",
+    "series_orders",
 ]
 
+_ORDER, _AMPLITUDE = "order", "amplitude"
 Verdict = Literal["adequate", "explained", "partly", "unknown"]
 
 
@@ -191,13 +193,38 @@ class Step:
             effect: {name: vars(estimate) for name, estimate in values.items()}
             for effect, values in self.parameters.items()
         }
+        first = self.parameters.get(self.effects[0], {}) if self.effects else {}
+        orders = [{"order": k, "amplitude": vars(size)} for k, size in series_orders(first)]
         return {
             "effects": list(self.effects),
             "parameters": parameters,
+            "orders": orders,
             "heldout_gain": self.heldout_gain,
             "angles": dict(self.angles),
             "combination": vars(self.combination) if self.combination else None,
         }
+
+
+def series_orders(values: Mapping[str, Estimate]) -> list[tuple[int, Estimate]]:
+    """Whole orders of an effect with their amplitudes, largest first.
+
+    Parameters
+    ----------
+    values : mapping of str to Estimate
+        Parameters of an effect; those of a series are numbered.
+
+    Returns
+    -------
+    list of tuple of int and Estimate
+        Empty for an effect without an order or an amplitude.
+    """
+    suffixes = [name.removeprefix(_ORDER) for name in values if name.startswith(_ORDER)]
+    found = [
+        (round(values[_ORDER + suffix].value), values[_AMPLITUDE + suffix])
+        for suffix in suffixes
+        if _AMPLITUDE + suffix in values
+    ]
+    return sorted(found, key=lambda item: -item[1].value)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.results import Estimate, OutputFit
+from winchkit.effects.series import single_orders
 from winchkit.effects.term import Term
 from winchkit.profile_edit.fitted import Fitted, write_fitted, write_without
 from winchkit.profile_edit.ledger import Judged
@@ -57,7 +58,11 @@ def _provenance(
 ) -> tuple[list[Fitted], Judged]:
     """Fitted terms and the ledger's figures, dated today."""
     today = datetime.now(UTC).date()
-    fitted = [Fitted(t, {n: e.std for n, e in v.items()}, runs, today) for t, v in terms]
+    fitted = [
+        Fitted(single, std, runs, today)
+        for term, values in terms
+        for single, std in single_orders(term, {n: e.std for n, e in values.items()})
+    ]
     judged = Judged(
         today,
         runs,

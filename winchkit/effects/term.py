@@ -19,6 +19,8 @@ from winchkit.schema.profiles.robot import RobotProfile
 
 __all__ = ["Term", "act", "modifiers_of", "robot_with_terms"]
 
+_ORDERS_IN_LABEL = 6
+
 
 def act(effect: Effect, values: Values, value: Any, at: At) -> Any:
     """Apply an effect to the value of its stage.
@@ -75,6 +77,9 @@ class Term:
     def label(self) -> str:
         """Its id, with the order where it has one."""
         orders = [f"{self.values[p.name]:g}" for p in self.effect.parameters if p.whole]
+        more = len(orders) - _ORDERS_IN_LABEL
+        if more > 1:
+            orders = [*orders[:_ORDERS_IN_LABEL], f"{more} more"]
         return self.effect.id + (f"[{', '.join(orders)}]" if orders else "")
 
     def modifier(self) -> Modifier:

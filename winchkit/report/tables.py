@@ -28,6 +28,7 @@ from winchkit.report.words.vocabulary import (
     interval_text,
     listed,
     parameter_name,
+    values_text,
 )
 
 __all__ = [
@@ -197,12 +198,12 @@ def equivalence(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
             continue
         rows = []
         for effect_id in step.effects:
-            values = [estimate_text(n, e) for n, e in step.parameters.get(effect_id, {}).items()]
+            values = values_text(step.parameters.get(effect_id, {}))
             angle = step.angles.get(effect_id)
             shown = "–" if angle is None else f"{degrees(angle):.1f}°"
             effect = effects.get(effect_id)
             distinguished = effect.told_apart if effect is not None else ""
-            rows.append([element("code", effect_id), ", ".join(values), distinguished, shown])
+            rows.append([element("code", effect_id), values, distinguished, shown])
         head = ["effect", "fitted values", "distinguished by", "angle"]
         caption = (
             f"{listed(list(step.effects))} cannot be distinguished with these {diagnosis.data}. "

@@ -29,9 +29,9 @@ from winchkit.report.words.vocabulary import (
     VERDICT_NAMES,
     clause,
     combination_text,
-    estimate_text,
     interval_text,
     parameter_name,
+    values_text,
 )
 
 if TYPE_CHECKING:
@@ -129,10 +129,11 @@ def addition_text(addition: Addition | Removal) -> str:
     fitted = []
     for term, every in addition.terms:
         values = {name: e for name, e in every.items() if not name.startswith(HOME)}
-        text = ", ".join(estimate_text(name, value) for name, value in values.items())
+        text = values_text(values)
         beside = "; with the home lengths of the lines" if len(values) < len(every) else ""
         fitted.append([term.label, text + beside])
-        sure = {n: interval_text(n, v) for n, v in values.items()}
+        series = "order_2" in values
+        sure = {} if series else {n: interval_text(n, v) for n, v in values.items()}
         fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
     blocks = [
         ["fitted", *hanging(fitted)] if fitted else [],

@@ -42,6 +42,10 @@ class Hypothesis:
         """Hypothesis with another effect at the values of the last one."""
         return replace(self, terms=(*self.terms[:-1], Term(effect, self.terms[-1].values)))
 
+    def with_term_at(self, index: int, term: Term) -> Hypothesis:
+        """Hypothesis with another term without memory in the place of one."""
+        return replace(self, terms=(*self.terms[:index], term, *self.terms[index + 1 :]))
+
     def without(self, index: int) -> Hypothesis:
         """Hypothesis with one effect less."""
         keep = [i for i in range(len(self.terms)) if i != index]

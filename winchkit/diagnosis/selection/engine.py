@@ -33,7 +33,7 @@ from winchkit.diagnosis.selection.starting_values import (
 )
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
-from winchkit.effects.series import harmonic_series, orders_of
+from winchkit.effects.series import harmonic_series, orders_of, single_orders
 from winchkit.effects.term import Term
 
 __all__ = [
@@ -394,11 +394,11 @@ class SelectionEngine(ABC):
         further = self.further_orders(trial.fit, own.effect, noise)
         if len(same) + len(further) < 2:
             return trial
-        series = harmonic_series([*(hypothesis.terms[i] for i in reversed(same)), *further])
+        series = harmonic_series([*(hypothesis.terms[i] for i in same), *further])
         for index in reversed(same):
             hypothesis = hypothesis.without(index)
         hypothesis = hypothesis.with_term(series, self.regression.n_runs)
-        fitted = self.refit(hypothesis, noise)
+        fitted = self.without_minor_orders(self.refit(hypothesis, noise), noise)
         longer = Trial(fitted, self.criterion(fitted))
         return min(trial, longer, key=lambda one: one.criterion)
 
@@ -410,6 +410,40 @@ class SelectionEngine(ABC):
         terms = [Term(item.candidate.effect, values) for values in places]
         starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
         return starts + [anew for start in starts for anew in self._without_discretization(start)]
+
+    def without_minor_orders(self, fitted: Fit, noise: Noise) -> Fit:
+        """A fit without the orders of its series that decrease χ² by less than their penalty.
+
+        Notes
+        -----
+        Wald statistic of the cosine and sine amplitudes of each order. Orders that were added
+        before another effect may have explained a part of it.
+        """
+        hypothesis = fitted.hypothesis
+        series = [i for i, term in enumerate(hypothesis.terms) if term.effect.single is not None]
+        if not series:
+            return fitted
+        whitened = fitted.jacobian * noise.inverse_sigma(self.regression)[:, None]
+        covariance = np.linalg.pinv(whitened.T @ whitened, hermitian=True)
+        dropped = False
+        for index in series:
+            term = hypothesis.terms[index]
+            own = np.flatnonzero(self.regression.unknowns_of(index, fitted.hypothesis))
+            singles = [single for single, _ in single_orders(term)]
+            pairs = own.reshape(len(singles), -1)
+            least = self.penalty_per_parameter * Coordinates(singles[0].effect).n_parameters
+            kept = [
+                single
+                for single, pair in zip(singles, pairs, strict=True)
+                if fitted.vector[pair]
+                @ np.linalg.pinv(covariance[np.ix_(pair, pair)], hermitian=True)
+                @ fitted.vector[pair]
+                >= least
+            ]
+            if kept and len(kept) < len(singles):
+                hypothesis = hypothesis.with_term_at(index, harmonic_series(kept))
+                dropped = True
+        return self.refit(hypothesis, noise) if dropped else fitted
 
     def _without_discretization(self, start: Hypothesis) -> list[Hypothesis]:
         """The same start with a zero discretisation correction, where hysteresis is added.

@@ -13,7 +13,7 @@ Pati, Y. C., Rezaiifar, R., Krishnaprasad, P. S. (1993). Orthogonal matching pur
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,6 +38,7 @@ _LEVEL = 0.01
 _MOST_ORDERS = 1000
 _MOST_IN_SERIES = 24
 _CELLS = 32
+_LEAST_WITHIN = 0.1
 _RATES = 200
 _TURN = 2 * np.pi
 
@@ -121,14 +122,18 @@ def periodogram(
     power = np.zeros(count)
     for output in outputs:
         products, lengths = np.zeros(count, dtype=np.complex128), np.zeros(count)
+        within, whole = np.zeros(count), 0.0
         for segment, envelope in zip(regression.segments, envelopes, strict=True):
             if segment.output == output and envelope.any():
                 own = weight[segment.rows]
                 products += _products(
                     regression, segment, own * residual[segment.rows], envelope, count
                 )
-                lengths += _squared_lengths(regression, segment, own, envelope, count)
-        known = lengths > 0
+                length, inside = _squared_lengths(regression, segment, own, envelope, count)
+                lengths += length
+                within += inside
+                whole += float(envelope @ envelope) / 2
+        known = (lengths > 0) & (within > _LEAST_WITHIN * whole)
         power[known] += np.abs(products[known]) ** 2 / lengths[known]
     return Periodogram(np.arange(1, count + 1), power)
 
@@ -152,16 +157,21 @@ def _products(
 
 def _squared_lengths(
     regression: TimeSeriesRegression, segment: Segment, weight: Array, envelope: Array, count: int
-) -> Array:
-    """Squared lengths of the whitened columns E sin(kθ), k from 1 to ``count``, approximately."""
+) -> tuple[Array, Array]:
+    """Squared lengths of the columns E sin(kθ), whitened and, within the band, not whitened."""
     signals = regression.dataset.recordings[segment.run].signals
     rate = np.abs(np.gradient(signals.motor_angle, signals.time)) / _TURN
     edges = np.linspace(0.0, float(np.max(rate)), _RATES + 1)
     size, _ = np.histogram(rate, edges, weights=envelope**2 / 2)
-    middle = (edges[1:] + edges[:-1]) / 2
+    frequency = np.outer(np.arange(1, count + 1), (edges[1:] + edges[:-1]) / 2)
+    # Beyond half the sampling rate a wave is seen at its mirrored frequency.
+    half = segment.band.rate / 2
+    frequency = np.abs((frequency + half) % (2 * half) - half)
     spectrum = np.append(segment.band.gain**2 * weight, 0.0)
-    row = np.outer(np.arange(1, count + 1), middle * 2 * segment.band.count / segment.band.rate)
-    return np.asarray(spectrum[np.minimum(row, len(spectrum) - 1).astype(np.intp)] @ size)
+    row = frequency * 2 * segment.band.count / segment.band.rate
+    row = np.minimum(row, len(spectrum) - 1).astype(np.intp)
+    inside = np.asarray((row < len(spectrum) - 1) @ size, np.float64)
+    return np.asarray(spectrum[row] @ size), inside
 
 
 def further_orders(
@@ -169,7 +179,7 @@ def further_orders(
     fitted: Fit,
     effect: Effect,
     inverse_sigma: Array,
-    least: float,
+    gain: Callable[[Array], float],
 ) -> tuple[Term, ...]:
     """Further orders of an effect that the residual of a fit contains.
 
@@ -183,8 +193,9 @@ def further_orders(
         Effect with an order.
     inverse_sigma
         1/σ of every row, shape (n_rows,).
-    least
-        Least decrease of χ² by an order: its penalty.
+    gain
+        Decrease of χ² that an order must exceed, from the residual (n_rows,): its penalty, or what
+        another effect would explain.
 
     Returns
     -------
@@ -208,6 +219,7 @@ def further_orders(
     while len(found) < _MOST_IN_SERIES:
         unweighted = np.divide(whitened, inverse_sigma, out=np.zeros_like(whitened), where=known)
         scan = periodogram(regression, hypothesis, effect, unweighted, inverse_sigma)
+        least = gain(unweighted)
         order = next((k for k in scan.peaks(least) if k not in excluded), None)
         if order is None:
             break

@@ -37,7 +37,6 @@ __all__ = [
     "without_term",
 ]
 
-_MOST_STEPS = 6
 _SHORT_LIST = 5
 _RIVALS = 2
 _RECONSIDERED = 3
@@ -155,7 +154,9 @@ def _forward_selection(
 ) -> tuple[Fit, Noise, tuple[Fit, ...]]:
     """Model with all accepted effects, its noise, and the fits of the first candidates."""
     tried: tuple[Fit, ...] = ()
-    for _ in range(_MOST_STEPS):
+    seen: set[tuple[str, ...]] = set()
+    while present.labels not in seen:
+        seen.add(present.labels)
         grown = None
         if scores and scores[0].net_gain > threshold:
             first = not tried
@@ -310,6 +311,7 @@ def _exchange_and_eliminate(
         present = _exchanged_terms(engine, _backward_elimination(engine, present, noise), noise)
         present = pair_exchange(engine, present, noise, 2)
         present = _backward_elimination(engine, present, noise)
+        present = engine.without_minor_orders(present, noise)
         if present.labels == before or len(present.hypothesis.terms) < engine.n_initial_terms + 2:
             break
     return engine.fit_with_noise(present.hypothesis, noise)

@@ -24,6 +24,7 @@ from winchkit.diagnosis.selection.orders import (
     periodogram,
     with_orders,
 )
+from winchkit.diagnosis.selection.scores import Projected
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -128,13 +129,21 @@ class TimeSeriesSelection(SelectionEngine):
         """Further orders of a fit's last effect that its residual contains."""
         if not has_orders(effect):
             return ()
-        least = self.penalty_per_parameter * Coordinates(effect).n_parameters
+        penalty = self.penalty_per_parameter * Coordinates(effect).n_parameters
+        projected = Projected(self.regression, self.signatures, fitted.jacobian, noise)
+        others = [
+            index
+            for index, candidate in enumerate(self.signatures.candidates)
+            if candidate.effect.id != effect.id
+        ]
+
+        def gain(residual: Array) -> float:
+            """Least decrease of χ²: an effect that explains more is added before."""
+            explained = projected.explained_ss(projected.products(residual))[others]
+            return max(penalty, float(np.max(explained, initial=0.0)))
+
         return further_orders(
-            self.regression,
-            fitted,
-            effect,
-            noise.inverse_sigma(self.regression),
-            least,
+            self.regression, fitted, effect, noise.inverse_sigma(self.regression), gain
         )
 
     @property

@@ -17,7 +17,7 @@ from winchkit.report.words.sentence import (
     still_text,
     worse_text,
 )
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, estimate_text, meaning
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, meaning, values_text
 
 __all__ = ["addition_sections", "addition_sentence"]
 
@@ -126,4 +126,4 @@ def _parameters(addition: Addition) -> Markup:
 
 
 def _values(values: Mapping[str, Estimate]) -> str:
-    return ", ".join(estimate_text(name, value) for name, value in values.items())
+    return values_text(values)

@@ -20,6 +20,7 @@ from winchkit.report.words.vocabulary import (
     clause,
     estimate_text,
     listed,
+    values_text,
 )
 
 __all__ = [
@@ -171,9 +172,9 @@ def _found(one: Diagnosis) -> str:
 
 def _step(step: Step) -> str:
     first, *others = step.effects
-    values = [estimate_text(n, e) for n, e in step.parameters.get(first, {}).items()]
+    values = values_text(step.parameters.get(first, {}))
     beside = f" (or {listed(others, 'or')})" if others else ""
-    return f"{first}{beside} {', '.join(values)}".strip()
+    return f"{first}{beside} {values}".strip()
 
 
 def _where(shared: SharedEffect) -> str:

@@ -11,9 +11,9 @@ from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VARIABLE_NAMES,
     clause,
-    estimate_text,
     kind,
     listed,
+    values_text,
 )
 
 __all__ = [
@@ -280,7 +280,7 @@ def _step(step: Step, data: str, form: str = ": {}") -> str:
 def _with_values(step: Step, effect: str, form: str, beside: str, link: str) -> str:
     """An effect in words with its values and a remark."""
     values = step.parameters.get(effect, {})
-    fitted = ", ".join(estimate_text(name, value) for name, value in values.items())
+    fitted = values_text(values)
     inside = link.join(part for part in (fitted, beside) if part)
     return clause(effect) + (form.format(inside) if inside else "")
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 
-from winchkit.diagnosis.results import Combination, Estimate
+from winchkit.diagnosis.results import Combination, Estimate, series_orders
+from winchkit.effects.series import fundamentals
 from winchkit.report.words.numbers import between, with_std
 
 __all__ = [
@@ -20,6 +22,7 @@ __all__ = [
     "meaning",
     "parameter_name",
     "parameter_unit",
+    "values_text",
 ]
 
 VERDICT_NAMES = {
@@ -118,6 +121,9 @@ _CLAUSES = {
     "torque-ripple": "the torque constant depends on the rotor position",
     "torque-lead": "the torque signal is the command, ahead of the torque",
 }
+_ORDERS_SHOWN = 8
+_MAIN_ORDERS = 0.1
+"""Share of the largest amplitude: smaller orders do not enter the guess of poles and slots."""
 _SYMBOLS = {"axial_stiffness": "EA"}
 _SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")
 
@@ -162,6 +168,26 @@ def combination_text(combination: Combination) -> str:
     """What the data determine: ``cable per motor turn = 18.7042 ± 0.0014 mm``."""
     unit = "" if combination.unit == "1" else combination.unit
     return f"{combination.name} = {with_std(combination.value, combination.std, unit)}"
+
+
+def values_text(values: Mapping[str, Estimate]) -> str:
+    """All parameters with their values; the orders of a harmonic series, the largest first."""
+    if "order_2" not in values:
+        return ", ".join(estimate_text(name, value) for name, value in values.items())
+    orders = series_orders(values)
+    largest = orders[0][1].value
+    main = [order for order, amplitude in orders if amplitude.value >= _MAIN_ORDERS * largest]
+    shown = [
+        f"{with_std(amplitude.value, amplitude.std, amplitude.unit)} at order {order}"
+        for order, amplitude in orders[:_ORDERS_SHOWN]
+    ]
+    more = len(orders) - len(shown)
+    text = ", ".join(shown) + (f" and {more} more orders" if more else "")
+    common = fundamentals(main)
+    if common:
+        text += f"; the main orders are multiples of {listed([str(k) for k in common])}"
+        text += ", as those of pole pairs and slots are"
+    return text
 
 
 def interval_text(parameter: str, estimate: Estimate) -> str:
