@@ -24,7 +24,7 @@ from winchkit.diagnosis.results import Diagnosis
 from winchkit.diagnosis.write import write_addition
 from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import load_catalogue
-from winchkit.effects.term import modifiers_of
+from winchkit.effects.term import Term, modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.runs import read_run
@@ -125,19 +125,32 @@ def error_on_test(line: Line) -> float:
 def test_it_names_friction_what_the_directions_differ_in_and_a_record_of_commands(
     answer: Diagnosis,
 ) -> None:
-    """The extra of the Stribeck curve never falls within these speeds: it may be Coulomb's."""
-    assert [step.effects for step in answer.steps] == [
-        ("motor-viscous-asymmetry",),
-        ("torque-lead",),
-        ("motor-coulomb", "motor-stribeck"),
-    ]
+    """Beyond these three there is only what depends on the position, a tenth of the friction."""
+    found = [step.effects for step in answer.steps]
+    assert found[:2] == [("motor-viscous-asymmetry",), ("torque-lead",)]
+    assert set(found[2]) <= {"motor-coulomb", "motor-stribeck"}
+    position = {name for effects in found[3:] for name in effects}
+    assert position <= {"spring-balancer", "friction-at-place"}
     assert any("no run repeats another" in note for note in answer.notes)
     values = {name: of for step in answer.steps for name, of in step.parameters.items()}
-    # The difference vanishes at standstill and grows with the speed, 38 N s/m either way.
     drag = values["motor-viscous-asymmetry"]["viscosity_difference"]
-    assert drag.value == pytest.approx(-38.0, abs=4.0)
+    assert drag.value < -20 * drag.std
     # The recorded force is a voltage times a constant: the current comes after it.
     assert 0.3e-3 < values["torque-lead"]["lead"].value < 1.2e-3
+
+
+def test_beside_coulomb_friction_the_directions_differ_by_38_newton_seconds(
+    profile: WinchProfile,
+) -> None:
+    """The difference vanishes at standstill and grows with the speed, 38 N s/m either way."""
+    catalogue = load_catalogue()
+    engine = selection_engine(prepare([run_of("train")], profile), catalogue)
+    hypothesis = engine.initial_model
+    for name in ("motor-viscous-asymmetry", "torque-lead", "motor-coulomb"):
+        hypothesis = hypothesis.with_term(Term(catalogue[name], catalogue[name].null), 1)
+    fitted, _ = engine.fit_with_noise(hypothesis)
+    drag = fitted.hypothesis.terms[2].values["viscosity_difference"]
+    assert drag == pytest.approx(-38.0, abs=4.0)
 
 
 def test_what_was_found_leaves_three_hundredths_on_another_file(
@@ -145,7 +158,7 @@ def test_what_was_found_leaves_three_hundredths_on_another_file(
 ) -> None:
     """The files differ by 2.0 % that no function of the motion explains."""
     terms = found.result.final.hypothesis.terms
-    assert error_on_test(Line(profile, modifiers_of(terms))) < 0.030
+    assert error_on_test(Line(profile, modifiers_of(terms))) < 0.029
 
 
 def test_without_friction_even_a_refitted_model_misses_a_sixth(profile: WinchProfile) -> None:
