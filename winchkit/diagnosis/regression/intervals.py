@@ -363,8 +363,9 @@ def _ends(
 ) -> dict[str, tuple[float, float]]:
     """Intervals of the values with a coordinate of their own; a polar pair has none."""
     out: dict[str, tuple[float, float]] = {}
+    polar = {name for pair in coordinates.effect.polar_pairs for name in pair}
     for index, name in enumerate(coordinates.names):
-        if name in (coordinates.effect.polar or ()):
+        if name in polar:
             continue
         at_ends = []
         for end in ends:

@@ -85,7 +85,7 @@ def combination_of_term(term: Term, covariance: ValueCovariance) -> Combination 
     has an eigenvector of the smallest eigenvalue; it is scaled to a coefficient of one for the
     first parameter.
     """
-    polar = term.effect.polar or ()
+    polar = {name for pair in term.effect.polar_pairs for name in pair}
     fitted = [name for name in Coordinates(term.effect).names if name not in polar]
     index = {name: covariance.names.index(f"{term.label}.{name}") for name in fitted}
     variance = np.diag(covariance.matrix)

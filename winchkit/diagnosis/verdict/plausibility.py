@@ -54,7 +54,8 @@ def _reasons(
         shown = f"{name} = {_text(estimate.value, parameter)}"
         known = _range(parameter, profile)
         if known is None:
-            bounds = [b for b in (parameter.low, parameter.high) if b != parameter.null]
+            ends = (parameter.low, parameter.high)
+            bounds = [b for b in ends if b != parameter.null and isfinite(b)]
             size = abs(parameter.typical - parameter.null) if isfinite(parameter.null) else 1.0
             if any(abs(estimate.value - b) <= _ROUNDING * max(size, abs(b)) for b in bounds):
                 yield f"{shown} is at a bound of the fit: {_CHECK}"
@@ -62,8 +63,8 @@ def _reasons(
         low, high, reason = known
         bottom, top = estimate.interval or (estimate.value, estimate.value)
         if max(top, estimate.value) < low or min(bottom, estimate.value) > high:
-            ends = f"{_text(low, parameter)} to {_text(high, parameter)}"
-            yield f"{shown} is beyond the plausible range ({ends}; {reason}): {_CHECK}"
+            span = f"{_text(low, parameter)} to {_text(high, parameter)}"
+            yield f"{shown} is beyond the plausible range ({span}; {reason}): {_CHECK}"
 
 
 def _range(parameter: Parameter, profile: WinchProfile | None) -> tuple[float, float, str] | None:
