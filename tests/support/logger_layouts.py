@@ -150,6 +150,28 @@ def _twincat(path: Path) -> None:
     path.write_text("\n".join([*lines, *_rows(columns, "\t", ",")]) + "\n", encoding="utf-8")
 
 
+def _twincat_shared(path: Path) -> None:
+    """One time for channels of one rate; rows are shorter once the slower channels have ended."""
+    m = motion()
+    every = slice(0, ROWS, 2)
+    lines = ["Name\tScope", "File\tlift.csv", "", ""]
+    for key, fast, slow in (
+        ("Name", "fActPos\tfActVelo\tfActTorque", "fCellForce"),
+        ("SymbolComment", "\t\t", ""),
+        ("Data-Type", "REAL64\tREAL64\tREAL64", "REAL64"),
+        ("SampleTime[ms]", "10\t10\t10", "20"),
+        ("VariableSize", "8\t8\t8", "8"),
+        ("Unit", "° (Angle)\t1/min\tNm (Torque)", "N (Force)"),
+    ):
+        lines.append(f"{key}\t{fast}\t{key}\t{slow}")
+    lines.append("")
+    fast_rows = _rows([m.time * 1e3, m.angle * _DEG, m.velocity * _RPM, m.torque], "\t", ",")
+    slow_rows = _rows([m.time[every] * 1e3, m.tension[every]], "\t", ",")
+    for k, row in enumerate(fast_rows):
+        lines.append(f"{row}\t{slow_rows[k]}" if k < len(slow_rows) else row)
+    path.write_text("\n".join([*lines, "EOF"]) + "\n", encoding="utf-8")
+
+
 def _lvm(
     columns: Sequence[Array | list[str]], names: str, step: str, decimal: str
 ) -> Callable[[Path], None]:
@@ -553,6 +575,7 @@ def _unusual() -> list[Layout]:
              "Index;Position [deg];Velocity [rpm];Torque [Nm];Force [N]"], ";")),
         Layout("row-of-types", ".csv", _text(deg_rpm, [
             "Time,Pos,Vel,Trq,Frc", "REAL,LREAL,LREAL,REAL,REAL", "s,°,1/min,Nm,N"])),
+        Layout("twincat-scope-shared-times", ".csv", _twincat_shared),
         Layout("markdown", ".md", lambda path: path.write_text(
             "| t [s] | pos [deg] | vel [rpm] | torque [Nm] | force [N] |\n|---|---|---|---|---|\n"
             + "".join(f"| {line} |\n" for line in _rows(deg_rpm, " | ")), encoding="utf-8")

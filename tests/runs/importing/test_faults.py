@@ -76,6 +76,19 @@ def test_faults_of_unused_columns_do_not_matter(tmp_path: Path) -> None:
     assert len(run(tmp_path / "log.csv", lines)) == 30
 
 
+def test_a_header_with_more_numbers_than_the_rows_ends_at_its_mark(tmp_path: Path) -> None:
+    """LabVIEW: the rows of a short recording are fewer than the numeric lines of the header."""
+    mark = "***End_of_Header***"
+    head = ["LabVIEW Measurement", "Separator\tTab", mark, "", "Channels\t3", "Samples\t5\t5\t5"]
+    head += [f"{key}\t0.01\t0.01\t0.01" for key in ("X0", "Delta_X", "Gain", "Zero")]
+    head += [mark, "X_Value\tAngle (deg)\tUntitled\tForce (N)\tComment"]
+    lines = [*head, *(f"{0.01 * k:.2f}\t{k}\t\t{100 + k}" for k in range(5))]
+    found = run(tmp_path / "log.lvm", lines)
+    assert len(found) == 5
+    assert set(found) == {"motor_angle", "tension"}
+    assert found["tension"].tolist() == [100, 101, 102, 103, 104]
+
+
 def test_repeated_rows_are_left_out_with_a_note(tmp_path: Path) -> None:
     lines = [HEAD, *rows()]
     lines.insert(5, lines[4])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -44,7 +44,7 @@ _SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "effort", "
 _GAINS = {"gtau", "ktau", "kt", "km", "torqueconstant", "torquegain", "gf", "forcegain"}
 
 
-@dataclass
+@dataclass(eq=False)
 class _Column:
     """A chosen column while its unit is determined."""
 
@@ -107,6 +107,7 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     _by_convention(work)
     _ask_units(work)
     rate = _rate(work)
+    _drop_clocks(work)
     _ask_columns(work, choice)
     assigned = {item.column.source: _assignment(item) for item in work.columns}
     unused = {
@@ -437,6 +438,17 @@ def _rate(work: _Work) -> float | None:
         )
         return 1 / work.table.interval
     return None
+
+
+def _drop_clocks(work: _Work) -> None:
+    """Leave out time columns of which no channel is used, where there are others."""
+    clocks = [item for item in work.columns if item.base == "time"]
+    channels = [item for item in work.columns if item.base not in {"time", DATE}]
+    needed = [clock for item in channels if (clock := _clock_of(work, item)) is not None]
+    for clock in clocks:
+        if needed and not any(clock is item for item in needed):
+            clock.candidate = replace(clock.candidate, reason="no channel of this clock is used")
+            work.columns.remove(clock)
 
 
 def _ask_columns(work: _Work, choice: Choice) -> None:

@@ -122,9 +122,7 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
         Of equal candidates the one with more cells in a row.
     """
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "%"))]
-    step = max(1, len(filled) // _SAMPLED)
-    # The last line may be cut off; the first ones are a header.
-    sample = filled[-1 - step * (_SAMPLED - 1) : -1 : step] if len(filled) > _SAMPLED else filled
+    sample = _blocks(filled)
     best: tuple[float, Dialect] | None = None
     for delimiter in _DELIMITERS:
         split = [split_line(line, delimiter) for line in sample]
@@ -135,6 +133,18 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
             if candidate is not None and (best is None or candidate[0] > best[0]):
                 best = candidate
     return None if best is None else best[1]
+
+
+def _blocks(lines: Sequence[str]) -> list[str]:
+    """Blocks of neighbouring lines: every n-th line may have whole numbers only.
+
+    The first lines are a header, and the last one may be cut off.
+    """
+    if len(lines) <= _SAMPLED:
+        return list(lines)
+    size = _SAMPLED // 3
+    starts = (len(lines) // 4, len(lines) // 2, len(lines) - size - 1)
+    return [line for start in starts for line in lines[start : start + size]]
 
 
 def _rated(

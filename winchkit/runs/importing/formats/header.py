@@ -14,21 +14,30 @@ from itertools import pairwise
 from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.unit_spelling import is_unit_row, read_unit, split_unit
 
-__all__ = ["Header", "read_header"]
+__all__ = ["KEYS", "Header", "keyed_width", "read_header"]
 
 Row = tuple[int, list[str]]
 """Line number and cells."""
 _COMMENT = re.compile(r"^\s*[#%!;*/]+\s*")
+_NAME = "Name"
+KEYS = frozenset(
+    (
+        *(_NAME, "SymbolComment", "Data-Type", "SampleTime", "SampleTime[ms]", "VariableSize"),
+        *("SymbolBased", "IndexGroup", "IndexOffset", "SymbolName", "NetID", "NetId", "Port"),
+        *("Offset", "ScaleFactor", "BitMask", "Unit", "Unit ScaleFactor", "Unit Offset"),
+    )
+)
+"""Keys of a TwinCAT Scope export."""
 _RULE = re.compile(r":?[-=_+]{2,}:?")
 _ROW_LABELS = {"type", "name", "id", "parent", "unit", "units", "description", "channel"}
 _IDENTIFIER = re.compile(r"[0-9A-Fa-f]{8,}(-[0-9A-Fa-f]{4,})*|\d+")
-_RATE_KEYS = re.compile(
+_RATEKEYS = re.compile(
     r"(export frame rate|capture frame rate|frame rate|sample ?rate|sampling ?rate|"
     r"sample frequency|sampling frequency|abtastrate|messrate|frequenz|frequency|rate|fs)\W*"
     r"(?P<unit>k?hz)?\W*",
     re.IGNORECASE,
 )
-_STEP_KEYS = re.compile(
+_STEPKEYS = re.compile(
     r"(delta_x|sample ?time|sampling ?time|sample ?interval|sampling ?interval|sample ?period|"
     r"sampling ?period|abtastzeit|abtastintervall|zykluszeit|cycle ?time|dt)"
     r"\W*(?P<unit>[mun]?s)?\W*",
@@ -78,7 +87,7 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     ]
     if is_blank:
         block = [_with_brackets(cells, width) for cells in block]
-    header = _pairs(block, width) or _stacked(block, width)
+    header = _keyed(block, width) or _stacked(block, width)
     header.metadata.update(_metadata([[" ".join(c)] if is_blank else c for c in above]))
     header.rows = tuple(tuple(cells) for _, cells in rows[cut:] if any(cells))
     header.interval = header.interval or _interval(header.metadata, decimal)
@@ -91,6 +100,7 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: 
     while cut and not any(rows[cut - 1][1]):
         cut -= 1
     end = cut
+    keys = KEYS if keyed_width(rows) else frozenset()
     while cut:
         if _is_rule(rows[cut - 1][1]):
             cut -= 1
@@ -103,6 +113,9 @@ def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: 
         fits = (len(cells) <= width + 1 and not is_comment) or len(cells) == width
         fits = fits or (is_blank and len([c for c in cells if c[:1] not in "(["]) == width)
         fits = fits and (spread or 2 * len(given) >= width)
+        if given and not is_comment and cells[0] in keys:
+            cut -= 1
+            continue
         if not given or not fits or (not texts and not spread):
             break
         if len(given) == 1 and width > 1:
@@ -154,27 +167,47 @@ def _padded(cells: Sequence[str], width: int) -> list[str]:
     return [*cells, *[""] * (width - len(cells))][:width]
 
 
-def _pairs(block: list[list[str]], width: int) -> Header | None:
-    """Pairs of key and value for each column: ``Name, x, Name, y`` and ``Unit, mm, Unit, N``."""
-    keyed: dict[str, list[str]] = {}
-    for cells in block:
-        padded = _padded(cells, width)
-        keys = {cell for cell in padded[0::2] if cell}
-        if len(keys) != 1 or width % 2 or width < 2:
-            return None
-        keyed[keys.pop()] = padded[1::2]
-    if "Name" not in keyed:
+def keyed_width(rows: Sequence[Row]) -> int:
+    """Cells of the row of names of a TwinCAT Scope export; 0 in another file.
+
+    Parameters
+    ----------
+    rows : sequence of (int, list of str)
+        The first rows of the file.
+
+    Returns
+    -------
+    int
+        Rows of numbers have fewer cells once the slower channels have ended.
+    """
+    for (_, cells), (_, below) in pairwise([row for row in rows if any(row[1])]):
+        starts = [n for n, cell in enumerate(cells) if cell == _NAME]
+        if starts[:1] == [0] and len(cells) > len(starts) and below[0] in KEYS - {_NAME}:
+            same = [n for n in starts if n < len(below) and below[n] == below[0]]
+            if same == starts:
+                return len(cells)
+    return 0
+
+
+def _keyed(block: list[list[str]], width: int) -> Header | None:
+    """Rows ``Name, x, y, Name, z`` and ``Unit, mm, N, Unit, V``: a time before its channels."""
+    names = next((cells for cells in block if cells[:1] == [_NAME]), None)
+    if names is None or not keyed_width([(0, cells) for cells in block]):
         return None
-    units = keyed.get("Unit", [""] * (width // 2))
-    steps = next((v for key, v in keyed.items() if key.lower().startswith("sampletime")), None)
-    names, spelled, labels = [], [], []
-    for name, unit in zip(keyed["Name"], units, strict=True):
+    names = _padded(names, width)
+    keyed = {cells[0]: _padded(cells, width) for cells in block if cells}
+    units = keyed.get("Unit", [""] * width)
+    has_steps = any(key.lower().startswith("sampletime") for key in keyed)
+    found = Header([], [], [])
+    for index, name in enumerate(names):
         plain, own = split_unit(name)
-        known = unit if read_unit(unit) else own
-        names += ["time", plain]
-        spelled += ["ms" if steps else "", known]
-        labels += [(name,), ()]
-    return Header(names, spelled, labels)
+        is_time = name == _NAME
+        following = names[index + 1] if is_time and index + 1 < width else ""
+        found.names.append("time" if is_time else plain or str(index + 1))
+        unit = units[index] if read_unit(units[index]) else own
+        found.units.append(("ms" if has_steps else "") if is_time else unit)
+        found.labels.append((following,) if is_time else ())
+    return found
 
 
 def _stacked(block: list[list[str]], width: int) -> Header:
@@ -244,7 +277,7 @@ def _interval(metadata: dict[str, str], decimal: str) -> float | None:
     """Sampling interval that the metadata declare, s."""
     for key, value in metadata.items():
         text = key.strip()
-        for pattern, is_rate in ((_RATE_KEYS, True), (_STEP_KEYS, False)):
+        for pattern, is_rate in ((_RATEKEYS, True), (_STEPKEYS, False)):
             match = pattern.fullmatch(text)
             if match is None:
                 continue

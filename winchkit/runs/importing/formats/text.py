@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import overload
 
@@ -19,7 +19,7 @@ from winchkit.runs.importing.formats.dialect import (
     find_dialect,
     split_line,
 )
-from winchkit.runs.importing.formats.header import Header, Row, read_header
+from winchkit.runs.importing.formats.header import KEYS, Header, Row, keyed_width, read_header
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.table import Column, Table, named_apart
 
@@ -27,6 +27,9 @@ __all__ = ["read_text_table", "table_of_rows"]
 
 _AHEAD = 3
 _BLOCK = 4096
+_HEAD = 60
+"""Lines in which a header ends."""
+_END_OF_HEADER = "***End_of_Header***"
 _TEXT_SHARE = 0.2
 """Share of texts above which a column is one of text, and not one of numbers with faults."""
 
@@ -52,7 +55,7 @@ def read_text_table(path: str, data: bytes) -> Table:
         For a binary file, and for one without rows of numbers.
     """
     lines, encoding = decode(data, path)
-    dialect = find_dialect(lines)
+    dialect = find_dialect(lines[_end_of_header(lines) :])
     if dialect is None:
         shown = next((line for line in lines if line.strip()), "")[:60]
         message = f"has no rows of numbers; its first line is {shown!r}"
@@ -71,6 +74,12 @@ def read_text_table(path: str, data: bytes) -> Table:
         notes=table.notes,
         interval=table.interval,
     )
+
+
+def _end_of_header(lines: Sequence[str]) -> int:
+    """Line after the mark by which LabVIEW ends its headers, which have numbers as well; else 0."""
+    marks = [n for n, line in enumerate(lines[:_HEAD]) if line.startswith(_END_OF_HEADER)]
+    return marks[-1] + 1 if marks else 0
 
 
 class _SplitLines(Sequence[Row]):
@@ -180,13 +189,17 @@ def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended:
     Table
         Columns without a name and without values are left out.
     """
-    first = _first_of_numbers(rows, dialect)
+    head = [rows[n] for n in range(min(len(rows), _HEAD))]
+    is_padded = bool(keyed := keyed_width(head))
+    if is_padded:
+        dialect = replace(dialect, width=keyed)
+    first = _first_of_numbers(rows, dialect, is_keyed=is_padded)
     if first is None:
         raise RunError(Fault("has no rows of numbers", path))
     header = read_header(
         rows[:first], dialect.width, dialect.decimal, is_blank=dialect.delimiter == BLANKS
     )
-    found = _kept(path, rows, first, header, dialect, is_ended=is_ended)
+    found = _kept(path, rows, first, header, dialect, is_ended=is_ended, is_padded=is_padded)
     columns = named_apart([c.column(header, n) for n, c in enumerate(found.columns)])
     lines = np.array(found.lines, dtype=np.intp)
     return Table(
@@ -211,9 +224,13 @@ def _is_numeric(cells: Sequence[str], dialect: Dialect) -> bool:
     return bool(certain) and 2 * len(values) > len(given)
 
 
-def _first_of_numbers(rows: Sequence[Row], dialect: Dialect) -> int | None:
+def _first_of_numbers(rows: Sequence[Row], dialect: Dialect, *, is_keyed: bool) -> int | None:
     """Index of the first row of numbers that further ones follow."""
-    for index, (_, cells) in enumerate(rows):
+    head = [rows[n][1][:1] for n in range(min(len(rows), _HEAD))]
+    keys = {_END_OF_HEADER, *(KEYS if is_keyed else ())}
+    marks = [n for n, first in enumerate(head) if first and first[0] in keys]
+    for index in range(marks[-1] + 1 if marks else 0, len(rows)):
+        cells = rows[index][1]
         if not _is_numeric(cells, dialect):
             continue
         after = [c for _, c in rows[index + 1 : index + 1 + 3 * _AHEAD] if any(c)][:_AHEAD]
@@ -230,6 +247,7 @@ def _kept(
     dialect: Dialect,
     *,
     is_ended: bool,
+    is_padded: bool,
 ) -> _Rows:
     """Rows of numbers without blank lines, comments and repeated headers."""
     width = dialect.width
@@ -241,6 +259,8 @@ def _kept(
         if not any(given):
             continue
         cells = given[:-1] if len(given) == width + 1 and not given[-1] else given
+        if is_padded and len(cells) < width and cells[0].upper() != "EOF":
+            cells = [*cells, *[""] * (width - len(cells))]
         is_title = cells[0] in titles and tuple(cells) in header.rows
         if len(cells) == width and not is_title:
             found.add(line, cells)
