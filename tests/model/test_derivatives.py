@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.model.derivatives import with_turning_points
+from winchkit.model.derivatives import Clock, with_turning_points
 
 
 @given(st.floats(0.02, 0.97), st.floats(0.5, 40.0))
@@ -42,3 +42,10 @@ def test_a_rest_is_no_turn() -> None:
     still = np.array([0.0, 1.0, 2.0, 2.0, 2.0, 1.0])
     turned, _ = with_turning_points(still)
     assert np.array_equal(turned, still)
+
+
+@given(st.integers(2, 60), st.integers(0, 2**32 - 1))
+def test_differences_are_numpys_gradient_on_uneven_samples(count: int, seed: int) -> None:
+    random = np.random.default_rng(seed)
+    time, x = np.cumsum(random.uniform(0.01, 0.03, count)), random.standard_normal(count)
+    assert Clock(time).differences(x) == pytest.approx(np.gradient(x, time), rel=1e-12)

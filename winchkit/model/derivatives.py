@@ -159,7 +159,26 @@ class Clock:
         """First derivative between neighbours, (n,)."""
         if self.spline is not None:
             return self.spline.smoothed(x, 1)
-        return np.asarray(np.gradient(x, self.time))
+        return self.differences(x)
+
+    def differences(self, x: Array) -> Array:
+        """First derivative between neighbours by differences, as by ``numpy.gradient``, (n,)."""
+        if len(x) < 3:
+            return np.asarray(np.gradient(x, self.time))
+        before, here, after, steps = self._weights
+        out = np.empty(len(x))
+        out[1:-1] = before * x[:-2] + here * x[1:-1] + after * x[2:]
+        out[0] = (x[1] - x[0]) / steps[0]
+        out[-1] = (x[-1] - x[-2]) / steps[-1]
+        return out
+
+    @cached_property
+    def _weights(self) -> tuple[Array, Array, Array, Array]:
+        """Weights of a sample and its neighbours in its difference, (n − 2,), and the steps."""
+        steps = np.diff(self.time)
+        left, right = steps[:-1], steps[1:]
+        both = left + right
+        return -right / (left * both), (right - left) / (left * right), left / (right * both), steps
 
     def wide_gradient(self, x: Array) -> Array:
         """First derivative over at least ±20 ms, (n,)."""
@@ -207,11 +226,13 @@ class Clock:
 def _by_number(x: Array) -> Array:
     if len(x) < 2:
         return np.ones_like(x)
-    out = np.gradient(x)
-    if len(x) >= 7:
-        one, two, three = (x[3 + k : len(x) - 3 + k] - x[3 - k : len(x) - 3 - k] for k in (1, 2, 3))
-        out[3:-3] = (45 * one - 9 * two + three) / 60
-    return np.asarray(out)
+    if len(x) < 7:
+        return np.asarray(np.gradient(x))
+    out = np.empty(len(x))
+    out[:3], out[-3:] = np.gradient(x[:4])[:3], np.gradient(x[-4:])[1:]
+    one, two, three = (x[3 + k : len(x) - 3 + k] - x[3 - k : len(x) - 3 - k] for k in (1, 2, 3))
+    out[3:-3] = (45 * one - 9 * two + three) / 60
+    return out
 
 
 def shifted(signal: Array, time: Array, later: float) -> Array:

@@ -209,7 +209,7 @@ class Line:
         rest = clock.sharp_gradient(longer) - paid_out
         added = clock.sharp_gradient(paid_out) + clock.wide_gradient(rest)
         if motion.rounded:
-            twice = np.gradient(np.gradient(longer, at.time), at.time)
+            twice = clock.differences(clock.differences(longer))
             added = added + motion.rounded * (twice - added)
         return load - motion.load_mass * added
 
