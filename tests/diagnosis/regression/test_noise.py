@@ -189,6 +189,10 @@ def test_without_repeats_noise_is_the_residual_of_the_saturated_model() -> None:
     assert np.std(regression.in_time(residual)[0]) > 20 * SIZE
     noise = noise_saturated(regression, residual, columns)
     assert not noise.from_repeats
+    # Two columns take two degrees of freedom, and a third that repeats them none.
+    assert np.sum(noise.dof) == pytest.approx(regression.n_rows - 2)
+    doubled = noise_saturated(regression, residual, columns, 3 * columns[:, :1])
+    assert doubled.power == pytest.approx(noise.power, rel=1e-6)
     assert noise.rms["cable_length"] == pytest.approx(SIZE, rel=0.06)
     quiet = lack_of_fit_test(regression, residual, columns, noise)
     assert np.isnan(quiet.p_value)

@@ -14,7 +14,9 @@ Whittle likelihood. J. Am. Stat. Assoc. 89, 600-610.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +41,7 @@ _KNOWN_DIFFERENCES = 6
 _NOTICEABLE = 0.02
 _REWEIGHTED = 3
 _ROWS_EACH = 4
+_LEAST_EIGENVALUE = 1e-8
 
 
 @dataclass(frozen=True)
@@ -142,7 +145,7 @@ def noise_from_repeats(
     return Noise(power, dof, _rms(regression, power), from_repeats=True)
 
 
-def noise_saturated(regression: Regression, residual: Array, columns: Array) -> Noise:
+def noise_saturated(regression: Regression, residual: Array, *columns: Array) -> Noise:
     """Noise variance of the residual beside all candidate effects (saturated model).
 
     Parameters
@@ -152,10 +155,11 @@ def noise_saturated(regression: Regression, residual: Array, columns: Array) -> 
     residual
         Measured minus predicted, shape (n_rows,).
     columns
-        Derivatives by the unknowns and signatures of all candidates, shape (n_rows, p).
+        Derivatives by the unknowns and signatures of all candidates, shape (n_rows, p) in parts.
 
     Notes
     -----
+    Only inner products per band are formed: an orthonormal basis would be as large as the columns.
     The first weights are equal within an output: weights from the residual itself would be smallest
     at the frequencies at which an effect is missing. Three iterations of reweighting follow. An
     effect outside the catalogue is counted as noise.
@@ -164,16 +168,55 @@ def noise_saturated(regression: Regression, residual: Array, columns: Array) -> 
     bands = regression.band_of_row
     total = sums_per_band(np.ones(regression.n_rows), bands, count)
     power = _even(regression, residual)
+    gram, products = _inner_products(regression, residual, columns)
     for _ in range(_REWEIGHTED):
-        inverse_sigma = 1 / np.sqrt(power[bands])
-        basis = orthonormal(
-            columns * inverse_sigma[:, None], _fewest_rows(regression) // _ROWS_EACH
+        through = _orthonormalizing(
+            np.tensordot(1 / power, gram, axes=1), _fewest_rows(regression) // _ROWS_EACH
         )
-        whitened = residual * inverse_sigma
-        left = (whitened - basis @ (basis.T @ whitened)) / inverse_sigma
-        dof = np.maximum(total - sums_per_band(np.sum(basis**2, axis=1), bands, count), 1.0)
+        amplitudes = through @ (through.T @ ((1 / power) @ products))
+        left, first = residual.copy(), 0
+        for part in columns:
+            left -= part @ amplitudes[first : first + part.shape[1]]
+            first += part.shape[1]
+        leverage = np.sum((gram @ through) * through, axis=(1, 2)) / power
+        dof = np.maximum(total - leverage, 1.0)
         power = _power(regression, left, bands, dof)
     return Noise(power, dof, _rms(regression, power), from_repeats=False)
+
+
+def _inner_products(
+    regression: Regression, residual: Array, columns: Sequence[Array]
+) -> tuple[Array, Array]:
+    """Inner products of columns per band, (n_bands, p, p), and with the residual, (n_bands, p)."""
+    p, count = sum(part.shape[1] for part in columns), len(regression.bands)
+    gram, products = np.zeros((count, p, p)), np.zeros((count, p))
+    for segment in regression.segments:
+        ids = regression.band_of_row[segment.rows]
+        edges = np.flatnonzero(np.diff(ids, prepend=-1, append=-1))
+        for low, high in pairwise((segment.rows.start + edges).tolist()):
+            band = int(regression.band_of_row[low])
+            own = np.hstack([part[low:high] for part in columns])
+            gram[band] += own.T @ own
+            products[band] += own.T @ residual[low:high]
+    return gram, products
+
+
+def _orthonormalizing(inner: Array, most: int) -> Array:
+    """V for which columns of these inner products times V are orthonormal, (p, rank).
+
+    As :func:`~winchkit.diagnosis.regression.projection.orthonormal`, from the inner products alone.
+    """
+    size = np.sqrt(np.diag(inner))
+    present = size > 0
+    if not present.any():
+        return np.zeros((len(inner), 0))
+    scaled = inner[np.ix_(present, present)] / np.outer(size[present], size[present])
+    values, vectors = np.linalg.eigh(scaled)
+    kept = values > _LEAST_EIGENVALUE * values[-1]
+    kept[: max(0, len(values) - most)] = False
+    out = np.zeros((len(inner), int(np.count_nonzero(kept))))
+    out[present] = (vectors[:, kept] / np.sqrt(values[kept])) / size[present, None]
+    return out
 
 
 def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:

@@ -65,8 +65,7 @@ class TimeSeriesSelection(SelectionEngine):
             offsets = jacobian[:, : self.regression.n_run_offsets]
             own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
             return noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
-        columns = np.hstack([jacobian, self.signatures.columns])
-        return noise_saturated(self.regression, residual, columns)
+        return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
 
     def coarse_problem(self, noise: Noise) -> CoarseProblem | None:
         """Every k-th sample of one run of each set of repeats, under this noise."""
