@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.signal import butter, sosfilt
 
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.finding import Finding
@@ -223,6 +224,15 @@ def test_velocity_against_angle(change: Callable[[Array], Array], code: str, wor
     findings = [f for f in inspect_run(Run("r", time, channels)) if f.channel == "motor_velocity"]
     assert [f.code for f in findings] == ([code] if code else [])
     assert all(word in f.text for f in findings)
+
+
+@given(SEEDS, st.floats(0.02, 0.16), st.integers(3, 6))
+@settings(max_examples=40, deadline=None)
+def test_a_filter_of_the_logger_is_a_low_pass(seed: int, share: float, order: int) -> None:
+    cut_off = share * RATE
+    filtered = sosfilt(butter(order, cut_off, fs=RATE, output="sos"), tension(seed))[100:]
+    (finding,) = found(run_of(np.asarray(filtered)), "low-pass")
+    assert 0.4 * cut_off < finding.value < 2 * cut_off
 
 
 def test_a_jerk_is_no_spike() -> None:

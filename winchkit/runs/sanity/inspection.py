@@ -9,6 +9,7 @@ import numpy as np
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.consistency import velocity_consistency
 from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.low_pass import low_pass
 from winchkit.runs.sanity.outliers import outliers
 from winchkit.runs.sanity.quantisation import quantised
 from winchkit.runs.sanity.repeated_values import constant, repeated_values
@@ -54,3 +55,4 @@ def _channel(run: Run, name: str, *, is_instrument: bool) -> Iterator[Finding]:
     yield from repeated_values(run, name)
     if is_instrument:
         yield from saturated(run, name)
+        yield from low_pass(run, name)
