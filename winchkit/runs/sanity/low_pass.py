@@ -3,7 +3,7 @@
 The noise of an instrument is nearly white up to half the sampling rate. Where the spectrum still
 falls by 15 dB in the last octave, or has only the rounding of the file there, a filter of at least
 third order or a long average was applied: neighbouring samples are then not independent. Filters of
-lower order are not found: the spectra of jerks and steps fall as they do.
+lower order are not found: the spectra of sudden accelerations and steps fall as they do.
 
 References
 ----------
@@ -33,7 +33,7 @@ _LEAST_BLOCKS = 6
 
 
 def low_pass(run: Run, name: str) -> Iterator[Finding]:
-    """A cut-off below half the sampling rate; value: the frequency from which the noise falls, Hz."""
+    """A cut-off below half the sampling rate; value: from which the noise falls, Hz."""
     values = run[name]
     power = _spectrum(values[np.isfinite(values)])
     if power is None:
