@@ -121,7 +121,7 @@ def without_copies(
 
 def _finding(run: Run, kept: Run, share: float) -> Finding:
     text = (
-        f"{share:.0%} of its rows are those of {kept.name}, with the same noise to within "
+        f"{100 * share:.0f} % of its rows are those of {kept.name}, with the same noise to within "
         "rounding: a copy, no repeat, and left out"
     )
     return Finding(COPIES, run.name, "time", share, text)
