@@ -12,14 +12,17 @@ from scipy.linalg import null_space
 from scipy.optimize import brentq, minimize
 
 from calibration_cases import Truth, robot
-from robot_poses.truth import HOME, turn
+from robot_poses.truth import GRAVITY, HOME, turn
 from winchkit.arrays import Array
 from winchkit.calibration.robot import pose_design as robot_next
 from winchkit.calibration.robot.calibrate import calibrate, split
 from winchkit.calibration.robot.prediction import rms
 from winchkit.errors import UsageError
-from winchkit.model.robot import Robot, lengths, robot_of, rotation_of
+from winchkit.model.robot import Pose, Robot, lengths, robot_of, rotation_of
+from winchkit.model.robot.hanging_balance import hanging_balance
+from winchkit.model.robot.pose_estimation import moved_pose
 from winchkit.runs.poses import Measured
+from winchkit.schema.profiles.winch import WinchProfile
 
 CENTRE = np.array([0.0, 0.0, -0.05])
 ROPES, COUNT = 4, 60
@@ -143,6 +146,103 @@ def test_proposed_poses_are_such_that_it_rests_there() -> None:
         free = null_space(slope.T)
         assert free.shape == (6, 2)
         np.testing.assert_allclose(free.T @ rise, 0.0, atol=1e-6)
+
+
+MASS = 3.0
+
+
+def forces(pose: Array) -> Array:
+    """Cable forces at rest by virtual work: a cable that gets longer pulls back with its force."""
+    ends = [(pose + step, pose - step) for step in np.eye(6) * 1e-6]
+    slope = np.array([(ropes(a) - ropes(b)) / 2e-6 for a, b in ends])
+    rise = np.array([(height(a) - height(b)) / 2e-6 for a, b in ends])
+    found, _, _, _ = np.linalg.lstsq(slope, -MASS * GRAVITY * rise, rcond=None)
+    assert np.max(np.abs(slope @ found + MASS * GRAVITY * rise)) < 1e-4
+    return np.asarray(found)
+
+
+def without_tracker(count: int, seed: int, ratio: tuple[float, ...]) -> tuple[Robot, Measured]:
+    """The true robot, and swivels, cells and roll and pitch of an IMU at poses at rest."""
+    rng = np.random.default_rng(seed)
+    home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
+    poses = []
+    for _ in range(count):
+        about = home + np.concatenate([rng.uniform(-0.12, 0.12, 3), np.zeros(3)])
+        poses.append(rest(ropes(about) + rng.uniform(-0.012, 0.012, ROPES), about))
+    shorter = (ropes(home) - np.array([ropes(pose) for pose in poses])).tolist()
+    motor = np.array([[wound_in(i, s) * ratio[i] for i, s in enumerate(row)] for row in shorter])
+    swivel = np.array([[swivel_of(pose, i) + 0.3 * i - 1 for i in range(ROPES)] for pose in poses])
+    pull = np.array([forces(pose) for pose in poses])
+    angles = np.array(poses)[:, 3:] + rng.normal(0, 5e-4, (count, 3))
+    angles[:, 2] = np.nan
+    nothing = np.full((count, ROPES), np.nan)
+    measured = Measured(
+        motor_angle=motor + rng.normal(0, ENCODER, motor.shape),
+        position=np.full((count, 3), np.nan),
+        angles=angles,
+        swivel=swivel + rng.normal(0, ANGLE, swivel.shape),
+        cable_length=nothing,
+        tension=pull + rng.normal(0, 0.05, pull.shape),
+        temperature=nothing,
+        run=np.zeros(count, dtype=np.intp),
+        place=np.array([f"row {n + 1}" for n in range(count)]),
+    )
+    profile, own = believed(home).profile, truth()
+    lines = tuple(
+        replace(line, exit_point=own.exit[i], anchor_point=own.anchor[i])
+        for i, line in enumerate(profile.line)
+    )
+    drums = []
+    for i, line in enumerate(lines):
+        assert isinstance(line.winch, WinchProfile)
+        drum = replace(line.winch.drum, winding_radius=own.winding[i], layer_growth=own.growth)
+        drums.append(
+            replace(line, swivel_radius=own.swivel[i], winch=replace(line.winch, drum=drum))
+        )
+    platform = replace(profile.platform, mass=MASS)
+    return robot_of(replace(profile, line=tuple(drums), platform=platform, prior={})), measured
+
+
+def swivel_of(pose: Array, line: int) -> float:
+    x, y, z, *angles = pose.tolist()
+    arm = np.array(turn(*angles)) @ np.array(truth().anchor[line])
+    seen = np.array([x, y, z]) + arm - np.array(truth().exit[line])
+    return float(np.arctan2(seen[1], seen[0]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [2, 0])
+def test_a_ratio_is_named_on_its_winch_without_a_tracker(wrong: int) -> None:
+    """Statics of the hanging platform take part: without tensions the ratio is not determined."""
+    ratio = tuple(1.01 if i == wrong else 1.0 for i in range(ROPES))
+    nominal, measured = without_tracker(50, 5, ratio)
+    found = calibrate(nominal, *split(measured))
+    assert found.solution.converged
+    assert "balance" in found.weights.sigma
+    (told,) = (text for text in found.warnings if "the cable per motor turn differs" in text)
+    assert told.startswith(f"line {wrong + 1}: the cable per motor turn differs by -")
+    share = float(told.split("differs by ")[1].split()[0])
+    assert share == pytest.approx(-100 * 0.01 / 1.01, abs=0.25)
+
+
+@pytest.mark.slow
+def test_no_ratio_is_named_where_all_are_right() -> None:
+    nominal, measured = without_tracker(50, 6, (1.0,) * ROPES)
+    found = calibrate(nominal, *split(measured))
+    assert not any("the cable per motor turn differs" in text for text in found.warnings)
+
+
+def test_the_equilibrium_has_the_derivatives_of_its_residual() -> None:
+    nominal, measured = without_tracker(3, 7, (1.0,) * ROPES)
+    rng = np.random.default_rng(1)
+    pose = Pose(HOME + rng.normal(0, 0.05, (3, 3)), rotation_of(*rng.normal(0, 0.05, (3, 3))))
+    platform = nominal.platform
+    found = hanging_balance(nominal.geometry, pose, measured.tension, platform)
+    step = 1e-4 * rng.normal(size=(3, 6))
+    there = hanging_balance(nominal.geometry, moved_pose(pose, step), measured.tension, platform)
+    back = hanging_balance(nominal.geometry, moved_pose(pose, -step), measured.tension, platform)
+    change = (there.residual - back.residual) / 2
+    np.testing.assert_allclose((found.by_pose @ step[..., None])[..., 0], change, atol=1e-6)
 
 
 def test_motor_angles_alone_are_not_enough_for_four_cables() -> None:

@@ -56,6 +56,9 @@ _NAMES = {"rope": "lengths by the drums", "position": "positions"}
 _LARGEST_ERROR = 0.05
 """Held-out position error as a share of the largest distance of two exit points, above which a
 robot is not called calibrated (rule of thumb: far above any camera, far below a wrong pose)."""
+_ODD_SIGMAS, _ODD_SHARE = 5.0, 0.005
+"""Change of one line's cable per motor turn against the others' above which it is reported, in
+standard deviations and as a share (rule of thumb: above tolerances of drums)."""
 _WORSE_ROTATION = 1.5
 """Ratio of the held-out rotation errors after and before above which a warning is due."""
 _COARSE_RATIO = 5.0
@@ -214,6 +217,7 @@ def calibrate(
             *_instrument_notes(declared, chosen),
             *_warnings(equations, solution, weights, observed, after.unfound),
             *_worse_rotation(before, after),
+            *_odd_ratios(equations, solution),
         ),
         found_instruments=chosen.free
         - (declared.instruments.free if declared.instruments else frozenset()),
@@ -324,6 +328,33 @@ def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
             "datum of the platform: its anchor points at the home pose; a common shift of all "
             "anchor points and of the home pose is the same as another reflector offset"
         )
+    return out
+
+
+def _odd_ratios(equations: Equations, solution: Solution) -> list[str]:
+    """Lines whose cable per motor turn differs from that of the others by more than five sigma.
+
+    The contrast of one line's relative change with the mean of the others' is free of a scale that
+    all lengths of a robot without a tracker share.
+    """
+    parameters = equations.parameters
+    block, names = parameters.block["winding_radius"], equations.robot.names
+    scale = parameters.std
+    posterior = np.linalg.inv(solution.linear.information + np.eye(len(scale)))
+    relative = solution.state.values[block] / parameters.nominal[block] - 1
+    by = scale[block] / parameters.nominal[block]
+    covariance = by[:, None] * posterior[np.ix_(block, block)] * by
+    out = []
+    for i, name in enumerate(names if len(names) > 2 else ()):
+        contrast = np.full(len(names), -1.0 / (len(names) - 1))
+        contrast[i] = 1.0
+        change, std = float(contrast @ relative), float(np.sqrt(contrast @ covariance @ contrast))
+        if abs(change) > _ODD_SIGMAS * std and abs(change) > _ODD_SHARE:
+            out.append(
+                f"line {name}: the cable per motor turn differs by {100 * change:+.2f} ± "
+                f"{100 * std:.2f} % from the profile, compared with the other lines: gear ratio, "
+                "counts per turn or winding radius of its winch"
+            )
     return out
 
 

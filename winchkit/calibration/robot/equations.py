@@ -4,7 +4,8 @@ The equations and their derivatives are those of :mod:`winchkit.model.robot.cons
 module places them into the vector of parameters (:mod:`winchkit.calibration.robot.parameters`).
 A pose with n lines has n closure equations and one for whatever else was measured there: three of
 its position, three of its rotation, a swivel angle and a cable length per line, and six of the
-balance of measured cable forces where the payload is fitted. The pose itself is always unknown.
+balance of measured cable forces where the payload is fitted or the platform hangs. The pose itself
+is always unknown.
 """
 
 from __future__ import annotations
@@ -36,11 +37,14 @@ from winchkit.model.robot.constraints import (
     winding_of,
 )
 from winchkit.model.robot.elongation import strain_of
+from winchkit.model.robot.hanging_balance import hanging_balance
 from winchkit.model.robot.tracker import Tracker, tracked_position, tracked_rotation
 from winchkit.runs.poses import Measured
 from winchkit.schema.profiles.robot import PlatformSpec
 
 __all__ = ["Equations"]
+
+_FREEDOMS = 6
 
 
 @dataclass(frozen=True)
@@ -80,8 +84,16 @@ class Equations:
         return (*kinds, *(["balance"] if self.has_balance else []))
 
     @property
+    def hangs(self) -> bool:
+        """Whether measured cable forces and a known weight determine where the platform stands."""
+        few = len(self.robot.names) < _FREEDOMS and self.robot.platform.mass > 0
+        return few and bool(np.any(np.all(np.isfinite(self.measured.tension), axis=1)))
+
+    @property
     def has_balance(self) -> bool:
-        """Whether the payload is fitted and cable forces were measured."""
+        """Whether cable forces were measured, and the payload is fitted or the platform hangs."""
+        if self.hangs:
+            return True
         block, std = self.parameters.block, self.parameters.std
         payload = np.concatenate([std[block["payload_mass"]], std[block["payload_centre"]]])
         return bool(np.any(payload > 0) and np.any(np.isfinite(self.measured.tension)))
@@ -233,7 +245,8 @@ class Equations:
 
     def _balance(self, state: State) -> Constraint:
         values = state.values
-        return balance(
+        equilibrium = hanging_balance if self.hangs else balance
+        return equilibrium(
             self.geometry(values), state.pose, self.measured.tension, self.platform(values)
         )
 

@@ -80,8 +80,11 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
         raise RunError(
             Fault(f"only {len(measured)} poses; at least {_LEAST_POSES} are needed to judge", place)
         )
-    known = np.isfinite(measured.position).sum() + np.isfinite(measured.angles).sum()
-    spare = np.isfinite(measured.motor_angle).sum() + known - 6 * len(measured)
+    kinds = (measured.motor_angle, measured.position, measured.angles)
+    spare = sum(int(np.isfinite(values).sum()) for values in kinds) - 6 * len(measured)
+    for values in (measured.swivel, measured.cable_length):
+        # Each line's instrument has a zero of its own.
+        spare += max(0, int(np.isfinite(values).sum()) - values.shape[1])
     if spare <= 0:
         raise RunError(
             Fault(
