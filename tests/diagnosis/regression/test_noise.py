@@ -199,6 +199,29 @@ def test_without_repeats_noise_is_the_residual_of_the_saturated_model() -> None:
     assert not quiet.rejected.any()
 
 
+def test_a_slow_residual_that_no_candidate_explains_is_not_amplified() -> None:
+    """A candidate acts at high frequencies, the residual has a slow part beside it.
+
+    Weights from the residual itself would let the many quiet bands determine the fit, which then
+    misses the slow bands by more than the residual that it started from.
+    """
+    random = np.random.default_rng(9)
+    samples = 2000
+    regression = length_problem([white(random, samples)], Ride(samples=samples))
+    (segment,) = regression.segments
+    frequency = segment.band.frequency / segment.band.frequency[-1]
+    fast = np.where(frequency > 0.2, random.standard_normal(len(frequency)), 0.0)
+    slow = np.where(frequency < 0.02, random.standard_normal(len(frequency)), 0.0)
+    column = fast + 30 * slow
+    residual = regression.residual(Hypothesis()) + SIZE * (0.5 * fast + 30 * np.roll(slow, 1))
+    noise = noise_saturated(regression, residual, [column[:, None]])
+    of_residual = power_in_bands(regression, residual**2)
+    scale = float(column @ residual / (column @ column))
+    of_least_squares = power_in_bands(regression, (residual - scale * column) ** 2)
+    assert np.all(noise.power < 1.2 * of_residual)
+    np.testing.assert_allclose(noise.power, of_least_squares, rtol=0.1)
+
+
 def test_noise_free_runs_get_the_variance_floor() -> None:
     regression = length_problem(NOTHING, RIDE)
     found, noise = judged(regression)

@@ -160,8 +160,10 @@ def noise_saturated(regression: Regression, residual: Array, *columns: Array) ->
     Notes
     -----
     Only inner products per band are formed: an orthonormal basis would be as large as the columns.
-    The first weights are equal within an output: weights from the residual itself would be smallest
-    at the frequencies at which an effect is missing. Three iterations of reweighting follow. An
+    Two-step estimate: the saturated model is fitted with equal weights within an output, and the
+    variance of each band is that of its residual. It is not iterated: where a real machine has what
+    no candidate explains, reweighting lets the bands with most rows determine the fit, the
+    residual of the others grows at each iteration, and ends above that of no model at all. An
     effect outside the catalogue is counted as noise.
     """
     count = len(regression.bands)
@@ -169,18 +171,17 @@ def noise_saturated(regression: Regression, residual: Array, *columns: Array) ->
     total = sums_per_band(np.ones(regression.n_rows), bands, count)
     power = _even(regression, residual)
     gram, products = _inner_products(regression, residual, columns)
-    for _ in range(_REWEIGHTED):
-        through = _orthonormalizing(
-            np.tensordot(1 / power, gram, axes=1), _fewest_rows(regression) // _ROWS_EACH
-        )
-        amplitudes = through @ (through.T @ ((1 / power) @ products))
-        left, first = residual.copy(), 0
-        for part in columns:
-            left -= part @ amplitudes[first : first + part.shape[1]]
-            first += part.shape[1]
-        leverage = np.sum((gram @ through) * through, axis=(1, 2)) / power
-        dof = np.maximum(total - leverage, 1.0)
-        power = _power(regression, left, bands, dof)
+    through = _orthonormalizing(
+        np.tensordot(1 / power, gram, axes=1), _fewest_rows(regression) // _ROWS_EACH
+    )
+    amplitudes = through @ (through.T @ ((1 / power) @ products))
+    left, first = residual.copy(), 0
+    for part in columns:
+        left -= part @ amplitudes[first : first + part.shape[1]]
+        first += part.shape[1]
+    leverage = np.sum((gram @ through) * through, axis=(1, 2)) / power
+    dof = np.maximum(total - leverage, 1.0)
+    power = _power(regression, left, bands, dof)
     return Noise(power, dof, _rms(regression, power), from_repeats=False)
 
 
