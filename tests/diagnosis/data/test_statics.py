@@ -46,7 +46,7 @@ def values_of(diagnosis: Diagnosis) -> Mapping[str, float]:
 
 def test_a_perfect_cell_is_adequate() -> None:
     said = diagnose([weighed(1), weighed(2)], GROOVED).diagnosis
-    assert (said.verdict, said.steps, said.caveats) == ("adequate", (), ())
+    assert (said.verdict, said.steps) == ("adequate", ())
     assert list(said.outputs) == ["tension"]
 
 

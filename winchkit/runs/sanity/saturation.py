@@ -22,6 +22,8 @@ _ALTERNATING = 0.2
 noise has two thirds, a smooth signal few."""
 _LONGEST = 10
 _TIMES = 3
+_DITHERED = 12
+"""Longest repetition elsewhere of a channel whose noise is not small against its resolution."""
 _OVERSHOOT = 3.0
 _BEFORE = 6
 
@@ -32,7 +34,8 @@ def saturated(run: Run, name: str) -> Iterator[Finding]:
     Notes
     -----
     Continuous noise has no two equal values: an extreme that repeats is a limit. Values of a coarse
-    resolution repeat, but three times as long as elsewhere only at a limit. A channel without
+    resolution repeat, but three times as long as elsewhere only at a limit; with a resolution far
+    above the noise nothing can be concluded. A channel without
     noise may rest at its extreme, but then approaches it slowly: there, the linear extrapolation of
     the two samples before must exceed the extreme by three times the second differences before it.
     An extreme of zero is that of an instrument at rest.
@@ -66,7 +69,8 @@ def _is_cut_off(signal: Array, at: NDArray[np.bool_], level: float) -> bool:
     if alternating > _ALTERNATING * len(changing):
         if np.count_nonzero(elsewhere) < _TIES * len(signal):
             return True
-        return _longest(between) > max(_LONGEST, _TIMES * _longest(elsewhere))
+        usual = _longest(elsewhere)
+        return usual <= _DITHERED and _longest(between) > max(_LONGEST, _TIMES * usual)
     begins = np.flatnonzero(between & ~np.append(False, between[:-1]))
     beyond = [_overshoot(signal, int(begin), level) for begin in begins if begin >= _BEFORE]
     return len(beyond) > 0 and float(np.median(beyond)) > _OVERSHOOT
