@@ -245,6 +245,8 @@ def refuse_unfit(equations: Equations) -> None:
 
 def _refuse_out_of_reach(equations: Equations) -> None:
     """Refuse positions that a robot of this size cannot reach: wrong unit or frame."""
+    if equations.instruments is not None and "frame" in equations.instruments.free:
+        return
     exits, home = equations.robot.geometry.exit_point, equations.robot.home.position
     size = float(np.max(np.linalg.norm(exits[:, None] - exits, axis=2)))
     distance = np.linalg.norm(equations.measured.position - home, axis=1)
@@ -253,7 +255,8 @@ def _refuse_out_of_reach(equations: Equations) -> None:
         raise UsageError(
             f"the positions measured lie {float(np.median(distance)):.4g} m from home, in a robot "
             f"whose exit points are at most {size:.4g} m apart; is platform_x … in its unit and in "
-            "the base frame?"
+            'the base frame? Of a tracker elsewhere declare frame = "unknown" in '
+            "[instrument.tracker]"
         )
 
 
