@@ -214,7 +214,7 @@ def test_a_slow_residual_that_no_candidate_explains_is_not_amplified() -> None:
     slow = np.where(frequency < 0.02, random.standard_normal(len(frequency)), 0.0)
     column = fast + 30 * slow
     residual = regression.residual(Hypothesis()) + SIZE * (0.5 * fast + 30 * np.roll(slow, 1))
-    noise = noise_saturated(regression, residual, [column[:, None]])
+    noise = noise_saturated(regression, residual, column[:, None])
     of_residual = power_in_bands(regression, residual**2)
     scale = float(column @ residual / (column @ column))
     of_least_squares = power_in_bands(regression, (residual - scale * column) ** 2)
