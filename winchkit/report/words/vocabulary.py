@@ -182,7 +182,7 @@ def values_text(values: Mapping[str, Estimate]) -> str:
         for order, amplitude in orders[:_ORDERS_SHOWN]
     ]
     more = len(orders) - len(shown)
-    text = ", ".join(shown) + (f" and {more} more orders" if more else "")
+    text = ", ".join(shown) + (f" and {more} more" if more else "")
     common = fundamentals(main)
     if common:
         text += f"; the main orders are multiples of {listed([str(k) for k in common])}"

@@ -1,0 +1,82 @@
+"""Joints and motors that others recorded: cogging of a motor, gravity of a joint.
+
+The recordings are no part of the project: they are looked for in the folder that WINCHKIT_REAL
+names, and beside the checkout in ``shared/data/real``; the tests are skipped where there are none.
+The amplitudes to compare with are least squares on the raw samples, in the README beside them.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from winchkit.diagnosis.add import add
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.results import series_orders
+from winchkit.diagnosis.write import write_addition
+from winchkit.runs import read_run
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.axis import AxisProfile
+from winchkit.schema.read import read_axis
+
+VARIABLE = "WINCHKIT_REAL"
+AXIS = AxisProfile(name="axis")
+COGGING = {7: 0.048, 28: 0.031, 14: 0.019, 36: 0.016, 12: 0.015, 84: 0.007}
+"""Amplitudes of the largest orders per turn, N m."""
+MAPS = ("map-a_16", "map-b_16", "map-d_16")
+"""In map-c orders 7 and 21 have the opposite sign (phase + π): it is no repeat of the others."""
+
+
+def folder() -> Path | None:
+    """Where the recordings are, if they are anywhere."""
+    beside = [parent / "shared" / "data" / "real" for parent in Path(__file__).resolve().parents]
+    told = os.environ.get(VARIABLE)
+    for place in [Path(told)] if told else beside:
+        if (place / "odrive-cogging").is_dir() and (place / "openarm-j4").is_dir():
+            return place
+    return None
+
+
+DATA = folder()
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        DATA is None, reason=f"the recordings are not here; {VARIABLE} names their folder"
+    ),
+]
+
+
+def runs_of(name: str, *files: str) -> list[Run]:
+    assert DATA is not None
+    return [read_run(DATA / name / f"{file}.csv") for file in files]
+
+
+def test_cogging_of_a_motor_is_one_effect_with_its_orders() -> None:
+    found = diagnose(runs_of("odrive-cogging", *MAPS), AXIS).diagnosis
+    first, *others = found.steps
+    assert first.effects == ("motor-cogging",)
+    amplitudes = {k: size.value for k, size in series_orders(first.parameters["motor-cogging"])}
+    for order, expected in COGGING.items():
+        assert amplitudes[order] == pytest.approx(expected, rel=0.1)
+    # The motor turns one way at one speed: its friction may be any of the family.
+    assert all("motor-coulomb" in step.effects for step in others)
+    assert len(others) <= 1
+    assert found.outputs["motor_torque"].heldout_rms_after < 0.006
+
+
+def test_the_orders_are_written_as_one_effect_each(tmp_path: Path) -> None:
+    source, better = tmp_path / "axis.toml", tmp_path / "better.toml"
+    source.write_text('schema = 1\nkind = "axis"\n')
+    addition = add("motor-cogging", runs_of("odrive-cogging", *MAPS), read_axis(source))
+    write_addition(source, addition, ["map.csv"], better)
+    orders = [table.values["order"] for table in read_axis(better).effect]
+    assert set(COGGING) <= set(orders)
+    assert len(orders) == len(set(orders))
+
+
+def test_a_joint_that_carries_an_arm_has_gravity_first() -> None:
+    found = diagnose(runs_of("openarm-j4", "collect"), AXIS).diagnosis
+    assert found.candidates[0].effect == "joint-gravity"
+    assert "joint-gravity" in found.steps[0].effects
