@@ -206,6 +206,8 @@ def fit_from(
     inverse_sigma: Array,
     problem: CoarseProblem | None = None,
     target: Target | None = None,
+    *,
+    optimum: bool = False,
 ) -> Fit:
     """Fit from several starting values and keep the smallest χ².
 
@@ -222,10 +224,12 @@ def fit_from(
     problem
         Coarse regression, on which the best starting values are found; None for none.
     target
-        The fit is abandoned at the optimum of the coarse regression, or at the only starting
-        values where there is no such regression, if this χ² is out of reach; None: never.
+        The fit is abandoned at the optimum of the coarse regression, or at starting values that are
+        an optimum, if this χ² is out of reach; None: never.
+    optimum
+        Whether the only starting values are an optimum that was found before.
     """
-    found = list(starts) if problem is None and len(starts) == 1 else None
+    found = list(starts) if optimum else None
     if problem is not None:
         found = starts_from_coarse_fits(regression, starts, inverse_sigma, problem)
     if found is not None and target is not None:

@@ -361,7 +361,9 @@ class SelectionEngine(ABC):
         for law in truncated_series(effect):
             key = _key(hypothesis, law, item)
             if not anew and key in self._optima:
-                fitted = fit_from(self.regression, [self._optima[key]], inverse_sigma, target=goal)
+                fitted = fit_from(
+                    self.regression, [self._optima[key]], inverse_sigma, target=goal, optimum=True
+                )
             else:
                 if best is None:
                     own = replace(item, candidate=item.candidate.with_law(law))
