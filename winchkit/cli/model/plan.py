@@ -188,8 +188,15 @@ def _plan_winch(
     """The next programme of one winch."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.plan import plan
+    from winchkit.errors import UsageError
+    from winchkit.schema.profiles.axis import AxisProfile
     from winchkit.schema.programme import write_programme
 
+    if isinstance(declared, AxisProfile):
+        raise UsageError(
+            f"'{declared.name}' is an axis, and motion programmes are in cable length; "
+            "'winchkit diagnose' lists the next runs"
+        )
     limits = None if bench is None else _limits(bench, asked.winch)
     answer = diagnose(asked.runs(runs), declared, asked.catalogue, asked.band)
     found = plan(answer, asked.catalogue, limits)
