@@ -19,7 +19,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.spectrum import Band, to_time
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 
-__all__ = ["RIVALS", "Regression", "regression_of"]
+__all__ = ["RIVALS", "SELECTIONS", "Regression", "in_time", "regression_of"]
 
 _LEVEL = 0.05
 _MOST = 15
@@ -27,6 +27,7 @@ _FOLDS = 5
 _MOST_ROWS = 10_000
 _THRESHOLDS = (0.02, 0.05, 0.1, 0.2, 0.4, 0.8)
 _NOTHING = 1e-12
+_PRESENT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,7 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
     every = max(1, regression.n_rows // _MOST_ROWS)
     times, folds = [], []
     for segment in regression.segments:
-        block = _in_time(rows[segment.rows], segment.band)
+        block = in_time(rows[segment.rows], segment.band)
         # Means of neighbours, not every n-th: thinning must not throw information away.
         kept = len(block) // every * every
         times.append(block[:kept].reshape(-1, every, block.shape[1]).mean(axis=1))
@@ -91,11 +92,12 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
     )
 
 
-def _in_time(rows: Array, band: Band) -> Array:
+def in_time(rows: Array, band: Band) -> Array:
+    """Columns of spectral rows as samples."""
     return np.column_stack([to_time(column, band) for column in rows.T])
 
 
-def bic_forward(data: Regression) -> tuple[str, ...]:
+def bic_forward(data: Regression) -> list[int]:
     """Add the group of columns that lowers n ln RSS + k ln n most, until none does."""
     count = len(data.residual)
 
@@ -106,7 +108,7 @@ def bic_forward(data: Regression) -> tuple[str, ...]:
     return _forward(data, enough)
 
 
-def score_test(data: Regression) -> tuple[str, ...]:
+def score_test(data: Regression) -> list[int]:
     """Add the most significant group while its score test passes Bonferroni, rows independent."""
     count, tests = len(data.residual), len(data.atoms)
 
@@ -116,7 +118,7 @@ def score_test(data: Regression) -> tuple[str, ...]:
     return _forward(data, enough)
 
 
-def lasso(data: Regression) -> tuple[str, ...]:
+def lasso(data: Regression) -> list[int]:
     """LassoCV with folds that are blocks of time."""
     from sklearn.linear_model import LassoCV
 
@@ -128,10 +130,10 @@ def lasso(data: Regression) -> tuple[str, ...]:
         scale = np.sqrt(len(data.residual))
         model = LassoCV(cv=splits, alphas=40, max_iter=3000, fit_intercept=False)
         model.fit(data.columns * scale, data.residual)
-    return _named(data, np.asarray(model.coef_))
+    return _present(np.asarray(model.coef_))
 
 
-def stlsq(data: Regression) -> tuple[str, ...]:
+def stlsq(data: Regression) -> list[int]:
     """Sequentially thresholded least squares, its threshold chosen on blocks of time."""
     from pysindy.optimizers import STLSQ
 
@@ -155,22 +157,31 @@ def stlsq(data: Regression) -> tuple[str, ...]:
         return total
 
     best = min(_THRESHOLDS, key=missed)
-    return _named(data, coefficients(best, np.ones(len(target), dtype=bool)))
+    return _present(coefficients(best, np.ones(len(target), dtype=bool)))
 
 
-RIVALS: dict[str, Callable[[Regression], tuple[str, ...]]] = {
+SELECTIONS: dict[str, Callable[[Regression], list[int]]] = {
     "BIC forward selection": bic_forward,
     "iid score test": score_test,
     "LassoCV, block folds": lasso,
     "pysindy STLSQ": stlsq,
 }
+"""Columns that each method selects, in the order of its choice."""
 
 
-def _forward(data: Regression, enough: Callable[[float, float, int], bool]) -> tuple[str, ...]:
-    """Effects in the order in which they were added."""
+def _names(select: Callable[[Regression], list[int]]) -> Callable[[Regression], tuple[str, ...]]:
+    """Effects of the selected columns."""
+    return lambda data: tuple(dict.fromkeys(data.effects[i] for i in select(data)))
+
+
+RIVALS = {name: _names(select) for name, select in SELECTIONS.items()}
+
+
+def _forward(data: Regression, enough: Callable[[float, float, int], bool]) -> list[int]:
+    """Columns in the order in which they were added."""
     residual, columns = data.residual.copy(), data.columns.copy()
     squares = float(residual @ residual)
-    named: list[str] = []
+    selected: list[int] = []
     for _ in range(_MOST):
         found = [(gain, atom, basis) for gain, atom, basis in _gains(data, columns, residual)]
         passing = [f for f in found if enough(f[0], squares, f[2].shape[1])]
@@ -180,8 +191,8 @@ def _forward(data: Regression, enough: Callable[[float, float, int], bool]) -> t
         residual -= basis @ (basis.T @ residual)
         columns -= basis @ (basis.T @ columns)
         squares -= gain
-        named.append(data.effects[atom.start])
-    return tuple(dict.fromkeys(named))
+        selected += [i for i in range(atom.start, atom.stop) if i not in selected]
+    return selected
 
 
 def _gains(
@@ -195,8 +206,7 @@ def _gains(
             yield float(np.sum((basis.T @ residual) ** 2)), atom, basis
 
 
-def _named(data: Regression, coefficients: Array) -> tuple[str, ...]:
-    """Effects with a coefficient that is not zero, largest first."""
+def _present(coefficients: Array) -> list[int]:
+    """Columns with a coefficient that is not zero, largest first."""
     order = np.argsort(-np.abs(coefficients))
-    there = [data.effects[i] for i in order if abs(coefficients[i]) > 1e-6]
-    return tuple(dict.fromkeys(there))
+    return [int(i) for i in order if abs(coefficients[i]) > _PRESENT]
