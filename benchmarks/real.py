@@ -73,7 +73,9 @@ RECORDINGS = (
     Recording("emps", ("emps/train.csv",), ("emps/test.csv",), MOVING_MASS),
     Recording(
         "odrive-maps",
-        tuple(f"real/odrive-cogging/map-{m}_16.csv" for m in "abc"),
+        tuple(
+            f"real/odrive-cogging/map-{m}_16.csv" for m in "ab"
+        ),  # map-c has another zero of its angle
         ("real/odrive-cogging/map-d_16.csv",),
     ),
     Recording(
