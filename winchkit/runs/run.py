@@ -18,6 +18,7 @@ CHANNEL_DIMENSIONS: dict[str, str] = {
     "motor_angle": "angle",
     "motor_velocity": "angular speed",
     "motor_torque": "torque",
+    "motor_current": "current",
     "tension": "force",
     "tension_gross": "force",
     "load": "force",

@@ -16,6 +16,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.copies import COPIES, without_copies
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
 from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
+from winchkit.diagnosis.data.motor_current import with_torques
 from winchkit.diagnosis.data.outlying_repeats import outlying_repeat
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, even_instants
@@ -176,7 +177,7 @@ def prepare(
     """
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
-    runs, at_rest = prepared_statics(runs, profile)
+    runs, at_rest = prepared_statics(with_torques(runs, profile), profile)
     notes = [*at_rest, *validate_runs(runs, profile)]
     runs, copied = without_copies(runs, profile)
     sanity = findings(runs, profile)
