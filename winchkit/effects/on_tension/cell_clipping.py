@@ -37,4 +37,5 @@ EFFECT = Effect(
     told_apart="Weights above and below the limit; the full scale on the amplifier's data sheet.",
     needs=("load",),
     order=8,
+    left_out="beyond its limit the reading does not determine the tension; use a larger cell",
 )  # fmt: skip
