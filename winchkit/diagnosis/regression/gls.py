@@ -115,7 +115,7 @@ def fit(
         step, expected_decrease = _step(
             jacobian * inverse_sigma[:, None], residual * inverse_sigma, damping, x, (low, high)
         )
-        least = max(_LEAST_DECREASE, tolerance * (chi_square - regression.n_rows))
+        least = max(_LEAST_DECREASE, tolerance * (chi_square - len(residual)))
         if expected_decrease < least:
             break
         trial = np.clip(x + step, low, high)
