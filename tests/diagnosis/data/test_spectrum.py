@@ -103,15 +103,16 @@ def test_noise_alone_raises_the_cut_off_in_few_of_many_cases() -> None:
     assert np.count_nonzero(np.array(raised) > 2.0) <= 12
 
 
-@given(st.integers(1, 200_000))
-def test_a_fast_length_has_small_factors_only_and_leaves_little_out(count: int) -> None:
-    fast = fast_count(count)
-    assert fast <= count
-    if count < 4000:
-        assert fast == count
-        return
-    assert count - fast <= 0.002 * count + 30
-    for factor in (2, 3, 5, 7, 11, 13, 17, 19, 23):
-        while fast % factor == 0:
-            fast //= factor
-    assert fast == 1
+def test_a_fast_length_is_the_largest_with_small_factors_only() -> None:
+    """Against a sieve, to 50 000; at most 0.8 % of a run is left out, less than 0.1 % of most."""
+    counts = np.arange(1, 50_001)
+    rest = counts.copy()
+    for prime in (2, 3, 5, 7, 11, 13, 17, 19, 23):
+        while np.any(divisible := rest % prime == 0):
+            rest[divisible] //= prime
+    largest = np.maximum.accumulate(np.where(rest == 1, counts, 0))
+    expected = np.where(counts < 4000, counts, largest)
+    assert np.array_equal([fast_count(int(count)) for count in counts], expected)
+    left_out = (counts - expected) / counts
+    assert np.max(left_out) < 0.008
+    assert np.median(left_out[4000:]) < 0.001

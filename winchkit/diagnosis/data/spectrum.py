@@ -201,8 +201,9 @@ def fast_count(count: int) -> int:
     """Largest number of samples, at most ``count``, whose transform is fast.
 
     A transform of n samples takes a time in proportion to the prime factors of n: one of 8998 =
-    2·11·409 samples takes ten times as long as one of 8993 = 17·23². Of some thousand samples at
-    most a few at the end of a run are left out; shorter runs are kept whole.
+    2·11·409 samples takes ten times as long as one of 8993 = 17·23². At most 0.8 % of a run is left
+    out at its end, the largest gap between such numbers above 4000 (6936 to 6992); shorter runs are
+    kept whole.
     """
     if count < _LEAST_CUT:
         return count
