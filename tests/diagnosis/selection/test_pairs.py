@@ -97,7 +97,7 @@ def test_an_effect_that_imitates_a_pair_is_exchanged_for_it() -> None:
     present, noise = engine.fit_with_noise(start)
     grown = _best_pair(engine, present, noise)
     assert grown is not None
-    # Pairs are screened by linear columns; a rival that they do not distinguish from a member of the
-    # pair, here cross-talk from a gain, is replaced by the exchange that follows.
+    # Pairs are screened by linear columns; a rival that these do not distinguish from a member of
+    # the pair, here cross-talk from a gain, is replaced by the exchange that follows.
     final = _exchanged_terms(engine, grown, noise)
     assert set(final.labels) == {t.label for t in hidden}
