@@ -88,9 +88,16 @@ class CoarseTimeSeries(Coarse):
         )
 
     def extended(self, hypothesis: Hypothesis) -> Hypothesis:
-        """The hypothesis with the initial states of all runs, repeats alike."""
+        """The hypothesis with the initial states of all runs, repeats alike.
+
+        The correction of the discretisation error belongs to the coarse step, and is left out.
+        """
+        nuisances = hypothesis.nuisances
+        if nuisances and self.regression.fits_discretization:
+            nuisances = (*nuisances[:-1], 0.0)
         return replace(
             hypothesis,
+            nuisances=nuisances,
             starts=tuple(tuple(s[i] for i in self._place) if s else () for s in hypothesis.starts),
         )
 
