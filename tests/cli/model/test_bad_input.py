@@ -66,7 +66,7 @@ def replaced(old: str, new: str) -> list[str]:
 CASES: dict[str, tuple[list[str], str]] = {
     "no motor angle": (
         without_column("motor_angle [rad]"),
-        ":2: there is no column 'motor_angle [rad]'; it has time, motor_torque",
+        ": no column 'motor_angle [rad]'; it has time, motor_torque, tension, cable_length",
     ),
     "no time": (without_column("time [s]"), ":2: there is no column 'time [s]'"),
     "no output": (

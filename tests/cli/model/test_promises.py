@@ -56,7 +56,10 @@ def test_compare_has_every_key(runs: list[Path]) -> None:
         assert set(output) >= {
             "unit", "samples", "band", "signal_rms", "rms", "max", "bias", "noise_rms", "follows",
         }  # fmt: skip
-        assert output["band"] == (pytest.approx(5.0) if name == "motor_torque" else None)
+        if name == "motor_torque":  # At 50 Hz: from a tenth of the rate to 0.4 times the rate.
+            assert 5.0 * (1 - 1e-9) <= output["band"] <= 20.0
+        else:
+            assert output["band"] is None
         assert output["rms"] <= output["max"]
         assert abs(output["bias"]) <= output["rms"]
         assert output["samples"] > 1000
@@ -92,7 +95,7 @@ def test_diagnose_has_every_key(fat: dict[str, Any]) -> None:
         assert len(run["separates"]) == 2
 
 
-def test_a_step_of_a_set_holds_values_of_all_and_null_where_unknown(fat: dict[str, Any]) -> None:
+def test_a_step_of_a_set_holds_a_value_and_a_deviation_of_every_member(fat: dict[str, Any]) -> None:
     (step,) = fat["steps"]
     assert set(step) >= {"effects", "parameters", "heldout_gain"}
     assert set(step["effects"]) >= {"drum-radius", "gear-ratio"}
@@ -102,8 +105,7 @@ def test_a_step_of_a_set_holds_values_of_all_and_null_where_unknown(fat: dict[st
         for estimate in values.values():
             assert set(estimate) >= {"value", "std", "unit"}
             deviations.append(estimate["std"])
-    assert None in deviations
-    assert any(std is not None for std in deviations)
+    assert all(std > 0 for std in deviations)
     assert step["parameters"]["drum-radius"]["radius_error"]["unit"] == "m"
     assert 0 < step["heldout_gain"] < 1
 
@@ -234,7 +236,7 @@ def test_options_of_add_come_in_any_order(
 def test_the_band_is_the_users(runs: list[Path]) -> None:
     default = answer("compare", *runs[:4], "-p", "bench-spiral")["outputs"]
     narrow = answer("compare", *runs[:4], "-p", "bench-spiral", "--band", "2")["outputs"]
-    assert default["motor_torque"]["band"] == pytest.approx(5.0)
+    assert 5.0 * (1 - 1e-9) <= default["motor_torque"]["band"] <= 20.0
     assert narrow["motor_torque"]["band"] == 2.0
     assert narrow["motor_torque"]["noise_rms"] < default["motor_torque"]["noise_rms"]
     assert narrow["tension"] == default["tension"]
