@@ -34,7 +34,11 @@ def test_the_curve_is_offered_added_and_marked(cornered: list[Path], tmp_path: P
         *cornered,
         "-o",
         new,
+        "--band",
+        "5",
     )
+    # Five corners pass at up to 3 Hz; their harmonics above 5 Hz belong to other orders than the
+    # curve's, and would be most of the error that is left.
     torque = added["outputs"]["motor_torque"]
     assert torque["heldout_rms_after"] < 0.8 * torque["heldout_rms_before"]
     (table,) = read_profile(new).effect
