@@ -84,9 +84,10 @@ def test_stamps_that_jitter_about_even_instants_are_mended(
     )
     found = even_instants(stamps, angle)
     assert found is not None
-    # The mean of the jitter is not observable.
+    # The mean of the jitter is not observable. The period is the slope of a straight line through n
+    # stamps, whose error spreads over the run with a standard deviation of 1/√n of the jitter's.
     error = found - instants
-    assert np.std(error) < 0.1 * np.std(stamps - instants)
+    assert np.std(error) < 5 * np.std(stamps - instants) / np.sqrt(len(instants))
 
 
 @pytest.mark.parametrize("seed", range(5))
