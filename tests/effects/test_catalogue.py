@@ -89,7 +89,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
         "place": ("rad", SHAPE),
         "width": ("rad", SHAPE),
     },
-    "cell-crosstalk": {"share": ("N/(N m)", 0), "mass": ("kg", 0)},
+    "cell-crosstalk": {"share": ("N/(N m)", 0)},
     "cell-clipping": {"share": ("1", 0), "limit": ("N", SHAPE)},
 }
 every_effect = pytest.mark.parametrize("effect", EFFECTS, ids=IDS)

@@ -326,8 +326,8 @@ CASES: dict[str, Case] = {
         lambda: _torque(0.05 * X.sm * np.exp(-((X.phi - 3.0) ** 2) / 4.0)),
     ),
     "cell-crosstalk": (
-        {"share": 3.0, "mass": 0.4},
-        lambda: {"tension": X.T + 3.0 * X.T * X.arm + 0.4 * X.a},
+        {"share": 3.0},
+        lambda: {"tension": X.T + 3.0 * X.T * X.arm},
     ),
     "cell-clipping": (
         {"share": 1.0, "limit": 300.0},

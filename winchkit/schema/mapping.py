@@ -30,7 +30,8 @@ MATRIX = tuple(f"platform_r{row}{column}" for row in "123" for column in "123")
 """Elements of a platform's rotation matrix, which become its quaternion."""
 
 _OF_A_WINCH = {
-    **{"motor_angle": "angle", "motor_velocity": "angular speed", "motor_torque": "torque"},
+    **{"motor_angle": "angle", "motor_velocity": "angular speed"},
+    **{"motor_torque": "torque", "motor_current": "current"},
     **dict.fromkeys(("tension", "tension_gross", "load", "load_gross"), "force"),
     **{"cable_length": "length", "cable_length_gross": "length"},
     **{"temperature": "temperature", "swivel": "angle"},

@@ -215,7 +215,7 @@ def _settle_unit(
         if answers.rated_torque:
             factor = answers.rated_torque * unit.factor * scale
             item.settle(factor, unit.text, "given", f"of {answers.rated_torque:g} N m")
-    elif dimension == "current":
+    elif dimension == "current" and item.base == "motor_torque":
         constant = answers.torque_constant or _gain(work.table)
         if constant:
             origin: Confidence = "given" if answers.torque_constant else "derived"
@@ -396,7 +396,8 @@ def _ask_units(work: _Work) -> None:
                 own,
             )
         elif dimension == "current":
-            _ask(work, f"'{name}' is a current: which torque constant?", "torque_constant", own)
+            kept = f'--column "motor_current={name} [{unit.text if unit else "A"}]"'
+            _ask(work, f"'{name}' is a current: which torque constant?", "torque_constant", kept)
         elif dimension == BRIDGE:
             for key in ("sensitivity", "capacity"):
                 if getattr(work.answers, key) is None:
