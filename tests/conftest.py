@@ -45,6 +45,7 @@ SLOW = frozenset(
             "drivers/modbus/test_modbus_campaign.py",
             "drivers/stream/test_faults.py",
             "papers/test_ipanema3.py",
+            "report/notebook",
             "report/pages/test_diagnosis.py",
             "report/pages/test_robot.py",
             "repository/test_examples.py",

@@ -10,6 +10,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from winchkit.rendering import renderers
 from winchkit.version import __version__
 
 if TYPE_CHECKING:
@@ -175,6 +176,8 @@ _NAMES = {
     "winchkit.sim.live.bench": ("LiveBench",),
     "winchkit.sim.record": ("simulate",),
 }
+# This package contains the results and their renderers, which know nothing of each other.
+renderers.load_from("winchkit.report.notebook.register")
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 

@@ -24,6 +24,7 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL, placed, variable_of
 from winchkit.effects.term import Term
 from winchkit.errors import UsageError
+from winchkit.rendering import Shown
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -40,8 +41,8 @@ __all__ = [
 _STARTS = 4
 
 
-@dataclass(frozen=True)
-class Addition:
+@dataclass(frozen=True, repr=False)
+class Addition(Shown):
     """A profile's effects refitted with a new one, and the change of the errors.
 
     Attributes
@@ -222,8 +223,8 @@ def _candidates_of(engine: TimeSeriesSelection, effect_id: str, noise: Noise) ->
     return [item for item in ranked if item.candidate.effect.id == effect_id][:_STARTS]
 
 
-@dataclass(frozen=True)
-class Removal:
+@dataclass(frozen=True, repr=False)
+class Removal(Shown):
     """A profile's effects refitted without one, and the change of the errors."""
 
     effect: str

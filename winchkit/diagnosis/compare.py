@@ -16,6 +16,7 @@ from winchkit.diagnosis.regression.noise import replicate_rms
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, attributions, harmonics
 from winchkit.diagnosis.residuals.maps import residual_maps
+from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
@@ -123,6 +124,7 @@ def compared(
         sanity=dataset.sanity,
         used_share=dataset.used_share,
         caveats=dataset.caveats,
+        traces=traces_of(regression, residual),
     )
     return Compared(regression, residual, comparison)
 

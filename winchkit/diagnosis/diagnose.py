@@ -13,15 +13,16 @@ from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
-from winchkit.diagnosis.regression.conditioning import fit_quality, value_covariance
+from winchkit.diagnosis.regression.conditioning import value_covariance
 from winchkit.diagnosis.regression.cross_validation import held_out
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.regression.intervals import Spread, estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import attributions, harmonics
+from winchkit.diagnosis.residuals.traces import Trace, trace_columns, traces_of
 from winchkit.diagnosis.results import (
     CandidateScore,
     Closest,
@@ -45,13 +46,16 @@ from winchkit.diagnosis.verdict.decision import (
     withheld,
 )
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
+from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.plausibility import implausible
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.location import located
 from winchkit.effects.term import Term
+from winchkit.rendering import Plotted
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.tabular import Columns, Tabular
 
 __all__ = [
     "Answer",
@@ -80,7 +84,7 @@ _SEARCH = (0.3, 0.8)
 _NAMING = (0.8, 1.0)
 
 
-class Answer:
+class Answer(Plotted, Tabular):
     """A diagnosis with everything that it was derived from, for reports and plans.
 
     Parameters
@@ -112,6 +116,13 @@ class Answer:
         self.diagnosis = diagnosis
         self.sets = tuple(sets)
         self.pairs = tuple(pairs)
+
+    def fit_report(self) -> str:
+        """Return the report of the fit; see :meth:`Diagnosis.fit_report`."""
+        return self.diagnosis.fit_report()
+
+    def _columns(self) -> Columns:
+        return trace_columns(self.diagnosis.traces)
 
     @property
     def threshold(self) -> DetectionThreshold:
@@ -245,6 +256,7 @@ def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> 
         used_share=engine.regression.dataset.used_share,
         caveats=engine.regression.dataset.caveats,
         interrupted=True,
+        traces=_traces(engine, start, named=False),
     )
     return WinchAnswer(engine, start, diagnosis)
 
@@ -267,6 +279,7 @@ def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
         sanity=dataset.sanity,
         used_share=dataset.used_share,
         caveats=dataset.caveats,
+        traces=_traces(engine, judgement.reported, named=False),
     )
     return WinchAnswer(engine, judgement.reported, diagnosis)
 
@@ -281,7 +294,8 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
     if sets:
         judgement = reweighted_judgement(engine, judgement)
         reported = judgement.reported
-    sets, steps, closest = _plausible(engine, reported, sets)
+    found, spread = reported, _spread(engine, reported)
+    sets, steps, closest = _plausible(engine, reported, sets, spread)
     if closest:
         names = ", ".join(dict.fromkeys(f"{each.effect}: {each.reason}" for each in closest))
         judgement = withheld(engine, result, 1.0, f"closest, but not named: {names}")
@@ -305,14 +319,40 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
         sanity=engine.regression.dataset.sanity,
         used_share=engine.regression.dataset.used_share,
         caveats=engine.regression.dataset.caveats,
-        fit=fit_quality(engine.regression, reported.final, reported.noise),
+        fit=fit_statistics(
+            engine.regression,
+            reported.initial_model,
+            reported.final,
+            reported.noise,
+            spread if reported is found else _spread(engine, reported),
+            profile=engine.regression.dataset.profile,
+        ),
         closest=closest,
+        traces=_traces(engine, reported, named=bool(steps)),
     )
     return WinchAnswer(engine, reported, diagnosis, sets, pairs)
 
 
+def _traces(
+    engine: TimeSeriesSelection, result: SelectionResult, *, named: bool
+) -> tuple[Trace, ...]:
+    """Measured and predicted outputs; by the profile too where effects were named."""
+    before = result.initial_model.residual
+    if not named:
+        return traces_of(engine.regression, before)
+    return traces_of(engine.regression, result.final.residual, before)
+
+
+def _spread(engine: SelectionEngine, result: SelectionResult) -> Spread:
+    """Uncertainty of the unknowns of the final model."""
+    return spread_of(engine.regression, result.final, result.noise, engine.regression.blocks)
+
+
 def _plausible(
-    engine: TimeSeriesSelection, result: SelectionResult, sets: Sequence[EquivalenceSet]
+    engine: TimeSeriesSelection,
+    result: SelectionResult,
+    sets: Sequence[EquivalenceSet],
+    spread: Spread,
 ) -> tuple[list[EquivalenceSet], tuple[Step, ...], tuple[Closest, ...]]:
     """Sets without members whose values cannot be, their steps, and the effects of empty sets.
 
@@ -321,7 +361,7 @@ def _plausible(
     dataset, found = engine.regression.dataset, list(sets)
     if not found:
         return [], (), ()
-    steps = steps_of(engine, result, found, dataset)
+    steps = steps_of(engine, result, found, dataset, spread)
     kept, closest = [], []
     for equivalence, step in zip(found, steps, strict=True):
         reasons = {
@@ -341,7 +381,7 @@ def _plausible(
         return [], (), tuple(closest)
     if all(a.effects == b.effects for a, b in zip(found, kept, strict=True)):
         return found, steps, ()
-    return kept, steps_of(engine, result, kept, dataset), ()
+    return kept, steps_of(engine, result, kept, dataset, spread), ()
 
 
 def _closest(
@@ -371,6 +411,7 @@ def steps_of(
     result: SelectionResult,
     sets: Sequence[EquivalenceSet],
     dataset: Dataset | None = None,
+    spread: Spread | None = None,
 ) -> tuple[Step, ...]:
     """Every addition with its equivalence set, values and held-out gain.
 
@@ -384,10 +425,12 @@ def steps_of(
         Equivalence set of every addition.
     dataset
         Runs of the winch, for combinations that have a name; None for a robot.
+    spread
+        Uncertainty of the unknowns of the final model, where it is known already.
     """
     final, noise, regression = result.final, result.noise, engine.regression
     out = []
-    spread = spread_of(regression, final, noise, regression.blocks)
+    spread = _spread(engine, result) if spread is None else spread
     own = estimates(regression, final, spread)[engine.n_initial_terms :]
     covariance = value_covariance(regression, final, noise)
     for equivalence, gain, (term, values) in zip(

@@ -11,14 +11,15 @@ from winchkit.diagnosis.design.programmes import OperatingRange, range_of_limits
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
+from winchkit.rendering import Shown
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.programme import Programme
 
 __all__ = ["Plan", "plan"]
 
 
-@dataclass(frozen=True)
-class Plan:
+@dataclass(frozen=True, repr=False)
+class Plan(Shown):
     """Candidate motion programmes for the next run, the best first."""
 
     dataset: Dataset

@@ -8,20 +8,22 @@ from math import isnan
 from typing import Any, ClassVar, Literal
 
 from winchkit.diagnosis.residuals.maps import ResidualMap
+from winchkit.diagnosis.residuals.traces import PoseTrace, Trace, trace_columns
 from winchkit.effects.empirical import empirical_id
 from winchkit.effects.placement import HOME
+from winchkit.fit_statistics import FitStatistics
+from winchkit.rendering import Plotted
 from winchkit.runs.sanity.finding import Finding
+from winchkit.tabular import Columns, Tabular
 
 __all__ = [
     "CandidateScore",
     "Closest",
     "Combination",
     "Comparison",
-    "Correlation",
     "Detectable",
     "Diagnosis",
     "Estimate",
-    "FitQuality",
     "NextRun",
     "OutputError",
     "OutputFit",
@@ -63,8 +65,8 @@ class OutputError:
         return {**plain, "follows": follows, "orders": orders}
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Plotted, Tabular):
     """Errors of a profile on measured runs, with only the length offset fitted."""
 
     outputs: Mapping[str, OutputError]
@@ -79,6 +81,11 @@ class Comparison:
     """Share of the measured samples that is compared, by output."""
     caveats: tuple[str, ...] = ()
     """Codes of what these runs cannot exclude."""
+    traces: tuple[Trace | PoseTrace, ...] = field(default=(), compare=False)
+    """Measured and predicted outputs of every run, or errors of every pose."""
+
+    def _columns(self) -> Columns:
+        return trace_columns(self.traces)
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that ``winchkit compare --json`` prints."""
@@ -130,33 +137,6 @@ class Combination:
     value: float
     std: float
     unit: str
-
-
-@dataclass(frozen=True)
-class Correlation:
-    """Correlation of two fitted values."""
-
-    a: str
-    """``effect.parameter``, or a nuisance parameter."""
-    b: str
-    value: float
-
-
-@dataclass(frozen=True)
-class FitQuality:
-    """How well the data determine the values of the reported model."""
-
-    correlations: tuple[Correlation, ...]
-    """Pairs above 0.5 in size, largest first."""
-    condition: float
-    """Condition number of the whitened derivatives with columns of unit length."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Dictionary that the command prints."""
-        return {
-            "correlations": [vars(pair) for pair in self.correlations],
-            "condition": self.condition,
-        }
 
 
 @dataclass(frozen=True)
@@ -274,8 +254,8 @@ class NextRun:
     power: float
 
 
-@dataclass(frozen=True)
-class Diagnosis:
+@dataclass(frozen=True, repr=False)
+class Diagnosis(Plotted, Tabular):
     """Result of a diagnosis: verdict, named effects, uncertainty and limits."""
 
     data: ClassVar[str] = "runs"
@@ -298,10 +278,26 @@ class Diagnosis:
     """Codes of what these runs cannot exclude; the verdict is one of four with or without them."""
     interrupted: bool = False
     """Whether the search was interrupted: errors and candidates are known, the verdict is not."""
-    fit: FitQuality | None = None
+    fit: FitStatistics | None = None
     """Of the reported model; None without unknowns."""
     closest: tuple[Closest, ...] = ()
     """Effects that are not named since their values cannot be."""
+    traces: tuple[Trace | PoseTrace, ...] = field(default=(), compare=False)
+    """Measured and predicted outputs of every run, or errors of every pose."""
+
+    def fit_report(self) -> str:
+        """Return the report of the fit of the reported model, in the layout of lmfit's.
+
+        Returns
+        -------
+        str
+            Data, degrees of freedom, χ², AIC and BIC; per value its standard deviation, initial
+            value, 95 % interval and plausible range; correlations above 0.5.
+        """
+        return "no model was fitted" if self.fit is None else self.fit.text()
+
+    def _columns(self) -> Columns:
+        return trace_columns(self.traces)
 
     @property
     def empirical(self) -> tuple[str, ...]:
@@ -336,7 +332,7 @@ class Diagnosis:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RobotDiagnosis(Diagnosis):
     """Result for a robot; ids of effects at a place are ``EFFECT/LINE`` inside."""
 

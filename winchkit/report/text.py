@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal
     from winchkit.diagnosis.diagnose import Answer
 
-__all__ = ["addition_text", "compare_text", "report_text"]
+__all__ = ["addition_text", "compare_text", "error_lines", "report_text"]
 
 _MOST_LINES = 70
 _FEW = 3
@@ -62,7 +62,7 @@ def report_text(answer: Answer) -> str:
     diagnosis = answer.diagnosis
     blocks = [
         [_head(diagnosis), *paragraph(sentence(diagnosis))],
-        _errors(diagnosis.outputs, grown=bool(diagnosis.steps), data=diagnosis.data),
+        error_lines(diagnosis.outputs, grown=bool(diagnosis.steps), data=diagnosis.data),
         _ladder(answer),
         _confusion(diagnosis),
         _correlations(diagnosis),
@@ -137,13 +137,29 @@ def addition_text(addition: Addition | Removal) -> str:
         fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
     blocks = [
         ["fitted", *hanging(fitted)] if fitted else [],
-        _errors(addition.outputs, grown=True),
+        error_lines(addition.outputs, grown=True),
         _notes(addition.notes),
     ]
     return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
 
 
-def _errors(outputs: Mapping[str, OutputFit], *, grown: bool, data: str = "runs") -> list[str]:
+def error_lines(outputs: Mapping[str, OutputFit], *, grown: bool, data: str = "runs") -> list[str]:
+    """Held-out errors per output as lines.
+
+    Parameters
+    ----------
+    outputs : mapping of str to OutputFit
+        Errors by output.
+    grown : bool
+        Whether the model was changed, so that there are errors before and after.
+    data : str
+        Kind of data, ``runs`` or ``poses``.
+
+    Returns
+    -------
+    list of str
+        Lines of at most 80 characters.
+    """
     head = ["held-out error, rms", "before", "after", "noise"]
     rows = [head if grown else [head[0], "error", "noise"]]
     for name, output in outputs.items():

@@ -9,6 +9,8 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
+from winchkit.rendering import Plotted
+from winchkit.tabular import Columns, Tabular
 from winchkit.units import parse, suggest
 
 __all__ = ["CHANNEL_DIMENSIONS", "Channel", "Run"]
@@ -47,8 +49,8 @@ class Channel:
         return int(np.count_nonzero(np.isnan(self.values)))
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(Plotted, Tabular):
     """Channels of one recording, all of shape (n,) on ``time``, and its metadata."""
 
     name: str
@@ -81,6 +83,14 @@ class Run:
             known = ["time", *self.channels]
             message = f"no column '{name}'; it has {', '.join(known)}" + suggest(name, known)
             raise RunError(Fault(message, self.path or self.name)) from None
+
+    def _columns(self) -> Columns:
+        return Columns(
+            {"time": self.time, **{name: item.values for name, item in self.channels.items()}},
+            {"time": "s", **{name: item.unit for name, item in self.channels.items()}},
+            {**self.metadata, "name": self.name},
+            ("time",),
+        )
 
     @property
     def load_mass(self) -> float | None:

@@ -9,13 +9,10 @@ import pytest
 
 from diagnosis_runs import GROOVED, Array, Ride, engine_for, made, term
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.regression.conditioning import (
-    ValueCovariance,
-    fit_quality,
-    value_covariance,
-)
+from winchkit.diagnosis.regression.conditioning import ValueCovariance, value_covariance
 from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.verdict.combination import combination_of_set, combination_of_term
+from winchkit.fit_statistics import correlations_of
 
 DATASET = prepare([made(0, GROOVED, ride=Ride(samples=200))], GROOVED)
 
@@ -81,9 +78,7 @@ def test_covariance_and_condition_are_those_of_the_whitened_derivatives() -> Non
     assert covariance.matrix == pytest.approx(expected, rel=1e-6)
     scaled = whitened / np.linalg.norm(whitened, axis=0)
     assert covariance.condition == pytest.approx(np.linalg.cond(scaled), rel=1e-6)
-    quality = fit_quality(engine.regression, fitted, noise)
-    assert quality is not None
-    pair = quality.correlations[0]
+    pair = correlations_of(covariance.names, covariance.matrix)[0]
     assert {pair.a, pair.b} == {"cell-gain.gain_error", "cell-offset.offset"}
     assert pair.value == pytest.approx(
         expected[-1, -2] / np.sqrt(expected[-1, -1] * expected[-2, -2]), rel=1e-6

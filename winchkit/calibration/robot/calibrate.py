@@ -37,19 +37,23 @@ from winchkit.calibration.robot.options import Options, ProgressCallback
 from winchkit.calibration.robot.outliers import gross_errors
 from winchkit.calibration.robot.parameters import (
     EFFECTS,
-    Parameter,
+    Estimated,
     Parameters,
     own_effects,
     parameters_of,
 )
 from winchkit.calibration.robot.prediction import PoseErrors, errors_at, rms
 from winchkit.calibration.robot.selection import Fitted, fitted_with_instruments
+from winchkit.calibration.robot.statistics import calibration_statistics
 from winchkit.errors import UsageError
+from winchkit.fit_statistics import FitStatistics
 from winchkit.model.robot import Robot
 from winchkit.model.robot.bundle_adjustment import Solution, Weights
+from winchkit.rendering import Plotted
 from winchkit.runs.poses import Measured
+from winchkit.tabular import Columns, Tabular
 
-__all__ = ["Calibrated", "Estimated", "Options", "calibrate", "equations_of", "split"]
+__all__ = ["Calibrated", "Options", "calibrate", "equations_of", "split"]
 
 _HELD_OUT_EVERY = 10
 _NAMES = {"rope": "lengths by the drums", "position": "positions"}
@@ -66,21 +70,8 @@ _COARSE_RATIO = 5.0
 (rule of thumb: a camera may be coarser than a drawing)."""
 
 
-@dataclass(frozen=True)
-class Estimated:
-    """Estimate of one parameter, in the unit of files."""
-
-    parameter: Parameter
-    nominal: float
-    value: float
-    std: float
-    """Posterior standard deviation."""
-    bound: str
-    """``low`` or ``high`` where the fit stopped at a bound, else empty."""
-
-
-@dataclass(frozen=True)
-class Calibrated:
+@dataclass(frozen=True, repr=False)
+class Calibrated(Plotted, Tabular):
     """Result of a calibration."""
 
     equations: Equations
@@ -131,6 +122,25 @@ class Calibrated:
     def values(self) -> Array:
         """Parameters in fitted units, (q,)."""
         return self.solution.state.values
+
+    @property
+    def statistics(self) -> FitStatistics:
+        """χ² with its degrees of freedom, values and correlations."""
+        return calibration_statistics(self.equations, self.solution, self.weights, self.estimates)
+
+    def fit_report(self) -> str:
+        """Return the report of the fit, in the layout of lmfit's.
+
+        Returns
+        -------
+        str
+            Data, degrees of freedom, χ², AIC and BIC; per parameter its standard deviation,
+            nominal value, 95 % interval and bounds; correlations above 0.5.
+        """
+        return self.statistics.text()
+
+    def _columns(self) -> Columns:
+        return self.statistics._columns()
 
 
 def split(measured: Measured) -> tuple[Measured, Measured]:

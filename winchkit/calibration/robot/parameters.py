@@ -23,6 +23,7 @@ from winchkit.units import dimension_of, parse
 __all__ = [
     "EFFECTS",
     "GEOMETRY",
+    "Estimated",
     "Parameter",
     "Parameters",
     "own_effects",
@@ -126,6 +127,19 @@ class Parameter:
         if not self.reciprocal:
             return value, std
         return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """Estimate of one parameter, in the unit of files."""
+
+    parameter: Parameter
+    nominal: float
+    value: float
+    std: float
+    """Posterior standard deviation."""
+    bound: str
+    """``low`` or ``high`` where the fit stopped at a bound, else empty."""
 
 
 @dataclass(frozen=True)

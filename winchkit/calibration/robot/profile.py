@@ -13,8 +13,9 @@ import numpy as np
 import tomlkit
 
 from winchkit.arrays import Array
-from winchkit.calibration.robot.calibrate import Calibrated, Estimated
+from winchkit.calibration.robot.calibrate import Calibrated
 from winchkit.calibration.robot.elongation import LAWS
+from winchkit.calibration.robot.parameters import Estimated
 from winchkit.calibration.robot.prediction import rms
 from winchkit.catalog import find
 from winchkit.model.robot import angles_of, rotation_of

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.calibration.robot.calibrate import Calibrated, Estimated
+from winchkit.calibration.robot.calibrate import Calibrated
+from winchkit.calibration.robot.parameters import Estimated
 from winchkit.calibration.robot.pose_design import NextPose
 from winchkit.calibration.robot.prediction import PoseErrors, rms
 from winchkit.calibration.robot.variance_components import NOISE
@@ -75,6 +76,7 @@ def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[s
         "warnings": list(found.warnings),
         "converged": found.solution.converged,
         "seconds": found.seconds,
+        "statistics": found.statistics.to_json(),
     }
 
 

@@ -130,7 +130,9 @@ def _tell_each(
         pages = pages_beside(html, list(winches)) if html else {}
         each = diagnose_each(winches, declared, catalogue, asked.band, **how, progress=progress)
         for name, answer in each:
-            found[name], said[name] = answer.diagnosis, _said(answer, as_json)
+            # Without the traces, which are megabytes each.
+            found[name] = replace(answer.diagnosis, traces=())
+            said[name] = _said(answer, as_json)
             present[name] = answer.result.lack_of_fit_test.p_value
             if html:
                 own = _page(answer, f"{title}, {name}", replace(asked, winch=name))

@@ -136,7 +136,20 @@ class Regression(ABC):
     def signal_rms(self, output: str) -> float:
         """Rms of a measured output within its band, SI; NaN where rows have no unit."""
 
+    @property
+    def n_priors(self) -> int:
+        """Number of unknowns with a prior, whose rows are no observations."""
+        return 0
+
     # The model
+
+    @property
+    def nuisance_names(self) -> tuple[str, ...]:
+        """Name of every nuisance parameter."""
+        names = ["length offset"] * int(self.fits_offset)
+        names += ["discretisation correction"] * int(self.fits_discretization)
+        count = self.nuisance_columns.shape[1]
+        return (*names, *(f"nuisance {index + 1}" for index in range(len(names), count)))
 
     @abstractmethod
     def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:

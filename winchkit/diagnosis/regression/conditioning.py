@@ -1,4 +1,4 @@
-"""Covariance of fitted values, their correlations, and the condition number of a fit.
+"""Covariance of fitted values, and the condition number of a fit.
 
 References
 ----------
@@ -16,13 +16,11 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.results import Correlation, FitQuality
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["ValueCovariance", "fit_quality", "value_covariance"]
+__all__ = ["ValueCovariance", "value_covariance"]
 
-_SHOWN = 0.5
 _STEP = 1e-4
 
 
@@ -71,28 +69,10 @@ def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCov
     return ValueCovariance(names, slopes @ covariance @ slopes.T, float(condition))
 
 
-def fit_quality(regression: Regression, fit: Fit, noise: Noise) -> FitQuality | None:
-    """Correlations above 0.5 and condition number of a fit; None without unknowns."""
-    covariance = value_covariance(regression, fit, noise)
-    if not covariance.names:
-        return None
-    std = np.sqrt(np.maximum(np.diag(covariance.matrix), 0.0))
-    pairs = [
-        Correlation(a, covariance.names[j], float(covariance.matrix[i, j] / (std[i] * std[j])))
-        for i, a in enumerate(covariance.names)
-        for j in range(i + 1, len(covariance.names))
-        if std[i] > 0.0 and std[j] > 0.0
-    ]
-    shown = [pair for pair in pairs if abs(pair.value) > _SHOWN]
-    return FitQuality(tuple(sorted(shown, key=lambda p: -abs(p.value))), covariance.condition)
-
-
 def _slopes(regression: Regression, fit: Fit) -> tuple[tuple[str, ...], Array]:
     """Names of all values, and their derivatives by the vector of unknowns."""
-    count = regression.nuisance_columns.shape[1]
-    names = ["length offset"] * int(regression.fits_offset)
-    names += ["discretisation correction"] * int(regression.fits_discretization)
-    names += [f"nuisance {index + 1}" for index in range(len(names), count)]
+    names = list(regression.nuisance_names)
+    count = len(names)
     rows = [np.eye(len(fit.vector))[index] for index in range(count)]
     at = count
     for term in fit.hypothesis.terms:

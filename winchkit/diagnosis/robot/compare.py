@@ -10,11 +10,12 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.residuals.traces import pose_traces
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.diagnosis.robot.adjustment import placed
 from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
-from winchkit.diagnosis.robot.errors import UNITS, Errors, errors_of, rms, signals
+from winchkit.diagnosis.robot.errors import UNITS, Errors, column_names, errors_of, rms, signals
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.variance_components import START
 from winchkit.effects.bind_robot import robot_terms
@@ -94,7 +95,9 @@ def compared_robot(
     most: dict[str, Attribution] = {}
     for followed in follows:
         most.setdefault(followed.output, followed)
-    return RobotCompared(Comparison(outputs, None, dataset.notes), regression, errors, most)
+    traces = pose_traces(column_names(dataset, errors), UNITS, errors)
+    comparison = Comparison(outputs, None, dataset.notes, traces=traces)
+    return RobotCompared(comparison, regression, errors, most)
 
 
 def _largest(name: str, error: Array) -> float:

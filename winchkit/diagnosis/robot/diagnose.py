@@ -26,11 +26,20 @@ from winchkit.diagnosis.diagnose import (
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.residuals.traces import PoseTrace, pose_traces
 from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, Where, plain_step
 from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.candidates import GEOMETRY
 from winchkit.diagnosis.robot.engine import PoseSelection
-from winchkit.diagnosis.robot.errors import Errors, FittedModel, errors_of, output_fits_of, rms
+from winchkit.diagnosis.robot.errors import (
+    UNITS,
+    Errors,
+    FittedModel,
+    column_names,
+    errors_of,
+    output_fits_of,
+    rms,
+)
 from winchkit.diagnosis.robot.excitation import missing_pose_excitation
 from winchkit.diagnosis.robot.pose_design import next_pose_runs
 from winchkit.diagnosis.robot.preparation import Preparation, calibrated_on, prepare_selection
@@ -39,6 +48,7 @@ from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.verdict.decision import Judgement, judge
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
+from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.model.stages import Stage
@@ -197,8 +207,23 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
             *_datum_notes(steps),
         ),
         geometry=geometry,
+        fit=fit_statistics(
+            engine.regression,
+            reported.initial_model,
+            reported.final,
+            reported.noise,
+            spread_of(engine.regression, reported.final, reported.noise, engine.regression.blocks),
+        ),
+        traces=_traces(selection, named=bool(steps)),
     )
     return RobotAnswer(selection, sets, diagnosis)
+
+
+def _traces(selection: RobotSelection, *, named: bool) -> tuple[PoseTrace, ...]:
+    """Errors of every pose; by the profile too where effects were named."""
+    before, after = selection.errors
+    names = column_names(selection.preparation.dataset, before)
+    return pose_traces(names, UNITS, *((after, before) if named else (before,)))
 
 
 _SAME_AS = {

@@ -20,6 +20,7 @@ from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.results import OutputFit
+from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
 from winchkit.model.robot.rotation import rotation_by, skew
@@ -28,6 +29,7 @@ __all__ = [
     "UNITS",
     "Errors",
     "FittedModel",
+    "column_names",
     "errors_of",
     "held_out_rms",
     "noise_rms",
@@ -83,6 +85,15 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
     if "tension" in residuals:
         out["tension"] = -residuals["tension"]
     return out
+
+
+def column_names(dataset: RobotDataset, errors: Errors) -> dict[str, tuple[str, ...]]:
+    """Names of the columns of every output's errors: axes, lines, or components of the wrench."""
+    known = {"platform_position": ("x", "y", "z"), "cable_length": tuple(dataset.names)}
+    return {
+        output: known.get(output, tuple(str(k + 1) for k in range(error.shape[1])))
+        for output, error in errors.items()
+    }
 
 
 def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:

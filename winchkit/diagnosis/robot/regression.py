@@ -133,6 +133,18 @@ class PoseRegression(Regression):
         """Number of rows without those of the prior."""
         return self._n_observations
 
+    @property
+    def n_priors(self) -> int:
+        """Number of free numbers of the geometry."""
+        return len(self.point.geometry)
+
+    @property
+    def nuisance_names(self) -> tuple[str, ...]:
+        """Zero offsets of instruments, then numbers of the geometry in units of their prior."""
+        geometry = [f"{item.term.effect.id}.{item.parameter}" for item in self.point.geometry]
+        zeros = self.nuisance_columns.shape[1] - len(geometry)
+        return (*(f"instrument zero {index + 1}" for index in range(zeros)), *geometry)
+
     def signal_rms(self, output: str) -> float:
         """NaN: rows are whitened; SI values are computed in ``robot/errors.py``."""
         return float("nan")

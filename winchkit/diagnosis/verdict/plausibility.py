@@ -15,7 +15,7 @@ from winchkit.effects.effect import Parameter
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["implausible"]
+__all__ = ["implausible", "plausible_range"]
 
 _ROUNDING = 1e-6
 _CHECK = "check sign, unit, torque constant, gravity"
@@ -52,7 +52,7 @@ def _reasons(
         if parameter.whole or not (isfinite(estimate.value) and isfinite(estimate.std)):
             continue
         shown = f"{name} = {_text(estimate.value, parameter)}"
-        known = _range(parameter, profile)
+        known = plausible_range(parameter, profile)
         if known is None:
             ends = (parameter.low, parameter.high)
             bounds = [b for b in ends if b != parameter.null and isfinite(b)]
@@ -67,7 +67,9 @@ def _reasons(
             yield f"{shown} is beyond the plausible range ({span}; {reason}): {_CHECK}"
 
 
-def _range(parameter: Parameter, profile: WinchProfile | None) -> tuple[float, float, str] | None:
+def plausible_range(
+    parameter: Parameter, profile: WinchProfile | None
+) -> tuple[float, float, str] | None:
     """Plausible range of a parameter in its unit, with its reason; None where none is known."""
     declared = parameter.plausible
     if declared is None:

@@ -23,7 +23,7 @@ _UNIT_DRUM = DrumSpec("grooved", winding_radius=1.0, groove_pitch=0.0)
 """A radius of 1 m: lengths of the line are then angles of the joint."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class AxisProfile(WinchProfile):
     """A joint or a motor as declared; only its torque is predicted, zero without effects.
 

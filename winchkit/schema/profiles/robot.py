@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from winchkit.rendering import Shown
 from winchkit.schema.profiles.instruments import InstrumentSpec
 from winchkit.schema.profiles.winch import EffectTable, LedgerEntry, WinchProfile
 from winchkit.schema.quantity import (
@@ -99,8 +100,8 @@ class FittedSpec(Table):
     """Posterior standard deviation by parameter, with its unit."""
 
 
-@dataclass(frozen=True)
-class RobotProfile(Table):
+@dataclass(frozen=True, repr=False)
+class RobotProfile(Shown, Table):
     """A cable robot as declared; frozen, SI."""
 
     name: str

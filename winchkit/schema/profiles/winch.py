@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import Annotated, Any, Literal
 
+from winchkit.rendering import Shown
 from winchkit.schema.quantity import (
     Angle,
     Count,
@@ -190,8 +191,8 @@ class EffectTable:
     line: int | None = None
 
 
-@dataclass(frozen=True)
-class WinchProfile(Table):
+@dataclass(frozen=True, repr=False)
+class WinchProfile(Shown, Table):
     """A winch as declared; frozen, SI."""
 
     name: str

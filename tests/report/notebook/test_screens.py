@@ -1,0 +1,143 @@
+"""Results in a console and in a notebook: one screen each, with the figures of the report."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from typing import Any
+
+import pytest
+
+from calibration_cases import csv, held, measured, robot, rows
+from report_answers import answer_of, recorded
+from winchkit.calibration.robot.calibrate import calibrate
+from winchkit.catalog import find
+from winchkit.diagnosis.add import add
+from winchkit.diagnosis.compare import compare
+from winchkit.rendering import Renderers, Shown
+from winchkit.schema.read import read_profile, read_robot
+
+PROFILE = read_profile(find("profiles", "bench-spiral"))
+VOID = {"polyline", "br"}
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Any]:
+    runs, answer = recorded("demo-fat-drum"), answer_of("demo-fat-drum")
+    return {
+        "run": runs[0],
+        "profile": PROFILE,
+        "robot": read_robot(find("profiles", "cabtive")),
+        "comparison": compare(runs, PROFILE),
+        "answer": answer,
+        "diagnosis": answer.diagnosis,
+        "fit": answer.diagnosis.fit,
+        "addition": add("drum-radius", runs, PROFILE),
+        "calibration": calibrate(robot(), measured(csv(rows())), held()),
+    }
+
+
+NAMES = ("run", "profile", "robot", "comparison", "answer", "diagnosis", "fit", "addition",
+         "calibration")  # fmt: skip
+
+
+class _Balance(HTMLParser):
+    """Checks that every element is closed, and collects the text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text = ""
+        self.seen: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: object) -> None:
+        self.open.append(tag)
+        self.seen.add(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def read(html: str) -> _Balance:
+    found = _Balance()
+    found.feed(html)
+    assert found.open == []
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_result_fits_on_one_screen(name: str, results: dict[str, Any]) -> None:
+    lines = repr(results[name]).split("\n")
+    assert 1 < len(lines) <= 24
+    assert max(map(len, lines)) <= 170 if name == "fit" else max(map(len, lines)) <= 80
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_cell_of_a_notebook_is_whole_and_needs_no_script(
+    name: str, results: dict[str, Any]
+) -> None:
+    html = results[name]._repr_html_()
+    found = read(html)
+    assert len(html) < 60_000
+    assert not {"script", "style", "link", "img"} & found.seen
+
+
+def test_a_run_shows_its_channels_with_their_ranges(results: dict[str, Any]) -> None:
+    run = results["run"]
+    for text in (repr(run), read(run._repr_html_()).text):
+        assert f"{run['tension'].max():.1f}" in text
+        assert "load_mass = 10 kg" in text
+    assert read(run._repr_html_()).seen >= {"table", "svg"}
+
+
+def test_a_profile_shows_what_its_file_declares(results: dict[str, Any]) -> None:
+    text = repr(results["profile"])
+    assert "winding radius 60.00 mm" in text
+    assert "wrap 60.00°" in text
+    assert "ratio 20.4" in text
+    assert "exit point (861.1 mm" in repr(results["robot"])
+
+
+def test_a_diagnosis_shows_its_verdict_the_value_and_the_errors(results: dict[str, Any]) -> None:
+    diagnosis = results["diagnosis"]
+    radius = diagnosis.steps[0].parameters["drum-radius"]["radius_error"]
+    cell = read(diagnosis._repr_html_()).text.replace("\u00a0", " ")
+    for text in (repr(diagnosis), cell):
+        assert "explained" in text.lower()
+        assert f"radius error = {radius.value * 1e3:.4f}" in text
+    assert repr(results["answer"]) == repr(diagnosis)
+
+
+def test_a_calibration_shows_the_errors_before_and_after(results: dict[str, Any]) -> None:
+    assert re.search(r"held out +40 +1\.\d+ mm", repr(results["calibration"]))
+
+
+def test_text_in_a_name_is_no_markup(results: dict[str, Any]) -> None:
+    from dataclasses import replace
+
+    run = replace(results["run"], name="<script>alert(1)</script>")
+    assert "script" not in read(run._repr_html_()).seen
+
+
+def test_a_type_without_renderer_has_the_representation_of_an_object() -> None:
+    class Bare(Shown):
+        pass
+
+    assert repr(Bare()).startswith("<")
+    assert Bare()._repr_html_() is None
+    assert Renderers().of(Bare) is None
+
+
+def test_the_report_is_loaded_when_a_result_is_shown_and_not_before() -> None:
+    code = (
+        "import sys, numpy as np\nfrom winchkit import Run\n"
+        "run = Run('a', np.arange(2.0), {})\nprint('winchkit.report' in sys.modules)\n"
+        "repr(run)\nprint('winchkit.report' in sys.modules, 'matplotlib' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "True", "False"]

@@ -1,0 +1,375 @@
+"""Figures of results by matplotlib: vector graphics with a unit on every axis.
+
+Colours are those of Okabe and Ito, which readers with colour-vision deficiencies distinguish.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.residuals.traces import PoseTrace, Trace
+from winchkit.diagnosis.results import Comparison, Diagnosis
+from winchkit.errors import UsageError, suggest
+from winchkit.report.figures.reduction import decimated
+from winchkit.report.words.numbers import Scale, scale_for
+from winchkit.report.words.sentence import capital
+from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.runs.run import Run
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from winchkit.calibration.robot.calibrate import Calibrated
+
+__all__ = ["answer_figure", "calibration_figure", "result_figure", "run_figure"]
+
+_BLACK, _BLUE, _ORANGE, _GREY = "#333333", "#0072B2", "#D55E00", "#999999"
+_STYLE: dict[Any, Any] = {
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "axes.titlesize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "lines.linewidth": 0.9,
+    "legend.frameon": False,
+    "savefig.dpi": 300,
+    "figure.dpi": 120,
+    "axes.formatter.use_mathtext": True,
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+}
+_WIDTH = 7.1
+"""Width of two columns of a journal, inches."""
+_OUTPUT_HEIGHT, _CHANNEL_HEIGHT, _POSE_HEIGHT = 2.5, 1.15, 2.0
+_POINTS = 4000
+_NAMED_RUNS = 8
+_CHANNELS = 8
+_GAP = 0.02
+"""Gap between runs that follow each other, as a share of the whole time."""
+
+Size = tuple[float, float] | None
+
+
+def result_figure(
+    result: Comparison | Diagnosis,
+    *,
+    output: str | Sequence[str] | None = None,
+    run: str | Sequence[str] | None = None,
+    figsize: Size = None,
+) -> Figure:
+    """Measured and predicted over time with the residual and the noise band below.
+
+    Parameters
+    ----------
+    result : Comparison or Diagnosis
+        Of a winch; of a robot the errors at every pose are drawn.
+    output, run : str or sequence of str, optional
+        Those to draw; by default all, runs one after the other.
+    figsize : (float, float), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Two axes per output.
+    """
+    traces = _chosen(result.traces, output, run)
+    noise = {name: fit.noise_rms for name, fit in result.outputs.items()}
+    if any(isinstance(trace, PoseTrace) for trace in traces):
+        return _pose_figure([t for t in traces if isinstance(t, PoseTrace)], noise, figsize)
+    own = [trace for trace in traces if isinstance(trace, Trace)]
+    outputs = list(dict.fromkeys(trace.output for trace in own))
+    with _figure(figsize or (_WIDTH, _OUTPUT_HEIGHT * len(outputs) + 0.3)) as figure:
+        # The width of the letters of the labels differs; their axes begin at one place.
+        grid = figure.subplots(
+            2 * len(outputs), 1, sharex=True, height_ratios=[1.6, 1.0] * len(outputs), squeeze=False
+        )[:, 0]
+        for index, name in enumerate(outputs):
+            parts = [trace for trace in own if trace.output == name]
+            _draw_output(grid[2 * index], grid[2 * index + 1], parts, noise.get(name))
+        last = grid[-1]
+        several = len({trace.run for trace in own}) > 1
+        last.set_xlabel("time, runs one after the other [s]" if several else "time [s]")
+        last.margins(x=0.01)
+        _name_runs(grid[0], [trace for trace in own if trace.output == outputs[0]])
+        _legend(figure, *grid[:2])
+        figure.align_ylabels()
+    return figure
+
+
+def answer_figure(answer: Answer, **options: Any) -> Figure:
+    """Figure of the diagnosis of an answer; options as of :func:`result_figure`."""
+    return result_figure(answer.diagnosis, **options)
+
+
+def run_figure(
+    run: Run, *, channels: str | Sequence[str] | None = None, figsize: Size = None
+) -> Figure:
+    """Channels of a run over time.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    channels : str or sequence of str, optional
+        Those to draw; by default the first eight with numbers.
+    figsize : (float, float), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One axis per channel.
+    """
+    there = [name for name in run if np.isfinite(run[name]).any()]
+    names = there[:_CHANNELS] if channels is None else _known(channels, list(run), "channel")
+    if not names:
+        raise UsageError(f"run {run.name} has no channel with numbers to draw")
+    with _figure(figsize or (_WIDTH, _CHANNEL_HEIGHT * len(names) + 0.4)) as figure:
+        axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, name in zip(axes, names, strict=True):
+            time, (values,) = decimated(run.time, [run[name]], _POINTS)
+            scale = _scale([values], run.channels[name].unit)
+            axis.plot(time, values / scale.worth, color=_BLUE)
+            axis.set_ylabel(_label(name.replace("_", " "), scale, broken=True))
+        axes[0].set_title(run.name, loc="left")
+        axes[-1].set_xlabel("time [s]")
+        figure.align_ylabels()
+    return figure
+
+
+def calibration_figure(found: Calibrated, *, figsize: Size = None) -> Figure:
+    """Pose errors before and after a robot's calibration, of fitted and of held-out poses.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+    figsize : (float, float), optional
+        Width and height, inches.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Position errors and, where rotations were measured, rotation errors.
+    """
+    sides = [
+        ("poses fitted", found.fit_before, found.fit_after),
+        ("poses held out", found.validation_before, found.validation_after),
+    ]
+    sides = [side for side in sides if np.isfinite(side[2].distance).any()]
+    rows = [("position error", "m", "distance"), ("rotation error", "rad", "angle")]
+    rows = [row for row in rows if any(np.isfinite(getattr(s[2], row[2])).any() for s in sides)]
+    if not sides:
+        raise UsageError("no position was measured: there are no pose errors to draw")
+    with _figure(figsize or (_WIDTH, 2.3 * len(rows) + 0.2)) as figure:
+        widths = [max(3.0, np.sqrt(len(side[1].distance))) for side in sides]
+        axes = figure.subplots(
+            len(rows), len(sides), sharey="row", width_ratios=widths, squeeze=False
+        )
+        for row, (name, unit, field) in enumerate(rows):
+            scale = _scale([getattr(s[k], field) for s in sides for k in (1, 2)], unit)
+            for column, (title, *errors) in enumerate(sides):
+                axis = axes[row, column]
+                for error, color, word in zip(errors, (_ORANGE, _BLUE), _BEFORE_AFTER, strict=True):
+                    values = getattr(error, field) / scale.worth
+                    _draw_sizes(axis, values, color, word)
+                if row == 0:
+                    axis.set_title(title, loc="left")
+                if row == len(rows) - 1:
+                    axis.set_xlabel("number of the pose")
+            shown = next(axis for axis in axes[row] if axis.axison)
+            shown.set_ylabel(_label(name, scale))
+        _legend(figure, axes[0, 0])
+    return figure
+
+
+_BEFORE_AFTER = ("before", "after calibration")
+
+
+def _draw_sizes(axis: Axes, values: Array, color: str, word: str) -> None:
+    """Positive values over their number on a logarithmic scale, with their rms."""
+    known = np.isfinite(values) & (values > 0)
+    if not known.any():
+        axis.set_axis_off()
+        return
+    number = np.arange(1, len(values) + 1)
+    axis.plot(number[known], values[known], ".", ms=3, color=color, label=word)
+    rms = float(np.sqrt(np.mean(values[known] ** 2)))
+    axis.axhline(rms, color=color, lw=0.8, ls="--", label=f"rms {word}")
+    axis.set_yscale("log")
+
+
+def _pose_figure(
+    traces: Sequence[PoseTrace], noise: Mapping[str, float | None], figsize: Size
+) -> Figure:
+    """Errors of every output at every pose, all lines or axes, with the noise band."""
+    with _figure(figsize or (_WIDTH, _POSE_HEIGHT * len(traces) + 0.3)) as figure:
+        axes = figure.subplots(len(traces), 1, sharex=True, squeeze=False)[:, 0]
+        for axis, trace in zip(axes, traces, strict=True):
+            before = trace.residual_before
+            parts = [trace.residual] if before is None else [before, trace.residual]
+            scale = _scale(parts, trace.unit)
+            _band(axis, noise.get(trace.output), scale)
+            tones = [_BLUE] if before is None else [_ORANGE, _BLUE]
+            words = ["profile"] if before is None else ["profile", "with the named effects"]
+            number = np.arange(1, len(trace.residual) + 1)
+            for part, color, word in zip(parts, tones, words, strict=True):
+                lines = axis.plot(number, part / scale.worth, ".", ms=2.5, color=color)
+                lines[0].set_label(word)
+            axis.axhline(0.0, color=_BLACK, lw=0.5)
+            axis.set_ylabel(_label(f"{_name(trace.output)}:\nresidual", scale))
+        axes[-1].set_xlabel("number of the pose")
+        _legend(figure, axes[0])
+        figure.align_ylabels()
+    return figure
+
+
+def _draw_output(upper: Axes, lower: Axes, traces: Sequence[Trace], noise: float | None) -> None:
+    """Measured and predicted above, the residual with the noise band below."""
+    starts = _starts(traces)
+    measured = [trace.measured for trace in traces]
+    scale = _scale(measured, traces[0].unit)
+    residuals = [trace.residual_before for trace in traces], [trace.residual for trace in traces]
+    drawn = [part for group in residuals for part in group if part is not None]
+    fine = _scale(drawn, traces[0].unit, share=3.0)
+    _band(lower, noise, fine)
+    named = any(trace.before is not None for trace in traces)
+    after = "with the named effects" if named else "predicted"
+    for trace, start in zip(traces, starts, strict=True):
+        lines = [
+            (upper, trace.measured, scale, _BLACK, "measured", 1.4),
+            (upper, trace.before, scale, _ORANGE, "predicted by the profile", 0.9),
+            (upper, trace.predicted, scale, _BLUE, after, 0.9),
+            (lower, trace.residual_before, fine, _ORANGE, "", 0.7),
+            (lower, trace.residual, fine, _BLUE, "", 0.7),
+        ]
+        for axis, values, own, color, word, width in lines:
+            if values is not None:
+                time, (shown,) = decimated(trace.time, [values], max(200, _POINTS // len(traces)))
+                first = trace is traces[0] and word
+                label = word if first else None
+                axis.plot(start + time, shown / own.worth, color=color, lw=width, label=label)
+    for axis in (upper, lower):
+        for start in starts[1:]:
+            axis.axvline(start, color=_GREY, lw=0.4, ls=":")
+    lower.axhline(0.0, color=_BLACK, lw=0.5)
+    upper.set_ylabel(_label(_name(traces[0].output), scale, broken=True))
+    lower.set_ylabel(_label("residual", fine, broken=True))
+
+
+def _starts(traces: Sequence[Trace]) -> list[float]:
+    """Start of every run on an axis on which they follow each other."""
+    lengths = [float(trace.time[-1]) for trace in traces]
+    gap = _GAP * sum(lengths) / len(lengths)
+    return [float(sum(lengths[:k]) + k * gap) for k in range(len(lengths))]
+
+
+def _name_runs(axis: Axes, traces: Sequence[Trace]) -> None:
+    """Names of the runs above their curves, where there are few."""
+    if not 1 < len(traces) <= _NAMED_RUNS:
+        return
+    for trace, start in zip(traces, _starts(traces), strict=True):
+        axis.annotate(
+            trace.run,
+            (start, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(0, 2),
+            textcoords="offset points",
+            va="bottom",
+            fontsize=7,
+            color=_GREY,
+        )
+
+
+def _band(axis: Axes, noise: float | None, scale: Scale) -> None:
+    if noise is not None and np.isfinite(noise):
+        size = noise / scale.worth
+        axis.axhspan(-size, size, color=_GREY, alpha=0.3, lw=0, label="noise, ± rms")
+
+
+def _legend(figure: Figure, *axes: Axes) -> None:
+    pairs = [pair for axis in axes for pair in zip(*axis.get_legend_handles_labels(), strict=True)]
+    figure.legend(*zip(*pairs, strict=True), loc="outside upper center", ncols=4)
+
+
+def _scale(parts: Sequence[Array | None], unit: str, share: float = 1.0) -> Scale:
+    """Unit for the largest value, or for some rms of it."""
+    values = np.concatenate(
+        [np.zeros(0), *(np.abs(part).ravel() for part in parts if part is not None)]
+    )
+    known = values[np.isfinite(values)]
+    if not len(known):
+        return scale_for(0.0, unit)
+    size = float(np.max(known)) if share == 1.0 else share * float(np.sqrt(np.mean(known**2)))
+    # Angles beyond a turn are in radians, as in the file.
+    return Scale("rad", 1.0) if unit == "rad" and size > 2 * np.pi else scale_for(size, unit)
+
+
+def _label(name: str, scale: Scale, *, broken: bool = False) -> str:
+    unit = f" [{scale.label}]" if scale.label else ""
+    return capital(name) + (unit.replace(" [", "\n[") if broken else unit)
+
+
+def _name(output: str) -> str:
+    return OUTPUT_NAMES.get(output, output.replace("_", " "))
+
+
+def _chosen(
+    traces: Sequence[Trace | PoseTrace],
+    output: str | Sequence[str] | None,
+    run: str | Sequence[str] | None,
+) -> list[Trace | PoseTrace]:
+    """Traces of the chosen outputs and runs."""
+    if not traces:
+        raise UsageError("this result holds no samples to draw; call compare or diagnose again")
+    outputs = list(dict.fromkeys(trace.output for trace in traces))
+    runs = list(dict.fromkeys(trace.run for trace in traces if isinstance(trace, Trace)))
+    kept = outputs if output is None else _known(output, outputs, "output")
+    kept_runs = runs if run is None else _known(run, runs, "run")
+    return [
+        trace
+        for trace in traces
+        if trace.output in kept and (isinstance(trace, PoseTrace) or trace.run in kept_runs)
+    ]
+
+
+def _known(given: str | Sequence[str], there: list[str], kind: str) -> list[str]:
+    """Names that are there; raises UsageError for one that is not."""
+    names = [given] if isinstance(given, str) else list(given)
+    for name in names:
+        if name not in there:
+            known = f"there are {', '.join(there)}" if there else f"there is no {kind}"
+            raise UsageError(f"no {kind} '{name}' to draw; {known}" + suggest(name, there))
+    return names
+
+
+@contextmanager
+def _figure(size: tuple[float, float]) -> Iterator[Figure]:
+    """An empty figure in the style of this package; of pyplot where that shows windows."""
+    try:
+        import matplotlib as mpl
+        from matplotlib import pyplot
+        from matplotlib.backends.registry import BackendFilter, backend_registry
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise UsageError(
+            "figures need matplotlib; install it with pip install 'winchkit[plot]'"
+        ) from None
+    with mpl.rc_context(_STYLE):
+        registry: Any = backend_registry
+        windows = registry.list_builtin(BackendFilter.INTERACTIVE)
+        # A notebook shows the returned figure: one of pyplot would be shown twice.
+        shown = pyplot.get_backend().lower() in windows
+        new = pyplot.figure if shown else Figure
+        yield new(figsize=size, layout="constrained")

@@ -1,0 +1,106 @@
+"""Runs from tables in memory: pandas, Polars, pyarrow, or any other Arrow stream."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.errors import UsageError, suggest
+from winchkit.runs.assemble import Recording, assemble
+from winchkit.runs.columns import header_of
+from winchkit.runs.run import Run
+from winchkit.tabular import arrow_of
+
+__all__ = ["run_of"]
+
+_NAME = "name"
+
+
+def run_of(
+    table: Any,
+    *,
+    units: Mapping[str, str] | None = None,
+    metadata: Mapping[str, str] | None = None,
+    name: str = "",
+) -> Run:
+    """Make a run from a table in memory.
+
+    Parameters
+    ----------
+    table : table of pandas, Polars or pyarrow, or any object with an Arrow C stream
+        A column per channel, named ``time``, ``motor_angle``, ``tension`` … as in a file; of
+        xarray, ``dataset.to_dataframe()``. Null is a missing value.
+    units : mapping of str to str, optional
+        Unit by column, for columns that do not bring their own: as Arrow metadata ``unit``, in
+        ``attrs["units"]`` of pandas, or in the name, ``tension [N]``.
+    metadata : mapping of str to str, optional
+        Such as ``{"load_mass": "10 kg"}``, beside that of the table.
+    name : str, optional
+        Name of the run; by default that of the table, else ``table``.
+
+    Returns
+    -------
+    Run
+        In SI: a run that was a table before (``run.to_pandas()``, ``run.to_arrow()``) is the same.
+
+    Raises
+    ------
+    RunError
+        With every fault, as :func:`winchkit.read_run`: a missing column, an unknown unit, times
+        that are out of order.
+    UsageError
+        For an object that is no table, a unit for a column that is not there, or without pyarrow.
+    """
+    found = arrow_of(table)
+    given = dict(units or {})
+    header = []
+    for field in found.schema:
+        own, unit = header_of(field.name) or (field.name, "")
+        unit = given.pop(own, given.pop(field.name, "")) or unit
+        header.append((own, unit or _text((field.metadata or {}).get(b"unit", b""))))
+    if given:
+        known = [own for own, _ in header]
+        wrong = next(iter(given))
+        raise UsageError(
+            f"units: the table has no column '{wrong}'; it has {', '.join(known)}"
+            + suggest(wrong, known)
+        )
+    texts = {_text(key): _text(value) for key, value in (found.schema.metadata or {}).items()}
+    texts = {key: value for key, value in texts.items() if key not in _OF_PROGRAMS}
+    named = name or texts.pop(_NAME, "") or "table"
+    texts.pop(_NAME, None)
+    columns = [_numbers(column) for column in found.columns]
+    recording = Recording(
+        named, header, columns, _no_line, metadata={**texts, **dict(metadata or {})}
+    )
+    return replace(assemble(recording), name=named, path="")
+
+
+_OF_PROGRAMS = frozenset({"pandas", "ARROW:schema"})
+"""Metadata that other programs write for themselves."""
+
+
+def _no_line(row: int) -> int | None:
+    """Rows of a table in memory have no line in a file."""
+    del row
+    return None
+
+
+def _numbers(column: Any) -> Array | None:
+    """Values of a column, NaN where it is null; None for a column with text."""
+    import pyarrow as pa
+
+    kind = column.type
+    if pa.types.is_duration(kind):
+        return np.asarray(column.to_numpy() / np.timedelta64(1, "s"), dtype=np.float64)
+    if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)):
+        return None
+    return np.array(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
+
+
+def _text(value: bytes) -> str:
+    return value.decode("utf-8", errors="replace")
