@@ -34,7 +34,9 @@ _BEGIN = """\
 Written by `python docs/make_api.py` from the docstrings; do not edit it by hand.
 `help(winchkit.open_bench)` shows parameters with units, results and errors.
 
-    from winchkit import diagnose, read_profile, read_run
+```python
+from winchkit import diagnose, read_profile, read_run
+```
 
 For effects of your own there are `winchkit.effects` and `winchkit.model.stages` besides, for
 control loops `winchkit.model.robot` and `winchkit.estimation`, for tests `winchkit.testing`. Paths

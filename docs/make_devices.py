@@ -1,4 +1,8 @@
-"""Writes docs/devices.md from device files and their schema: ``python docs/make_devices.py``."""
+"""Writes the pages of drives and of instruments: ``python docs/make_devices.py``.
+
+docs/howto/drive.md is docs/howto/drive.txt with the keys of the schema, docs/devices.md lists the
+shipped instruments from their device files.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +19,16 @@ from winchkit.schema.host_loss import VendorObject, VendorWatchdog
 from winchkit.schema.read import read_device
 
 PAGE = Path(__file__).with_name("devices.md")
-_DRIVES = Path(__file__).with_name("drives.txt")
-"""The part on drives, with a line ``<keys of CLASS>`` for each table of keys."""
+DRIVE_PAGE = Path(__file__).parent / "howto" / "drive.md"
+_DRIVES = DRIVE_PAGE.with_suffix(".txt")
+"""The page on drives, with a line ``<keys of CLASS>`` for each table of keys."""
 _BEGIN = """\
-# Instruments
+# Shipped instruments
 
 Written by `python docs/make_devices.py` from the device files; do not edit it by hand. The same
 files are used by the readers and the simulated instruments. None has been tested on the device yet.
+How to declare another one: [load cells on Modbus and CANopen](howto/load-cell.md),
+[instruments on a serial line](howto/serial-instrument.md), [drives](howto/drive.md).
 """
 _TABLES = {item.__name__: item for item in (ServoSpec, PdoSpec, OptionSpec, QuirkSpec)}
 _TABLES |= {item.__name__: item for item in (VendorWatchdog, VendorObject)}
@@ -38,11 +45,15 @@ def page(devices: Sequence[DeviceSpec]) -> str:
     """The page: each instrument with what its file declares."""
     instruments = [device for device in devices if device.servo is None]
     sections = ("\n".join(_section(device)) + "\n" for device in instruments)
-    return "\n".join([*_drives(), "", _BEGIN, *sections])
+    return "\n".join([_BEGIN, *sections])
 
 
-def _drives() -> Iterator[str]:
-    """The part on drives, with every key as the schema has it."""
+def drive_page() -> str:
+    """The page on drives, with every key as the schema has it."""
+    return "\n".join(_drive_lines()) + "\n"
+
+
+def _drive_lines() -> Iterator[str]:
     for line in _DRIVES.read_text(encoding="utf-8").rstrip("\n").split("\n"):
         name = line.removeprefix("<keys of ")
         if name == line:
@@ -110,3 +121,4 @@ def _how(device: DeviceSpec) -> str:
 if __name__ == "__main__":
     found = [read_device(find("devices", name)) for name in names("devices")]
     PAGE.write_text(page(found), encoding="utf-8")
+    DRIVE_PAGE.write_text(drive_page(), encoding="utf-8")

@@ -170,7 +170,7 @@ def test_a_drive_that_notices_nothing_moves_with_hardware_that_stops_it(tmp_path
 
 def test_the_page_on_an_unknown_drive_leads_to_a_jog(tmp_path: Path) -> None:
     """Its two files as they stand there, its checks, and a jog; only the channel is the rig's."""
-    page = (Path(__file__).parents[2] / "docs/devices.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs/howto/drive.md").read_text(encoding="utf-8")
     device, bench = re.findall(r"^```toml\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     home = tmp_path / "erob"
     home.mkdir()

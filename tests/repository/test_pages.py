@@ -5,15 +5,19 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import textwrap
 import tomllib
 from pathlib import Path
 
 import pytest
 
-from snippets import ROOT, Session, Snippet, said, snippets_of
+from recordings_of_others import lay_out
+from snippets import FIRST_TERMINAL, LANGUAGES, ROOT, Session, Snippet, said, snippets_of
 
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+PAGES = sorted(
+    path
+    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
+    if "site" not in path.relative_to(ROOT).parts
+)
 _LINK = re.compile(r"\]\((?!\w+://)([^)\s]+)\)")
 _PATH = re.compile(
     r"`((?:winchkit|devices|profiles|sim|tests|docs|examples|\.ci|benchmarks)/[\w./-]*)`"
@@ -29,35 +33,62 @@ def sessions() -> list[object]:
     """Pages with something to run; those that serve a bench beside it move it in real time."""
     found = []
     for page in PAGES:
-        marks = {s.mark for s in snippets_of(page) if not s.reason}
-        live = [pytest.mark.realtime] if "first-terminal" in marks else []
+        marks = {s.mark for s in snippets_of(page) if not s.reason and s.language != "text"}
+        live = [pytest.mark.realtime] if FIRST_TERMINAL in marks else []
         if marks:
             found.append(pytest.param(page, id=name(page), marks=live))
     return found
+
+
+RECORDINGS = {
+    "docs/tutorial/emps.md": "emps",
+    "docs/tutorial/known-effect.md": "emps",
+    "docs/tutorial/cogging.md": "odrive-cogging",
+}
+"""Pages that use recordings of others, and which."""
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sessions are written for a POSIX shell")
 @pytest.mark.parametrize("page", sessions())
 def test_what_a_page_shows_is_what_happens(page: Path, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    if name(page) in RECORDINGS:
+        lay_out(RECORDINGS[name(page)], tmp_path)
     with Session(tmp_path) as session:
         for snippet in snippets_of(page):
             session.run(snippet)
 
 
-def test_the_formats_page_in_python(tmp_path: Path) -> None:
-    text = (ROOT / "docs/formats.md").read_text(encoding="utf-8")
-    indented = re.findall(r"(?:^(?: {4}.*)?\n)+", text, re.MULTILINE)
-    blocks = [textwrap.dedent(block).strip() for block in indented]
-    programmes = [block for block in blocks if block.startswith("from winchkit")]
-    assert len(programmes) == 2
-    shutil.copytree(ROOT / "profiles", tmp_path / "profiles")
-    recorded = "winchkit sim record demo-adequate -p programme-demo --rate '5 Hz' --format mcap"
-    with Session(tmp_path) as session:
-        session.run(Snippet(1, "console", "", f"$ {recorded}\n...", ""))
-        session.run(Snippet(1, "console", "", "$ mv demo-10kg-1.mcap lift.mcap\n", ""))
-        for programme in programmes:
-            session.run(Snippet(1, "python", "", programme, ""))
+NOT_RUN = {
+    "needs a CAN adapter": "docs/commands.md",
+    "asks a person beside the winch": "docs/commands.md",
+    "the answer depends on the computer": "docs/realtime.md",
+    "needs the drive": "docs/howto/drive.md",
+    "tests/devices/test_makers_drives.py runs it with the maker's file": "docs/howto/drive.md",
+    "the checks of .ci/run": "CONTRIBUTING.md",
+    "tests/repository/test_wheel.py installs winchkit into a new environment": (
+        "docs/tutorial/first-hour.md"
+    ),
+}
+"""Reasons for blocks that are not run, and the page of each."""
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_every_block_has_a_language_and_is_run_or_has_a_reason(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    snippets = snippets_of(page)
+    assert len(re.findall(r"^```", text, re.MULTILINE)) == 2 * len(snippets)
+    assert {snippet.language for snippet in snippets} <= set(LANGUAGES)
+    reasons = {snippet.reason for snippet in snippets if snippet.reason}
+    assert {NOT_RUN.get(reason) for reason in reasons} <= {name(page)}
+    # No command or programme is an indented block, which no test would run.
+    fenced = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    assert re.findall(r"^ {4}(?:\$|import |from \w+ import ).*", fenced, re.MULTILINE) == []
+
+
+def test_no_reason_is_left_over() -> None:
+    used = {snippet.reason for page in PAGES for snippet in snippets_of(page) if snippet.reason}
+    assert used == set(NOT_RUN)
 
 
 def test_the_readme_begins_with_the_two_commands() -> None:

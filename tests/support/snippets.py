@@ -1,25 +1,38 @@
 """Fenced blocks of Markdown pages, executed as a reader would type them.
 
-``console`` blocks hold ``$ commands`` with what they print; ``...`` stands for anything, numbers
-may differ, and so may line breaks. ``python`` blocks are programmes. A block whose language is
-followed by ``first-terminal`` goes on while the blocks after it run. An HTML comment
-``<!-- not run: reason -->`` before a block keeps it from being run.
+| language | block |
+|---|---|
+| ``console`` | ``$ commands`` with their output; ``...`` is any text, numbers may differ |
+| ``python`` | a programme |
+| ``toml`` | a declaration, read by its schema, or a part of one, parsed |
+| ``csv`` | a run, read by ``winchkit check``, or points of a load cell, fitted |
+| ``json`` | output with ``…`` for values, parsed |
+| ``usage`` | a command line with its options, compared with those of the command |
+| ``text`` | a drawing or a formula |
+
+A block with ``title="NAME"`` is a file that the reader saves under this name. A ``console`` block
+with ``title="first terminal"`` continues while the blocks after it run. An HTML
+comment ``<!-- not run: reason -->`` before a block keeps it from being run. A session that fails
+beside a stall of this computer is skipped, with the stall (tests/conftest.py).
 """
 
 from __future__ import annotations
 
+import csv
+import json
 import os
 import re
 import signal
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-__all__ = ["ROOT", "Session", "Snippet", "said", "snippets_of"]
+__all__ = ["FIRST_TERMINAL", "LANGUAGES", "ROOT", "Session", "Snippet", "said", "snippets_of"]
 
 ROOT = Path(__file__).parents[2]
 _FENCE = re.compile(
@@ -28,10 +41,8 @@ _FENCE = re.compile(
 )
 _NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+−]?\d+)?")
 _PATIENCE = 120
-_STALLED = ("no complete feedback", "no load cell reading", "heartbeat is gone")
-"""What a bench says when this machine stood still for a moment; rightly, it stops."""
-_AGAIN = 3
-"""How often a command that was stopped so is given anew."""
+FIRST_TERMINAL = 'title="first terminal"'
+LANGUAGES = ("console", "python", "toml", "csv", "json", "usage", "text")
 
 
 @dataclass(frozen=True)
@@ -44,6 +55,13 @@ class Snippet:
     text: str
     reason: str
     """Why it is not run; empty where it is."""
+
+    @property
+    def file(self) -> str:
+        """Name of the file that the block is; empty where it is none."""
+        if self.mark == FIRST_TERMINAL or not self.mark.startswith('title="'):
+            return ""
+        return self.mark.removeprefix('title="').removesuffix('"')
 
     @property
     def commands(self) -> Iterator[tuple[str, str]]:
@@ -74,6 +92,17 @@ def _plain(text: str) -> str:
     return " ".join(_NUMBER.sub("#", text).split())
 
 
+def options_of(command: str) -> set[str]:
+    """All options of a command of winchkit."""
+    import click
+
+    from winchkit.cli import main
+
+    found = main.get_command(click.Context(main), command)
+    assert found is not None, f"winchkit has no command {command!r}"
+    return {name for item in found.params for name in (*item.opts, *item.secondary_opts)}
+
+
 class Session:
     """A reader's folder and terminals; a context manager."""
 
@@ -98,21 +127,58 @@ class Session:
         """Run one block and compare what it prints."""
         if snippet.reason:
             return
+        if snippet.file:
+            (self._folder / snippet.file).write_text(snippet.text, encoding="utf-8")
         if snippet.language == "python":
             self._checked([sys.executable, "-W", "error", "-c", snippet.text], "...")
-        elif snippet.mark == "first-terminal":
+        elif snippet.mark == FIRST_TERMINAL:
             ((command, output),) = snippet.commands
             self._begin(command, output)
         elif snippet.language == "console":
             for command, output in snippet.commands:
                 self._checked(["bash", "-c", command], output)
+        elif snippet.language == "toml":
+            self._declared(snippet)
+        elif snippet.language == "csv":
+            self._table(snippet)
+        elif snippet.language == "json":
+            json.loads(re.sub(r"\[…\]|\{…\}|…", "null", snippet.text))
+        elif snippet.language == "usage":
+            self._usage(snippet)
+
+    def _declared(self, snippet: Snippet) -> None:
+        """Parse a part of a TOML file; check a whole one with the files that it names."""
+        table = tomllib.loads(snippet.text)
+        if "kind" in table and "schema" in table:
+            self._checked_file(f"block-{snippet.line}.toml", snippet.text)
+
+    def _table(self, snippet: Snippet) -> None:
+        """Check a run; fit the points of a load cell."""
+        name = f"block-{snippet.line}.csv"
+        if "motor_angle" in snippet.text:
+            self._checked_file(name, snippet.text)
+            return
+        rows = list(csv.reader(snippet.text.splitlines()))
+        assert {len(row) for row in rows} == {len(rows[0])}
+        (self._folder / name).write_text(snippet.text, encoding="utf-8")
+        self._checked(["winchkit", "cell", "calibrate", "--points", name, "--yes"], "...")
+
+    def _checked_file(self, name: str, text: str) -> None:
+        (self._folder / name).write_text(text, encoding="utf-8")
+        self._checked(["winchkit", "check", name], "...")
+
+    def _usage(self, snippet: Snippet) -> None:
+        """Compare the options of a usage line with those of the commands that it names."""
+        for line in re.split(r"^(?=winchkit)", snippet.text, flags=re.MULTILINE):
+            if not line.strip():
+                continue
+            commands = line.split()[1].split("|")
+            known = {name for command in commands for name in options_of(command)}
+            named = set(re.findall(r"(?<![\w-])--?[a-z][a-z-]*", line))
+            assert named <= known, f"{line}\nnames options that {commands} lack: {named - known}"
 
     def _checked(self, command: list[str], output: str) -> None:
         done = self._done(command)
-        for _ in range(_AGAIN):
-            if done.returncode == 0 or not any(word in done.stdout for word in _STALLED):
-                break
-            done = self._done(command)
         assert done.returncode == 0, f"{command[-1]}\nends with {done.returncode}:\n{done.stdout}"
         assert said(output, done.stdout), f"{command[-1]}\nprints\n{done.stdout}\nand not\n{output}"
 

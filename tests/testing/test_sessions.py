@@ -52,7 +52,7 @@ def test_the_example_passes_its_own_tests() -> None:
 
 
 def test_the_page_is_a_file_of_tests(tmp_path: Path) -> None:
-    page = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "howto" / "ci.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
     (tmp_path / "test_page.py").write_text(block, encoding="utf-8")
     done = run_pytest(tmp_path)

@@ -165,7 +165,7 @@ def grow(
     effect = catalogue[effect_id]
     if not effect.repeatable and any(table.id == effect_id for table in profile.effect):
         raise UsageError(f"profile '{profile.name}' has the effect '{effect_id}' already")
-    dataset = prepare(runs, profile, band, decimate=True)
+    dataset = prepare(runs, profile, band, decimate=True, catalogue=catalogue)
     candidates = Catalogue([*catalogue, _placed(effect, dataset)])
     engine = selection_engine(dataset, candidates)
     lacking = engine.regression.missing_needs(effect)
@@ -266,9 +266,9 @@ def remove(
     RunError
         With every fault of every run.
     """
-    engine = selection_engine(
-        prepare(runs, profile, band, decimate=True), catalogue or load_catalogue()
-    )
+    catalogue = catalogue or load_catalogue()
+    dataset = prepare(runs, profile, band, decimate=True, catalogue=catalogue)
+    engine = selection_engine(dataset, catalogue)
     initial_model, noise = engine.fit_with_noise(engine.initial_model)
     terms = initial_model.hypothesis.terms
     there = [index for index, term in enumerate(terms) if term.effect.id == effect_id]

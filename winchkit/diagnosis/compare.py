@@ -85,7 +85,9 @@ def compared(
     band: float | None = None,
 ) -> Compared:
     """The same as :func:`compare`, with the residual."""
-    regression = TimeSeriesRegression(prepare(runs, profile, band, kept_cut_offs=WHOLE_TRANSITION))
+    regression = TimeSeriesRegression(
+        prepare(runs, profile, band, kept_cut_offs=WHOLE_TRANSITION, catalogue=catalogue)
+    )
     start = initial_hypothesis(profile, catalogue, regression)
     residual = regression.residual(start)
     offset = None

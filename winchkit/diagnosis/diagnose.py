@@ -203,7 +203,7 @@ def diagnose(
     """
     catalogue = catalogue or load_catalogue()
     progress("reading the signals", 0.0)
-    dataset = prepare(runs, profile, band, decimate=decimate, fast=True)
+    dataset = prepare(runs, profile, band, decimate=decimate, fast=True, catalogue=catalogue)
     progress("drawing the candidates", 0.1)
     engine = selection_engine(dataset, catalogue)
     if caveats(dataset.sanity) and not as_recorded:

@@ -16,6 +16,7 @@ from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.data.sign_and_scale import sign_and_scale
 from winchkit.diagnosis.data.validation import validate_runs
 from winchkit.diagnosis.diagnose import diagnose
+from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.errors import RunError
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
@@ -139,6 +140,14 @@ def test_friction_and_inertia_determine_the_sign_without_a_load(seed: int) -> No
 def test_the_inertia_in_the_profile_is_a_prediction() -> None:
     heavy = replace(GROOVED, effect=(EffectTable("rotor-inertia", {"inertia": "0.4 kg m^2"}),))
     assert codes([joint(1, 1.0)[0]], heavy) == []
+
+
+def test_an_effect_of_the_user_in_the_profile_is_a_prediction() -> None:
+    catalogue = load_catalogue()
+    own = replace(catalogue["rotor-inertia"], id="mine")
+    heavy = replace(GROOVED, effect=(EffectTable("mine", {"inertia": "0.4 kg m^2"}),))
+    assert sign_and_scale([joint(1, 1.0)[0]], heavy, Catalogue([*catalogue, own])) == []
+    assert sign_and_scale([joint(1, -1.0)[0]], heavy, Catalogue([*catalogue, own])) != []
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,8 @@
-"""What docs/serial.md shows is a device file that is read as the page says."""
+"""What docs/howto/serial-instrument.md shows is a device file that is read as the page says."""
 
 from __future__ import annotations
 
 import re
-import textwrap
 from pathlib import Path
 
 import pytest
@@ -13,14 +12,14 @@ from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.parser import StreamParser
 from winchkit.schema.read import read_device
 
-PAGE = (Path(__file__).parents[3] / "docs/serial.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs/howto/serial-instrument.md").read_text(encoding="utf-8")
 
 
 def test_the_line_of_your_own_is_read(tmp_path: Path) -> None:
-    blocks = re.findall(r"(?:^(?: {4}.*)?\n)+", PAGE, re.MULTILINE)
+    blocks = re.findall(r"^```toml\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
     (text,) = [block for block in blocks if 'name = "my-cell"' in block]
     path = tmp_path / "device.toml"
-    path.write_text(textwrap.dedent(text), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     parser = StreamParser(read_device(path))
     parser.begin()
     good, moving, over = parser.feed(

@@ -6,7 +6,6 @@ them. WINCHKIT_EMPS and WINCHKIT_REAL name the folders, else ``shared/data`` bes
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
+from recordings_of_others import emps_variables, folder
 from winchkit.runs import read_run
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.formats.source import read_table
@@ -22,18 +22,6 @@ from winchkit.runs.importing.mapping import mapping_of, write_mapping
 from winchkit.runs.importing.runs import run_of
 from winchkit.runs.importing.streams import streams_of
 from winchkit.runs.run import Run
-
-GAIN = 35.15065
-"""Force over the drive's signal, N/V, published with the data."""
-
-
-def folder(variable: str, name: str) -> Path | None:
-    """Where the data are, if they are anywhere."""
-    beside = [parent / "shared" / "data" / name for parent in Path(__file__).resolve().parents]
-    named = os.environ.get(variable)
-    places = [Path(named)] if named else beside
-    return next((place for place in places if place.is_dir()), None)
-
 
 EMPS, REAL = folder("WINCHKIT_EMPS", "emps"), folder("WINCHKIT_REAL", "real")
 
@@ -45,13 +33,7 @@ def test_emps_by_the_variables_of_its_authors(name: str, tmp_path: Path) -> None
     known = read_run(EMPS / f"{name}.csv")
     force = known["motor_torque"]
     path = tmp_path / "DATA_EMPS.mat"
-    variables = {
-        "t": known.time,
-        "qm": known["motor_angle"],
-        "qg": known["motor_angle"] + 1e-5,
-        "vir": force / GAIN,
-    }
-    savemat(path, {**{k: v.reshape(-1, 1) for k, v in variables.items()}, "gtau": GAIN})
+    savemat(path, emps_variables(EMPS / f"{name}.csv"))
     plain = guess_columns(read_table(path))
     assert {item.channel for item in plain.used} == {"time", "motor_angle"}
     answers = Answers(columns=(read_column("motor_torque=vir*gtau"),))

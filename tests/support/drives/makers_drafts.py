@@ -1,4 +1,4 @@
-"""Device files as a user writes them by docs/devices.md, from a maker's EDS alone."""
+"""Device files as a user writes them by docs/howto/drive.md, from a maker's EDS alone."""
 
 from __future__ import annotations
 

@@ -88,7 +88,7 @@ def command(
     exports of trackers. Guesses columns and units, shows the guess, and asks what it cannot know;
     without a terminal it ends with 2 and names the options that answer. The mapping that it saves
     makes the next import silent. A FILE without a motor angle is joined to the one that has it, by
-    its time stamps or by cross-correlation (docs/importing.md).
+    its time stamps or by cross-correlation (docs/howto/logger.md).
     """
     from winchkit.cli.files.import_table import entry_of, tables_text
     from winchkit.runs.importing.streams import streams_of

@@ -26,6 +26,7 @@ from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs
 from winchkit.diagnosis.data.zeroing import zeroed_anew
+from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import UsageError
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Line, Motion
@@ -149,6 +150,7 @@ def prepare(
     *,
     decimate: bool = False,
     fast: bool = False,
+    catalogue: Catalogue | None = None,
 ) -> Dataset:
     """Validate runs and build their data set.
 
@@ -167,6 +169,8 @@ def prepare(
         Whether long runs are decimated as far as their signals allow.
     fast
         Whether a few samples at the end of a run are left out, so that its transforms are fast.
+    catalogue
+        Effects, those of the profile among them; by default all that are installed.
 
     Raises
     ------
@@ -180,7 +184,7 @@ def prepare(
     runs, at_rest = prepared_statics(with_torques(runs, profile), profile)
     notes = [*at_rest, *validate_runs(runs, profile)]
     runs, copied = without_copies(runs, profile)
-    sanity = findings(runs, profile)
+    sanity = findings(runs, profile, catalogue)
     resolution = resolutions(runs)
     runs, mended = evenly_stamped([without_outliers(run) for run in runs])
     notes += mended

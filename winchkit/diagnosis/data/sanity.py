@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.diagnosis.data.sign_and_scale import sign_and_scale
+from winchkit.effects.catalogue import Catalogue
 from winchkit.model.stages import OUTPUTS
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.finding import Finding
@@ -22,9 +23,12 @@ ALARMING = frozenset({"inverted-sign", "wrong-factor"})
 """Codes of findings with which effects of a winch are not looked for."""
 
 
-def findings(runs: Sequence[Run], profile: WinchProfile) -> tuple[Finding, ...]:
+def findings(
+    runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue | None = None
+) -> tuple[Finding, ...]:
     """Findings on runs: sign and scale against the profile first, then of every channel."""
-    found = [*sign_and_scale(runs, profile), *(f for run in runs for f in inspect_run(run))]
+    found = sign_and_scale(runs, profile, catalogue)
+    found += [f for run in runs for f in inspect_run(run)]
     # A constant angle is that of a run at rest, which has a note.
     return tuple(f for f in found if (f.code, f.channel) != ("constant", "motor_angle"))
 

@@ -22,6 +22,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.sampling import bridged
 from winchkit.effects.bind import line_of
+from winchkit.effects.catalogue import Catalogue
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.runs.run import Run
@@ -41,7 +42,9 @@ _LEAST_SAMPLES = 50
 _NEAR = 0.05
 
 
-def sign_and_scale(runs: Sequence[Run], profile: WinchProfile) -> list[Finding]:
+def sign_and_scale(
+    runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue | None = None
+) -> list[Finding]:
     """Findings ``inverted-sign`` and ``wrong-factor`` of tension, torque and load.
 
     Parameters
@@ -50,6 +53,8 @@ def sign_and_scale(runs: Sequence[Run], profile: WinchProfile) -> list[Finding]:
         Validated runs.
     profile
         Winch profile.
+    catalogue
+        Effects; by default all that are installed.
 
     Returns
     -------
@@ -59,7 +64,7 @@ def sign_and_scale(runs: Sequence[Run], profile: WinchProfile) -> list[Finding]:
     """
     wrong: dict[tuple[str, str, str, str], list[tuple[str, Slope]]] = {}
     for run in runs:
-        for (channel, other), slope in _suspects(run, _slopes(run, profile)).items():
+        for (channel, other), slope in _suspects(run, _slopes(run, profile, catalogue)).items():
             code = "inverted-sign" if slope.value < 0 else "wrong-factor"
             known = named_factor(slope) if _outside(abs(slope.value)) else ""
             wrong.setdefault((channel, other, code, known), []).append((run.name, slope))
@@ -105,7 +110,7 @@ def _outside(size: float) -> bool:
     return not 1 / _LARGEST < size < _LARGEST
 
 
-def _slopes(run: Run, profile: WinchProfile) -> dict[str, Slope]:
+def _slopes(run: Run, profile: WinchProfile, catalogue: Catalogue | None) -> dict[str, Slope]:
     """Slopes of measured over predicted outputs, where the run determines them."""
     signals = _signals(run, profile)
     nominal = Line(profile)
@@ -116,7 +121,8 @@ def _slopes(run: Run, profile: WinchProfile) -> dict[str, Slope]:
     outputs = {"tension": beside[:2], "motor_torque": beside}
     if not np.any(predicted["motor_torque"]):
         # Without a load the profile's own inertia and friction are the prediction.
-        predicted["motor_torque"] = line_of(profile).predict(motion)["motor_torque"]
+        whole = line_of(profile, catalogue)
+        predicted["motor_torque"] = whole.predict(motion)["motor_torque"]
         outputs["motor_torque"] = [np.ones(len(signals.time))]
     out = {}
     for name, columns in outputs.items():
