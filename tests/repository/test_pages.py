@@ -30,13 +30,14 @@ def name(page: Path) -> str:
 
 
 def sessions() -> list[object]:
-    """Pages with something to run; those that serve a bench beside it move it in real time."""
+    """Pages with something to run; those that serve or open a bench do so in real time."""
     found = []
     for page in PAGES:
-        marks = {s.mark for s in snippets_of(page) if not s.reason and s.language != "text"}
-        live = [pytest.mark.realtime] if FIRST_TERMINAL in marks else []
-        if marks:
-            found.append(pytest.param(page, id=name(page), marks=live))
+        run = [s for s in snippets_of(page) if not s.reason and s.language != "text"]
+        live = any(s.mark == FIRST_TERMINAL or "LiveBench(" in s.text for s in run)
+        if run:
+            marks = [pytest.mark.realtime] if live else []
+            found.append(pytest.param(page, id=name(page), marks=marks))
     return found
 
 
