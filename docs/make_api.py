@@ -9,18 +9,38 @@ import winchkit
 
 PAGE = Path(__file__).with_name("api.md")
 SECTIONS = {
-    "A bench": ("open_bench", "attach", "Bench", "BenchSnapshot"),
-    "A simulated bench": ("LiveBench", "SimulatedClock", "simulate"),
+    "A bench": (
+        *("open_bench", "attach", "Bench", "BenchSnapshot", "run_programme", "stop_on_bus"),
+        *("commission",),
+    ),
+    "Instruments": (
+        *("cell_info", "cell_rate", "cell_health", "cell_tare", "cell_zero", "cell_store"),
+        *("read_points", "fit_cell", "static_effects"),
+    ),
+    "Drives": (
+        *("can_bus", "scan", "drive_info", "bus_load"),
+        *("config_save", "config_diff", "config_load", "config_store", "config_restore"),
+        *("lss_list", "lss_identify", "lss_set"),
+    ),
+    "A simulated bench": ("LiveBench", "SimulatedClock", "simulate", "listed_benches"),
     "Files": (
-        *("find", "read_profile", "read_axis", "read_robot"),
-        *("read_bench", "read_programme", "read_simbench"),
-        *("read_run", "read_poses", "write_run", "open_writer", "Run"),
+        *("find", "check", "read_profile", "read_axis", "read_robot", "read_size"),
+        *("read_bench", "read_programme", "write_programme", "read_simbench", "read_mapping"),
+    ),
+    "Runs": (
+        *("read_run", "read_poses", "write_run", "open_writer", "Run", "run_of", "export"),
+        *("read_log", "info_of", "recover", "open_replay"),
     ),
     "Diagnosis": (
-        *("compare", "diagnose", "plan", "add", "write_addition"),
-        *("load_catalogue", "Effect", "Parameter"),
+        *("compare", "diagnose", "diagnose_each", "plan", "add", "remove"),
+        *("write_addition", "write_removal", "undo", "ladder"),
+        *("load_catalogue", "new_effect", "Effect", "Parameter", "sized"),
     ),
-    "Cable robots": ("robot_of", "Robot", "Pose", "RobotCycle", "ForceLimits", "calibrate"),
+    "Cable robots": (
+        *("robot_of", "Robot", "Pose", "RobotCycle", "ForceLimits"),
+        *("calibrate", "next_poses", "write_calibrated"),
+        *("compare_robot", "diagnose_robot", "plan_poses", "add_to_robot", "remove_from_robot"),
+    ),
     "Estimators": ("DahlEstimator", "identify_dahl", "ElongationCorrection"),
     "Errors": (
         *("WinchkitError", "UsageError", "FileError", "Fault", "RunError", "ConnectionLost"),
@@ -40,7 +60,8 @@ from winchkit import diagnose, read_profile, read_run
 
 For effects of your own there are `winchkit.effects` and `winchkit.model.stages` besides, for
 control loops `winchkit.model.robot` and `winchkit.estimation`, for tests `winchkit.testing`. Paths
-of other modules may change with any version. `import winchkit` loads no other package: a name is
+of other modules may change with any version; [stability.md](stability.md) says what is promised,
+and which call each command is. `import winchkit` loads no other package: a name is
 imported when it is first used. `winchkit.__version__` is the version.
 """
 

@@ -72,9 +72,10 @@ def lacking(public: object) -> list[str]:
         needed = ["Parameters"] if has_own and len(parameters(public)) > 0 else []
     else:
         assert callable(public)
-        result = inspect.signature(public).return_annotation
+        signature = inspect.signature(public)
+        result = signature.return_annotation
         gives = "Yields" if str(result).startswith("Iterator") else "Returns"
-        needed = ["Parameters"] + ([gives] if result != "None" else [])
+        needed = ["Parameters"] * bool(signature.parameters) + [gives] * (result != "None")
     return [each for each in needed if not re.search(rf"^ *{each}\n *-+$", text, re.MULTILINE)] + (
         [] if text else ["summary"]
     )

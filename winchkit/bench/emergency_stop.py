@@ -36,8 +36,24 @@ class Stopped:
 def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
     """Quick-stop every drive of a bench file and wait until each confirms.
 
-    All drives get the command before any is waited for. Raises ConnectionLost when a bus does not
-    open.
+    All drives get the command before any is waited for.
+
+    Parameters
+    ----------
+    spec : BenchSpec
+        Contents of the bench file.
+    clock : Clock, optional
+        By default that of the computer.
+
+    Returns
+    -------
+    list of Stopped
+        Per drive whether it confirmed.
+
+    Raises
+    ------
+    ConnectionLost
+        Where a bus does not open.
     """
     clock = clock or MonotonicClock()
     with ExitStack() as stack:

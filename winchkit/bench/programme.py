@@ -33,14 +33,44 @@ def run_programme(
     progress: Progress = lambda _repeat, _number, _step: None,
     replace: bool = False,
 ) -> list[Path]:
-    """Run every step of every repeat; returns the files written, in order.
+    """Run every step of every repeat of a motion programme.
 
-    A programme with repeats begins where they end: the winches go there first, unlogged. Files
-    are ``<programme>-<load>kg-<repeat>.csv``, without the load where none is known. A
-    question about a load that this programme has hung already is not asked again. At a question
-    the winches are disabled. Raises whatever stops a motion, and what was logged until then is
-    kept: a reset and a new command are the caller's. Earlier runs of a programme of this name are
-    written over with ``replace`` only; without it they raise UsageError before any motion.
+    Parameters
+    ----------
+    bench : Bench
+        An open bench.
+    programme : Programme
+        The motion programme.
+    folder : str or Path
+        Of the files.
+    ask : callable
+        Asks the operator a question of the programme.
+    suffix : str
+        Format, ``.csv`` or ``.mcap``.
+    progress : callable, optional
+        Called with repeat, number of the step, and step.
+    replace : bool
+        Write over earlier runs of a programme of this name.
+
+    Returns
+    -------
+    list of Path
+        Files written, in order.
+
+    Raises
+    ------
+    UsageError
+        Before any motion, where runs of this name exist and are not to be replaced.
+    MotionError
+        Whatever stops a motion; rows logged until then are kept. A reset and a new command are the
+        caller's.
+
+    Notes
+    -----
+    A programme with repeats begins where they end: the winches move there first, unlogged. Files
+    are ``<programme>-<load>kg-<repeat>.csv``, without the load where none is known. A question
+    about a load that this programme has hung already is not asked again. At a question the winches
+    are disabled.
     """
     if not replace and (held := earlier_runs(programme, folder, suffix)):
         earlier = f"{held[0]} holds an earlier run of '{programme.name}'"

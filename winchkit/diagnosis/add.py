@@ -259,6 +259,11 @@ def remove(
     band
         Cut-off frequency of the torque's low-pass filter, Hz.
 
+    Returns
+    -------
+    Removal
+        The other effects with their estimates, and the errors before and after.
+
     Raises
     ------
     UsageError

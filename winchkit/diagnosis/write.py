@@ -44,7 +44,21 @@ def write_removal(
 ) -> None:
     """Write a profile without an effect, with the others refitted where there were runs.
 
-    Parameters and errors are those of :func:`write_addition`; ``removal`` is None without runs.
+    Parameters
+    ----------
+    source, out : str or Path
+        The profile file, and its copy.
+    effect : str
+        Name of the effect.
+    removal : Removal or None
+        Result of ``remove``; None without runs.
+    runs : sequence of str
+        Names of the runs that the others were refitted to.
+
+    Raises
+    ------
+    FileError
+        Where a file cannot be read or written.
     """
     terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
     fitted, judged = _provenance(terms, outputs, runs)

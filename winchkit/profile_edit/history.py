@@ -45,7 +45,7 @@ class Rung:
 
 
 def ladder(profile: WinchProfile | RobotProfile) -> tuple[Rung, ...]:
-    """Every step of a profile's ledger, oldest first. Raises FileError for a wrong quantity.
+    """Return every step of a profile's ledger, oldest first; raises FileError for a wrong quantity.
 
     Parameters
     ----------

@@ -117,7 +117,13 @@ def demo_names() -> list[str]:
 
 
 def listed_benches() -> list[dict[str, object]]:
-    """Every shipped simulated bench: name, description, and hidden effects."""
+    """List the shipped simulated benches.
+
+    Returns
+    -------
+    list of dict
+        Name, description, and hidden effects.
+    """
     from winchkit.schema.read import load
 
     rows: list[dict[str, object]] = []

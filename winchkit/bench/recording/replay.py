@@ -114,7 +114,25 @@ class Replay:
 
 
 def open_replay(path: str | Path, clock: Clock | None = None) -> Replay:
-    """A log or a run, CSV or MCAP, ready to play; raises RunError."""
+    """Open a log or a run for playing.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV or MCAP.
+    clock : Clock, optional
+        By which the samples are timed; by default that of the computer.
+
+    Returns
+    -------
+    Replay
+        At its beginning.
+
+    Raises
+    ------
+    RunError
+        For an invalid file.
+    """
     return Replay(read_log(path), clock or MonotonicClock())
 
 

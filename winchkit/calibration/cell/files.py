@@ -115,6 +115,11 @@ def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
         optional ``std [N]``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the
         direction follows from the order of the loads.
 
+    Returns
+    -------
+    tuple of CalibrationPoint
+        In the order of the file.
+
     Raises
     ------
     FileError

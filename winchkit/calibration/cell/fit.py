@@ -76,6 +76,11 @@ def fit_cell(
     order
         Line or parabola.
 
+    Returns
+    -------
+    CellFit
+        Coefficients with their covariance, and figures of merit.
+
     Raises
     ------
     RunError

@@ -17,7 +17,7 @@ from winchkit.errors import Fault, FileError, one_line
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
 
-__all__ = ["command"]
+__all__ = ["Verdict", "check", "command"]
 
 RUNS = (".csv", ".mcap")
 EDS = (".eds", ".dcf")
@@ -68,7 +68,7 @@ def command(
     """
     if not files and not computer:
         raise click.UsageError("Missing argument 'FILE...'; or --computer.", ctx)
-    verdicts = [_verdict(file, effects) for file in files]
+    verdicts = [check(file, effects) for file in files]
     lines = about_computer() if computer else ()
     for verdict in verdicts:
         for warning in verdict.warnings:
@@ -84,9 +84,24 @@ def command(
     ctx.exit(0 if all(verdict.ok for verdict in verdicts) else FileError.exit_code)
 
 
-def _verdict(file: str, effects: Sequence[str]) -> Verdict:
+def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
+    """Read a file of any kind and list its faults.
+
+    Parameters
+    ----------
+    file : str or Path
+        Declaration (.toml), run (.csv, .mcap), EDS or DCF.
+    effects : sequence of str
+        Python files with effects of your own that a profile has.
+
+    Returns
+    -------
+    Verdict
+        Kind, name, faults and warnings; ``ok`` where the file can be used.
+    """
+    file = str(file)
+    suffix = Path(file).suffix.lower()
     try:
-        suffix = Path(file).suffix.lower()
         if suffix in RUNS:
             return _run(file)
         if suffix in EDS:

@@ -46,6 +46,11 @@ def diagnose_each(
     progress
         Progress callback: text and share of the work done.
 
+    Yields
+    ------
+    tuple of str and WinchAnswer
+        Name and answer of every winch, in order.
+
     Notes
     -----
     Two winches are computed at a time. An answer holds hundreds of megabytes after long runs:

@@ -69,6 +69,11 @@ def add_to_robot(
     catalogue
         Effects; by default all that are installed.
 
+    Returns
+    -------
+    Addition
+        Every effect with its estimates, and the errors before and after.
+
     Raises
     ------
     UsageError
@@ -155,6 +160,22 @@ def remove_from_robot(
     """Refit the profile's effects without one of them, ``EFFECT`` or ``EFFECT/LINE``.
 
     ``home-length`` alone removes those of all lines.
+
+    Parameters
+    ----------
+    effect_id
+        Name of the effect, with its line where it has one.
+    runs
+        Poses.
+    profile
+        The robot.
+    catalogue
+        Effects; by default all that are installed.
+
+    Returns
+    -------
+    Removal
+        The other effects with their estimates, and the errors before and after.
 
     Raises
     ------

@@ -309,6 +309,11 @@ def diagnose_robot(
     progress
         Called with the present step and the share of the work done, 0 to 1.
 
+    Returns
+    -------
+    RobotAnswer
+        The diagnosis with everything that it was derived from.
+
     Raises
     ------
     RunError
