@@ -1,4 +1,4 @@
-"""A user effect begun from the residual that no effect of the catalogue explains."""
+"""A user effect that starts from the residual that no effect of the catalogue explains."""
 
 from __future__ import annotations
 
