@@ -2,7 +2,8 @@
 
 ``python benchmarks/diagnosis_campaign.py --cases 40 --seed 1 --json``: one JSON object on stdout,
 a table on stderr. ``--winches 8``: recordings of eight winches, of which none, one or all hide
-an effect. See benchmarks/README.md.
+an effect. ``--loggers``: one effect or none, recorded by loggers with faults. See
+benchmarks/README.md.
 """
 
 from __future__ import annotations
@@ -11,12 +12,17 @@ import argparse
 import json
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
 from campaign.case import Plan
+from campaign.logger_case import LoggerPlan, run_logger_cases
+from campaign.logger_score import logger_summary, logger_table
+from campaign.loggers import FAULTS
 from campaign.run import run_cases
 from campaign.score import summary, table
 from campaign.several import EXTENTS
@@ -26,6 +32,7 @@ from campaign.sizes import CATALOGUE, OUTSIDE
 KINDS = ("none", "single", "pair", "triple", "outside", "norepeat")
 _POOLS = dict.fromkeys(("single", "norepeat", "one", "all"), CATALOGUE) | {"outside": OUTSIDE}
 SNRS = (0.3, 1.0, 3.0, 10.0)
+LOGGER_SNRS = (1.0, 3.0, 10.0)
 
 
 def plans(
@@ -42,6 +49,24 @@ def plans(
     return out
 
 
+def logger_plans(args: argparse.Namespace) -> list[LoggerPlan]:
+    """One plan a case: every fourth hides nothing, the others an effect, sizes and faults in turn.
+
+    What is not given is drawn at random.
+    """
+    snrs = [0.0, *(args.snr or LOGGER_SNRS)]
+    effects, faults = args.effect or [""], args.fault or [""]
+    return [
+        LoggerPlan(
+            snrs[index % len(snrs)],
+            effects[index // len(snrs) % len(effects)],
+            faults[index % len(faults)],
+            args.small,
+        )
+        for index in range(args.cases)
+    ]
+
+
 def main() -> None:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -49,6 +74,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", choices=dict.fromkeys((*KINDS, *EXTENTS)), action="append")
     parser.add_argument("--winches", type=int, default=1, help="in one recording")
+    parser.add_argument("--loggers", action="store_true", help="that have faults")
+    parser.add_argument("--fault", choices=FAULTS, action="append", help="not a drawn one")
     parser.add_argument("--snr", type=float, action="append")
     parser.add_argument("--effect", action="append", help="hide this one instead of a drawn one")
     parser.add_argument("--small", action="store_true", help="shorter runs")
@@ -57,6 +84,10 @@ def main() -> None:
     parser.add_argument("--log", type=Path, help="file that gets every score as a line of JSON")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
+    if args.loggers:
+        scores = run_logger_cases(args.seed, logger_plans(args), args.jobs, args.keep, args.log)
+        show(logger_summary(scores), logger_table, args.json)
+        return
     kinds = EXTENTS if args.winches > 1 else KINDS
     if wrong := set(args.kind or ()) - set(kinds):
         parser.error(f"{', '.join(wrong)}: of {args.winches} winches there are {', '.join(kinds)}")
@@ -73,8 +104,13 @@ def main() -> None:
         result = several_summary(several)
     else:
         result = summary(run_cases(args.seed, todo, args.jobs, args.keep, args.log))
-    print(table(result), file=sys.stderr)
-    if args.json:
+    show(result, table, args.json)
+
+
+def show(result: dict[str, Any], words: Callable[[dict[str, Any]], str], as_json: bool) -> None:
+    """A table on stderr, JSON on stdout."""
+    print(words(result), file=sys.stderr)
+    if as_json:
         print(json.dumps(result, indent=1, default=float))
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,21 @@ from campaign.files import write_run
 from campaign.truth import OUTPUTS, Hidden, show
 from winchkit.arrays import Array
 
-__all__ = ["record", "record_several"]
+__all__ = ["AR", "EDGE", "Recording", "record", "record_several", "recordings", "write"]
 
 Random = np.random.Generator
-_EDGE = 2
+AR = 0.9
+"""Coefficient of the coloured part of the noise."""
+EDGE = 2
+"""Last samples that are not recorded: the physics' own differences are one-sided there."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One run as a file has it: channels (n,), SI, the time first, and metadata."""
+
+    channels: Mapping[str, Array]
+    metadata: Mapping[str, str]
 
 
 def record(random: Random, bench: Bench, hidden: Hidden, folder: Path) -> tuple[Path, ...]:
@@ -27,9 +39,24 @@ def record_several(
     random: Random, benches: Mapping[str, Bench], hidden: Mapping[str, Hidden], folder: Path
 ) -> tuple[Path, ...]:
     """Write every run of several winches, each by its name, into files that hold all of them."""
+    return write(recordings(random, benches, hidden), folder)
+
+
+def write(runs: Sequence[Recording], folder: Path) -> tuple[Path, ...]:
+    """Write recordings as ``run-0.csv`` …; paths in their order."""
+    paths = [folder / f"run-{index}.csv" for index in range(len(runs))]
+    for run, path in zip(runs, paths, strict=True):
+        write_run(path, run.channels, run.metadata)
+    return tuple(paths)
+
+
+def recordings(
+    random: Random, benches: Mapping[str, Bench], hidden: Mapping[str, Hidden]
+) -> list[Recording]:
+    """Every run of several winches; channels of a winch with a name are ``A.tension``."""
     offsets = {name: random.normal(0, 0.02) for name in benches}
     first = next(iter(benches.values()))
-    paths = []
+    out = []
     for index, (run, number) in enumerate(zip(first.situations, first.programmes, strict=True)):
         channels = {"time": run.time[:: run.every]}
         for name, bench in benches.items():
@@ -44,11 +71,8 @@ def record_several(
         metadata = {"programme": f"moves-{number}"}
         if first.load == "mass":
             metadata["load_mass"] = f"{run.mass} kg"
-        path = folder / f"run-{index}.csv"
-        # At the last samples the physics' own differences are one-sided: no winch does that.
-        write_run(path, {name: x[:-_EDGE] for name, x in channels.items()}, metadata)
-        paths.append(path)
-    return tuple(paths)
+        out.append(Recording({name: x[:-EDGE] for name, x in channels.items()}, metadata))
+    return out
 
 
 def _shown(
@@ -70,9 +94,9 @@ def _shown(
 def _noise(random: Random, count: int, rms: float, colour: float) -> Array:
     """White noise, of which ``colour`` (a share of the power) is AR(1)."""
     white = random.normal(size=count)
-    drive = random.normal(size=count) * np.sqrt(1 - 0.9**2)
+    drive = random.normal(size=count) * np.sqrt(1 - AR**2)
     slow, y = [], float(random.normal())
     for d in drive.tolist():
-        y = 0.9 * y + d
+        y = AR * y + d
         slow.append(y)
     return np.asarray(rms * (np.sqrt(1 - colour) * white + np.sqrt(colour) * np.array(slow)))

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import product
 from math import pi
+from typing import TypeVar
 
 import numpy as np
 
 from campaign.winch import Winch
 
-__all__ = ["CATALOGUE", "CATALOGUED", "OUTSIDE", "Scene", "allowed", "draw"]
+__all__ = ["CATALOGUE", "CATALOGUED", "OUTSIDE", "RECENT", "Scene", "allowed", "draw", "shapes"]
 
 Random = np.random.Generator
+T = TypeVar("T")
 Values = dict[str, float]
 Sized = Callable[[float], Values]
 
@@ -39,6 +42,11 @@ OUTSIDE = (
     "outside-mis-spooling", "outside-joint", "outside-wander", "outside-clipping",
     "outside-platform", "outside-square-drag",
 )  # fmt: skip
+RECENT = (
+    "load-lever", "cell-crosstalk", "cell-clipping", "friction-growth", "friction-at-place",
+    "drum-unbalance", "spring-balancer", "torque-ripple",
+)  # fmt: skip
+"""Effects that the catalogue got after seeds were first drawn."""
 
 CATALOGUED = {"outside-crosstalk": "spring-balancer", "outside-clipping": "cell-clipping"}
 """Physics that was outside the catalogue when seeds were first drawn, and its name there now."""
@@ -58,6 +66,9 @@ def allowed(effect: str, winch: Winch, load_known: bool, warms: bool, loads: int
         "cable-thermal": warms,
         "cell-thermal": warms and load_known,
         "outside-clipping": load_known,
+        "load-lever": load_known,
+        "cell-crosstalk": load_known,
+        "cell-clipping": load_known,
         "outside-joint": loads > 2,
         "outside-sticky-place": load_known,
         "outside-square-drag": load_known,
@@ -79,6 +90,31 @@ def draw(effect: str, random: Random, winch: Winch, scene: Scene) -> Sized:
         name, typical = soft
         return lambda size: {name: typical / size}
     return _shaped(effect, random, winch, scene)
+
+
+def shapes(effect: str, winch: Winch, scene: Scene) -> list[Sized]:
+    """The values of an effect as functions of its size, for a grid of its shape.
+
+    The grid has the middles of equal parts of the range from which every shape parameter is drawn,
+    either sign, and two phases a quarter turn apart.
+    """
+    if effect in _ONE:
+        name, typical, either_sign = _ONE[effect]
+        return [
+            lambda size, sign=sign: {name: sign * typical * size}
+            for sign in ((1.0, -1.0) if either_sign else (1.0,))
+        ]
+    if effect in _SOFT:
+        name, typical = _SOFT[effect]
+        return [lambda size: {name: typical / size}]
+    parts = _PARTS.get(effect, ())
+    grid = product(*([(k + 0.5) / count for k in range(count)] for count in parts))
+    phases = (0.0, pi / 2) if effect in PHASED else (0.0,)
+    return [
+        _SHAPED[effect](_Shape(_Quantiles(list(at)), winch, scene, phase))
+        for at in grid
+        for phase in phases
+    ]
 
 
 @dataclass(frozen=True)
@@ -117,6 +153,7 @@ _ONE = {
     "torque-lag": ("time_constant", 0.02, False),
     "motor-viscous-asymmetry": ("viscosity_difference", 3e-4, True),
     "torque-lead": ("lead", 5e-3, False),
+    "friction-growth": ("rate", 2e-4, True),
     "outside-crosstalk": ("size", 0.02, True),
     "outside-shaken-length": ("size", 1e-5, True),
     "outside-wander": ("size", 5e-4, True),
@@ -129,11 +166,30 @@ _SOFT = {
 }
 
 
+@dataclass
+class _Quantiles:
+    """Gives quantiles in turn where a random generator gives numbers."""
+
+    left: list[float] = field(default_factory=list)
+
+    def uniform(self, low: float, high: float) -> float:
+        """Quantile of the uniform distribution."""
+        return low + self.left.pop(0) * (high - low)
+
+    def choice(self, among: Sequence[T]) -> T:
+        """Quantile of a list."""
+        return among[int(self.left.pop(0) * len(among))]
+
+    def integers(self, low: int, high: int) -> int:
+        """Quantile of low … high − 1."""
+        return low + int(self.left.pop(0) * (high - low))
+
+
 @dataclass(frozen=True)
 class _Shape:
     """What an effect's shape is drawn from."""
 
-    random: Random
+    random: Random | _Quantiles
     winch: Winch
     scene: Scene
     phase: float
@@ -166,6 +222,40 @@ def _backlash(d: _Shape) -> Sized:
     # Whether the motor feels no load within the play, or is held on a flank.
     opens = float(d.random.integers(0, 2))
     return lambda z: {"gap": 4e-3 * z, "opens": opens}
+
+
+def _ripple(d: _Shape) -> Sized:
+    order = float(d.random.choice([2, 4, 6, 12]))
+    return lambda z: {"amplitude": 0.02 * z, "phase": d.phase, "order": order}
+
+
+def _lever(d: _Shape) -> Sized:
+    return lambda z: {"amplitude": 0.02 * z, "phase": d.phase}
+
+
+def _unbalance(d: _Shape) -> Sized:
+    return lambda z: {"amplitude": 0.01 * z, "phase": d.phase}
+
+
+def _spring(d: _Shape) -> Sized:
+    way, level = float(d.random.choice([-1.0, 1.0])), d.random.uniform(-1, 1)
+    return lambda z: {"stiffness": way * 1e-3 * z, "torque": 0.01 * z * level}
+
+
+def _place(d: _Shape) -> Sized:
+    stroke = d.scene.stroke / d.winch.radius
+    place, width = -d.random.uniform(0.2, 0.8) * stroke, 0.1 * stroke
+    return lambda z: {"torque": 0.02 * z, "place": place, "width": width}
+
+
+def _crosstalk(d: _Shape) -> Sized:
+    way = float(d.random.choice([-1.0, 1.0]))
+    return lambda z: {"share": way * 5.0 * z, "mass": 0.0}
+
+
+def _limit(d: _Shape) -> Sized:
+    limit = d.random.uniform(0.5, 0.99) * d.high
+    return lambda z: {"share": min(0.3 * z, 1.0), "limit": limit}
 
 
 def _cogging(d: _Shape) -> Sized:
@@ -279,9 +369,49 @@ _SHAPED: dict[str, Callable[[_Shape], Sized]] = {
     "pulley-dahl": _pulley_dahl,
     "motor-stribeck": _motor_stribeck,
     "gear-efficiency": _efficiency,
+    "torque-ripple": _ripple,
+    "load-lever": _lever,
+    "drum-unbalance": _unbalance,
+    "spring-balancer": _spring,
+    "friction-at-place": _place,
+    "cell-crosstalk": _crosstalk,
+    "cell-clipping": _limit,
     "outside-harmonic": _harmonic,
     "outside-sticky-place": _sticky_place,
     "outside-mis-spooling": _mis_spooling,
     "outside-joint": _joint,
     "outside-clipping": _clipping,
 }
+
+PHASED = frozenset(
+    {
+        "drum-eccentricity",
+        "gear-transmission-error",
+        "motor-cogging",
+        "torque-ripple",
+        "load-lever",
+        "drum-unbalance",
+    }
+)
+"""Sines, whose phase is fitted with the amplitude."""
+_PARTS = {
+    "gear-transmission-error": (7,),
+    "gear-backlash": (2,),
+    "motor-cogging": (4,),
+    "torque-ripple": (4,),
+    "encoder-slip": (4, 2),
+    "guide-offset": (3, 2),
+    "cable-elongation-quartic": (2, 2),
+    "cable-elongation-exponential": (3,),
+    "cable-hysteresis": (3,),
+    "cable-creep": (3,),
+    "cell-creep": (3,),
+    "pulley-stribeck": (3, 2),
+    "pulley-dahl": (3,),
+    "motor-stribeck": (3,),
+    "spring-balancer": (2, 2),
+    "friction-at-place": (6,),
+    "cell-crosstalk": (2,),
+    "cell-clipping": (4,),
+}
+"""Parts into which the range of every shape parameter is divided, in the order of the draws."""

@@ -72,7 +72,8 @@ class _Line:
         load = self.run.mass * (G - np.gradient(np.gradient(free, self.time), self.time))
         drum_side = self._to_the_drum(load, free)
         length = self._rope(free, load)
-        ideal = length, self._cell(drum_side, free), self._torque(drum_side, arm, free), load
+        torque = self._torque(drum_side, arm, free)
+        ideal = length, self._cell(drum_side, torque), torque, load
         return Shown(*(channel[:: self.run.every] for channel in ideal))
 
     def _turned(self, motor_angle: Array) -> Array:
@@ -172,6 +173,8 @@ class _Line:
         if p := self.get("cable-weight"):
             up = np.sin(np.radians(self.winch.inclination))
             tension = tension + p["mass_per_length"] * G * free * up
+        if p := self.get("load-lever"):
+            tension = tension * (1 + p["amplitude"] * np.sin(self.drum_angle + p["phase"]))
         for wrap in reversed(self.winch.wraps):
             tension = self._over_pulley(tension, np.radians(wrap), free)
         if p := self.get("outside-sticky-place"):
@@ -200,7 +203,7 @@ class _Line:
             after = after + p["equivalent_mass"] * np.gradient(self.speed, self.time)
         return after
 
-    def _cell(self, tension: Array, free: Array) -> Array:
+    def _cell(self, tension: Array, torque: Array) -> Array:
         shown = tension * (1 + (self.get("cell-gain") or {}).get("gain_error", 0.0))
         shown = shown + (self.get("cell-offset") or {}).get("offset", 0.0)
         if p := self.get("cell-nonlinearity"):
@@ -213,6 +216,11 @@ class _Line:
             shown = shown - dahl(shown, limit, np.full_like(shown, p["fraction"] / 0.1))
         if p := self.get("cell-creep"):
             shown = shown + p["fraction"] * lag(shown, self.time, p["time_constant"], 0.0)
+        if p := self.get("cell-crosstalk"):
+            acceleration = np.gradient(self.speed, self.time)
+            shown = shown + p["share"] * torque + p["mass"] * acceleration
+        if p := self.get("cell-clipping"):
+            shown = shown - p["share"] * np.maximum(shown - p["limit"], 0.0)
         if p := self.get("outside-clipping"):
             shown = np.minimum(shown, p["most"])
         if p := self.get("cell-lag"):
@@ -236,10 +244,21 @@ class _Line:
         if p := self.get("motor-cogging"):
             turned = p["order"] * self.run.motor_angle + p["phase"]
             torque = torque + p["amplitude"] * np.sin(turned)
+        torque = torque + (self.get("friction-growth") or {}).get("rate", 0.0) * self.time * way
+        if p := self.get("friction-at-place"):
+            distance = (self.drum_angle - p["place"]) / p["width"]
+            torque = torque + p["torque"] * way * np.exp(-(distance**2))
+        if p := self.get("drum-unbalance"):
+            torque = torque + p["amplitude"] * np.sin(self.drum_angle + p["phase"])
+        if p := self.get("spring-balancer"):
+            torque = torque + p["stiffness"] * self.drum_angle + p["torque"]
         if p := self.get("rotor-inertia"):
             torque = torque + p["inertia"] * np.gradient(rate, self.time)
         if p := self.get("outside-crosstalk"):
             torque = torque + p["size"] * (free - self.winch.length_reference)
+        if p := self.get("torque-ripple"):
+            turned = p["order"] * self.run.motor_angle + p["phase"]
+            torque = torque * (1 + p["amplitude"] * np.sin(turned))
         if p := self.get("torque-lead"):
             torque = np.interp(self.time + p["lead"], self.time, torque)
         if p := self.get("torque-lag"):

@@ -1,0 +1,156 @@
+"""Whether recorded runs identify the hidden effect, by the generator's own likelihood.
+
+The likelihood ratio of the truth, at its true values, against a rival effect alone is exp(D/2),
+D = min ‖y − f_r(z)‖² − ‖y − f‖², in the metric of the noise that the generator added, after the
+fit of what every comparison leaves free (the length's zero, one or one a run; a zero of the tension
+a run where the logger zeroed it). A rival's response is simulated at its usual size for a grid of
+its shape, and its size is the least-squares one; the shapes that come near are simulated again at
+0.4, 1 and 1.6 times that size, and the response is linear in between. The hidden effect is
+identifiable where the ratio exceeds 20 for every rival, none at all included.
+
+A rival's law may contain the hidden one (a Stribeck curve as flat as Coulomb friction): it is tried
+at the shapes of its grid. No code of the diagnosis takes part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, hypot, log, pi
+
+import numpy as np
+
+from campaign.bench import Bench
+from campaign.likelihood import gram, least_along, without
+from campaign.loggers import Fault
+from campaign.sizes import CATALOGUE, PHASED, RECENT, Sized, allowed, shapes
+from campaign.truth import OUTPUTS, Hidden, show
+from winchkit.arrays import Array
+
+__all__ = ["RATIO", "Identity", "identity"]
+
+RATIO = 20.0
+_KNOTS = (0.4, 1.0, 1.6)
+_NEAR = 0.3
+"""Share of the hidden effect's square that a shape may leave to be simulated again."""
+_CLOSE = 200.0
+"""Twice the logarithm of the ratio below which every shape is simulated again."""
+_NOTHING = "nothing"
+
+
+@dataclass(frozen=True)
+class Identity:
+    """How well runs identify what is hidden."""
+
+    rival: str
+    """The effect that comes nearest."""
+    log_ratio: float
+    """Natural logarithm of the likelihood of the truth over that of the rival."""
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the truth is told from every rival."""
+        return self.log_ratio > log(RATIO)
+
+
+def identity(bench: Bench, hidden: Hidden, fault: Fault) -> Identity:
+    """Likelihood ratio of the hidden effect against the nearest single rival."""
+    ground = _Ground(bench, hidden, fault)
+    forms = [
+        _Form(effect, sized, effect in PHASED)
+        for effect in (*CATALOGUE, *RECENT)
+        if effect not in hidden
+        and allowed(effect, bench.winch, bench.load != "cell", bench.warms, len(bench.scene.masses))
+        for sized in shapes(effect, bench.winch, bench.scene)[:: 2 if effect in PHASED else 1]
+    ]
+    starts = [start for form in forms for start in form.starts]
+    products = ground.products(starts)
+    truth, change = float(products[1, 1]), float(products[0, 0] - products[1, 1])
+    least, near, column = [float(products[0, 0])], [], 2
+    for form in forms:
+        count = len(form.starts)
+        square, size = _scaled(products, list(range(column, column + count)))
+        column += count
+        least.append(square)
+        if any(size) and square - truth < max(_CLOSE, _NEAR * change):
+            near.append((len(least) - 1, [form.at(size, part) for part in _KNOTS]))
+    products = ground.products([values for _, knots in near for values in knots])
+    for number, (index, knots) in enumerate(near):
+        first = 2 + number * len(knots)
+        least[index] = least_along(products, 0, range(first, first + len(knots)))
+    nearest = int(np.argmin(least))
+    rival = forms[nearest - 1].effect if nearest else _NOTHING
+    return Identity(rival, (least[nearest] - truth) / 2)
+
+
+@dataclass(frozen=True)
+class _Form:
+    """A rival effect in one shape."""
+
+    effect: str
+    sized: Sized
+    phased: bool
+
+    @property
+    def starts(self) -> list[Hidden]:
+        """The usual size, of a sine in two phases."""
+        values = self.sized(1.0)
+        turned = [{**values, "phase": pi / 2}] if self.phased else []
+        return [{self.effect: one} for one in (values, *turned)]
+
+    def at(self, size: Array, part: float) -> Hidden:
+        """A part of a size, which of a sine has a cosine and a sine component."""
+        values = self.sized(part * hypot(*size))
+        if self.phased:
+            values["phase"] = atan2(size[1], size[0])
+        return {self.effect: values}
+
+
+def _scaled(products: Array, columns: list[int]) -> tuple[float, Array]:
+    """Least square of the first column less multiples of others, and these; none is negative."""
+    inner = products[np.ix_(columns, columns)]
+    size = np.linalg.pinv(inner, hermitian=True) @ products[columns, 0]
+    if len(columns) == 1:
+        size = np.maximum(size, 0.0)
+    return float(products[0, 0] - 2 * size @ products[columns, 0] + size @ inner @ size), size
+
+
+class _Ground:
+    """What a logger's files say of effects: responses, noise and what is free."""
+
+    def __init__(self, bench: Bench, hidden: Hidden, fault: Fault) -> None:
+        self._bench, self._hidden, self._fault = bench, hidden, fault
+        self._files = [file for file in fault.files if not file.copy]
+        self._outputs = [o for o in OUTPUTS if o != "tension" or bench.load != "cell"]
+        anew = {(output, file.run) for output in fault.zeroed for file in self._files}
+        self._free = sorted({("cable_length", -1), *anew})
+
+    def products(self, effects: Sequence[Hidden]) -> Array:
+        """Products of what is recorded (less the plain winch), its noise, and responses."""
+        count = 2 + len(effects)
+        total = np.zeros((count + len(self._free),) * 2)
+        for file in self._files:
+            run = self._bench.situations[file.run]
+            plain, true, *responses = (
+                show(self._bench.winch, run, one) for one in ({}, self._hidden, *effects)
+            )
+            for output in self._outputs:
+                rows = np.arange(len(file.rows))
+                if output in file.spikes:
+                    rows = rows[~file.spikes[output]]
+                at = file.rows[rows]
+                base = getattr(plain, output)[at]
+                values = file.recording.channels[output][rows]
+                columns = [values - base, values - getattr(true, output)[at]]
+                columns += [getattr(one, output)[at] - base for one in responses]
+                free = [
+                    np.full(len(at), float(o == output and run in (-1, file.run)))
+                    for o, run in self._free
+                ]
+                total += gram(np.column_stack([*columns, *free]), at, *self._noise(output))
+        return without(total, range(count, len(total)))[:count, :count]
+
+    def _noise(self, output: str) -> tuple[float, float]:
+        """Variances of the white and of the coloured part."""
+        power, colour = self._bench.noise[output] ** 2, self._bench.colour
+        return (1 - colour) * power + self._fault.steps.get(output, 0.0) ** 2 / 12, colour * power

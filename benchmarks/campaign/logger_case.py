@@ -1,0 +1,172 @@
+"""Cases of one hidden effect, or none, that a logger with a fault recorded; and their answers."""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from campaign.bench import Bench, draw_bench
+from campaign.case import ATTEMPTS, Plan, size_effects
+from campaign.identifiable import Identity, identity
+from campaign.logger_score import LoggerScore
+from campaign.loggers import FAULTS, MISREAD, Fault, fault_of
+from campaign.record import recordings, write
+from campaign.sizes import CATALOGUE, RECENT, allowed
+from campaign.truth import Hidden
+from campaign.winch import write_profile
+
+__all__ = ["LoggerCase", "LoggerPlan", "answer", "make_logger_case", "run_logger_cases"]
+
+Random = np.random.Generator
+
+
+@dataclass(frozen=True)
+class LoggerPlan:
+    """What a case is to be; what is empty is drawn at random."""
+
+    snr: float
+    """Zero where nothing is hidden."""
+    effect: str = ""
+    fault: str = ""
+    small: bool = False
+
+
+@dataclass(frozen=True)
+class LoggerCase:
+    """A case on disk and what is true of it."""
+
+    seed: int
+    snr: float
+    hidden: Hidden
+    fault: Fault
+    identity: Identity | None
+    """None where nothing is hidden, and where a sign or unit is wrong."""
+    runs: tuple[Path, ...]
+    profile: Path
+    scene: str
+
+
+def make_logger_case(seed: int, plan: LoggerPlan, folder: Path) -> LoggerCase | None:
+    """Draw a case and write it, the same for the same seed and plan.
+
+    None where no winch drawn can have the wanted effect at the wanted size.
+    """
+    for attempt in range(ATTEMPTS):
+        random = np.random.default_rng([seed, attempt])
+        name = plan.fault or str(random.choice(FAULTS))
+        bench = draw_bench(random, repeats=True, small=plan.small)
+        hidden = _hidden(random, plan, bench)
+        if hidden is None:
+            continue
+        fault = fault_of(name, random, bench, recordings(random, {"": bench}, {"": hidden}))
+        if fault is None:
+            continue
+        folder.mkdir(parents=True, exist_ok=True)
+        profile = folder / "winch.toml"
+        write_profile(bench.winch, profile)
+        runs = write([file.recording for file in fault.files], folder)
+        known = None if not hidden or name in MISREAD else identity(bench, hidden, fault)
+        return LoggerCase(seed, plan.snr, hidden, fault, known, runs, profile, bench.words)
+    return None
+
+
+def _hidden(random: Random, plan: LoggerPlan, bench: Bench) -> Hidden | None:
+    """One effect at the wanted size, nothing where the size is zero; None where it cannot be."""
+    if not plan.snr:
+        return {}
+    known, loads = bench.load != "cell", len(bench.scene.masses)
+    pool = (plan.effect,) if plan.effect else (*CATALOGUE, *RECENT)
+    fit = [e for e in pool if allowed(e, bench.winch, known, bench.warms, loads)]
+    if not fit:
+        return None
+    name = str(random.choice(fit))
+    return size_effects(random, Plan("single", plan.snr), bench, (name,))
+
+
+def answer(case: LoggerCase) -> LoggerScore:
+    """Diagnose a case from its files."""
+    from winchkit.diagnosis.diagnose import diagnose
+    from winchkit.errors import WinchkitError
+    from winchkit.runs.read import read_run
+    from winchkit.schema.read import read_profile
+
+    begun = time.process_time()
+    try:
+        said = diagnose([read_run(path) for path in case.runs], read_profile(case.profile))
+    except WinchkitError as error:
+        told, refusal = {}, str(error)
+    else:
+        told, refusal = said.diagnosis.to_json(), ""
+    known = case.identity
+    return LoggerScore(
+        seed=case.seed,
+        snr=case.snr,
+        hidden={name: dict(values) for name, values in case.hidden.items()},
+        fault=case.fault.name,
+        detail=case.fault.words,
+        channel=case.fault.channel,
+        rival=known.rival if known else "",
+        log_ratio=known.log_ratio if known else None,
+        identifiable=bool(known and known.identifiable),
+        verdict=told.get("verdict", "refused"),
+        steps=tuple(tuple(step["effects"]) for step in told.get("steps", ())),
+        caveats=tuple(told.get("caveats", ())),
+        findings=tuple(sorted({(f["code"], f["channel"]) for f in told.get("sanity", ())})),
+        refusal=refusal,
+        seconds=time.process_time() - begun,
+        scene=case.scene,
+    )
+
+
+def _one(job: tuple[int, LoggerPlan, str | None]) -> LoggerScore | None:
+    seed, plan, keep = job
+    with tempfile.TemporaryDirectory() as folder:
+        place = Path(keep) / f"case-{seed}" if keep else Path(folder)
+        case = make_logger_case(seed, plan, place)
+        return None if case is None else answer(case)
+
+
+def run_logger_cases(
+    seed: int, plans: Sequence[LoggerPlan], jobs: int, keep: Path | None, log: Path | None = None
+) -> list[LoggerScore]:
+    """Scores in the order of the plans; progress on stderr.
+
+    Each score is a line of ``log``; cases whose score is there already are not run again.
+    """
+    known = {score.seed: score for score in _logged(log)}
+    work = [(seed * 100_000 + i, p, str(keep) if keep else None) for i, p in enumerate(plans)]
+    left = [job for job in work if job[0] not in known]
+    for job, got in zip(left, _answers(left, jobs), strict=True):
+        if got is None:
+            print(f"none {job[0]} cannot be made: {job[1]}", file=sys.stderr)
+            continue
+        known[got.seed] = got
+        if log is not None:
+            with log.open("a", encoding="utf-8") as lines:
+                lines.write(json.dumps(asdict(got)) + "\n")
+        print(got.line, file=sys.stderr, flush=True)
+    return [known[job[0]] for job in work if job[0] in known]
+
+
+def _answers(
+    jobs: Sequence[tuple[int, LoggerPlan, str | None]], processes: int
+) -> Iterator[LoggerScore | None]:
+    if processes == 1:
+        yield from map(_one, jobs)
+        return
+    with ProcessPoolExecutor(processes) as pool:
+        yield from pool.map(_one, jobs)
+
+
+def _logged(log: Path | None) -> Iterator[LoggerScore]:
+    if log is not None and log.exists():
+        for line in log.read_text(encoding="utf-8").splitlines():
+            yield LoggerScore.read(json.loads(line))
