@@ -15,6 +15,8 @@ from winchkit.arrays import Array
 __all__ = ["Bench", "draw_bench", "draw_beside"]
 
 Random = np.random.Generator
+_FINE = 200.0
+"""Steps of a fine physics, Hz."""
 
 
 @dataclass(frozen=True)
@@ -49,12 +51,16 @@ class Bench:
         )
 
 
-def draw_bench(random: Random, repeats: bool, small: bool) -> Bench:
-    """Any bench; with ``repeats`` every run is recorded twice, perfectly or imperfectly."""
+def draw_bench(random: Random, repeats: bool, small: bool, finely: bool = False) -> Bench:
+    """Any bench; with ``repeats`` every run is recorded twice, perfectly or imperfectly.
+
+    Its physics has finer steps than the samples, or steps as coarse as they are; ``finely``: steps
+    of 5 ms, whose differences are nearly derivatives.
+    """
     winch = draw_winch(random)
-    # Physics in finer steps than the samples, or in steps as coarse as they are.
-    every = int(random.choice([1, 4]))
-    rate = every * float(random.choice([20.0, 25.0, 50.0]))
+    every, sampled = int(random.choice([1, 4])), float(random.choice([20.0, 25.0, 50.0]))
+    rate = _FINE if finely else every * sampled
+    every = round(rate / sampled)
     seconds = float(random.uniform(60, 100 if small else 200))
     stroke = float(random.uniform(0.5, 5))
     # The cable stays on the drum and its first layer.

@@ -22,9 +22,9 @@ import numpy as np
 
 from campaign.bench import Bench
 from campaign.likelihood import gram, least_along, without
-from campaign.loggers import Fault
+from campaign.loggers import Fault, Logged
 from campaign.sizes import CATALOGUE, PHASED, RECENT, Sized, allowed, shapes
-from campaign.truth import OUTPUTS, Hidden, show
+from campaign.truth import OUTPUTS, Hidden, Shown, show
 from winchkit.arrays import Array
 
 __all__ = ["RATIO", "Identity", "identity"]
@@ -129,28 +129,64 @@ class _Ground:
         """Products of what is recorded (less the plain winch), its noise, and responses."""
         count = 2 + len(effects)
         total = np.zeros((count + len(self._free),) * 2)
-        for file in self._files:
-            run = self._bench.situations[file.run]
-            plain, true, *responses = (
-                show(self._bench.winch, run, one) for one in ({}, self._hidden, *effects)
-            )
-            for output in self._outputs:
-                rows = np.arange(len(file.rows))
-                if output in file.spikes:
-                    rows = rows[~file.spikes[output]]
-                at = file.rows[rows]
-                base = getattr(plain, output)[at]
-                values = file.recording.channels[output][rows]
-                columns = [values - base, values - getattr(true, output)[at]]
-                columns += [getattr(one, output)[at] - base for one in responses]
-                free = [
-                    np.full(len(at), float(o == output and run in (-1, file.run)))
-                    for o, run in self._free
-                ]
-                total += gram(np.column_stack([*columns, *free]), at, *self._noise(output))
+        for same in self._repeats():
+            shared = _Responses(self._bench, max(same, key=lambda file: len(self._time(file))).run)
+            for file in same:
+                plain, true = (
+                    show(self._bench.winch, self._bench.situations[file.run], one)
+                    for one in ({}, self._hidden)
+                )
+                changes = [shared.of(file.run, one) for one in effects]
+                for output in self._outputs:
+                    rows = np.arange(len(file.rows))
+                    if output in file.spikes:
+                        rows = rows[~file.spikes[output]]
+                    at = file.rows[rows]
+                    values = file.recording.channels[output][rows]
+                    columns = [values - getattr(ideal, output)[at] for ideal in (plain, true)]
+                    columns += [change[output][at] for change in changes]
+                    columns += [
+                        np.full(len(at), float(o == output and run in (-1, file.run)))
+                        for o, run in self._free
+                    ]
+                    total += gram(np.column_stack(columns), at, *self._noise(output))
         return without(total, range(count, len(total)))[:count, :count]
+
+    def _repeats(self) -> list[list[Logged]]:
+        """Files of one programme and load together."""
+        groups: dict[tuple[int, float], list[Logged]] = {}
+        for file in self._files:
+            key = self._bench.programmes[file.run], self._bench.situations[file.run].mass
+            groups.setdefault(key, []).append(file)
+        return list(groups.values())
+
+    def _time(self, file: Logged) -> Array:
+        return self._bench.situations[file.run].time
 
     def _noise(self, output: str) -> tuple[float, float]:
         """Variances of the white and of the coloured part."""
         power, colour = self._bench.noise[output] ** 2, self._bench.colour
         return (1 - colour) * power + self._fault.steps.get(output, 0.0) ** 2 / 12, colour * power
+
+
+class _Responses:
+    """Changes of the outputs by effects in a run and in shorter repeats of it, simulated once."""
+
+    def __init__(self, bench: Bench, run: int) -> None:
+        self._bench, self._run = bench, run
+        self._plain = show(bench.winch, bench.situations[run], {})
+        self._known: dict[int, dict[str, Array]] = {}
+
+    def of(self, run: int, effect: Hidden) -> dict[str, Array]:
+        """Change of every output; of an effect of the temperature in ``run`` itself."""
+        if any(name.endswith("thermal") for name in effect):
+            own = self._bench.situations[run]
+            return _change(show(self._bench.winch, own, {}), show(self._bench.winch, own, effect))
+        if id(effect) not in self._known:
+            other = show(self._bench.winch, self._bench.situations[self._run], effect)
+            self._known[id(effect)] = _change(self._plain, other)
+        return self._known[id(effect)]
+
+
+def _change(plain: Shown, other: Shown) -> dict[str, Array]:
+    return {output: getattr(other, output) - getattr(plain, output) for output in OUTPUTS}

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -62,16 +63,16 @@ def make_logger_case(seed: int, plan: LoggerPlan, folder: Path) -> LoggerCase | 
     for attempt in range(ATTEMPTS):
         random = np.random.default_rng([seed, attempt])
         name = plan.fault or str(random.choice(FAULTS))
-        bench = draw_bench(random, repeats=True, small=plan.small)
+        bench = draw_bench(random, repeats=True, small=plan.small, finely=True)
+        folder.mkdir(parents=True, exist_ok=True)
+        profile = folder / "winch.toml"
+        write_profile(bench.winch, profile)
         hidden = _hidden(random, plan, bench)
-        if hidden is None:
+        if hidden is None or not _plausible(hidden, profile):
             continue
         fault = fault_of(name, random, bench, recordings(random, {"": bench}, {"": hidden}))
         if fault is None:
             continue
-        folder.mkdir(parents=True, exist_ok=True)
-        profile = folder / "winch.toml"
-        write_profile(bench.winch, profile)
         runs = write([file.recording for file in fault.files], folder)
         known = None if not hidden or name in MISREAD else identity(bench, hidden, fault)
         return LoggerCase(seed, plan.snr, hidden, fault, known, runs, profile, bench.words)
@@ -89,6 +90,22 @@ def _hidden(random: Random, plan: LoggerPlan, bench: Bench) -> Hidden | None:
         return None
     name = str(random.choice(fit))
     return size_effects(random, Plan("single", plan.snr), bench, (name,))
+
+
+def _plausible(hidden: Hidden, profile: Path) -> bool:
+    """Whether all values are within the ranges that the catalogue declares for real machines."""
+    from winchkit.effects.catalogue import load_catalogue
+    from winchkit.schema.read import read_profile
+
+    catalogue, winch = load_catalogue(), read_profile(profile)
+    for effect, values in hidden.items():
+        for name, value in values.items():
+            known = catalogue[effect].parameter(name).plausible if name != "opens" else None
+            if known is not None:
+                size = float(attrgetter(known.of)(winch)) if known.of else 1.0
+                if not known.low * size <= value <= known.high * size:
+                    return False
+    return True
 
 
 def answer(case: LoggerCase) -> LoggerScore:
