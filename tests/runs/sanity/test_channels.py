@@ -192,6 +192,19 @@ def test_gaps_are_counted_with_what_they_lose() -> None:
     assert "2 gaps" in finding.text
 
 
+def test_lost_samples_are_gaps_and_no_jitter_nor_resolution() -> None:
+    random = np.random.default_rng(4)
+    kept = random.random(COUNT) > 0.03
+    time = (np.arange(COUNT) / RATE)[kept]
+    # A motion of two speeds, without noise.
+    angle = np.interp(time, [0, time[-1] / 2, time[-1]], [0, 3.0 * time[-1], 4.0 * time[-1]])
+    run = Run("r", time, {"motor_angle": Channel(angle, "rad")})
+    codes = {f.code: f for f in inspect_run(run)}
+    assert set(codes) == {"gap"}
+    lost = np.count_nonzero(~kept[np.flatnonzero(kept)[0] : np.flatnonzero(kept)[-1]])
+    assert codes["gap"].value == pytest.approx(lost / RATE)
+
+
 @given(st.lists(st.integers(0, 60), min_size=2, max_size=60))
 def test_rows_are_kept_in_order_of_time(stamps: list[int]) -> None:
     time = np.array(stamps, dtype=np.float64)

@@ -16,6 +16,8 @@ Mask = NDArray[np.bool_]
 _GAP = 2.5
 """Shortest gap in median sampling intervals (rule of thumb: one missing sample and jitter)."""
 
+_SAME = 1e-3
+"""Deviation of stamps from even instants, in steps, that is none (as in the even clock)."""
 _LEAST_STAMPS = 16
 """Stamps from which a period is estimated."""
 _BINS = 8
@@ -73,13 +75,14 @@ def even_instants(time: Array, angle: Array) -> Array | None:
     Returns
     -------
     (n,) array or None
-        Instants, s; None where the stamps are even, or where the restricted likelihood of the
-        smoothing spline is larger over the stamps.
+        Instants, s; None where the stamps are even but for lost samples, or where the restricted
+        likelihood of the smoothing spline is larger over the stamps.
     """
     if Clock(time).even or len(time) < _LEAST_STAMPS or not np.ptp(angle):
         return None
     instants = _nearest_even(time - time[0])
-    if instants is None:
+    step = float(np.median(np.diff(time)))
+    if instants is None or np.max(np.abs(instants - (time - time[0]))) <= _SAME * step:
         return None
     stamped = SmoothingSpline.fit(time - time[0], angle)
     even = SmoothingSpline.fit(instants - instants[0], angle)

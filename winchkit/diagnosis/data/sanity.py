@@ -15,6 +15,7 @@ from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
 from winchkit.runs.sanity.outliers import outlier_masks
 from winchkit.runs.sanity.quantisation import resolution
+from winchkit.runs.sanity.sampling import with_lost_samples
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["ALARMING", "caveats", "findings", "resolutions", "without_outliers"]
@@ -42,7 +43,11 @@ def resolutions(runs: Sequence[Run]) -> dict[str, float]:
     """Resolution of every output, rms over the runs that have it, SI."""
     out = {}
     for output in OUTPUTS:
-        squares = [resolution(run[output]) ** 2 for run in runs if output in run]
+        squares = [
+            resolution(with_lost_samples(run.time, run[output])) ** 2
+            for run in runs
+            if output in run
+        ]
         if squares:
             out[output] = float(np.sqrt(np.mean(squares)))
     return out

@@ -23,6 +23,7 @@ from winchkit.arrays import Array
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.local_noise import local_noise, smallest_differences
+from winchkit.runs.sanity.sampling import with_lost_samples
 from winchkit.runs.sanity.text import size
 
 __all__ = ["quantisation_noise", "quantised", "resolution"]
@@ -86,8 +87,9 @@ def resolution(values: Array) -> float:
 def quantised(run: Run, name: str) -> Iterator[Finding]:
     """A channel whose resolution is not small against its noise; value: the step."""
     channel = run.channels[name]
-    step = resolution(channel.values)
-    if step and step >= local_noise(channel.values):
+    values = with_lost_samples(run.time, channel.values)
+    step = resolution(values)
+    if step and step >= local_noise(values):
         floor = quantisation_noise(step)
         yield Finding(
             "quantised",

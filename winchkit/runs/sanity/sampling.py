@@ -12,12 +12,13 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import counted, share
 
-__all__ = ["increasing_rows", "sampling"]
+__all__ = ["increasing_rows", "sampling", "with_lost_samples"]
 
 _GAP = 2.5
 """Shortest gap in median intervals, as in the comparison: one missing sample and jitter."""
 _JITTER = 0.05
-"""Standard deviation of the intervals, relative to their mean, that is reported."""
+"""Standard deviation of the intervals, relative to their mean, that is reported; an interval that
+is a whole number of usual ones to within as much has lost samples."""
 _LEAST_SAMPLES = 20
 
 
@@ -27,8 +28,8 @@ def sampling(run: Run) -> Iterator[Finding]:
         return
     steps = np.diff(run.time)
     usual = float(np.median(steps))
-    gaps = steps[steps > _GAP * usual]
-    even = steps[steps <= _GAP * usual]
+    lost_some = _lost_some(run.time)
+    gaps, even = steps[lost_some], steps[~lost_some]
     jitter = float(np.std(even) / np.mean(even))
     if jitter > _JITTER:
         yield Finding(
@@ -49,6 +50,34 @@ def sampling(run: Run) -> Iterator[Finding]:
             f"{counted(len(gaps), 'gap')}, together {lost:.3g} s of {np.ptp(run.time):.3g} s, the "
             f"longest {gaps.max():.3g} s",
         )
+
+
+def with_lost_samples(time: Array, values: Array) -> Array:
+    """Values of a channel with NaN at the places where samples were lost.
+
+    Differences of the values are then those of consecutive samples.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Stamps, s, increasing.
+    values : (n,) array
+
+    Returns
+    -------
+    (m,) array
+        One NaN for every gap, whatever its length.
+    """
+    if len(time) < _LEAST_SAMPLES:
+        return values
+    return np.insert(values, np.flatnonzero(_lost_some(time)) + 1, np.nan)
+
+
+def _lost_some(time: Array) -> NDArray[np.bool_]:
+    """Intervals, (n − 1,), in which samples were lost."""
+    steps = np.diff(time) / np.median(np.diff(time))
+    whole = np.round(steps)
+    return (steps > _GAP) | ((whole > 1) & (np.abs(steps - whole) <= _JITTER))
 
 
 def increasing_rows(time: Array, run: str) -> tuple[NDArray[np.intp], list[Finding]]:
