@@ -49,7 +49,7 @@ class Identity:
 
     @property
     def identifiable(self) -> bool:
-        """Whether the truth is told from every rival."""
+        """Whether the truth is more likely than every rival by a factor of 20."""
         return self.log_ratio > log(RATIO)
 
 

@@ -250,7 +250,7 @@ def _place(d: _Shape) -> Sized:
 
 def _crosstalk(d: _Shape) -> Sized:
     way = float(d.random.choice([-1.0, 1.0]))
-    return lambda z: {"share": way * 5.0 * z, "mass": 0.0}
+    return lambda z: {"share": way * 5.0 * z}
 
 
 def _limit(d: _Shape) -> Sized:

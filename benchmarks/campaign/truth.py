@@ -217,8 +217,7 @@ class _Line:
         if p := self.get("cell-creep"):
             shown = shown + p["fraction"] * lag(shown, self.time, p["time_constant"], 0.0)
         if p := self.get("cell-crosstalk"):
-            acceleration = np.gradient(self.speed, self.time)
-            shown = shown + p["share"] * torque + p["mass"] * acceleration
+            shown = shown + p["share"] * torque
         if p := self.get("cell-clipping"):
             shown = shown - p["share"] * np.maximum(shown - p["limit"], 0.0)
         if p := self.get("outside-clipping"):

@@ -185,3 +185,28 @@ def test_a_clean_recording_has_no_finding_and_uses_nearly_all_samples() -> None:
 def test_a_torque_alone() -> None:
     run = without(made(3), "tension", "cable_length")
     assert codes([scaled(run, "motor_torque", -1.0)]) == [("motor_torque", "inverted-sign")]
+
+
+def one_way(seed: int, mass: float, factor: float = 1.0) -> Run:
+    """A run in one direction at one speed, with a rest in its last eighth alone."""
+    run = without(made(seed, load_mass=mass), "cable_length", "motor_torque")
+    random = np.random.default_rng(seed)
+    angle = -40.0 * np.minimum(run.time, run.time[0] + 7 / 8 * np.ptp(run.time))
+    tension = factor * (mass * 9.80665 + random.normal(0, 0.5, len(run.time)))
+    return with_channel(with_channel(run, "motor_angle", angle, "rad"), "tension", tension)
+
+
+def test_runs_in_one_direction_are_judged_together() -> None:
+    """Alone a weight and friction are the same constant; two weights separate them."""
+    right = [one_way(1, 10.0), one_way(2, 25.0)]
+    wrong = [one_way(1, 10.0, 1e-3), one_way(2, 25.0, 1e-3)]
+    assert codes(right) == []
+    assert codes(wrong[:1]) == []
+    assert codes(wrong) == [("tension", "wrong-factor")] * 2
+
+
+@pytest.mark.parametrize(("factor", "words"), [(2**12 / (2 * pi), "2^12"), (37.0, "no known")])
+def test_an_angle_in_another_unit_is_refused_as_such(factor: float, words: str) -> None:
+    with pytest.raises(RunError, match="wrong factor or unit of") as refused:
+        validate_runs([scaled(made(3), "motor_angle", factor)], GROOVED)
+    assert words in str(refused.value)

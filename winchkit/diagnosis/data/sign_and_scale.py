@@ -2,7 +2,9 @@
 
 Every run's tension and torque are regressed on their prediction; a slope far from one is no effect
 of a winch, but a wrong unit, factor or sign of a channel. The standard deviation of the slope is
-that of a block jackknife. Friction and inertia, which the profile may lack, are fitted beside.
+that of a block jackknife. Friction and inertia, which the profile may lack, are fitted beside; a
+run whose motion does not separate them from the load, as one in one direction, has the slope of all
+runs together.
 Without a load the prediction of the torque may vanish: then the work of its dissipative part must
 not be negative (passivity).
 
@@ -63,8 +65,8 @@ def sign_and_scale(
         same factor, the load is.
     """
     wrong: dict[tuple[str, str, str, str], list[tuple[str, Slope]]] = {}
-    for run in runs:
-        for (channel, other), slope in _suspects(run, _slopes(run, profile, catalogue)).items():
+    for run, slopes in zip(runs, _slopes(runs, profile, catalogue), strict=True):
+        for (channel, other), slope in _suspects(run, slopes).items():
             code = "inverted-sign" if slope.value < 0 else "wrong-factor"
             known = named_factor(slope) if _outside(abs(slope.value)) else ""
             wrong.setdefault((channel, other, code, known), []).append((run.name, slope))
@@ -103,15 +105,47 @@ def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
         if abs(slope_at(factor) - 1) < _NEAR:
             known = named_factor(Slope(factor, 0.0))
             return f"wrong factor or unit of 'motor_angle', {known}"
-    return ""
+    return (
+        f"wrong factor or unit of {either}, which no known constant explains"
+        if _outside(abs(slope))
+        else ""
+    )
 
 
 def _outside(size: float) -> bool:
     return not 1 / _LARGEST < size < _LARGEST
 
 
-def _slopes(run: Run, profile: WinchProfile, catalogue: Catalogue | None) -> dict[str, Slope]:
-    """Slopes of measured over predicted outputs, where the run determines them."""
+def _slopes(
+    runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue | None
+) -> list[dict[str, Slope]]:
+    """Slopes of measured over predicted outputs of every run, where they are determined."""
+    rows = [_rows(run, profile, catalogue) for run in runs]
+    alike: dict[tuple[str, int], list[tuple[Array, Array]]] = {}
+    for own in rows:
+        for name, (measured, columns) in own.items():
+            alike.setdefault((name, columns.shape[1]), []).append((measured, columns))
+    together = {
+        key: _slope(
+            np.concatenate([measured for measured, _ in found]),
+            np.concatenate([columns for _, columns in found]),
+        )
+        for key, found in alike.items()
+    }
+    out = []
+    for own in rows:
+        slopes = {
+            name: _slope(measured, columns) or together[name, columns.shape[1]]
+            for name, (measured, columns) in own.items()
+        }
+        out.append({name: slope for name, slope in slopes.items() if slope is not None})
+    return out
+
+
+def _rows(
+    run: Run, profile: WinchProfile, catalogue: Catalogue | None
+) -> dict[str, tuple[Array, Array]]:
+    """Measured outputs of a run, and columns: the prediction, then what is fitted beside."""
     signals = _signals(run, profile)
     nominal = Line(profile)
     motion = nominal.motion(signals)
@@ -124,13 +158,11 @@ def _slopes(run: Run, profile: WinchProfile, catalogue: Catalogue | None) -> dic
         whole = line_of(profile, catalogue)
         predicted["motor_torque"] = whole.predict(motion)["motor_torque"]
         outputs["motor_torque"] = [np.ones(len(signals.time))]
-    out = {}
-    for name, columns in outputs.items():
-        if name in run and name in predicted and np.any(predicted[name]):
-            slope = _slope(run[name], np.column_stack([predicted[name], *columns]))
-            if slope is not None and abs(slope.value) > _SIGMAS * slope.std:
-                out[name] = slope
-    return out
+    return {
+        name: (run[name], np.column_stack([predicted[name], *columns]))
+        for name, columns in outputs.items()
+        if name in run and name in predicted and np.any(predicted[name])
+    }
 
 
 def _suspects(run: Run, slopes: Mapping[str, Slope]) -> dict[tuple[str, str], Slope]:
@@ -169,7 +201,10 @@ def _is_wrong(slope: Slope) -> bool:
 
 
 def _slope(measured: Array, columns: Array) -> Slope | None:
-    """Coefficient of the first column by least squares, with its block jackknife."""
+    """Coefficient of the first column by least squares, with its block jackknife.
+
+    None where it is not five standard deviations from zero.
+    """
     rows = np.flatnonzero(np.isfinite(measured) & np.all(np.isfinite(columns), axis=1))
     rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
     if len(rows) < _LEAST_SAMPLES:
@@ -179,7 +214,8 @@ def _slope(measured: Array, columns: Array) -> Slope | None:
     scale = float(np.sqrt(np.mean(columns[rows, 0] ** 2)))
     without = _jackknifed(x, y)[:, 0] / scale
     value = float(np.linalg.lstsq(x, y, rcond=None)[0][0]) / scale
-    return Slope(value, _jackknife_std(without))
+    slope = Slope(value, _jackknife_std(without))
+    return slope if abs(slope.value) > _SIGMAS * slope.std else None
 
 
 def _jackknifed(x: Array, y: Array) -> Array:

@@ -20,6 +20,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.requirements import excites, missing_needs
+from winchkit.diagnosis.data.rounding import mean_error, noise_before_rounding
 from winchkit.diagnosis.data.spectrum import (
     WHOLE_TRANSITION,
     band_edges,
@@ -35,7 +36,7 @@ from winchkit.diagnosis.regression.prediction_cache import Predictor, masked
 from winchkit.effects.effect import Effect
 from winchkit.model.line import Line
 from winchkit.model.stages import At, Stage
-from winchkit.runs.sanity.quantisation import quantisation_noise
+from winchkit.runs.sanity.local_noise import local_noise
 
 __all__ = ["TimeSeriesRegression"]
 
@@ -97,16 +98,29 @@ class TimeSeriesRegression(Regression):
 
     @cached_property
     def _quantisation_power(self) -> Array:
-        """Variance of a spectral coefficient by quantisation, mean over every band."""
+        """Variance of a spectral coefficient by rounding, mean over every band.
+
+        The error that m repeats share has m times its variance in each: in their mean it is whole.
+        """
         power = np.zeros(len(self.bands))
         count = np.zeros(len(self.bands))
+        repeats = {run: len(group.runs) for group in self.replicates for run in group.runs}
         for segment in self.segments:
-            variance = quantisation_noise(self.dataset.resolution.get(segment.output, 0.0)) ** 2
-            valid = self.dataset.recordings[segment.run].valid[segment.output]
-            variance *= float(np.mean(valid)) / self.dataset.decimation_factor
             bands = self.band_of_row[segment.rows]
-            np.add.at(power, bands, variance * segment.band.gain**2)
             np.add.at(count, bands, 1.0)
+            step = self.dataset.resolution.get(segment.output, 0.0)
+            if not step:
+                continue
+            recording = self.dataset.recordings[segment.run]
+            measured = recording.measured[segment.output]
+            predicted = recording.nominal_smooth[segment.output]
+            after = min(local_noise(measured), local_noise(measured - predicted))
+            shared, white = mean_error(predicted, step, noise_before_rounding(after, step))
+            own = white * float(np.mean(recording.valid[segment.output])) * segment.band.gain**2
+            for component in shared:
+                squares = self._masked(segment, component) ** 2
+                own = own + repeats.get(segment.run, 1) * squares
+            np.add.at(power, bands, own / self.dataset.decimation_factor)
         return power / np.maximum(count, 1.0)
 
     @property

@@ -34,6 +34,10 @@ _UNITS: tuple[tuple[float, str], ...] = (
     (2.0, "2: diameter and radius, or a second fall of the cable"),
     (pi, "π: circumference and diameter"),
     *((2.0**n, f"2^{n}: counts") for n in range(_FEWEST_BITS, _MOST_BITS + 1)),
+    *(
+        (2.0**n / (2 * pi), f"2^{n}/(2π): counts of a turn and radians")
+        for n in range(_FEWEST_BITS, _MOST_BITS + 1)
+    ),
 )
 
 KNOWN_FACTORS: tuple[float, ...] = tuple(
