@@ -67,6 +67,7 @@ NOT_RUN = {
     "needs the drive": "docs/howto/drive.md",
     "tests/devices/test_makers_drives.py runs it with the maker's file": "docs/howto/drive.md",
     "the checks of .ci/run": "CONTRIBUTING.md",
+    "changes the changelog": "docs/release.md",
     "tests/repository/test_wheel.py installs winchkit into a new environment": (
         "docs/tutorial/first-hour.md"
     ),

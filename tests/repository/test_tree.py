@@ -99,9 +99,46 @@ def test_private_things_are_recognised(text: str, private: bool) -> None:
 
 
 def test_the_changelog_mentions_every_command() -> None:
-    text = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    pages = [ROOT / "CHANGELOG.md", *(ROOT / "docs" / "changes").glob("*.md")]
+    text = " ".join(page.read_text(encoding="utf-8") for page in pages)
     quoted = set(re.findall(r"[\w-]+", " ".join(re.findall(r"`([^`]+)`", text))))
     assert set(COMMANDS) <= quoted
+
+
+def test_the_top_folder_holds_what_it_needs_only() -> None:
+    top = {path.relative_to(ROOT).parts[0] for path in tracked()}
+    assert top <= {
+        *(".ci", ".github", ".gitignore", ".pre-commit-config.yaml"),
+        *("CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENSE", "README.md"),
+        *("benchmarks", "devices", "docs", "examples", "profiles", "pyproject.toml", "sim"),
+        *("tests", "winchkit"),
+    }
+
+
+def test_the_citation_has_what_the_format_requires() -> None:
+    yaml = pytest.importorskip("yaml", reason="PyYAML comes with the extra 'docs'")
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    citation = yaml.safe_load(text)
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    assert all("name" in author or "family-names" in author for author in citation["authors"])
+    # The version of a citation is that of its release.
+    assert "version" not in citation
+
+
+def test_workflows_run_the_checks_with_pinned_actions() -> None:
+    yaml = pytest.importorskip("yaml", reason="PyYAML comes with the extra 'docs'")
+    steps, text = [], ""
+    for path in sorted((ROOT / ".github/workflows").glob("*.yml")):
+        text += path.read_text(encoding="utf-8")
+        for job in yaml.safe_load(path.read_text(encoding="utf-8"))["jobs"].values():
+            steps += job["steps"]
+    ran = " ".join(step.get("run", "") for step in steps)
+    for program in (".ci/run", "docs/make_site.py", "benchmarks/compatibility.py"):
+        assert program in ran
+        assert (ROOT / program).is_file()
+    used = [step["uses"] for step in steps if "uses" in step]
+    assert all(re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40}", name) for name in used)
+    assert "secrets." not in text
 
 
 def test_the_ci_script_is_a_valid_program() -> None:
