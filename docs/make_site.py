@@ -23,6 +23,7 @@ OUTSIDE = {
     "CONTRIBUTING.md": "contributing.md",
     "CHANGELOG.md": "changelog.md",
     "benchmarks/README.md": "benchmarks.md",
+    ".github/SECURITY.md": "security.md",
 }
 """Pages outside docs/, and their names on the site."""
 PICTURES = (".svg", ".png")
