@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import re
 from pathlib import Path
 
 import winchkit
@@ -51,8 +52,8 @@ SECTIONS = {
 _BEGIN = """\
 # Public names
 
-Written by `python docs/make_api.py` from the docstrings; do not edit it by hand.
-`help(winchkit.open_bench)` shows parameters with units, results and errors.
+Written by `python docs/make_api.py` from the docstrings and `docs/public_names.txt`; do not edit it
+by hand. `help(winchkit.open_bench)` shows the same in Python.
 
 ```python
 from winchkit import diagnose, read_profile, read_run
@@ -66,14 +67,65 @@ imported when it is first used. `winchkit.__version__` is the version.
 """
 
 
+SIGNATURES = Path(__file__).with_name("public_names.txt")
+_ROLE = re.compile(r":\w+:`~?(?:[\w.]+\.)?([\w]+)`")
+_SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
+
+
 def page() -> str:
-    """The page: public names by subject, each with the first line of its docstring."""
-    parts = [_BEGIN]
+    """The page: public names by subject in tables, then signature and docstring of each."""
+    parts, details = [_BEGIN], []
+    signatures = _signatures()
     for title, names in SECTIONS.items():
         parts.append(f"## {title}\n\n| name | what |\n|---|---|")
-        parts += [f"| `{name}` | {_summary(name)} |" for name in names]
+        parts += [f"| [`{name}`](#{name.lower()}) | {_summary(name)} |" for name in names]
         parts.append("")
-    return "\n".join(parts)
+        details += [_entry(name, signatures[name]) for name in names]
+    return "\n".join([*parts, "## Signatures\n", *details])
+
+
+def _signatures() -> dict[str, str]:
+    """Lines of each public name of ``winchkit`` in the file of signatures."""
+    text = SIGNATURES.read_text(encoding="utf-8")
+    (own,) = re.findall(r"^winchkit\n((?: .*\n)+)", text, re.MULTILINE)
+    found = re.findall(r"^  (?:class )?(\w+)(.*\n(?: {4}.*\n)*)", own, re.MULTILINE)
+    return {name: (name + rest).rstrip() for name, rest in found}
+
+
+def _entry(name: str, signature: str) -> str:
+    """Section of one name."""
+    lines = [
+        f"### {name}\n",
+        "```text",
+        re.sub(r"^ {2}", "", signature, flags=re.MULTILINE),
+        "```\n",
+    ]
+    doc = inspect.getdoc(getattr(winchkit, name)) or ""
+    begin, *sections = _SECTION.split(_plain(doc))
+    lines.append(begin.strip() + "\n")
+    for title, body in zip(sections[::2], sections[1::2], strict=True):
+        lines.append(f"**{title}**\n")
+        lines.append(_items(body) if title in _LISTS else body.strip() + "\n")
+    return "\n".join(lines)
+
+
+_LISTS = {"Parameters", "Returns", "Yields", "Raises", "Attributes"}
+
+
+def _items(body: str) -> str:
+    """Entries of a NumPy section as a list: the name with its type, then the description."""
+    items = []
+    for entry in re.split(r"\n(?=\S)", body.strip("\n")):
+        head, _, rest = entry.partition("\n")
+        name, _, kind = head.partition(" : ")
+        described = " ".join(rest.split())
+        items.append(f"- `{name}`{f' ({kind})' if kind else ''}" + (f": {described}" * bool(rest)))
+    return "\n".join(items) + "\n"
+
+
+def _plain(doc: str) -> str:
+    """Docstring with Markdown's literals and without roles."""
+    return _ROLE.sub(r"`\1`", doc).replace("``", "`")
 
 
 def _summary(name: str) -> str:
