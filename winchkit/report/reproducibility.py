@@ -13,9 +13,11 @@ import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.robot.dataset import RobotDataset
-from winchkit.report.html.markup import Markup, compact, details, element, section, table
+from winchkit.report.html.markup import Markup, compact, details, element, folded, table
 
 __all__ = ["Command", "repeat"]
+
+_FEW = 3
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,20 @@ class Command:
         if isinstance(self.dataset, RobotDataset):
             return self.named or self.dataset.robot.name
         return self.named or self.dataset.profile.name
+
+    @property
+    def source(self) -> str:
+        """Profile, runs and version, as figures print them."""
+        if isinstance(self.dataset, RobotDataset):
+            names = list(self.dataset.runs)
+        else:
+            names = [recording.name for recording in self.dataset.recordings]
+        runs = (
+            ", ".join(names)
+            if len(names) <= _FEW
+            else f"{len(names)} runs, {names[0]} to {names[-1]}"
+        )
+        return f"profile {self.profile}; {runs}; winchkit {version('winchkit')}"
 
     def compare(self, profile: str) -> str:
         """Command that compares the runs with a profile."""
@@ -72,7 +88,7 @@ def repeat(command: Command, commands: Sequence[str], what: str, raw: Mapping[st
     """The section on reproduction; ``what`` is the name of the result ``raw``."""
     versions = ", ".join(f"{name} {version(name)}" for name in ("winchkit", "numpy", "scipy"))
     profile = element("code", command.profile)
-    return section(
+    return folded(
         "repeat",
         "Commands to reproduce this result and to continue",
         _runs(command.dataset),

@@ -12,6 +12,7 @@ from winchkit.effects.effect import Effect
 from winchkit.report.detectability import untestable, visible
 from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, join, table
+from winchkit.report.words.headline import worst_outputs
 from winchkit.report.words.numbers import (
     Scale,
     grouped,
@@ -54,25 +55,27 @@ def output_scale(output: OutputFit) -> Scale:
 def figures(diagnosis: Diagnosis) -> Markup:
     """Held-out error before and after, and noise, per output."""
     grown = bool(diagnosis.steps)
-    head = ["output", "measured, rms", "error before"]
-    head += ["error after"] if grown else []
+    head = ["output", "today" if grown else "error"]
+    head += ["with it"] if grown else []
     rows = []
-    for name, output in diagnosis.outputs.items():
+    for name in worst_outputs(diagnosis.outputs):
+        output = diagnosis.outputs[name]
         scale = output_scale(output)
         last = output.heldout_rms_after if grown else output.heldout_rms_before
-        cells = [OUTPUT_NAMES.get(name, name), quantity(output.signal_rms, output.unit)]
-        cells.append(scale.text(output.heldout_rms_before))
+        cells: list[str] = [OUTPUT_NAMES.get(name, name)]
+        cells.append(element("span", scale.text(output.heldout_rms_before), class_="before"))
         if grown:
-            cells.append(scale.text(last))
+            cells.append(element("span", scale.text(last), class_="after"))
         noise = output.noise_rms
         cells.append("unknown" if noise is None else scale.text(noise))
-        cells.append(f"{last / noise:.2f}" if noise else "–")
+        cells.append(significant(last / noise, 2) if noise else "–")
+        cells.append(quantity(output.signal_rms, output.unit))
         rows.append(cells)
     caption = (
         f"Held-out error, rms: each group of {diagnosis.data} is predicted with values fitted "
         "without it."
     )
-    return table(caption, [*head, "noise", "error / noise"], rows)
+    return table(caption, [*head, "noise", "÷ noise", "measured"], rows)
 
 
 def named(

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from winchkit.report.html.chart import Axis, Chart, axis_over, reading
 
 from report_answers import recorded
 from report_parsed import Page
@@ -17,7 +18,6 @@ from winchkit.diagnosis.compare import Compared, compared
 from winchkit.diagnosis.residuals.attribution import attributions
 from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
 from winchkit.report.figures.maps import map_text
-from winchkit.report.html.chart import Axis, Chart, axis_over, reading
 from winchkit.report.pages.pages import comparison_html
 from winchkit.report.text import compare_text
 from winchkit.report.words.numbers import Scale

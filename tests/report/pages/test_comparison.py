@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from winchkit.report.figures.plots import Residuals, plots_of
 
 from report_answers import recorded
 from report_parsed import HOSTILE, Page
@@ -15,7 +16,6 @@ from winchkit.catalog import find
 from winchkit.diagnosis.compare import Compared, compare, compared
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import OutputError
-from winchkit.report.figures.plots import Residuals, plots_of
 from winchkit.report.pages.comparison import distance_text
 from winchkit.report.pages.pages import comparison_html
 from winchkit.schema.read import read_profile

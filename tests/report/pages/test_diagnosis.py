@@ -9,12 +9,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from winchkit.report.figures.plots import plots_of
 
 from report_answers import FRICTION, answer_of, answered, recorded
 from report_parsed import HOSTILE, Page
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.report.figures.plots import plots_of
 from winchkit.report.figures.waterfall import waterfall_of
 from winchkit.report.pages.pages import report_html, residuals_of
 from winchkit.report.words.sentence import sentence

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
 from winchkit.model.variables import ANGLES
-from winchkit.report.figures.plots import Residuals
-from winchkit.report.html.chart import Axis, Chart, Reading, legend, reading
-from winchkit.report.html.markup import Markup, element
-from winchkit.report.words.numbers import Scale, percent, significant, unbroken
+from winchkit.report.figures.axes import Reading, reading
+from winchkit.report.figures.figure import Cells, Figure, Panel
+from winchkit.report.figures.layout import signed_levels
+from winchkit.report.figures.residuals import Residuals
+from winchkit.report.words.numbers import Scale, percent
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 __all__ = [
+    "map_figures",
     "map_reading",
     "map_text",
-    "maps_drawn",
     "signed",
 ]
 
@@ -54,15 +55,14 @@ def signed(value: float, scale: Scale) -> str:
     return f"+{text}" if value > 0 else text
 
 
-_FAINTEST = 0.04
 _MOST = 2
 _ABOVE_NOISE = 2.0
 """Least value of full colour as a multiple of the noise, so that values near it are pale."""
 
 
-def maps_drawn(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, list[Markup]]:
+def map_figures(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, list[Figure]]:
     """Maps per output: the two with the largest shares, or the first before and after a change."""
-    out: dict[str, list[Markup]] = {}
+    out: dict[str, list[Figure]] = {}
     for output, scale in scales.items():
         found = [
             m for m in residual_maps(residuals.regression, residuals.before) if m.output == output
@@ -70,54 +70,50 @@ def maps_drawn(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, l
         if not found:
             continue
         noise = residuals.noise.get(output) or 0.0
-        peak = max(float(np.nanmax(np.abs(found[0].mean))), _ABOVE_NOISE * noise)
+        peak = max(float(np.nanmax(np.abs(found[0].mean))), _ABOVE_NOISE * noise) / scale.worth
         after = residuals.after
         changed = None if after is None else same_cells(residuals.regression, after, found[0])
         if changed is None:
-            out[output] = [_figure("", drawn, peak, scale) for drawn in found[:_MOST]]
+            drawn = [(str(n), "", one) for n, one in enumerate(found[:_MOST], start=1)]
         else:
-            states = ((", before,", found[0]), (", after,", changed))
-            out[output] = [_figure(name, drawn, peak, scale) for name, drawn in states]
+            drawn = [
+                ("today", ", present model", found[0]),
+                ("with", f", {residuals.changed}", changed),
+            ]
+        out[output] = [
+            _figure(f"map-{output}-{name}", state, one, peak, scale, residuals.source)
+            for name, state, one in drawn
+        ]
     return out
 
 
-def _figure(state: str, drawn: ResidualMap, peak: float, scale: Scale) -> Markup:
+def _figure(
+    name: str, state: str, drawn: ResidualMap, peak: float, scale: Scale, source: str
+) -> Figure:
     readings = [map_reading(name) for name in drawn.over]
-    shown = [r.shown(edges) for r, edges in zip(readings, drawn.edges, strict=True)]
+    x, y = (np.asarray(r.shown(edges)) for r, edges in zip(readings, drawn.edges, strict=True))
     output = OUTPUT_NAMES.get(drawn.output, drawn.output)
-    caption = (
-        f"Mean residual of the {output}{state} {map_text(drawn, scale)}. "
-        "Empty without measurements."
+    over = " and ".join(_name(name) for name in drawn.over)
+    cells = Cells(
+        "mean residual",
+        scale.label,
+        x,
+        y,
+        drawn.mean / scale.worth,
+        signed_levels(peak),
+        signed=True,
+        counts=drawn.count.astype(float),
     )
     axes = [
-        Axis(r.label, float(e[0]), float(e[-1]), r.logarithmic)
-        for r, e in zip(readings, shown, strict=True)
+        r.axis((float(edges[0]), float(edges[-1])))
+        for r, edges in zip(readings, (x, y), strict=True)
     ]
-    chart = Chart(axes[0], axes[1], caption)
-    cells = [
-        chart.cell(
-            (float(shown[0][i]), float(shown[0][i + 1])),
-            (float(shown[1][j]), float(shown[1][j + 1])),
-            "below" if drawn.mean[i, j] < 0 else "above",
-            max(_FAINTEST, min(1.0, abs(float(drawn.mean[i, j])) / peak)),
-            _said(drawn, (i, j), readings, scale),
-        )
-        for i, j in np.argwhere(np.isfinite(drawn.mean)).tolist()
-    ]
-    ends = [
-        ("below", f"{signed(-peak, scale)} or less"),
-        ("above", f"{signed(peak, scale)} or more"),
-    ]
-    words = element("figcaption", unbroken(caption))
-    return element("figure", chart.draw(*cells), legend(ends), words)
-
-
-def _said(
-    drawn: ResidualMap, cell: tuple[int, int], readings: Sequence[Reading], scale: Scale
-) -> str:
-    ends = [
-        f"{significant(float(r.shown(e[at])))} to {significant(float(r.shown(e[at + 1])))} {r.unit}"
-        for r, e, at in zip(readings, drawn.edges, cell, strict=True)
-    ]
-    mean = signed(float(drawn.mean[cell]), scale)
-    return f"{', '.join(part.strip() for part in ends)}: {mean} ({drawn.count[cell]} samples)"
+    return Figure(
+        name,
+        f"Mean residual over {over}{state}",
+        f"Mean residual of the {output}{state} {map_text(drawn, scale)}. "
+        "Empty without measurements; cells with a minus are negative.",
+        axes[0],
+        (Panel(axes[1], cells=cells),),
+        source=source,
+    )

@@ -35,40 +35,37 @@ __all__ = [
 _FEW = 5
 
 
-def decimated(x: Array, series: Sequence[Array], points: int) -> tuple[Array, list[Array]]:
-    """Decimate signals over one variable, with the extremes of every interval.
+def decimated(series: Sequence[Array], intervals: int) -> NDArray[np.intp]:
+    """Indices of the samples that a drawing keeps: the extremes of every interval.
 
     Parameters
     ----------
-    x : (n,) array
-        Variable.
     series : sequence of (n,) array
-        Signals; NaN where missing.
-    points : int
-        Maximum number of samples.
+        Signals over one variable; NaN where missing.
+    intervals : int
+        Number of intervals of equal counts.
 
     Returns
     -------
-    x : (m,) array
-        First and last x of every interval.
-    series : list of (m,) array
-        Extremes of every interval in their order; NaN where all its samples are NaN.
+    (m,) array of int
+        Sorted; the minimum and the maximum of every series in every interval, a missing sample of an
+        interval without any value, and the first and the last sample. All samples where these are
+        fewer.
     """
-    if len(x) <= points:
-        return x, [np.asarray(values, dtype=float) for values in series]
-    edges = np.linspace(0, len(x), points // 2 + 1).astype(int)
-    at = np.column_stack([x[edges[:-1]], x[edges[1:] - 1]]).ravel()
-    return at, [_extremes(np.asarray(values, dtype=float), edges) for values in series]
-
-
-def _extremes(values: Array, edges: NDArray[np.intp]) -> Array:
-    out = np.full((len(edges) - 1, 2), np.nan)
-    for row, (first, last) in enumerate(pairwise(edges)):
-        stretch = values[first:last]
-        if np.isfinite(stretch).any():
-            ends = sorted([int(np.nanargmin(stretch)), int(np.nanargmax(stretch))])
-            out[row] = stretch[ends]
-    return out.ravel()
+    count = len(series[0])
+    if count <= 2 * intervals * len(series):
+        return np.arange(count)
+    edges = np.linspace(0, count, intervals + 1).astype(int)
+    kept = [np.array([0, count - 1])]
+    for values in series:
+        missing = np.isnan(values)
+        filled = np.where(missing, np.inf, values), np.where(missing, -np.inf, values)
+        for first, last in pairwise(edges):
+            kept.append(
+                first
+                + np.array([np.argmin(filled[0][first:last]), np.argmax(filled[1][first:last])])
+            )
+    return np.unique(np.concatenate(kept))
 
 
 def decimated_points(x: Array, points: int) -> NDArray[np.intp]:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from math import isfinite
-
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Where
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.profile_edit.history import LADDER_UNITS
+from winchkit.report.figures.axes import reading
+from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.pose_traces import trace_over
 from winchkit.report.figures.reduction import curve_of
-from winchkit.report.html.chart import Chart, axis_over, reading
-from winchkit.report.html.markup import Markup, element
-from winchkit.report.words.numbers import scale_for, unbroken
+from winchkit.report.words.numbers import scale_for
 from winchkit.report.words.sentence import capital, main_patterns, where_text
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 __all__ = [
     "unexplained_curve",
@@ -35,28 +34,34 @@ def unexplained_curve(answer: Answer, where: Where) -> tuple[Array, Array]:
     return curve.x, curve.mean
 
 
-def unexplained_figures(answer: Answer) -> list[Markup]:
+def unexplained_figures(answer: Answer, source: str = "") -> list[Figure]:
     """One figure per output; none without a residual, or where only its frequency is known."""
     if answer.diagnosis.verdict not in {"partly", "unknown"}:
         return []
     places = [w for w in main_patterns(answer.diagnosis.where) if w.frequency is None]
-    figures = [_figure(answer, where) for where in places]
-    return [element("div", *figures, class_="pair maps")] if figures else []
+    return [_figure(answer, where, source) for where in places]
 
 
-def _figure(answer: Answer, where: Where) -> Markup:
+def _figure(answer: Answer, where: Where, source: str) -> Figure:
     at, residual = unexplained_curve(answer, where)
     how = reading(where.variable, within_turn=where.order is not None)
-    x = [float(v) for v in how.shown(at)]
     scale = scale_for(3 * float(abs(residual).max()), LADDER_UNITS[where.output])
-    mean = [float(v) / scale.worth for v in residual]
-    points = [(a, b) for a, b in zip(x, mean, strict=True) if isfinite(a) and isfinite(b)]
-    caption = f"Mean residual: {where_text(where)}."
-    chart = Chart(
-        axis_over(how.label, x, logarithmic=how.logarithmic),
-        axis_over(f"residual [{scale.label}]", mean, zero=True),
-        caption,
+    noise = None
+    if isinstance(answer, WinchAnswer):
+        noise = answer.diagnosis.outputs[where.output].noise_rms
+    output = OUTPUT_NAMES.get(where.output, where.output)
+    over = VARIABLE_NAMES.get(where.variable, where.variable)
+    return Figure(
+        f"pattern-{where.output}",
+        capital(f"{output}, mean residual over {over}"),
+        f"Mean residual: {where_text(where)}.",
+        how.axis(),
+        (
+            Panel(
+                Axis("residual", scale.label, zero=True),
+                (Series("residual, mean", "today", how.shown(at), residual / scale.worth, "mean"),),
+                None if noise is None else noise / scale.worth,
+            ),
+        ),
+        source=source,
     )
-    dots = [chart.dot(a, b, "residual") for a, b in points]
-    drawn = chart.draw(chart.line(points, "residual"), *dots)
-    return element("figure", drawn, element("figcaption", unbroken(capital(caption))))

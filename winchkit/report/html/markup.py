@@ -14,6 +14,7 @@ __all__ = [
     "compact",
     "details",
     "element",
+    "folded",
     "inline",
     "join",
     "section",
@@ -49,6 +50,17 @@ def section(id_: str, heading: str, *children: str) -> Markup:
     return element("section", title, *children, id=id_, aria_labelledby=f"{id_}-heading")
 
 
+def folded(id_: str, heading: str, *children: str, beside: str = "") -> Markup:
+    """A section to be opened, with a remark beside its heading; empty without content."""
+    if not any(children):
+        return Markup("")
+    title = element("h2", heading, id=f"{id_}-heading")
+    head = element(
+        "summary", title, *([element("span", beside, class_="beside")] if beside else [])
+    )
+    return element("details", head, *children, id=id_, class_="section")
+
+
 def details(summary: str, *children: str) -> Markup:
     """A block to be opened."""
     return element("details", element("summary", summary), *children)
@@ -64,13 +76,13 @@ def table(
         rest = [
             element("td", cell, class_="words")
             if at < words
-            else element("td", cell, class_="figure")
+            else element("td", cell, class_="number")
             for at, cell in enumerate(cells[1:], start=1)
         ]
         return element("tr", first, *rest)
 
     top = [
-        element("th", name, scope="col", **({} if at < words else {"class_": "figure"}))
+        element("th", name, scope="col", **({} if at < words else {"class_": "number"}))
         for at, name in enumerate(head)
     ]
     inside = element(

@@ -1,4 +1,4 @@
-"""Frame of every page: one file with its styles, scripts and licences, without network access."""
+"""Frame of every page: one file with its styles, script and data, without network access."""
 
 from __future__ import annotations
 
@@ -6,37 +6,96 @@ from collections.abc import Sequence
 from datetime import date
 from importlib.resources import files
 
-from winchkit.report.figures.plots import OutputPlots
+from winchkit.report.figures.figure import Figure
+from winchkit.report.figures.layout import WIDE
+from winchkit.report.figures.tokens import DARK, LIGHT, STYLES, style_sheet, token_sheet
 from winchkit.report.html.markup import Markup, element, inline
+from winchkit.report.html.svg import page_svg
 
-__all__ = ["page"]
+__all__ = ["figure_block", "page"]
 
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src blob:"
+_ZOOM = (
+    ("in", "+", "Enlarge"),
+    ("out", "−", "Reduce"),
+    ("left", "←", "Move left"),
+    ("right", "→", "Move right"),
+    ("reset", "Reset", "Show the whole time"),
+)
+_FILES = ("PNG", "SVG", "CSV")
 
 
-def page(title: str, plots: Sequence[OutputPlots], *content: Markup) -> str:
-    """A whole page: title, content, and the data of its plots."""
-    head = element(
-        "header", element("h1", title), element("p", f"winchkit, {date.today()}", class_="quiet")
+def page(title: str, figures: Sequence[Figure], *content: Markup, headed: bool = True) -> str:
+    """A whole page: title, content, and the data of its figures.
+
+    Parameters
+    ----------
+    title : str
+        Title of the document.
+    figures : sequence of Figure
+        Figures that the content shows by :func:`figure_block`.
+    *content : Markup
+        Sections.
+    headed : bool
+        Whether the title is the heading; else the content has its own.
+
+    Returns
+    -------
+    str
+        HTML, self-contained.
+    """
+    day = element("p", f"winchkit, {date.today()}", class_="quiet")
+    head = [element("header", element("h1", title), day)] if headed else []
+    script = _script(figures) if figures else []
+    body = element("body", element("main", *head, *content), *script)
+    return f'<!DOCTYPE html>\n<html lang="en">{_head(title)}{body}</html>\n'
+
+
+def figure_block(figure: Figure, width: float = WIDE, more: str = "") -> Markup:
+    """A figure of a page with its buttons, which the script shows, and its caption."""
+    name = figure.title
+    zoom = [
+        element(
+            "button", text, type="button", data_zoom=key, title=what, aria_label=f"{what}: {name}"
+        )
+        for key, text, what in (_ZOOM if figure.zoom else ())
+    ]
+    save = [
+        element("button", kind, type="button", data_save=kind.lower(), aria_label=f"{kind}: {name}")
+        for kind in _FILES
+    ]
+    tools = element(
+        "div",
+        *([element("span", *zoom, class_="group")] if zoom else []),
+        element("span", *save, class_="group"),
+        class_="tools",
+        hidden="",
     )
-    drawing = _drawing(plots) if plots else []
-    noscript = element("noscript", element("p", "The plots need JavaScript; the rest does not."))
-    within = [head, noscript, *content] if plots else [head, *content]
-    body = element("body", element("main", *within), *drawing)
-    return f'<!DOCTYPE html>\n<html lang="en">{_head(title, drawn=bool(plots))}{body}</html>\n'
+    return element(
+        "figure",
+        tools,
+        element("div", page_svg(figure, width), class_="canvas"),
+        element("figcaption", figure.caption),
+        class_=f"figure {more}".rstrip(),
+        data_figure=figure.id,
+    )
 
 
-def _drawing(plots: Sequence[OutputPlots]) -> list[Markup]:
-    """Script elements of the plots; none for a page without plots."""
+def _script(figures: Sequence[Figure]) -> list[Markup]:
+    """Script elements: the data of the figures, the styles of saved figures, and the program."""
+    data = {figure.id: {"source": figure.source, **figure.table().to_json()} for figure in figures}
+    styles = {f"f-{name}": style.attributes(LIGHT) for name, style in STYLES.items()}
+    embedded = inline({"figures": data, "styles": styles})
     return [
-        Markup(f'<script type="application/json" id="plots">{inline(_data(plots))}</script>'),
-        _script("uPlot.iife.min.js"),
-        _script("report.js"),
+        Markup(f'<script type="application/json" id="figures">{embedded}</script>'),
+        Markup(f"<script>{_asset('report.js')}</script>"),
     ]
 
 
-def _head(title: str, *, drawn: bool) -> Markup:
+def _head(title: str) -> Markup:
     policy = f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
+    dark = f"@media screen and (prefers-color-scheme:dark){{:root{{{token_sheet(DARK)}}}}}"
+    tokens = f":root{{{token_sheet(LIGHT)}}}{dark}"
     return element(
         "head",
         Markup('<meta charset="utf-8">'),
@@ -44,29 +103,10 @@ def _head(title: str, *, drawn: bool) -> Markup:
         Markup('<meta name="viewport" content="width=device-width, initial-scale=1">'),
         Markup('<meta name="color-scheme" content="light dark">'),
         element("title", title),
-        Markup(
-            f"<!-- The plots are drawn by uPlot:\n{_asset('uPlot.LICENSE')}-->" if drawn else ""
-        ),
-        Markup(f"<style>{_asset('uPlot.min.css') if drawn else ''}{_asset('report.css')}</style>"),
+        Markup(f"<style>{tokens}\n{_asset('report.css')}\n{style_sheet()}</style>"),
     )
-
-
-def _plot_styles() -> list[Markup]:
-    return [
-        Markup(f"<!-- The plots are drawn by uPlot:\n{_asset('uPlot.LICENSE')}-->"),
-        Markup(f"<style>{_asset('uPlot.min.css')}</style>"),
-    ]
-
-
-def _script(name: str) -> Markup:
-    return Markup(f"<script>{_asset(name)}</script>")
 
 
 def _asset(name: str) -> str:
     """A file of the folder ``assets`` beside this module."""
     return (files("winchkit.report.html") / "assets" / name).read_text(encoding="utf-8")
-
-
-def _data(plots: Sequence[OutputPlots]) -> dict[str, object]:
-    both = [plot for own in plots for plot in (own.over_time, own.over_variable) if plot]
-    return {plot.id: plot.data for plot in both}

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.add import Addition
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.report import tables
-from winchkit.report.html.markup import Markup, element, join, section, table
-from winchkit.report.pages.parts import bullets, lead
+from winchkit.report.html.markup import Markup, element, folded, join, table
+from winchkit.report.pages.parts import bullets, code_block, compared_text, lead
 from winchkit.report.reproducibility import Command, repeat
-from winchkit.report.words.numbers import quantity, scale_for
+from winchkit.report.words.headline import worst_outputs
+from winchkit.report.words.numbers import scale_for, significant
 from winchkit.report.words.sentence import (
+    capital,
     gain_text,
     moved_outputs,
     still_text,
@@ -27,8 +29,9 @@ def addition_sections(
     figures: Sequence[Markup],
     command: Command,
     better: str,
+    title: str = "",
 ) -> Markup:
-    """Everything below the title; ``better`` is the profile that was written."""
+    """Content of the page; ``better`` is the profile that was written."""
     effect = addition.added[0].effect.id
     commands = [
         command.add(effect, command.profile, better),
@@ -37,10 +40,11 @@ def addition_sections(
     ]
     return join(
         [
-            _lead(addition, better),
-            section("residuals", "Residuals before and after", *figures),
-            section("parameters", "All effects of the new profile", _parameters(addition)),
-            section("notes", "Notes", bullets(addition.notes)),
+            _lead(addition, better, command, title),
+            element("div", *figures, id="residuals"),
+            folded("effects", "Added effect: formula and source", _added(addition)),
+            folded("parameters", "All effects of the new profile", _parameters(addition)),
+            folded("notes", "Notes", bullets(addition.notes)),
             repeat(command, commands, "addition", addition.to_json()),
         ]
     )
@@ -58,17 +62,22 @@ def addition_sentence(addition: Addition) -> str:
     return " ".join(part for part in (named, gain, nothing, worse, still_text(outputs)) if part)
 
 
-def _lead(addition: Addition, better: str) -> Markup:
-    term, values = addition.added
+def _lead(addition: Addition, better: str, command: Command, title: str) -> Markup:
+    term, _ = addition.added
     chip, tone = _chip(addition.outputs)
-    return lead(
-        chip,
-        tone,
-        [addition_sentence(addition)],
-        tables.named([(term.effect, term.label, values)]),
-        _errors(addition.outputs),
-        element("p", "Written to ", element("code", better), ".", class_="quiet"),
-    )
+    rows = [
+        ("Fitted to", compared_text(command.dataset, command.profile)),
+        ("Error", addition_sentence(addition)),
+        ("Written to", element("code", better)),
+        ("Next", code_block(command.diagnose(better))),
+    ]
+    head = capital(meaning(term.effect.id)) or f"Added: {term.label}"
+    return lead(title, chip, tone, head, rows, _errors(addition.outputs))
+
+
+def _added(addition: Addition) -> Markup:
+    term, values = addition.added
+    return tables.named([(term.effect, term.label, values)])
 
 
 def _chip(outputs: Mapping[str, OutputFit]) -> tuple[str, str]:
@@ -83,30 +92,29 @@ def _chip(outputs: Mapping[str, OutputFit]) -> tuple[str, str]:
 def _errors(outputs: Mapping[str, OutputFit]) -> Markup:
     """Errors before and after per output, fitted and held out, and the noise."""
     rows = []
-    for name, output in outputs.items():
+    for name in worst_outputs(outputs):
+        output = outputs[name]
         scale = scale_for(output.heldout_rms_before, output.unit)
-        errors = [
-            output.rms_before,
-            output.rms_after,
-            output.heldout_rms_before,
-            output.heldout_rms_after,
-        ]
+        errors = [output.heldout_rms_before, output.heldout_rms_after]
         noise = output.noise_rms
         rows.append(
             [
                 OUTPUT_NAMES.get(name, name),
-                quantity(output.signal_rms, output.unit),
-                *(scale.text(error) for error in errors),
+                *(
+                    element("span", scale.text(error), class_=tone)
+                    for error, tone in zip(errors, ("before", "after"), strict=True)
+                ),
                 "unknown" if noise is None else scale.text(noise),
-                f"{output.heldout_rms_after / noise:.2f}" if noise else "–",
+                significant(output.heldout_rms_after / noise, 2) if noise else "–",
+                f"{scale.text(output.rms_before)} → {scale.text(output.rms_after)}",
             ]
         )
-    head = ["output", "measured, rms", "fitted, before", "after", "held out, before", "after"]
+    head = ["output", "today", "with it", "noise", "÷ noise", "fitted"]
     caption = (
-        "Error, rms, of the fitted runs, and held out: each group of runs is predicted with values "
-        "fitted without it. The last column is the held-out error after, over the noise."
+        "Held-out error, rms: each group of runs is predicted with values fitted without it. The "
+        "last column is the error of the fitted runs."
     )
-    return table(caption, [*head, "noise", "error / noise"], rows)
+    return table(caption, head, rows)
 
 
 def _parameters(addition: Addition) -> Markup:

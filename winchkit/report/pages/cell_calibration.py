@@ -6,17 +6,22 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from winchkit.report.html.chart import Chart, axis_over, legend
-from winchkit.report.html.markup import Markup, element, join, section, table
-from winchkit.report.html.page import page
+import numpy as np
+
+from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.html.markup import Markup, element, folded, join, section, table
+from winchkit.report.html.page import figure_block, page
+from winchkit.report.words.numbers import scale_for
 
 if TYPE_CHECKING:
-    from winchkit.calibration.cell.fit import CellFit, Figure
+    from winchkit.calibration.cell.fit import CellFit
+    from winchkit.calibration.cell.fit import Figure as Merit
     from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration
 
 __all__ = [
     "NAMES",
+    "cell_figures",
     "effect_lines",
     "figures",
     "report_lines",
@@ -87,7 +92,7 @@ def figures(fit: CellFit) -> list[tuple[str, str]]:
     ]
 
 
-def _share(figure: Figure) -> str:
+def _share(figure: Merit) -> str:
     if math.isnan(figure.value):
         return "unknown"
     spread = "" if math.isnan(figure.std) else f" ± {figure.std:.3%}"
@@ -114,7 +119,7 @@ def _residual_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[st
 
 _FORMULA = "True force = c0 + c1 x + c2 x², x the indicated force in N; a line has no c2."
 _SPAN = "Figures of merit; the span is from the smallest to the largest load."
-_TONES = {"up": "above", "down": "below"}
+_TONES = {"up": "today", "down": "with"}
 
 
 def report_page(
@@ -140,10 +145,12 @@ def report_page(
         (name, f"{value:.6g}", f"{std:.2g}")
         for name, value, std in zip(NAMES, fit.coefficients, fit.std, strict=False)
     ]
+    drawn = cell_figures(fit, calibration)
     return page(
         f"Calibration of {calibration.name}",
-        (),
+        drawn,
         section("about", "Load cell", _about(calibration)),
+        element("div", *(figure_block(figure) for figure in drawn), class_="output"),
         section(
             "fit",
             "Fit",
@@ -156,8 +163,7 @@ def report_page(
             join(element("p", warning) for warning in fit.warnings),
         ),
         section("effects", "Effects of the cell", _effects(needed)),
-        section("residuals", "Residuals", _drawing(fit, calibration.point)),
-        section("points", "Points", _points(calibration.point, fit)),
+        folded("points", "Points", _points(calibration.point, fit)),
     )
 
 
@@ -200,22 +206,53 @@ def _points(points: Sequence[CalibrationPoint], fit: CellFit) -> Markup:
     return table(caption, head, rows, 2)
 
 
-def _drawing(fit: CellFit, points: Sequence[CalibrationPoint]) -> Markup:
-    """Residuals over the load."""
-    caption = "True less fitted force over the load; a difference of up and down is hysteresis."
-    chart = Chart(
-        axis_over("load [N]", [point.load for point in points]),
-        axis_over("residual [N]", fit.residuals, zero=True),
-        caption,
-    )
-    marks = [
-        chart.dot(
-            point.load,
-            residual,
-            _TONES[point.going],
-            f"{point.load:.4g} N going {point.going}: {residual:+.3g} N",
+def cell_figures(fit: CellFit, calibration: CellCalibration) -> list[Figure]:
+    """Readings and fit, and the residuals, over the load.
+
+    Parameters
+    ----------
+    fit : CellFit
+        The fit.
+    calibration : CellCalibration
+        The calibration as filed.
+
+    Returns
+    -------
+    list of Figure
+        One figure.
+    """
+    points = calibration.point
+    load = np.array([point.load for point in points], dtype=float)
+    shown = np.array([point.indicated for point in points], dtype=float)
+    residual = np.asarray(fit.residuals, dtype=float)
+    going = np.array([point.going for point in points])
+    order = np.argsort(load)
+    size = scale_for(float(np.max(np.abs(residual), initial=0.0)), "N")
+    readings = [Series("fitted", "measured", load[order], (load - residual)[order])]
+    errors = []
+    for word, tone in _TONES.items():
+        own = going == word
+        name = f"load going {word}"
+        readings.append(Series(f"indicated, {name}", tone, load[own], shown[own], "points", name))
+        errors.append(
+            Series(f"residual, {name}", tone, load[own], residual[own] / size.worth, "points", name)
         )
-        for point, residual in zip(points, fit.residuals, strict=True)
+    return [
+        Figure(
+            f"calibration-{_file_name(calibration.name)}",
+            "Force over the load",
+            "Indicated and fitted force, and the true less the fitted force; a difference of up "
+            "and down is hysteresis.",
+            Axis("load", "N"),
+            (
+                Panel(Axis("indicated and fitted", "N"), tuple(readings)),
+                Panel(Axis("residual", size.label, zero=True), tuple(errors)),
+            ),
+            source=f"calibration of {calibration.name}, {calibration.date.isoformat()}",
+        )
     ]
-    colours = legend([(tone, f"load going {going}") for going, tone in _TONES.items()])
-    return element("figure", chart.draw(*marks), colours, element("figcaption", caption))
+
+
+def _file_name(name: str) -> str:
+    """A name as a part of a file's name."""
+    return "".join(c if c.isascii() and c.isalnum() else "-" for c in name) or "cell"

@@ -7,19 +7,19 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.report.comparison_rows import HEAD, followed, offset_text, size_rows
-from winchkit.report.figures.plots import AT_NOISE
-from winchkit.report.html.markup import Markup, element, join, section, table
-from winchkit.report.pages.parts import bullets, data, lead
+from winchkit.report.html.markup import Markup, element, folded, join, table
+from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
 from winchkit.report.reproducibility import Command, repeat
-from winchkit.report.words.numbers import percent, quantity, significant, unbroken
+from winchkit.report.words.headline import at_noise, comparison_headline, worst_outputs
+from winchkit.report.words.numbers import percent, quantity, scale_for, significant, unbroken
 from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 __all__ = ["comparison_sections", "distance_text"]
 
 _NEXT = (
-    "A comparison quantifies the error of the model, not its cause: winchkit diagnose, with the "
-    "command below, names the missing effect or states that there is none."
+    "A comparison quantifies the error, not its cause. This command names the missing effect, or "
+    "states that there is none:"
 )
 
 
@@ -28,15 +28,17 @@ def comparison_sections(
     over: Mapping[str, Attribution],
     figures: Sequence[Markup],
     command: Command,
+    title: str = "",
 ) -> Markup:
-    """Content below the title; ``over`` is the main variable of each output's error."""
+    """Content of the page; ``over`` is the main variable of each output's error."""
     profile = command.profile
     return join(
         [
-            _lead(comparison, over),
-            section("residuals", "Residuals", *figures),
-            section("data", "Data", data(comparison)),
-            section("notes", "Notes", bullets(comparison.notes)),
+            _lead(comparison, over, command, title),
+            element("div", *figures, id="residuals"),
+            folded("attribution", "Error of every output", _table(comparison)),
+            folded("data", "Data", data(comparison)),
+            folded("notes", "Notes", bullets(comparison.notes)),
             repeat(
                 command,
                 [command.compare(profile), command.diagnose(profile)],
@@ -54,7 +56,7 @@ def distance_text(name: str, error: OutputError, over: Attribution | None) -> st
     if error.noise_rms is None:
         return f"{off}; its noise is unknown without repeats; {_attributed(over)}."
     noise = f"its noise of {quantity(error.noise_rms, error.unit)}"
-    if _at_noise(error):
+    if at_noise(error):
         return f"{off}, about {noise}."
     ratio = error.rms / error.noise_rms if error.noise_rms else None
     beside = "with" if ratio is None else f"{significant(ratio, 2)} times"
@@ -70,35 +72,61 @@ def _attributed(over: Attribution | None) -> str:
     return f"it depends on {VARIABLE_NAMES.get(over.variable, over.variable)} {share}"
 
 
-def _lead(comparison: Comparison, over: Mapping[str, Attribution]) -> Markup:
+def _lead(
+    comparison: Comparison, over: Mapping[str, Attribution], command: Command, title: str
+) -> Markup:
     outputs = comparison.outputs
-    texts = [distance_text(name, error, over.get(name)) for name, error in outputs.items()]
-    rows = [
-        [name, unbroken(followed(error)), *sizes, _ratio(error)]
-        for (name, *sizes), error in zip(size_rows(comparison), outputs.values(), strict=True)
+    texts = [
+        element("div", unbroken(distance_text(name, outputs[name], over.get(name))))
+        for name in worst_outputs(outputs)
     ]
+    chip, tone = _chip(list(outputs.values()))
+    rows = [
+        ("Compared", compared_text(command.dataset, command.profile)),
+        ("Error", join(texts)),
+        ("Cause", join([_NEXT, code_block(command.diagnose(command.profile))])),
+    ]
+    return lead(title, chip, tone, comparison_headline(comparison), rows, _sizes(comparison))
+
+
+def _sizes(comparison: Comparison) -> Markup:
+    """Error, noise and their ratio, the worst output first."""
+    rows = []
+    for name in worst_outputs(comparison.outputs):
+        error = comparison.outputs[name]
+        scale = scale_for(error.rms, error.unit)
+        noise = "unknown" if error.noise_rms is None else scale.text(error.noise_rms)
+        size = element("span", scale.text(error.rms), class_="before")
+        measured = quantity(error.signal_rms, error.unit)
+        rows.append([OUTPUT_NAMES.get(name, name), size, noise, _ratio(error), measured])
+    head = ["output", "error, rms", "noise", "÷ noise", "measured"]
+    return table("Measured less predicted, with the values of the profile's file.", head, rows)
+
+
+def _table(comparison: Comparison) -> Markup:
+    sizes = {row[0]: row[1:] for row in size_rows(comparison)}
+    rows = []
+    for name in worst_outputs(comparison.outputs):
+        error, words = comparison.outputs[name], OUTPUT_NAMES.get(name, name)
+        rows.append([words, unbroken(followed(error)), *sizes[words], _ratio(error)])
     caption = (
         "Measured less predicted, with the values of the profile's file. Shares are those of the "
         "error's variance."
     )
-    inside = [table(caption, ["output", "explained by", *HEAD[1:], "rms / noise"], rows, words=2)]
+    out = [table(caption, ["output", "explained by", *HEAD[1:], "÷ noise"], rows, words=2)]
     if comparison.offset is not None:
-        inside.append(element("p", f"{capital(offset_text(comparison.offset))}."))
-    return lead(*_chip(list(outputs.values())), texts, *inside, element("p", _NEXT, class_="quiet"))
+        out.append(element("p", f"{capital(offset_text(comparison.offset))}."))
+    return join(out)
 
 
 def _ratio(error: OutputError) -> str:
-    return f"{error.rms / error.noise_rms:.2f}" if error.noise_rms else "–"
+    return significant(error.rms / error.noise_rms, 2) if error.noise_rms else "–"
 
 
 def _chip(errors: Sequence[OutputError]) -> tuple[str, str]:
     """The comparison in a word, and its colour."""
-    if any(error.noise_rms is not None and not _at_noise(error) for error in errors):
+    if any(error.noise_rms is not None and not at_noise(error) for error in errors):
         return "Above the noise", "partly"
     if any(error.noise_rms is None for error in errors):
         return "Noise unknown", "partly"
     return "At the noise", "adequate"
-
-
-def _at_noise(error: OutputError) -> bool:
-    return error.noise_rms is not None and error.rms < AT_NOISE * error.noise_rms

@@ -10,13 +10,15 @@ from winchkit.diagnosis.results import Diagnosis
 from winchkit.report import tables
 from winchkit.report.as_json import report_json
 from winchkit.report.detectability import effects_of, smallest_shown
-from winchkit.report.figures.unexplained import unexplained_figures
+from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.waterfall import waterfall_of
-from winchkit.report.html.markup import Markup, element, join, section, table
-from winchkit.report.pages.parts import bullets, data, lead
+from winchkit.report.html.markup import Markup, element, folded, join, table
+from winchkit.report.html.page import figure_block
+from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
 from winchkit.report.reproducibility import Command, repeat
+from winchkit.report.words.headline import headline
 from winchkit.report.words.numbers import percent
-from winchkit.report.words.sentence import changes_text, sentence, where_text
+from winchkit.report.words.sentence import capital, cause_and_error, changes_text, where_text
 from winchkit.report.words.vocabulary import VERDICT_NAMES, listed
 
 __all__ = ["sections"]
@@ -30,57 +32,94 @@ def sections(
     story: Sequence[str],
     truth: Mapping[str, object] | None,
     command: Command,
+    title: str = "",
+    unexplained: Sequence[Figure] = (),
 ) -> Markup:
-    """Content below the title."""
+    """Content of the page: summary and figures, and everything else to be opened."""
     diagnosis = answer.diagnosis
     effects = effects_of(answer)
+    runs = diagnosis.data
     return join(
         [
-            _verdict(answer),
-            section("story", "Procedure", _story(story)),
-            section("residuals", "Residuals", *figures),
-            section(
+            _verdict(answer, command, title),
+            folded("story", "Procedure", _story(story)),
+            element("div", *figures, id="residuals"),
+            folded(
+                "effects",
+                "Named effects: formula and source",
+                _named(answer),
+            ),
+            folded(
                 "waterfall",
                 "Contribution of each effect",
-                tables.waterfall(waterfall_of(answer), diagnosis),
+                element("div", tables.waterfall(waterfall_of(answer), diagnosis), class_="bars")
+                if diagnosis.steps
+                else Markup(""),
             ),
-            section("candidates", "Candidate effects", tables.candidates(answer)),
-            section(
+            folded("unexplained", "Unexplained residual", _unexplained(answer, unexplained)),
+            folded(
                 "confusion",
-                f"Effects that cannot be distinguished with these {diagnosis.data}",
+                f"Effects that cannot be distinguished with these {runs}",
                 tables.equivalence(diagnosis, effects),
             ),
-            section("correlations", "Correlation of fitted values", tables.correlations(diagnosis)),
-            section(
+            folded("next", "Next runs", _next(diagnosis)),
+            folded("candidates", "Candidate effects", tables.candidates(answer)),
+            folded("correlations", "Correlation of fitted values", tables.correlations(diagnosis)),
+            folded(
                 "detectable",
-                f"Effects that are detectable with these {diagnosis.data}",
+                f"Effects that are detectable with these {runs}",
                 tables.detectable(answer),
             ),
-            section("unexplained", "Unexplained residual", _unexplained(answer)),
-            section("next", "Next runs", _next(diagnosis)),
-            section("data", "Data", data(diagnosis)),
-            section("notes", "Notes", bullets(diagnosis.notes)),
-            section("truth", "Simulated effect", _truth(truth)),
+            folded("data", "Data", data(diagnosis)),
+            folded("notes", "Notes", bullets(diagnosis.notes)),
+            folded("truth", "Simulated effect", _truth(truth)),
             repeat(command, _commands(diagnosis, command), "diagnosis", report_json(answer)),
         ]
     )
 
 
-def _verdict(answer: Answer) -> Markup:
+def _verdict(answer: Answer, command: Command, title: str) -> Markup:
     diagnosis = answer.diagnosis
     seen = smallest_shown(answer) if diagnosis.verdict == "adequate" else []
-    shown = element(
-        "p", f"Detectable with these {diagnosis.data}, among others: ", listed(seen), "."
-    )
+    shown = f"Detectable with these {diagnosis.data}, among others: {listed(seen)}." if seen else ""
+    cause, error = cause_and_error(diagnosis)
+    rows = [
+        ("Compared", compared_text(command.dataset, command.profile)),
+        ("Cause", cause),
+        ("Error", error),
+        ("Detectable", shown),
+        ("Cure", _cure(diagnosis, command)),
+        ("Would decide", _decides(diagnosis)),
+    ]
     return lead(
+        title,
         VERDICT_NAMES[diagnosis.verdict],
         diagnosis.verdict,
-        [sentence(diagnosis)],
-        *([shown] if seen else []),
-        _named(answer),
+        headline(diagnosis),
+        rows,
         tables.figures(diagnosis),
-        element("p", changes_text(diagnosis), class_="quiet"),
     )
+
+
+def _cure(diagnosis: Diagnosis, command: Command) -> str:
+    """The command that adds the first named effect, or continues without one."""
+    if diagnosis.interrupted:
+        return ""
+    if diagnosis.verdict == "adequate":
+        return "None is needed."
+    continued = _commands(diagnosis, command)[2:]
+    return code_block(continued[0]) if continued else ""
+
+
+def _decides(diagnosis: Diagnosis) -> str:
+    """The first proposed run that distinguishes effects, else what would change the verdict."""
+    if diagnosis.interrupted:
+        return ""
+    if not diagnosis.next_runs:
+        return changes_text(diagnosis)
+    first = diagnosis.next_runs[0]
+    power = "" if isnan(first.power) else f" (power {percent(first.power)})"
+    return f"{capital(first.programme)}: it distinguishes {listed(list(first.separates))}{power}."
 
 
 def _named(answer: Answer) -> Markup:
@@ -98,7 +137,7 @@ def _story(story: Sequence[str]) -> Markup:
     return element("ol", *items) if items else Markup("")
 
 
-def _unexplained(answer: Answer) -> Markup:
+def _unexplained(answer: Answer, figures: Sequence[Figure]) -> Markup:
     diagnosis = answer.diagnosis
     if diagnosis.verdict == "explained" and diagnosis.unexplained_share >= _TRACE:
         left = percent(diagnosis.unexplained_share)
@@ -114,7 +153,9 @@ def _unexplained(answer: Answer) -> Markup:
     places = bullets([where_text(where) for where in diagnosis.where])
     caption = "Its patterns; correlated variables explain the same part of the residual:"
     head = element("p", caption) if places else Markup("")
-    return join([left, head, places, *unexplained_figures(answer), _offer(diagnosis)])
+    drawn = [figure_block(one, 480) for one in figures]
+    pair = element("div", *drawn, class_="pair maps") if drawn else Markup("")
+    return join([left, head, places, pair, _offer(diagnosis)])
 
 
 def _offer(diagnosis: Diagnosis) -> Markup:

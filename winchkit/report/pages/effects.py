@@ -7,22 +7,21 @@ from math import inf, isfinite
 
 import numpy as np
 
-from winchkit.arrays import Array
 from winchkit.effects.card import Signature, in_control, parameter_kind, signature
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS
+from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.reduction import decimated
-from winchkit.report.html.chart import Chart, axis_over
 from winchkit.report.html.markup import Markup, element, section, table
-from winchkit.report.html.page import page
+from winchkit.report.html.page import figure_block, page
 from winchkit.report.words.numbers import plain, scale_for
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed, meaning, parameter_name
 
 __all__ = ["effects_html"]
 
-_POINTS = 240
-_HEIGHT = 190.0
+_INTERVALS = 120
+_SIDE = 480
 _MOTION = (
     "Along the standard motion: a fast and a slow stroke under 15 kg, then under 45 kg, at rising "
     "temperature. Each curve is the change of the output by the effect, computed by its code."
@@ -45,7 +44,10 @@ def effects_html(effects: Sequence[Effect], title: str) -> str:
         HTML, self-contained.
     """
     contents = [_contents(effects)] if len(effects) > 1 else []
-    return page(title, (), *contents, *(_card(effect) for effect in effects))
+    drawn = [_drawing(effect) for effect in effects]
+    figures = [figure for own, _ in drawn for figure in own]
+    cards = [_card(effect, blocks) for effect, (_, blocks) in zip(effects, drawn, strict=True)]
+    return page(title, figures, *contents, *cards)
 
 
 def _contents(effects: Sequence[Effect]) -> Markup:
@@ -63,7 +65,7 @@ def _contents(effects: Sequence[Effect]) -> Markup:
     return section("contents", f"{len(effects)} effects", *lists)
 
 
-def _card(effect: Effect) -> Markup:
+def _card(effect: Effect, drawing: Sequence[Markup]) -> Markup:
     needs = [need.replace("_", " ") for need in effect.needs]
     pairs = [
         ("formula", element("span", effect.formula, class_="formula")),
@@ -87,7 +89,7 @@ def _card(effect: Effect) -> Markup:
         element("p", effect.what),
         element("dl", *facts, class_="facts"),
         _parameters(effect),
-        *_drawing(effect),
+        *drawing,
     )
 
 
@@ -115,47 +117,41 @@ def _size(value: float, unit: str) -> str:
     return scale.labelled(plain(value / scale.worth))
 
 
-def _drawing(effect: Effect) -> list[Markup]:
+def _drawing(effect: Effect) -> tuple[list[Figure], list[Markup]]:
     drawn = signature(effect)
     if not drawn.changes:
-        return [element("p", "It has no effect on the standard motion.", class_="quiet")]
-    over = "pose of the standard robot, line 1" if effect.of_robots else "time [s]"
-    figures = [_moves(drawn, over), *(_change(drawn, name, over) for name in drawn.changes)]
+        text = "It has no effect on the standard motion."
+        return [], [element("p", text, class_="quiet")]
+    over = Axis("pose of the standard robot, line 1") if effect.of_robots else Axis("time", "s")
+    figures = [_figure(effect.id, drawn, name, over) for name in ("", *drawn.changes)]
     sizes = ", ".join(
         f"{parameter_name(p.name)} {_size(drawn.values[p.name], p.unit)}"
         for p in effect.parameters
         if isfinite(drawn.values[p.name])
     )
-    return [
-        element("div", *figures, class_="pair maps"),
-        element("p", f"{'' if effect.of_robots else _MOTION} Drawn with {sizes}.", class_="quiet"),
-    ]
+    text = f"{'' if effect.of_robots else _MOTION} Drawn with {sizes}."
+    blocks = [figure_block(figure, _SIDE) for figure in figures]
+    pair = element("div", *blocks, class_="pair maps")
+    return figures, [pair, element("p", text, class_="quiet")]
 
 
-def _moves(drawn: Signature, over: str) -> Markup:
-    said = "Free length of the nominal line, for orientation."
-    return _figure((drawn.time, over), drawn.cable_length, ("free length", "m"), "residual", said)
-
-
-def _change(drawn: Signature, output: str, over: str) -> Markup:
-    said = f"Change of the {OUTPUT_NAMES.get(output, output)}."
-    shown = ("change", OUTPUT_UNITS[output])
-    return _figure((drawn.time, over), drawn.changes[output], shown, "before", said)
-
-
-def _figure(
-    along: tuple[Array, str], values: Array, shown: tuple[str, str], tone: str, said: str
-) -> Markup:
-    """One curve, its extremes kept."""
-    (time, over), (name, unit) = along, shown
+def _figure(effect: str, drawn: Signature, output: str, over: Axis) -> Figure:
+    """The change of an output, or the free length for orientation; extremes are kept."""
+    values = drawn.changes[output] if output else drawn.cable_length
+    unit = OUTPUT_UNITS[output] if output else "m"
     scale = scale_for(float(np.nanmax(np.abs(values))), unit)
-    x, (y,) = decimated(time, [values / scale.worth], _POINTS)
-    points = [(a, b) for a, b in zip(x.tolist(), y.tolist(), strict=True) if isfinite(b)]
-    chart = Chart(
-        axis_over(over, x.tolist()),
-        axis_over(f"{name} [{scale.label}]", [b for _, b in points], zero=tone == "before"),
-        said,
-        height=_HEIGHT,
+    rows = decimated([values], _INTERVALS)
+    name = OUTPUT_NAMES.get(output, output)
+    caption = (
+        f"Change of the {name}." if output else "Free length of the nominal line, for orientation."
     )
-    drawn = chart.draw(chart.line(points, tone))
-    return element("figure", drawn, element("figcaption", said))
+    tone, label = ("today", "change") if output else ("plain", "free length")
+    series = Series(label, tone, drawn.time[rows], values[rows] / scale.worth)
+    return Figure(
+        f"signature-{effect}-{output or 'motion'}",
+        capital(f"change of the {name}") if output else "Motion",
+        caption,
+        over,
+        (Panel(Axis(label, scale.label, zero=bool(output)), (series,)),),
+        source=f"effect {effect}",
+    )

@@ -46,7 +46,11 @@ def ladder_html(name: str, rungs: Sequence[Rung]) -> str:
     shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]
     head = ["step", "meaning", *(OUTPUT_NAMES[o] for o in shown)]
     steps = table(caption, head, _rows(rungs, shown), words=2)
-    return page(title, (), section("waterfall", "Held-out error per step", steps))
+    return page(
+        title,
+        (),
+        section("waterfall", "Held-out error per step", element("div", steps, class_="bars")),
+    )
 
 
 def _rows(rungs: Sequence[Rung], shown: Sequence[str]) -> list[list[str]]:

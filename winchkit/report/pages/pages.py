@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.add import Grown
 from winchkit.diagnosis.compare import Compared
 from winchkit.diagnosis.diagnose import WinchAnswer
-from winchkit.report.figures.maps import maps_drawn
-from winchkit.report.figures.plots import OutputPlots, Residuals, plots_of
+from winchkit.report.figures.figure import Figure
+from winchkit.report.figures.maps import map_figures
+from winchkit.report.figures.residuals import OutputFigures, Residuals, residual_figures
+from winchkit.report.figures.unexplained import unexplained_figures
 from winchkit.report.html.markup import Markup
 from winchkit.report.html.page import page
 from winchkit.report.pages.addition import addition_sections
@@ -16,9 +18,19 @@ from winchkit.report.pages.comparison import comparison_sections
 from winchkit.report.pages.diagnosis import sections
 from winchkit.report.pages.parts import drawings
 from winchkit.report.reproducibility import Command
-from winchkit.report.words.sentence import moved_outputs
+from winchkit.report.words.headline import size_texts, worst_outputs
 
-__all__ = ["addition_html", "comparison_html", "report_html", "residuals_of"]
+__all__ = [
+    "addition_figures",
+    "addition_html",
+    "comparison_figures",
+    "comparison_html",
+    "report_figures",
+    "report_html",
+    "residuals_of",
+    "residuals_of_addition",
+    "residuals_of_comparison",
+]
 
 
 def report_html(
@@ -52,15 +64,21 @@ def report_html(
     str
         HTML, self-contained.
     """
-    residuals, diagnosis = residuals_of(answer), answer.diagnosis
-    plots = plots_of(residuals)
-    moved = moved_outputs(diagnosis.outputs) if diagnosis.steps else []
-    figures = _figures(residuals, plots, moved)
-    command = Command(residuals.regression.dataset, profile, options)
-    return page(title, plots, sections(answer, figures, story, truth, command))
+    command = Command(answer.engine.regression.dataset, profile, options)
+    residuals = residuals_of(answer, command.source)
+    drawn, cards = _cards(residuals, size_texts(answer.diagnosis.outputs))
+    patterns = unexplained_figures(answer, command.source)
+    content = sections(answer, cards, story, truth, command, title, patterns)
+    return page(title, [*drawn, *patterns], content, headed=False)
 
 
-def residuals_of(answer: WinchAnswer) -> Residuals:
+def report_figures(answer: WinchAnswer, source: str = "") -> list[Figure]:
+    """The figures of the page of a diagnosis, the worst output first."""
+    drawn, _ = _cards(residuals_of(answer, source), {})
+    return [*drawn, *unexplained_figures(answer, source)]
+
+
+def residuals_of(answer: WinchAnswer, source: str = "") -> Residuals:
     """Residuals on the page of a diagnosis; ``after`` only where an effect was named."""
     diagnosis, found = answer.diagnosis, answer.result
     return Residuals(
@@ -68,6 +86,38 @@ def residuals_of(answer: WinchAnswer) -> Residuals:
         found.initial_model.residual,
         found.final.residual if diagnosis.steps else None,
         {name: output.noise_rms for name, output in diagnosis.outputs.items()},
+        _changed([step.effects[0] for step in diagnosis.steps]),
+        source,
+        tuple(worst_outputs(diagnosis.outputs)),
+    )
+
+
+def _changed(effects: Sequence[str]) -> str:
+    """Name of the model with added effects."""
+    return f"with {effects[0]}" if len(effects) == 1 else f"with {len(effects)} effects"
+
+
+def residuals_of_comparison(compared: Compared, source: str = "") -> Residuals:
+    """Residuals on the page of a comparison."""
+    outputs = compared.comparison.outputs
+    noise = {name: error.noise_rms for name, error in outputs.items()}
+    order = tuple(worst_outputs(outputs))
+    return Residuals(
+        compared.regression, compared.residual, None, noise, source=source, order=order
+    )
+
+
+def residuals_of_addition(grown: Grown, source: str = "") -> Residuals:
+    """Residuals on the page of an addition."""
+    outputs = grown.addition.outputs
+    return Residuals(
+        grown.regression,
+        grown.initial_model.residual,
+        grown.final.residual,
+        {name: output.noise_rms for name, output in outputs.items()},
+        _changed([grown.addition.added[0].label]),
+        source,
+        tuple(worst_outputs(outputs)),
     )
 
 
@@ -92,13 +142,18 @@ def comparison_html(
     str
         HTML, self-contained.
     """
-    noise = {name: error.noise_rms for name, error in compared.comparison.outputs.items()}
-    residuals = Residuals(compared.regression, compared.residual, None, noise)
-    plots = plots_of(residuals)
-    figures = _figures(residuals, plots)
     command = Command(compared.regression.dataset, profile, options)
-    over = {own.output: own.followed for own in plots if own.followed}
-    return page(title, plots, comparison_sections(compared.comparison, over, figures, command))
+    residuals = residuals_of_comparison(compared, command.source)
+    own = residual_figures(residuals)
+    drawn, cards = _cards(residuals, size_texts(compared.comparison.outputs), own)
+    over = {one.output: one.followed for one in own if one.followed}
+    content = comparison_sections(compared.comparison, over, cards, command, title)
+    return page(title, drawn, content, headed=False)
+
+
+def comparison_figures(compared: Compared, source: str = "") -> list[Figure]:
+    """The figures of the page of a comparison, the worst output first."""
+    return _cards(residuals_of_comparison(compared, source), {})[0]
 
 
 def addition_html(
@@ -124,19 +179,32 @@ def addition_html(
     str
         HTML, self-contained.
     """
-    noise = {name: output.noise_rms for name, output in grown.addition.outputs.items()}
-    residuals = Residuals(
-        grown.regression, grown.initial_model.residual, grown.final.residual, noise
-    )
-    plots = plots_of(residuals)
-    figures = _figures(residuals, plots, moved_outputs(grown.addition.outputs))
     command = Command(grown.regression.dataset, profile, options)
+    drawn, cards = _cards(
+        residuals_of_addition(grown, command.source), size_texts(grown.addition.outputs)
+    )
     better = better or "better.toml"
-    return page(title, plots, addition_sections(grown.addition, figures, command, better))
+    content = addition_sections(grown.addition, cards, command, better, title)
+    return page(title, drawn, content, headed=False)
 
 
-def _figures(
-    residuals: Residuals, plots: Sequence[OutputPlots], first: Sequence[str] = ()
-) -> list[Markup]:
-    """Curves and maps of every output; some outputs come first."""
-    return drawings(plots, maps_drawn(residuals, {p.output: p.scale for p in plots}), first)
+def addition_figures(grown: Grown, source: str = "") -> list[Figure]:
+    """The figures of the page of an addition, the worst output first."""
+    return _cards(residuals_of_addition(grown, source), {})[0]
+
+
+def _cards(
+    residuals: Residuals,
+    sizes: Mapping[str, str],
+    own: Sequence[OutputFigures] | None = None,
+) -> tuple[list[Figure], list[Markup]]:
+    """All figures of the outputs, and a card of each output."""
+    own = residual_figures(residuals) if own is None else own
+    maps = map_figures(residuals, {one.output: one.scale for one in own})
+    every = [
+        figure
+        for one in own
+        for figure in (one.over_time, one.over_variable, *maps.get(one.output, ()))
+        if figure is not None
+    ]
+    return every, drawings(own, maps, sizes)

@@ -4,32 +4,105 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.results import Comparison, Diagnosis
-from winchkit.report.figures.plots import OutputPlots, Plot
-from winchkit.report.html.markup import Markup, element
+from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.report.figures.figure import Figure
+from winchkit.report.figures.residuals import OutputFigures, run_names
+from winchkit.report.html.markup import Markup, details, element
+from winchkit.report.html.page import figure_block
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.numbers import unbroken
 from winchkit.report.words.sentence import capital
-from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed
 
-__all__ = ["bullets", "data", "drawings", "lead"]
+__all__ = ["bullets", "code_block", "compared_text", "data", "drawings", "lead",
+           "output_card"]  # fmt: skip
+
+_ICONS = {
+    "adequate": '<circle cx="8" cy="8" r="6"/><path d="M5.2 8.2l2 2 3.6-4.2"/>',
+    "explained": (
+        '<circle cx="8" cy="8" r="6" stroke-dasharray="2.2 1.6"/><path d="M8 5.4v5.2M5.4 8h5.2"/>'
+    ),
+    "partly": '<path d="M4.5 6.2h7M4.5 9.8h7"/>',
+    "unknown": (
+        '<path d="M8 1.8L14.2 8 8 14.2 1.8 8z"/>'
+        '<path d="M6.6 6.6c.2-1.8 3-1.6 2.8.1-.1 1-1.4 1-1.4 2.1M8 10.9v.1"/>'
+    ),
+}
+"""Icon beside the verdict's word, by its colour."""
+_SIDE = 480
+"""Width of a figure beside one over time, px."""
 
 
-def lead(chip: str, tone: str, sentences: Sequence[str], *inside: Markup) -> Markup:
-    """Result of a page: a word, sentences, and tables.
+def lead(
+    context: str,
+    chip: str,
+    tone: str,
+    headline: str,
+    rows: Sequence[tuple[str, str]],
+    *beside: Markup,
+) -> Markup:
+    """Result of a page: a word, a headline, and a summary of what was compared and follows.
 
     ``tone`` is a verdict whose colour is taken: adequate, explained, partly, unknown.
+    ``rows`` are questions and their answers; empty answers are left out.
     """
-    texts = [element("p", unbroken(text), class_="sentence") for text in sentences]
+    icon = Markup(f'<svg viewBox="0 0 16 16" aria-hidden="true">{_ICONS[tone]}</svg>')
+    head = element(
+        "div",
+        element("h2", icon, chip, id="verdict-heading", class_="chip"),
+        element("h1", unbroken(headline)),
+        class_="lead",
+    )
+    steps = [
+        part
+        for question, answer in rows
+        if answer
+        for part in (element("dt", question), element("dd", unbroken_words(answer)))
+    ]
+    brief = element(
+        "div",
+        element("dl", *steps, class_="steps"),
+        *([element("div", *beside)] if any(beside) else []),
+        class_="card brief",
+        id="summary",
+    )
     return element(
         "section",
-        element("h2", chip, id="verdict-heading", class_="chip"),
-        *texts,
-        *inside,
+        element("p", context, class_="context"),
+        head,
+        brief,
         id="verdict",
         class_=f"verdict {tone}",
         aria_labelledby="verdict-heading",
     )
+
+
+def unbroken_words(text: str) -> str:
+    """Text with no-break spaces between numbers and units; markup as it is."""
+    return text if isinstance(text, Markup) else unbroken(text)
+
+
+def code_block(*commands: str) -> Markup:
+    """Commands, one a line."""
+    return element("pre", element("code", "\n".join(commands)), tabindex="0")
+
+
+def compared_text(dataset: Dataset | RobotDataset, profile: str) -> str:
+    """``4 runs, 46.4 s: demo 10 kg (2), demo 20 kg (2); profile bench-spiral``."""
+    if isinstance(dataset, RobotDataset):
+        count = len(dataset.pose)
+        return f"{count} poses of {len(dataset.names)} cables; profile {profile}"
+    times = [recording.signals.time for recording in dataset.recordings]
+    whole = sum(float(time[-1] - time[0]) for time in times)
+    names = run_names(dataset)
+    often = {name: names.count(name) for name in names}
+    kinds = [name if n == 1 else f"{name} ({n})" for name, n in often.items()]
+    few = kinds if len(kinds) <= 6 else [*kinds[:5], f"{len(kinds) - 5} more"]
+    runs = "1 run" if len(times) == 1 else f"{len(times)} runs"
+    duration = f"{whole:.1f} s" if whole < 600 else f"{whole / 60:.0f} min"
+    return f"{runs}, {duration}: {listed(few)}; profile {profile}"
 
 
 def bullets(lines: Sequence[str]) -> Markup:
@@ -51,27 +124,39 @@ def data(result: Comparison | Diagnosis) -> Markup:
 
 
 def drawings(
-    plots: Sequence[OutputPlots],
-    maps: Mapping[str, Sequence[Markup]],
-    first: Sequence[str] = (),
+    figures: Sequence[OutputFigures],
+    maps: Mapping[str, Sequence[Figure]],
+    sizes: Mapping[str, str],
 ) -> list[Markup]:
-    """The figures of every output, with its maps below; some outputs come first."""
-    ordered = sorted(
-        plots, key=lambda p: first.index(p.output) if p.output in first else len(first)
-    )
-    return [_output(own, maps.get(own.output, ())) for own in ordered]
+    """A card per output, the first open; ``sizes`` are remarks on their errors."""
+    cards = []
+    for number, own in enumerate(figures):
+        blocks = [figure_block(own.over_time)]
+        if own.over_variable is None:
+            blocks.append(
+                element("p", "No measured variable explains the residual.", class_="quiet")
+            )
+        else:
+            blocks.append(figure_block(own.over_variable, _SIDE))
+        pair = element("div", *blocks, class_="pair")
+        found = maps.get(own.output, ())
+        more = [figure_block(one, _SIDE) for one in found]
+        over = details(
+            "Mean residual over two variables", element("div", *more, class_="pair maps")
+        )
+        cards.append(
+            output_card(own.output, [pair, *([over] if more else [])], sizes, opened=number == 0)
+        )
+    return cards
 
 
-def _output(own: OutputPlots, maps: Sequence[Markup]) -> Markup:
-    title = element("h3", capital(OUTPUT_NAMES.get(own.output, own.output)))
-    pair = element("div", *maps, class_="pair maps") if maps else Markup("")
-    if own.over_variable is None:
-        words = element("p", "No measured variable explains the residual.", class_="quiet")
-        return element("div", title, _figure(own.over_time), words, pair, class_="output")
-    both = element("div", _figure(own.over_time), _figure(own.over_variable), class_="pair")
-    return element("div", title, both, pair, class_="output")
-
-
-def _figure(plot: Plot) -> Markup:
-    canvas = element("div", class_="plot", data_plot=plot.id, role="img", aria_label=plot.caption)
-    return element("figure", canvas, element("figcaption", unbroken(plot.caption)))
+def output_card(
+    output: str, content: Sequence[Markup], sizes: Mapping[str, str], *, opened: bool
+) -> Markup:
+    """The figures of an output; the first card is open, the others are to be opened."""
+    title = capital(OUTPUT_NAMES.get(output, output))
+    size = element("span", unbroken(sizes.get(output, "")), class_="beside")
+    if opened:
+        return element("div", element("h2", title, " ", size), *content, class_="output")
+    head = element("summary", element("h2", title), size)
+    return element("details", head, *content, class_="output")

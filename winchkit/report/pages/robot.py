@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import isfinite, nan, sqrt
+from typing import Literal
 
 import numpy as np
 
@@ -15,29 +17,37 @@ from winchkit.diagnosis.robot.compare import RobotCompared
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.diagnosis.robot.errors import UNITS, Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
-from winchkit.report.figures.plots import AT_NOISE
+from winchkit.report.figures.axes import Reading, reading
+from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.pose_traces import NUMBER, Trace, traces
-from winchkit.report.html.chart import Axis, Chart, axis_over, legend, reading
+from winchkit.report.figures.unexplained import unexplained_figures
 from winchkit.report.html.markup import Markup, element, table
-from winchkit.report.html.page import page
+from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.addition import addition_sections
 from winchkit.report.pages.comparison import comparison_sections
 from winchkit.report.pages.diagnosis import sections
+from winchkit.report.pages.parts import output_card
 from winchkit.report.reproducibility import Command
 from winchkit.report.tables import bar
-from winchkit.report.words.numbers import Scale, scale_for, unbroken
-from winchkit.report.words.sentence import capital, moved_outputs, where_text
-from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.report.words.headline import size_texts, worst_outputs
+from winchkit.report.words.numbers import scale_for
+from winchkit.report.words.sentence import capital, where_text
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 __all__ = [
     "pose_figures",
+    "robot_addition_figures",
     "robot_addition_html",
+    "robot_comparison_figures",
     "robot_comparison_html",
+    "robot_report_figures",
     "robot_report_html",
 ]
 
 _SPREAD = 0.25
 _CHANGED = 1.02
+_FEW_POSES = 400
+"""Poses up to which a point is large."""
 
 
 def pose_figures(
@@ -45,65 +55,79 @@ def pose_figures(
     before: Errors,
     after: Errors | None,
     noise: Mapping[str, float | None],
-    first: Sequence[str] = (),
-) -> list[Markup]:
-    """A block per output: its errors over their main variable, and by line or axis.
+    order: Sequence[str] = (),
+    changed: str = "with the effect",
+    source: str = "",
+) -> dict[str, Figure]:
+    """Errors of every output over their main variable, in the given order.
 
-    ``after`` is None where nothing was changed; outputs in ``first`` come first.
+    ``after`` is None where nothing was changed.
     """
-    drawn = traces(regression, before, after)
-    drawn.sort(key=lambda t: list(first).index(t.over.output) if t.over.output in first else 99)
-    return [
-        _output(regression, trace, before, after, noise.get(trace.over.output)) for trace in drawn
-    ]
+    drawn = {trace.over.output: trace for trace in traces(regression, before, after)}
+    ordered = [name for name in dict.fromkeys((*order, *drawn)) if name in drawn]
+    return {
+        name: replace(_figure(drawn[name], noise.get(name), changed), source=source)
+        for name in ordered
+    }
 
 
-def _output(
+def _cards(
     regression: PoseRegression,
-    trace: Trace,
+    figures: Mapping[str, Figure],
     before: Errors,
     after: Errors | None,
-    noise: float | None,
-) -> Markup:
-    name = trace.over.output
-    title = element("h3", capital(OUTPUT_NAMES.get(name, name)))
-    lines = list(AXES) if name == "platform_position" else list(regression.dataset.names)
-    then = None if after is None else on_cables(regression, {name: after[name]})[name]
-    each = _each_line(name, lines, on_cables(regression, {name: before[name]})[name], then)
-    pair = element("div", _figure(trace, noise), each, class_="pair maps")
-    return element("div", title, pair, class_="output")
+    sizes: Mapping[str, str],
+) -> list[Markup]:
+    """A card per output: its figure, and its error by line or axis."""
+    cards = []
+    for number, (name, figure) in enumerate(figures.items()):
+        lines = list(AXES) if name == "platform_position" else list(regression.dataset.names)
+        then = None if after is None else on_cables(regression, {name: after[name]})[name]
+        each = _each_line(name, lines, on_cables(regression, {name: before[name]})[name], then)
+        pair = element("div", figure_block(figure), element("div", each), class_="pair")
+        cards.append(output_card(name, [pair], sizes, opened=number == 0))
+    return cards
 
 
-def _figure(trace: Trace, noise: float | None) -> Markup:
-    """Dots of every pose, means as lines, the noise as a band."""
+def _figure(trace: Trace, noise: float | None, changed: str) -> Figure:
+    """Points of every pose, means as lines, the noise as a band."""
     how, unit = reading(trace.over.variable), UNITS[trace.over.output]
     scale = scale_for(float(np.abs(trace.before).max(initial=0.0)), unit)
     if noise is not None and trace.over.output == "platform_position":
         noise /= sqrt(len(AXES))  # Noise of one axis from that of the distance.
-    states = [("before", trace.before)]
+    states = [("today", "present model", trace.before)]
     if trace.after is not None and _differ(trace):
-        states.append(("after", trace.after))
-    elif float(np.sqrt(np.mean(trace.before**2))) < AT_NOISE * (noise or 0.0):
-        states = [("residual", trace.before)]
-    caption = _caption(trace, noise)
-    across = _axis(trace, how.label, np.asarray(how.shown(trace.x)))
-    every = [float(v) / scale.worth for _, values in states for v in values]
-    up = axis_over(f"measured − predicted [{scale.label}]", every, zero=True)
-    chart = Chart(across, up, caption)
-    marks = _band(chart, noise, scale)
-    places = _beside(trace, how.shown(trace.x), len(states))
-    for (tone, values), x in zip(states, places, strict=True):
-        dots = zip(x.tolist(), (values / scale.worth).tolist(), strict=True)
-        marks += [chart.dot(a, b, tone) for a, b in dots]
-    for tone, values in states:
+        states.append(("with", changed, trace.after))
+    x = _beside(trace, np.asarray(how.shown(trace.x)))
+    series = []
+    for tone, name, values in states:
+        mark: Literal["dots", "points"] = "dots" if len(x) > _FEW_POSES else "points"
+        series.append(Series(name, tone, x, values / scale.worth, mark))
+    for tone, name, values in states:
         at, mean = trace.means(values)
-        points = zip(how.shown(at).tolist(), (mean / scale.worth).tolist(), strict=True)
         if trace.over.variable != "winch":
-            marks.append(chart.line(points, tone))
-    said = ["before", "after"] if len(states) > 1 else ["unchanged"]
-    words = [(tone, text) for (tone, _), text in zip(states, said, strict=True)]
-    drawn = chart.draw(*marks)
-    return element("figure", drawn, legend(words), element("figcaption", unbroken(caption)))
+            shown = np.asarray(how.shown(at))
+            series.append(Series(f"mean, {name}", tone, shown, mean / scale.worth, "mean"))
+    output = OUTPUT_NAMES.get(trace.over.output, trace.over.output)
+    over = VARIABLE_NAMES.get(trace.over.variable, trace.over.variable)
+    line = "" if trace.line is None else f", {_line_word(trace)} {trace.line}"
+    return Figure(
+        f"error-{trace.over.output}",
+        f"{capital(output)} error over {over}{line}",
+        _caption(trace, noise),
+        _axis(trace, how),
+        (
+            Panel(
+                Axis("measured less predicted", scale.label, zero=True),
+                tuple(series),
+                None if noise is None or not isfinite(noise) else noise / scale.worth,
+            ),
+        ),
+    )
+
+
+def _line_word(trace: Trace) -> str:
+    return "along" if trace.over.output == "platform_position" else "line"
 
 
 def _differ(trace: Trace) -> bool:
@@ -123,34 +147,27 @@ def _caption(trace: Trace, noise: float | None) -> str:
     if trace.line is not None and over.line is None:
         where = "along" if over.output == "platform_position" else "of line"
         text += f", drawn {where} {trace.line}, with the largest share"
-    band = "" if noise is None else " The grey band is the noise, ± its rms."
-    return f"{capital(text)}. Dots are poses, lines their means.{band}"
+    band = "" if noise is None else " The band is the noise, ± its rms."
+    return f"{capital(text)}. Points are poses, lines their means.{band}"
 
 
-def _axis(trace: Trace, label: str, shown: Array) -> Axis:
+def _axis(trace: Trace, how: Reading) -> Axis:
     if trace.over.variable == "winch":
-        return Axis("line, in the order of the file", 0.4, float(trace.x.max()) + 0.6)
-    return axis_over(label, shown.tolist())
+        last = float(trace.x.max())
+        names = tuple((float(n), str(n)) for n in range(1, int(last) + 1))
+        return Axis("line, in the order of the file", limits=(0.4, last + 0.6), categories=names)
+    return how.axis()
 
 
-def _beside(trace: Trace, x: Array, states: int) -> list[Array]:
-    """Positions of the dots of each state; those of one line are side by side."""
+def _beside(trace: Trace, x: Array) -> Array:
+    """Positions of the points; those of one line are side by side."""
     if trace.over.variable != "winch":
-        return [x] * states
+        return x
     out = x.copy()
     for value in np.unique(x):
         alike = x == value
         out[alike] += np.linspace(-_SPREAD, _SPREAD, int(np.count_nonzero(alike)))
-    return [out] * states
-
-
-def _band(chart: Chart, noise: float | None, scale: Scale) -> list[Markup]:
-    if noise is None or not isfinite(noise):
-        return []
-    half = noise / scale.worth
-    low, high = max(-half, chart.y.low), min(half, chart.y.high)
-    ends = (chart.x.low, chart.x.high)
-    return [chart.cell(ends, (low, high), "residual", 0.2, f"noise: {scale.text(noise)} rms")]
+    return out
 
 
 def _each_line(name: str, lines: Sequence[str], before: Array, after: Array | None) -> Markup:
@@ -160,16 +177,17 @@ def _each_line(name: str, lines: Sequence[str], before: Array, after: Array | No
     every = [size for own in sizes.values() for size in own if isfinite(size)]
     longest = max(every, default=0.0)
     scale = scale_for(longest, UNITS[name])
+    tones = {"before": "today", "after": "with"}
     rows = [
-        [line, *(bar(own[k], 1.05 * longest, None, scale, tone) for tone, own in sizes.items())]
+        [line, *(bar(own[k], 1.05 * longest, None, scale, tones[t]) for t, own in sizes.items())]
         for k, line in enumerate(lines)
     ]
     kind = "axis" if name == "platform_position" else "line"
-    head = [kind, *(tone if after is not None else "error" for tone in sizes)]
+    head = [kind, *(["today", "with it"] if after is not None else ["error"])]
     least = (
         " as the least cable forces that balance the residual wrench" if name == "tension" else ""
     )
-    return table(f"Error, rms, by {kind}{least}.", head, rows)
+    return element("div", table(f"Error, rms, by {kind}{least}.", head, rows), class_="bars")
 
 
 def _rms(values: Array) -> float:
@@ -198,14 +216,35 @@ def robot_report_html(
     str
         HTML, self-contained.
     """
+    selection, diagnosis = answer.selection, answer.diagnosis
+    command = Command(selection.preparation.dataset, profile, options)
+    drawn = _report_figures(answer, command.source)
+    before, after = selection.errors
+    grown = after if diagnosis.steps else None
+    regression = selection.final.regression
+    cards = _cards(regression, drawn, before, grown, size_texts(diagnosis.outputs))
+    patterns = unexplained_figures(answer, command.source)
+    content = sections(answer, cards, (), None, command, title, patterns)
+    return page(title, [*drawn.values(), *patterns], content, headed=False)
+
+
+def robot_report_figures(answer: RobotAnswer, source: str = "") -> list[Figure]:
+    """The figures of the page of a robot's diagnosis."""
+    drawn = _report_figures(answer, source).values()
+    return [*drawn, *unexplained_figures(answer, source)]
+
+
+def _report_figures(answer: RobotAnswer, source: str) -> dict[str, Figure]:
     diagnosis, selection = answer.diagnosis, answer.selection
     before, after = selection.errors
     noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
-    moved = moved_outputs(diagnosis.outputs) if diagnosis.steps else []
-    grown = after if diagnosis.steps else None
-    figures = pose_figures(selection.final.regression, before, grown, noise, moved)
-    command = Command(selection.preparation.dataset, profile, options)
-    return page(title, (), sections(answer, figures, (), None, command))
+    steps = diagnosis.steps
+    changed = f"with {steps[0].effects[0]}" if len(steps) == 1 else f"with {len(steps)} effects"
+    if steps and steps[0].whole:
+        changed = "calibrated"
+    order = worst_outputs(diagnosis.outputs)
+    grown = after if steps else None
+    return pose_figures(selection.final.regression, before, grown, noise, order, changed, source)
 
 
 def robot_comparison_html(
@@ -229,14 +268,25 @@ def robot_comparison_html(
     str
         HTML, self-contained.
     """
-    comparison, command = (
-        compared.comparison,
-        Command(compared.regression.dataset, profile, options),
-    )
-    noise = {name: error.noise_rms for name, error in comparison.outputs.items()}
-    figures = pose_figures(compared.regression, compared.errors, None, noise)
-    content = comparison_sections(comparison, compared.followed, figures, command)
-    return page(title, (), content)
+    comparison = compared.comparison
+    command = Command(compared.regression.dataset, profile, options)
+    drawn = _comparison_figures(compared, command.source)
+    sizes = size_texts(comparison.outputs)
+    cards = _cards(compared.regression, drawn, compared.errors, None, sizes)
+    content = comparison_sections(comparison, compared.followed, cards, command, title)
+    return page(title, list(drawn.values()), content, headed=False)
+
+
+def robot_comparison_figures(compared: RobotCompared, source: str = "") -> list[Figure]:
+    """The figures of the page of a robot's comparison."""
+    return list(_comparison_figures(compared, source).values())
+
+
+def _comparison_figures(compared: RobotCompared, source: str) -> dict[str, Figure]:
+    outputs = compared.comparison.outputs
+    noise = {name: error.noise_rms for name, error in outputs.items()}
+    order = worst_outputs(outputs)
+    return pose_figures(compared.regression, compared.errors, None, noise, order, source=source)
 
 
 def robot_addition_html(
@@ -267,10 +317,24 @@ def robot_addition_html(
     str
         HTML, self-contained.
     """
+    command = Command(grown.regression.dataset, profile, options)
+    drawn = _addition_figures(grown, command.source)
+    sizes = size_texts(grown.addition.outputs)
+    cards = _cards(grown.regression, drawn, *grown.errors, sizes)
+    better = better or "better.toml"
+    content = addition_sections(grown.addition, cards, command, better, title)
+    return page(title, list(drawn.values()), content, headed=False)
+
+
+def robot_addition_figures(grown: RobotGrown, source: str = "") -> list[Figure]:
+    """The figures of the page of an effect added to a robot."""
+    return list(_addition_figures(grown, source).values())
+
+
+def _addition_figures(grown: RobotGrown, source: str) -> dict[str, Figure]:
     outputs = grown.addition.outputs
     noise = {name: output.noise_rms for name, output in outputs.items()}
     before, after = grown.errors
-    figures = pose_figures(grown.regression, before, after, noise, moved_outputs(outputs))
-    command = Command(grown.regression.dataset, profile, options)
-    content = addition_sections(grown.addition, figures, command, better or "better.toml")
-    return page(title, (), content)
+    changed = f"with {grown.addition.added[0].label}"
+    order = worst_outputs(outputs)
+    return pose_figures(grown.regression, before, after, noise, order, changed, source)

@@ -6,24 +6,35 @@ from collections.abc import Iterator, Sequence
 from math import degrees, isfinite
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from winchkit.calibration.robot.results import candidate_lines, in_words, noise_words
-from winchkit.report.html.chart import Axis, Chart, axis_over, legend
-from winchkit.report.html.markup import Markup, element, section, table
-from winchkit.report.html.page import page
+from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.html.markup import Markup, element, folded, table
+from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
+from winchkit.report.words.numbers import quantity
+from winchkit.report.words.sentence import capital
 
 if TYPE_CHECKING:
-    from winchkit.calibration.robot.calibrate import Calibrated
+    from winchkit.calibration.robot.calibrate import Calibrated, Estimated
     from winchkit.calibration.robot.pose_design import NextPose
     from winchkit.calibration.robot.prediction import PoseErrors
 
-__all__ = ["calibration_html"]
+__all__ = ["calibration_figures", "calibration_html"]
 
 _MM = 1e3
+_MOST = 5
 
 
-def calibration_html(found: Calibrated, following: Sequence[NextPose], title: str) -> str:
-    """The page, self-contained and without script.
+def calibration_html(
+    found: Calibrated,
+    following: Sequence[NextPose],
+    title: str,
+    source: str = "",
+    written: str = "",
+) -> str:
+    """The page, self-contained.
 
     Parameters
     ----------
@@ -33,23 +44,81 @@ def calibration_html(found: Calibrated, following: Sequence[NextPose], title: st
         Proposed poses.
     title : str
         Title of the page.
+    source : str
+        Profile and runs, for the files of the figures.
+    written : str
+        The written profile; empty where none was.
 
     Returns
     -------
     str
         HTML, self-contained.
     """
-    head, tone = _verdict(found)
+    chip, tone = _verdict(found)
+    figures = calibration_figures(found, source)
+    pair = [figure_block(figure) for figure in figures]
+    compared, *others = _sentences(found)
+    blind = found.observed.unobservable
+    rows = [
+        ("Compared", source),
+        ("Error", compared),
+        ("Fitted", others[0]),
+        ("Cause", others[1] if len(others) > 1 else ""),
+        ("Result", capital(found.refusal) if found.refusal else ""),
+        ("Written to", element("code", written) if written and not found.refusal else ""),
+        ("Would decide", _decides(following, blind)),
+    ]
     return page(
         title,
-        (),
-        lead(head, tone, list(_sentences(found))),
-        section("errors", "Position errors of the poses", *_figures(found)),
-        section("blind", "Not identifiable from these poses", bullets(found.observed.unobservable)),
-        section("missing", "Candidate effects", bullets(candidate_lines(found))),
-        section("notes", "Notes", bullets(found.warnings)),
-        section("next", "Poses to measure next", _next(following)),
-        section("parameters", "Parameters", _parameters(found)),
+        figures,
+        lead(title, chip, tone, _headline(found), rows, _changes(found)),
+        element("div", *pair, class_="pair maps output") if pair else Markup(""),
+        folded("blind", "Not identifiable from these poses", bullets(blind)),
+        folded("missing", "Candidate effects", bullets(candidate_lines(found))),
+        folded("notes", "Notes", bullets(found.warnings)),
+        folded("next", "Poses to measure next", _next(following)),
+        folded("parameters", "Parameters", _parameters(found)),
+        headed=False,
+    )
+
+
+def _headline(found: Calibrated) -> str:
+    from winchkit.calibration.robot.prediction import rms
+
+    if found.refusal:
+        return "The robot is not calibrated"
+    before, after = found.validation_before.distance, found.validation_after.distance
+    if not isfinite(rms(after)):
+        return "The robot is calibrated; no pose was held out"
+    return f"Pose error falls from {quantity(rms(before), 'm')} to {quantity(rms(after), 'm')}"
+
+
+def _decides(following: Sequence[NextPose], blind: Sequence[str]) -> str:
+    if following:
+        return f"{len(following)} poses to measure next are listed below."
+    if blind:
+        return (
+            f"{len(blind)} parameters are not identifiable from these poses: winchkit calibrate "
+            "--next 8 proposes poses that determine more of them."
+        )
+    return "Poses at other places that the calibrated model does not predict to within its noise."
+
+
+def _changes(found: Calibrated) -> Markup:
+    """The largest changes in multiples of their standard deviation."""
+
+    def size(item: tuple[str, Estimated]) -> float:
+        one = item[1]
+        ratio = abs(one.value - one.nominal) / one.std if one.std > 0 else 0.0
+        return ratio if isfinite(ratio) else 0.0
+
+    ranked = sorted(found.estimates.items(), key=lambda item: -size(item))[:_MOST]
+    rows = []
+    for name, estimate in ranked:
+        nominal, value, sigma, unit = in_words(estimate)
+        rows.append([name, f"{value} ± {sigma} {unit}", nominal])
+    return table(
+        "Largest changes, with the nominal value.", ["parameter", "value", "nominal"], rows
     )
 
 
@@ -96,42 +165,44 @@ def _sentences(found: Calibrated) -> Iterator[str]:
         )
 
 
-def _figures(found: Calibrated) -> Iterator[Markup]:
+def calibration_figures(found: Calibrated, source: str = "") -> list[Figure]:
+    """Position errors of the poses before and after, held out first."""
     pairs = [
-        ("Poses fitted", found.fit_before, found.fit_after),
-        ("Poses held out", found.validation_before, found.validation_after),
+        ("held-out", "Poses held out", found.validation_before, found.validation_after),
+        ("fitted", "Poses fitted", found.fit_before, found.fit_after),
     ]
-    sizes = [
-        float(v) * _MM
-        for _, before, after in pairs
-        for values in (before.distance, after.distance)
-        for v in values
-        if isfinite(v) and v > 0
-    ]
-    if not sizes:
-        return
-    up = axis_over("position error [mm]", sizes, logarithmic=True)
-    drawn = [
-        _figure(name, up, before, after)
-        for name, before, after in pairs
+    return [
+        _figure(name, title, before, after, source)
+        for name, title, before, after in pairs
         if any(isfinite(value) for value in after.distance)
     ]
-    yield element("div", *drawn, class_="pair maps")
 
 
-def _figure(name: str, up: Axis, before: PoseErrors, after: PoseErrors) -> Markup:
-    """Dots over the poses, with one scale for all figures and the pose as tooltip."""
-    places = after.place.tolist()
-    caption = f"{name}: distance of the predicted from the measured position, before and after."
-    chart = Chart(axis_over("number of the pose", [1.0, float(len(places))]), up, caption)
-    dots = [
-        chart.dot(number, v * _MM, word, f"{place}: {v * _MM:.3g} mm {word}")
-        for word, values in (("before", before.distance), ("after", after.distance))
-        for number, (place, v) in enumerate(zip(places, values.tolist(), strict=True), start=1)
-        if isfinite(v) and v > 0
-    ]
-    colours = legend([("before", "before calibration"), ("after", "after calibration")])
-    return element("figure", chart.draw(*dots), colours, element("figcaption", caption))
+def _figure(name: str, title: str, before: PoseErrors, after: PoseErrors, source: str) -> Figure:
+    """Points over the poses on a logarithmic axis, rms as lines."""
+    series = []
+    for tone, word, errors in (
+        ("today", "before calibration", before),
+        ("with", "after calibration", after),
+    ):
+        size = np.asarray(errors.distance, dtype=float) * _MM
+        number = np.arange(1.0, len(size) + 1)
+        good = np.isfinite(size) & (size > 0)
+        series.append(Series(word, tone, number[good], size[good], "points"))
+    for one in series[:2]:
+        mean = float(np.sqrt(np.mean(one.y**2))) if len(one.y) else float("nan")
+        ends = np.array([0.0, len(after.distance) + 1.0])
+        line = Series(f"rms {mean:.3g} mm", one.tone, ends, np.full(2, mean), "line")
+        series.append(line)
+    return Figure(
+        f"pose-error-{name}",
+        title,
+        f"{title}: distance of the predicted from the measured position, before and after "
+        "calibration.",
+        Axis("number of the pose", limits=(0.0, len(after.distance) + 1.0)),
+        (Panel(Axis("position error", "mm", logarithmic=True), tuple(series)),),
+        source=source,
+    )
 
 
 def _next(following: Sequence[NextPose]) -> Markup:

@@ -19,7 +19,9 @@ from winchkit.report.words.vocabulary import (
 __all__ = [
     "CLEAR_ORDER",
     "capital",
+    "cause_and_error",
     "changes_text",
+    "doubtful",
     "gain_text",
     "main_patterns",
     "moved_outputs",
@@ -69,23 +71,41 @@ def sentence(diagnosis: Diagnosis) -> str:
     str
         Plain text.
     """
+    return " ".join(part for part in cause_and_error(diagnosis) if part)
+
+
+def cause_and_error(diagnosis: Diagnosis) -> tuple[str, str]:
+    """The sentence in two parts: the cause, and the error that it explains.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of a winch or a robot.
+
+    Returns
+    -------
+    tuple of str
+        The second is empty where the first has the figures.
+    """
     if diagnosis.interrupted:
-        return "Interrupted before a verdict: errors of the profile, and candidates by evidence."
-    if diagnosis.verdict == "unknown" and (doubts := _doubts(diagnosis)):
-        return doubts
+        text = "Interrupted before a verdict: errors of the profile, and candidates by evidence."
+        return text, ""
+    if diagnosis.verdict == "unknown" and (doubts := doubtful(diagnosis)):
+        return doubts, ""
     if diagnosis.verdict == "adequate":
         return _adequate(diagnosis)
     if diagnosis.steps:
         steps, outputs = diagnosis.steps, diagnosis.outputs
         gain = gain_text(outputs, _opening(steps)) or _NO_GAIN
-        parts = [_named(steps, diagnosis.data), gain, still_text(outputs)]
+        parts = [gain, still_text(outputs)]
         if diagnosis.verdict == "partly":
             parts.append(_unexplained(diagnosis, "Partly unexplained"))
-        return " ".join(part for part in parts if part)
+        return _named(steps, diagnosis.data), " ".join(part for part in parts if part)
     if diagnosis.verdict == "partly":
-        return _unexplained(diagnosis, "Partly explained by known effects, none of which is named")
+        opening = "Partly explained by known effects, none of which is named"
+        return _unexplained(diagnosis, opening), ""
     opening = "Nothing is named" if diagnosis.closest else "Unexplained by any known effect"
-    return _closest(diagnosis) + _unexplained(diagnosis, opening)
+    return _closest(diagnosis) + _unexplained(diagnosis, opening), ""
 
 
 def changes_text(diagnosis: Diagnosis) -> str:
@@ -96,7 +116,7 @@ def changes_text(diagnosis: Diagnosis) -> str:
             f"This result would be refuted by {words['more']} with a residual above the noise "
             "floor."
         )
-    if diagnosis.verdict == "unknown" and _doubts(diagnosis):
+    if diagnosis.verdict == "unknown" and doubtful(diagnosis):
         return (
             f"This result would change with {words['one']} in the right unit and sign, or with the "
             "confirmation that these are right."
@@ -214,14 +234,14 @@ def still_text(outputs: Mapping[str, OutputFit]) -> str:
     return f"Still above the noise floor: {listed(texts)}." if texts else ""
 
 
-def _doubts(diagnosis: Diagnosis) -> str:
+def doubtful(diagnosis: Diagnosis) -> str:
     """Wrong signs and units, with which no effect is looked for; empty without any."""
     found = [f for f in diagnosis.sanity if f.code in ALARMING]
     texts = list(dict.fromkeys(f"{f.channel}: {f.text}" for f in found))
     return f"No effect is named with a wrong channel: {'; '.join(texts)}." if texts else ""
 
 
-def _adequate(diagnosis: Diagnosis) -> str:
+def _adequate(diagnosis: Diagnosis) -> tuple[str, str]:
     figures = []
     for name, output in diagnosis.outputs.items():
         figure = f"{OUTPUT_NAMES.get(name, name)} {quantity(output.heldout_rms_after, output.unit)}"
@@ -230,11 +250,9 @@ def _adequate(diagnosis: Diagnosis) -> str:
         figures.append(figure)
     errors = f"Held-out error: {'; '.join(figures)}." if figures else ""
     if _from_repeats(diagnosis):
-        return f"No effect is missing: the residual is at the noise floor. {errors}".strip()
-    return (
-        "No known effect is missing; an unknown effect cannot be excluded without repeats. "
-        f"{errors}"
-    ).strip()
+        return "No effect is missing: the residual is at the noise floor.", errors
+    known = "No known effect is missing; an unknown effect cannot be excluded without repeats."
+    return known, errors
 
 
 def _named(steps: tuple[Step, ...], data: str) -> str:

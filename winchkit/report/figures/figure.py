@@ -1,0 +1,214 @@
+"""A figure as data: series, bands, cells and labels over common axes, without any drawing.
+
+:mod:`winchkit.report.figures.layout` places it, :mod:`winchkit.report.figures.export` writes it as
+SVG, PNG and CSV. Values are in the units of their axes.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.plain_json import significant
+
+__all__ = ["Axis", "Cells", "Figure", "Panel", "RunMark", "Series", "Table"]
+
+_DIGITS = 7
+_FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Name, unit and range of an axis."""
+
+    name: str
+    unit: str = ""
+    logarithmic: bool = False
+    limits: tuple[float, float] | None = None
+    """Ends of the axis; None for those of the data with a margin."""
+    zero: bool = False
+    """Whether zero is within the range."""
+    categories: tuple[tuple[float, str], ...] = ()
+    """Places and names, for an axis without numbers."""
+
+    @property
+    def label(self) -> str:
+        """Name with the unit: ``time [s]``."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+@dataclass(frozen=True)
+class Series:
+    """Values over the x axis, (n,) each; NaN where there is none."""
+
+    name: str
+    tone: str
+    """``measured``, ``today`` (present model), ``with`` (changed model) or ``plain``."""
+    x: Array
+    y: Array
+    mark: Literal["line", "mean", "dots", "points"] = "line"
+    """``mean`` is a thick line, ``dots`` are many samples, ``points`` a few."""
+    legend: str = ""
+    """Name in the legend, where series of several panels have one style; else ``name``."""
+
+
+@dataclass(frozen=True)
+class Cells:
+    """A value per cell of a grid: numbers of samples, or signed means."""
+
+    name: str
+    unit: str
+    x_edges: Array
+    """(across + 1,)"""
+    y_edges: Array
+    """(up + 1,)"""
+    values: Array
+    """(across, up); NaN for an empty cell."""
+    levels: tuple[float, ...]
+    """Lower limits of the classes of colour; of signed values those above zero."""
+    signed: bool = False
+    counts: Array | None = None
+    """Samples per cell of a mean, (across, up)."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Series over one y axis."""
+
+    y: Axis
+    series: tuple[Series, ...] = ()
+    band: float | None = None
+    """Half width of the noise band around zero."""
+    cells: Cells | None = None
+    share: float = 1.0
+    """Height relative to the other panels."""
+
+
+@dataclass(frozen=True)
+class RunMark:
+    """Start of a run on the x axis."""
+
+    at: float
+    run: str
+    label: str = ""
+    """Programme and load; empty for a repeat of the run before."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """The data of a figure as columns; texts are references into ``words``."""
+
+    head: tuple[str, ...]
+    columns: tuple[list[float | None], ...]
+    words: tuple[str, ...] = ()
+    """Texts of the first column, whose values are their numbers; empty for a numeric column."""
+
+    def to_json(self) -> dict[str, Any]:
+        """What the page embeds."""
+        return {"head": self.head, "columns": self.columns, "words": self.words}
+
+    def csv(self) -> str:
+        """Comma-separated values with one line of names; empty cells for missing values."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow([_plain(name) for name in self.head])
+        for row in zip(*self.columns, strict=True):
+            first = self.words[int(row[0] or 0)] if self.words else None
+            cells = ["" if v is None else f"{v:.{_DIGITS}g}" for v in row]
+            writer.writerow(cells if first is None else [_plain(first), *cells[1:]])
+        return out.getvalue()
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Panels over one x axis, with title, caption and the start of every run."""
+
+    id: str
+    """Name of its files."""
+    title: str
+    caption: str
+    """Text alternative and figure caption."""
+    x: Axis
+    panels: tuple[Panel, ...]
+    marks: tuple[RunMark, ...] = ()
+    zoom: bool = False
+    """Whether a part of the x axis can be selected on the page."""
+    source: str = ""
+    """Profile, runs and version, for files."""
+
+    def table(self) -> Table:
+        """All data of the figure."""
+        cells = next((p.cells for p in self.panels if p.cells is not None), None)
+        if cells is not None and cells.signed:
+            return _cells_table(self, cells)
+        return _series_table(self)
+
+
+def _series_table(figure: Figure) -> Table:
+    """Rows of every set of series with one x, in sequence; a column per series."""
+    every = [(panel, one) for panel in figure.panels for one in panel.series]
+    groups: list[tuple[Array, list[int]]] = []
+    for index, (_, one) in enumerate(every):
+        own = next((g for g in groups if g[0] is one.x), None)
+        if own is None:
+            groups.append((one.x, own_indices := []))
+            own_indices.append(index)
+        else:
+            own[1].append(index)
+    x = np.concatenate([x for x, _ in groups]) if groups else np.zeros(0)
+    columns = [np.full(len(x), np.nan) for _ in every]
+    at = 0
+    for own_x, indices in groups:
+        for index in indices:
+            columns[index][at : at + len(own_x)] = every[index][1].y
+        at += len(own_x)
+    head = [figure.x.label, *(_headed(one.name, panel.y.unit) for panel, one in every)]
+    data = [_numbers(column) for column in (x, *columns)]
+    if not figure.marks:
+        return Table(tuple(head), tuple(data))
+    starts = [mark.at for mark in figure.marks]
+    runs = np.maximum(np.searchsorted(starts, x, side="right") - 1, 0)
+    number: list[float | None] = [int(run) for run in runs]
+    return Table(("run", *head), (number, *data), tuple(mark.run for mark in figure.marks))
+
+
+def _cells_table(figure: Figure, cells: Cells) -> Table:
+    """A row per cell that holds a value."""
+    across, up = np.nonzero(np.isfinite(cells.values))
+    y = figure.panels[0].y
+    head = [
+        f"{axis.name}, {end} [{axis.unit or '1'}]"
+        for axis in (figure.x, y)
+        for end in ("from", "to")
+    ]
+    columns = [
+        cells.x_edges[across],
+        cells.x_edges[across + 1],
+        cells.y_edges[up],
+        cells.y_edges[up + 1],
+        cells.values[across, up],
+    ]
+    head.append(_headed(cells.name, cells.unit))
+    if cells.counts is not None:
+        head.append("samples")
+        columns.append(cells.counts[across, up].astype(float))
+    return Table(tuple(head), tuple(_numbers(column) for column in columns))
+
+
+def _headed(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
+def _numbers(values: Sequence[float] | Array) -> list[float | None]:
+    return significant(np.asarray(values, dtype=float).tolist(), _DIGITS)
+
+
+def _plain(text: str) -> str:
+    """Text that a spreadsheet does not read as a formula."""
+    return f"'{text}" if text.startswith(_FORMULA_SIGNS) else text
