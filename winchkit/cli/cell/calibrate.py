@@ -11,6 +11,7 @@ import click
 
 from winchkit.cli.core.options import bench_by_default, complete_bench, complete_winch
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.model.options import figures_option, write_figures, write_page
 
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import Cells
@@ -61,6 +62,7 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     "-o", "--output", metavar="FILE", help="The calibration's file; CELL.toml by default."
 )
 @click.option("--html", metavar="FILE", help="Also write the report as one page.")
+@figures_option
 @click.option("--yes", is_flag=True, help="Accept the fit without asking.")
 @click.option("--json", "as_json", is_flag=True, help="Print the fit as JSON.")
 def command(
@@ -74,6 +76,7 @@ def command(
     output: str | None,
     html: str | None,
     *,
+    figures: str | None,
     yes: bool,
     as_json: bool,
     **guided: Any,
@@ -99,6 +102,10 @@ def command(
         click.echo(line, err=as_json)
     if html is not None:
         _write_page(html, calibration, fit, needed)
+    if figures is not None:
+        from winchkit.report.pages.cell_calibration import cell_figures
+
+        write_figures(figures, cell_figures(fit, calibration))
     if not yes:
         click.confirm(f"Accept, and write {target}?", abort=True, err=True)
     write_text(target, calibration_toml(calibration))
@@ -141,7 +148,6 @@ def _found(
 def _write_page(
     path: str, calibration: CellCalibration, fit: CellFit, needed: StaticDiagnosis
 ) -> None:
-    from winchkit.cli.model.options import write_page
     from winchkit.report.pages.cell_calibration import report_page
 
     write_page(path, report_page(calibration, fit, needed))

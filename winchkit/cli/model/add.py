@@ -12,11 +12,13 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.model.options import (
     Asked,
     ManyValues,
+    figures_option,
     html_option,
     json_option,
     model_options,
     page_title,
     read_all,
+    write_figures,
     write_page,
 )
 
@@ -34,8 +36,16 @@ __all__ = ["command"]
 @model_options
 @json_option
 @html_option
+@figures_option
 def command(
-    effect: str, runs: Sequence[str], output: str, asked: Asked, as_json: bool, html: str | None
+    *,
+    effect: str,
+    runs: Sequence[str],
+    output: str,
+    asked: Asked,
+    as_json: bool,
+    html: str | None,
+    figures: str | None,
 ) -> None:
     """Fit EFFECT beside the effects of a profile on runs, and write the better profile.
 
@@ -51,7 +61,7 @@ def command(
     names = [Path(run).name for run in runs]
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band)
-        _to_robot(effect, runs, declared, asked, output, as_json, html)
+        _to_robot(effect, runs, declared, asked, output, as_json, html, figures)
         return
     grown = grow(effect, asked.runs(runs), declared, catalogue, asked.band)
     write_addition(asked.source, grown.addition, names, Path(output))
@@ -62,6 +72,12 @@ def command(
         title = page_title(declared.name, runs, effect)
         page = addition_html(grown, title, asked.profile, output, options=asked.options)
         write_page(html, page)
+    if figures:
+        from winchkit.report.pages.pages import addition_figures
+        from winchkit.report.reproducibility import Command
+
+        source = Command(grown.regression.dataset, asked.profile).source
+        write_figures(figures, addition_figures(grown, source))
 
 
 def _to_robot(
@@ -72,6 +88,7 @@ def _to_robot(
     output: str,
     as_json: bool,
     html: str | None,
+    figures: str | None,
 ) -> None:
     """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
     from winchkit.diagnosis.robot.add import grow_robot
@@ -89,6 +106,12 @@ def _to_robot(
         options = asked.options
         page = robot_addition_html(grown, title, asked.profile, output, options=options)
         write_page(html, page)
+    if figures:
+        from winchkit.report.pages.robot import robot_addition_figures
+        from winchkit.report.reproducibility import Command
+
+        source = Command(grown.regression.dataset, asked.profile).source
+        write_figures(figures, robot_addition_figures(grown, source))
 
 
 def _tell(addition: Addition, output: str, as_json: bool) -> None:

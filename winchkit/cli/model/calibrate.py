@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.model.options import ManyValues, html_option, page_title, read_all, write_page
+from winchkit.cli.model.options import (
+    ManyValues,
+    figures_option,
+    html_option,
+    page_title,
+    read_all,
+    write_figures,
+    write_page,
+)
 from winchkit.errors import UsageError, suggest
 
 if TYPE_CHECKING:
@@ -48,6 +56,7 @@ _NOISE_DIMENSIONS = {
 @click.option("--next", "following", type=click.IntRange(0), default=0, help="Poses to propose.")
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 @html_option
+@figures_option
 def command(
     robot: str,
     runs: Sequence[str],
@@ -60,6 +69,7 @@ def command(
     following: int,
     as_json: bool,
     html: str | None,
+    figures: str | None,
 ) -> None:
     """Calibrate the robot of profile ROBOT on the poses of RUNs and write the better profile.
 
@@ -83,10 +93,22 @@ def command(
         from winchkit.report.pages.robot_calibration import calibration_html
 
         title = page_title(found.equations.robot.profile.name, runs)
-        write_page(html, calibration_html(found, ahead, title))
+        write_page(html, calibration_html(found, ahead, title, _source(robot, runs), output))
+    if figures:
+        from winchkit.report.pages.robot_calibration import calibration_figures
+
+        write_figures(figures, calibration_figures(found, _source(robot, runs)))
     if found.refusal:
         click.echo(f"winchkit: {found.refusal}", err=True)
         click.get_current_context().exit(1)
+
+
+def _source(robot: str, runs: Sequence[str]) -> str:
+    """Profile, runs and version, as the figures name them."""
+    from importlib.metadata import version
+
+    names = ", ".join(Path(run).name for run in runs)
+    return f"profile {robot}; {names}; winchkit {version('winchkit')}"
 
 
 def _options(

@@ -13,6 +13,7 @@ from winchkit.cli.core.output import echo_each, echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
+    figures_option,
     html_option,
     json_option,
     model_options,
@@ -20,7 +21,9 @@ from winchkit.cli.model.options import (
     pages_beside,
     read_all,
     read_each,
+    save_figures,
     save_page,
+    write_figures,
     write_page,
 )
 
@@ -37,36 +40,49 @@ __all__ = ["command"]
 @model_options
 @json_option
 @html_option
-def command(runs: Sequence[str], asked: Asked, as_json: bool, html: str | None) -> None:
+@figures_option
+def command(
+    runs: Sequence[str], asked: Asked, as_json: bool, html: str | None, figures: str | None
+) -> None:
     """Compare runs with a profile at its file values; only the length offset is fitted."""
     from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.compare import compared
-    from winchkit.report.pages.pages import comparison_html
+    from winchkit.report.pages.pages import comparison_figures, comparison_html
+    from winchkit.report.reproducibility import Command
     from winchkit.schema.profiles.robot import RobotProfile
 
     declared = declared_profile(asked.source)
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band, asked.winch)
-        _tell_robot(runs, declared, asked, as_json, html)
+        _tell_robot(runs, declared, asked, as_json, html, figures)
         return
     if asked.each:
-        _tell_each(runs, declared, asked, as_json, html)
+        _tell_each(runs, declared, asked, as_json, html, figures)
         return
     answer = compared(asked.runs(runs), declared, asked.catalogue, asked.band)
     _tell(answer.comparison, as_json)
     if html:
         title = page_title(declared.name, runs)
         write_page(html, comparison_html(answer, title, asked.profile, options=asked.options))
+    if figures:
+        source = Command(answer.regression.dataset, asked.profile).source
+        write_figures(figures, comparison_figures(answer, source))
 
 
 def _tell_each(
-    runs: Sequence[str], declared: WinchProfile, asked: Asked, as_json: bool, html: str | None
+    runs: Sequence[str],
+    declared: WinchProfile,
+    asked: Asked,
+    as_json: bool,
+    html: str | None,
+    figures: str | None,
 ) -> None:
     """Every winch of the runs by itself, and what their errors follow alike or not."""
     from winchkit.diagnosis.compare import compared
     from winchkit.diagnosis.fleet.anova import errors_of, shared_errors
     from winchkit.report.pages.fleet import shared_errors_text
-    from winchkit.report.pages.pages import comparison_html
+    from winchkit.report.pages.pages import comparison_figures, comparison_html
+    from winchkit.report.reproducibility import Command
     from winchkit.report.text import compare_text
 
     found, errors = {}, {}
@@ -82,6 +98,9 @@ def _tell_each(
                 options = replace(asked, winch=name).options
                 page = comparison_html(answer, f"{title}, {name}", asked.profile, options=options)
                 save_page(str(Path(html).with_name(pages[name])), page)
+            if figures:
+                source = Command(answer.regression.dataset, asked.profile).source
+                save_figures(figures, comparison_figures(answer, source), name)
             del answer  # gigabytes after long runs
     shared = shared_errors(errors)
     if as_json:
@@ -95,10 +114,17 @@ def _tell_each(
         from winchkit.report.pages.fleet import shared_errors_html
 
         write_page(html, shared_errors_html(found, shared, title, pages))
+    if figures:
+        click.echo(f"figures: {figures}", err=True)
 
 
 def _tell_robot(
-    runs: Sequence[str], declared: RobotProfile, asked: Asked, as_json: bool, html: str | None
+    runs: Sequence[str],
+    declared: RobotProfile,
+    asked: Asked,
+    as_json: bool,
+    html: str | None,
+    figures: str | None,
 ) -> None:
     """Poses with a robot's profile."""
     from winchkit.diagnosis.robot.compare import compared_robot
@@ -110,6 +136,12 @@ def _tell_robot(
 
         title = page_title(declared.name, runs)
         write_page(html, robot_comparison_html(answer, title, asked.profile, options=asked.options))
+    if figures:
+        from winchkit.report.pages.robot import robot_comparison_figures
+        from winchkit.report.reproducibility import Command
+
+        source = Command(answer.regression.dataset, asked.profile).source
+        write_figures(figures, robot_comparison_figures(answer, source))
 
 
 def _tell(comparison: Comparison, as_json: bool) -> None:

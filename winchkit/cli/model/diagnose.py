@@ -14,6 +14,7 @@ from winchkit.cli.core.output import echo_each, echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
+    figures_option,
     html_option,
     json_option,
     model_options,
@@ -21,13 +22,16 @@ from winchkit.cli.model.options import (
     pages_beside,
     read_all,
     read_each,
+    save_figures,
     save_page,
+    write_figures,
     write_page,
 )
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.diagnose import Answer, WinchAnswer
     from winchkit.diagnosis.results import Diagnosis
+    from winchkit.report.figures.figure import Figure
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
 
@@ -43,6 +47,7 @@ __all__ = ["command"]
 )
 @json_option
 @html_option
+@figures_option
 def command(
     *,
     runs: Sequence[str],
@@ -51,6 +56,7 @@ def command(
     as_recorded: bool,
     as_json: bool,
     html: str | None,
+    figures: str | None,
 ) -> None:
     """Name the physical effect that the model lacks, with its size and what it would buy.
 
@@ -66,11 +72,11 @@ def command(
     how = {"decimate": not every_sample, "as_recorded": as_recorded}
     if isinstance(declared, RobotProfile):
         refuse_options(asked.band, asked.winch)
-        _tell_robot(runs, declared, asked, as_json, html)
+        _tell_robot(runs, declared, asked, as_json, html, figures)
     elif asked.each:
-        _tell_each(runs, declared, asked, how, as_json, html)
+        _tell_each(runs, declared, asked, how, as_json, html, figures)
     else:
-        _tell_one(runs, declared, asked, how, as_json, html)
+        _tell_one(runs, declared, asked, how, as_json, html, figures)
 
 
 def _tell_one(
@@ -80,6 +86,7 @@ def _tell_one(
     how: Mapping[str, bool],
     as_json: bool,
     html: str | None,
+    figures: str | None,
 ) -> None:
     """What one winch lacks, on a page besides where that is asked."""
     from winchkit.diagnosis.diagnose import diagnose
@@ -98,6 +105,8 @@ def _tell_one(
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         write_page(html, _page(answer, page_title(declared.name, runs), asked))
+    if figures:
+        write_figures(figures, _figures(answer, asked))
 
 
 def _tell_known(known: WinchAnswer, as_json: bool) -> None:
@@ -115,6 +124,7 @@ def _tell_each(
     how: Mapping[str, bool],
     as_json: bool,
     html: str | None,
+    figures: str | None,
 ) -> None:
     """What every winch of the runs lacks, each by itself, and what they have in common."""
     from winchkit.diagnosis.fleet.diagnose import diagnose_each
@@ -137,6 +147,8 @@ def _tell_each(
             if html:
                 own = _page(answer, f"{title}, {name}", replace(asked, winch=name))
                 save_page(str(Path(html).with_name(pages[name])), own)
+            if figures:
+                save_figures(figures, _figures(answer, asked), name)
             del answer  # hundreds of megabytes after long runs
     shared, chances = shared_effects(found, catalogue), alarms(found, present)
     if as_json:
@@ -148,10 +160,17 @@ def _tell_each(
         from winchkit.report.pages.fleet import shared_effects_html
 
         write_page(html, shared_effects_html(found, shared, chances, title, pages))
+    if figures:
+        click.echo(f"figures: {figures}", err=True)
 
 
 def _tell_robot(
-    runs: Sequence[str], declared: RobotProfile, asked: Asked, as_json: bool, html: str | None
+    runs: Sequence[str],
+    declared: RobotProfile,
+    asked: Asked,
+    as_json: bool,
+    html: str | None,
+    figures: str | None,
 ) -> None:
     """What a robot's model lacks, from poses."""
     from winchkit.diagnosis.robot.diagnose import diagnose_robot
@@ -164,6 +183,19 @@ def _tell_robot(
 
         title = page_title(declared.name, runs)
         write_page(html, robot_report_html(answer, title, asked.profile, options=asked.options))
+    if figures:
+        from winchkit.report.pages.robot import robot_report_figures
+        from winchkit.report.reproducibility import Command
+
+        source = Command(answer.selection.preparation.dataset, asked.profile).source
+        write_figures(figures, robot_report_figures(answer, source))
+
+
+def _figures(answer: WinchAnswer, asked: Asked) -> Sequence[Figure]:
+    from winchkit.report.pages.pages import report_figures
+    from winchkit.report.reproducibility import Command
+
+    return report_figures(answer, Command(answer.engine.regression.dataset, asked.profile).source)
 
 
 def _page(answer: WinchAnswer, title: str, asked: Asked) -> str:

@@ -16,6 +16,7 @@ from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue
+    from winchkit.report.figures.figure import Figure
     from winchkit.runs.run import Run
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
@@ -24,6 +25,7 @@ __all__ = [
     "Asked",
     "ManyValues",
     "declared_profile",
+    "figures_option",
     "html_option",
     "json_option",
     "model_options",
@@ -34,7 +36,9 @@ __all__ = [
     "read_runs",
     "refuse_curves",
     "refuse_options",
+    "save_figures",
     "save_page",
+    "write_figures",
     "write_page",
 ]
 
@@ -184,6 +188,23 @@ def _of_winch(run: Run, winch: str | None) -> Run:
 
 html_option = click.option("--html", metavar="FILE", help="Also write the answer as one page.")
 _RUNS_NAMED = 3
+
+
+def _drawable(_: click.Context, __: click.Parameter, folder: str | None) -> str | None:
+    """Refuse ``--figures`` before any work where PNG cannot be written."""
+    if folder is not None:
+        from winchkit.report.figures.export import require_png
+
+        require_png()
+    return folder
+
+
+figures_option = click.option(
+    "--figures",
+    metavar="DIR",
+    callback=_drawable,
+    help="Also write every figure as PNG, SVG and CSV into this folder.",
+)
 _NO_FILE = pattern(r"[^\w.-]")
 _PAGE_BEGINS = b"<!DOCTYPE html>"
 
@@ -192,6 +213,20 @@ def write_page(path: str, page: str) -> None:
     """Write a page as :func:`save_page` does and say so on stderr."""
     save_page(path, page)
     click.echo(f"report: {path}", err=True)
+
+
+def write_figures(folder: str, figures: Sequence[Figure]) -> None:
+    """Write figures as :func:`save_figures` does and report it on stderr."""
+    save_figures(folder, figures)
+    click.echo(f"figures: {folder} ({len(figures)} as PNG, SVG and CSV)", err=True)
+
+
+def save_figures(folder: str, figures: Sequence[Figure], winch: str | None = None) -> None:
+    """Write figures as PNG, SVG and CSV; those of one of several winches start with its name."""
+    from winchkit.report.figures import export
+
+    prefix = "" if winch is None else f"{_NO_FILE.sub('-', winch) or 'winch'}-"
+    export.write_figures(figures, Path(folder), prefix)
 
 
 def save_page(path: str, page: str) -> None:

@@ -86,6 +86,8 @@ class Panel:
     band: float | None = None
     """Half width of the noise band around zero."""
     cells: Cells | None = None
+    floor: float | None = None
+    """Value of x up to which the panel is shaded: the noise floor of a ratio."""
     share: float = 1.0
     """Height relative to the other panels."""
 
@@ -141,18 +143,22 @@ class Figure:
     """Whether a part of the x axis can be selected on the page."""
     source: str = ""
     """Profile, runs and version, for files."""
+    height: float = 268.0
+    """Of all panels together, px."""
 
     def table(self) -> Table:
         """All data of the figure."""
         cells = next((p.cells for p in self.panels if p.cells is not None), None)
-        if cells is not None and cells.signed:
-            return _cells_table(self, cells)
-        return _series_table(self)
+        if self.panels[0].y.categories:
+            return _category_table(self)
+        if cells is None:
+            return _series_table(self)
+        return _joined(_cells_table(self, cells), _series_table(self))
 
 
 def _series_table(figure: Figure) -> Table:
     """Rows of every set of series with one x, in sequence; a column per series."""
-    every = [(panel, one) for panel in figure.panels for one in panel.series]
+    every = [(panel, one) for panel in figure.panels for one in panel.series if one.name]
     groups: list[tuple[Array, list[int]]] = []
     for index, (_, one) in enumerate(every):
         own = next((g for g in groups if g[0] is one.x), None)
@@ -176,6 +182,30 @@ def _series_table(figure: Figure) -> Table:
     runs = np.maximum(np.searchsorted(starts, x, side="right") - 1, 0)
     number: list[float | None] = [int(run) for run in runs]
     return Table(("run", *head), (number, *data), tuple(mark.run for mark in figure.marks))
+
+
+def _category_table(figure: Figure) -> Table:
+    """A row per category of the y axis; a column per named series with its x."""
+    panel = figure.panels[0]
+    names = tuple(name for _, name in panel.y.categories)
+    number: list[float | None] = list(range(len(names)))
+    columns, head = [number], ["output"]
+    for one in (one for one in panel.series if one.name):
+        found = dict(zip(one.y.tolist(), one.x.tolist(), strict=True))
+        values = [found.get(place, float("nan")) for place, _ in panel.y.categories]
+        columns.append(_numbers(values))
+        head.append(_headed(f"{figure.x.name}, {one.name}", figure.x.unit))
+    return Table(tuple(head), tuple(columns), names)
+
+
+def _joined(first: Table, second: Table) -> Table:
+    """Rows of two numeric tables below each other, with the columns of both."""
+    if len(second.head) < 2:
+        return first
+    rows = [len(table.columns[0]) for table in (first, second)]
+    before = [[*column, *([None] * rows[1])] for column in first.columns]
+    after = [[*([None] * rows[0]), *column] for column in second.columns]
+    return Table((*first.head, *second.head), (*before, *after))
 
 
 def _cells_table(figure: Figure, cells: Cells) -> Table:

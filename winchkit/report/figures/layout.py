@@ -28,8 +28,6 @@ WIDE, NARROW = 700, 340
 _MARGIN_LEFT, _MARGIN_RIGHT = 50, 12
 _TITLE, _LINE, _SWATCH = 20, 18, 22
 _RUNS, _HEADING, _TICKS, _GAP = 18, 18, 36, 10
-_HEIGHT = 268
-"""Height of all panels together, px."""
 _CHARACTER = 0.55
 """Mean width of a character as a share of the font size."""
 _PER_TICK_X, _PER_TICK_Y = 80, 48
@@ -136,7 +134,7 @@ def scene_of(figure: Figure, width: float = WIDE, *, source: bool = False) -> Sc
         if panel.y.name:
             down += _HEADING
             build.texts.append(Text(left, down - 6, _heading(panel), "label"))
-        height = _HEIGHT * panel.share / shares
+        height = figure.height * panel.share / shares
         _panel(build, figure, number, (left, down, right - left, height), x)
         down += height + _GAP
     bottom = down - _GAP
@@ -209,18 +207,18 @@ def _legend(figure: Figure) -> Iterator[tuple[str, tuple[Shape, ...]]]:
     for panel in figure.panels:
         for one in panel.series:
             name = one.legend or one.name
-            if (name, one.tone, one.mark) not in seen:
+            if name and (name, one.tone, one.mark) not in seen:
                 seen.add((name, one.tone, one.mark))
                 dotted = one.mark in {"dots", "points"}
                 yield name, _marks(one, (middle if dotted else across,))
 
 
-def _marks(one: Series, parts: tuple[Array, ...]) -> tuple[Shape, ...]:
-    """The shapes of a series: a mean has a casing, points of the changed model are rings."""
+def _marks(one: Series, parts: tuple[Array, ...], *, cased: bool = False) -> tuple[Shape, ...]:
+    """The shapes of a series: a mean over cells has a casing, points of ``with`` are rings."""
     style = f"{one.tone}-{one.mark}"
     if one.mark in {"line", "mean"}:
         own = Shape(style, "line", parts)
-        return (Shape("casing", "line", parts), own) if one.mark == "mean" else (own,)
+        return (Shape("casing", "line", parts), own) if cased else (own,)
     own = Shape(style, "dots", parts)
     ring = one.tone == "with" and one.mark == "points"
     return (own, Shape("inside", "dots", parts)) if ring else (own,)
@@ -239,6 +237,12 @@ def _panel(
     shapes: list[Shape] = []
     if panel.band is not None and isfinite(panel.band):
         shapes += _band(panel.band, y)
+    if panel.floor is not None:
+        at = x.share(panel.floor)
+        shapes += [
+            Shape("band", "cells", (np.array([[0.0, 0.0, at, 1.0]]),)),
+            Shape("limit", "line", (np.array([[at, 0.0], [at, 1.0]]),)),
+        ]
     for at, text in _y_ticks(panel.y, y, height):
         down = top + (1 - y.share(at)) * height
         if not y.logarithmic and abs(at) < 1e-6 * (y.high - y.low):
@@ -253,7 +257,7 @@ def _panel(
         shapes.append(Shape("run", "line", tuple(between)))
     starts = [mark.at for mark in figure.marks]
     for one in panel.series:
-        shapes += _marks(one, _parts(one, x, y, starts))
+        shapes += _marks(one, _parts(one, x, y, starts), cased=panel.cells is not None)
     build.areas.append(Area(left, top, width, height, tuple(shapes)))
 
 

@@ -81,14 +81,14 @@ def map_figures(residuals: Residuals, scales: Mapping[str, Scale]) -> dict[str, 
                 ("with", f", {residuals.changed}", changed),
             ]
         out[output] = [
-            _figure(f"map-{output}-{name}", state, one, peak, scale, residuals.source)
+            _figure(f"map-{output}-{name}", state, one, peak, scale=scale, source=residuals.source)
             for name, state, one in drawn
         ]
     return out
 
 
 def _figure(
-    name: str, state: str, drawn: ResidualMap, peak: float, scale: Scale, source: str
+    name: str, state: str, drawn: ResidualMap, peak: float, *, scale: Scale, source: str
 ) -> Figure:
     readings = [map_reading(name) for name in drawn.over]
     x, y = (np.asarray(r.shown(edges)) for r, edges in zip(readings, drawn.edges, strict=True))

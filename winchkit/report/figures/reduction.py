@@ -48,9 +48,9 @@ def decimated(series: Sequence[Array], intervals: int) -> NDArray[np.intp]:
     Returns
     -------
     (m,) array of int
-        Sorted; the minimum and the maximum of every series in every interval, a missing sample of an
-        interval without any value, and the first and the last sample. All samples where these are
-        fewer.
+        Sorted; the minimum and the maximum of every series in every interval, a missing sample of
+        an interval without any value, and the first and the last sample. All samples where these
+        are fewer.
     """
     count = len(series[0])
     if count <= 2 * intervals * len(series):

@@ -38,6 +38,8 @@ _DOTS = 1500
 """Samples up to which each is a dot; more are drawn as a density."""
 _CELLS_X, _CELLS_Y = 56, 28
 _TAILS = 0.001
+_EMPTY = 0.1
+"""Part of the range of a variable that is a gap of its mean where it holds no sample."""
 _SAME = 1e-3
 _SPREAD = 0.2
 _DEGREES = 360.0
@@ -253,7 +255,7 @@ def _over_variable(
     ]
     good = np.isfinite(variable) & np.isfinite([values for _, _, values in states]).all(axis=0)
     x, states = variable[good], [(t, n, values[good]) for t, n, values in states]
-    centres, means = bin_means(x, [v for _, _, v in states], bin_edges(x, followed, _DEGREES))
+    centres, means = _means(x, [v for _, _, v in states], bin_edges(x, followed, _DEGREES))
     lines = [
         Series(f"mean, {name}" if len(states) > 1 else "mean", tone, centres, mean, "mean")
         for (tone, name, _), mean in zip(states, means, strict=True)
@@ -290,6 +292,18 @@ def _over_variable(
             ),
         ),
     )
+
+
+def _means(x: Array, values: Sequence[Array], edges: Array) -> tuple[Array, list[Array]]:
+    """Means over bins; NaN where a wide range of the variable holds no sample."""
+    ordered = np.sort(x)
+    wide = np.diff(ordered) > _EMPTY * (ordered[-1] - ordered[0])
+    middles = (ordered[:-1] + ordered[1:])[wide] / 2
+    centres, means = bin_means(x, values, np.unique(np.concatenate([edges, middles])))
+    order = np.argsort(np.concatenate([centres, middles]), kind="stable")
+    gaps = np.full(len(middles), np.nan)
+    places = np.concatenate([centres, middles])[order]
+    return places, [np.concatenate([mean, gaps])[order] for mean in means]
 
 
 def _density(

@@ -109,6 +109,7 @@ STYLES: dict[str, Style] = {
     "zero": Style(stroke="edge"),
     "run": Style(stroke="edge", dash="2 3"),
     "band": Style(fill="band"),
+    "limit": Style(stroke="ink", width=1.5),
     "floor": Style(stroke="edge", dash="4 3"),
     "measured-line": Style(stroke="ink", width=2.4, opacity=0.35),
     "plain-line": Style(stroke="muted", width=1.5),

@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.add import Addition
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.report import tables
+from winchkit.report.figures.figure import Figure
 from winchkit.report.html.markup import Markup, element, folded, join, table
+from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, lead
 from winchkit.report.reproducibility import Command, repeat
 from winchkit.report.words.headline import worst_outputs
@@ -29,7 +31,9 @@ def addition_sections(
     figures: Sequence[Markup],
     command: Command,
     better: str,
+    *,
     title: str = "",
+    ladder: Figure | None = None,
 ) -> Markup:
     """Content of the page; ``better`` is the profile that was written."""
     effect = addition.added[0].effect.id
@@ -40,7 +44,7 @@ def addition_sections(
     ]
     return join(
         [
-            _lead(addition, better, command, title),
+            _lead(addition, better, command, title=title, ladder=ladder),
             element("div", *figures, id="residuals"),
             folded("effects", "Added effect: formula and source", _added(addition)),
             folded("parameters", "All effects of the new profile", _parameters(addition)),
@@ -62,9 +66,15 @@ def addition_sentence(addition: Addition) -> str:
     return " ".join(part for part in (named, gain, nothing, worse, still_text(outputs)) if part)
 
 
-def _lead(addition: Addition, better: str, command: Command, title: str) -> Markup:
+def _lead(
+    addition: Addition, better: str, command: Command, *, title: str, ladder: Figure | None
+) -> Markup:
     term, _ = addition.added
     chip, tone = _chip(addition.outputs)
+    beside = [
+        _errors(addition.outputs),
+        *([figure_block(ladder, 480, "ladder")] if ladder else []),
+    ]
     rows = [
         ("Fitted to", compared_text(command.dataset, command.profile)),
         ("Error", addition_sentence(addition)),
@@ -72,7 +82,7 @@ def _lead(addition: Addition, better: str, command: Command, title: str) -> Mark
         ("Next", code_block(command.diagnose(better))),
     ]
     head = capital(meaning(term.effect.id)) or f"Added: {term.label}"
-    return lead(title, chip, tone, head, rows, _errors(addition.outputs))
+    return lead(title, chip, tone, head, rows, *beside)
 
 
 def _added(addition: Addition) -> Markup:

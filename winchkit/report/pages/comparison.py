@@ -7,7 +7,9 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.report.comparison_rows import HEAD, followed, offset_text, size_rows
+from winchkit.report.figures.figure import Figure
 from winchkit.report.html.markup import Markup, element, folded, join, table
+from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
 from winchkit.report.reproducibility import Command, repeat
 from winchkit.report.words.headline import at_noise, comparison_headline, worst_outputs
@@ -28,13 +30,15 @@ def comparison_sections(
     over: Mapping[str, Attribution],
     figures: Sequence[Markup],
     command: Command,
+    *,
     title: str = "",
+    ladder: Figure | None = None,
 ) -> Markup:
     """Content of the page; ``over`` is the main variable of each output's error."""
     profile = command.profile
     return join(
         [
-            _lead(comparison, over, command, title),
+            _lead(comparison, over, command, title=title, ladder=ladder),
             element("div", *figures, id="residuals"),
             folded("attribution", "Error of every output", _table(comparison)),
             folded("data", "Data", data(comparison)),
@@ -73,7 +77,12 @@ def _attributed(over: Attribution | None) -> str:
 
 
 def _lead(
-    comparison: Comparison, over: Mapping[str, Attribution], command: Command, title: str
+    comparison: Comparison,
+    over: Mapping[str, Attribution],
+    command: Command,
+    *,
+    title: str,
+    ladder: Figure | None,
 ) -> Markup:
     outputs = comparison.outputs
     texts = [
@@ -81,12 +90,13 @@ def _lead(
         for name in worst_outputs(outputs)
     ]
     chip, tone = _chip(list(outputs.values()))
+    beside = [_sizes(comparison), *([figure_block(ladder, 480, "ladder")] if ladder else [])]
     rows = [
         ("Compared", compared_text(command.dataset, command.profile)),
         ("Error", join(texts)),
         ("Cause", join([_NEXT, code_block(command.diagnose(command.profile))])),
     ]
-    return lead(title, chip, tone, comparison_headline(comparison), rows, _sizes(comparison))
+    return lead(title, chip, tone, comparison_headline(comparison), rows, *beside)
 
 
 def _sizes(comparison: Comparison) -> Markup:

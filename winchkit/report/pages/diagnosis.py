@@ -32,8 +32,10 @@ def sections(
     story: Sequence[str],
     truth: Mapping[str, object] | None,
     command: Command,
+    *,
     title: str = "",
     unexplained: Sequence[Figure] = (),
+    ladder: Figure | None = None,
 ) -> Markup:
     """Content of the page: summary and figures, and everything else to be opened."""
     diagnosis = answer.diagnosis
@@ -41,7 +43,7 @@ def sections(
     runs = diagnosis.data
     return join(
         [
-            _verdict(answer, command, title),
+            _verdict(answer, command, title, ladder),
             folded("story", "Procedure", _story(story)),
             element("div", *figures, id="residuals"),
             folded(
@@ -78,7 +80,7 @@ def sections(
     )
 
 
-def _verdict(answer: Answer, command: Command, title: str) -> Markup:
+def _verdict(answer: Answer, command: Command, title: str, ladder: Figure | None) -> Markup:
     diagnosis = answer.diagnosis
     seen = smallest_shown(answer) if diagnosis.verdict == "adequate" else []
     shown = f"Detectable with these {diagnosis.data}, among others: {listed(seen)}." if seen else ""
@@ -88,7 +90,7 @@ def _verdict(answer: Answer, command: Command, title: str) -> Markup:
         ("Cause", cause),
         ("Error", error),
         ("Detectable", shown),
-        ("Cure", _cure(diagnosis, command)),
+        ("Cure" if diagnosis.steps else "Next", _cure(diagnosis, command)),
         ("Would decide", _decides(diagnosis)),
     ]
     return lead(
@@ -98,6 +100,7 @@ def _verdict(answer: Answer, command: Command, title: str) -> Markup:
         headline(diagnosis),
         rows,
         tables.figures(diagnosis),
+        *([figure_block(ladder, 480, "ladder")] if ladder else []),
     )
 
 
@@ -119,7 +122,8 @@ def _decides(diagnosis: Diagnosis) -> str:
         return changes_text(diagnosis)
     first = diagnosis.next_runs[0]
     power = "" if isnan(first.power) else f" (power {percent(first.power)})"
-    return f"{capital(first.programme)}: it distinguishes {listed(list(first.separates))}{power}."
+    run = capital(first.programme.rstrip("."))
+    return f"{run}. It distinguishes {listed(list(first.separates))}{power}."
 
 
 def _named(answer: Answer) -> Markup:

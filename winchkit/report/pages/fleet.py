@@ -7,12 +7,15 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.fleet.anova import SharedAttribution, SharedError
 from winchkit.diagnosis.fleet.meta_analysis import Pooled, SharedEffect
 from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Step
-from winchkit.report.html.markup import Markup, compact, details, element, section, table
-from winchkit.report.html.page import page
-from winchkit.report.pages.parts import bullets
+from winchkit.report.figures.figure import Figure
+from winchkit.report.figures.ladder import fleet_ladders
+from winchkit.report.html.markup import Markup, compact, element, folded, section, table
+from winchkit.report.html.page import figure_block, page
+from winchkit.report.pages.parts import bullets, lead
 from winchkit.report.words.columns import aligned, hanging, paragraph
+from winchkit.report.words.headline import at_noise
 from winchkit.report.words.numbers import Scale, percent, quantity, scale_for, significant, unbroken
-from winchkit.report.words.sentence import main_patterns, where_text
+from winchkit.report.words.sentence import capital, main_patterns, where_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VARIABLE_NAMES,
@@ -35,6 +38,10 @@ __all__ = [
 ]
 
 _FOLLOWED = 3
+_CAUSES = 4
+_SIDE = 560
+_ORDER = ("unknown", "partly", "explained", "adequate")
+_SOME = {0: "No effect is", 1: "1 effect is"}
 _BY_CHANCE = 0.01
 """Least probability at which a false alarm of one of many winches is reported."""
 _ALL = 0.9
@@ -233,11 +240,25 @@ def shared_effects_html(
     plain = winch_rows(found, chances)
     rows = [[_link(name, pages), verdict, unbroken(text)] for name, verdict, text in plain]
     texts = [unbroken(effect_text(one)) for one in shared]
-    return page(
+    verdicts = [one.verdict for one in found.values()]
+    kinds = dict.fromkeys(sorted(verdicts, key=_ORDER.index))
+    counted = [f"{verdicts.count(v)} {VERDICT_NAMES[v].lower()}" for v in kinds]
+    worst = next(iter(kinds), "adequate")
+    beside = [
+        ("Compared", f"{len(found)} winches, each by itself, with one profile"),
+        ("Verdicts", f"{capital(', '.join(counted))}."),
+        ("Cause", bullets(texts[:_CAUSES]) if texts else "No effect is missing in any winch."),
+        ("Cure", "The page of each winch has its command."),
+    ]
+    headline = (
+        f"{_SOME.get(len(shared), f'{len(shared)} effects are')} missing over {len(found)} winches"
+    )
+    return _page(
         title,
-        (),
-        section("winches", "Every winch", _table(["winch", "verdict", "effects"], rows, 3)),
-        section("shared", "Effects in common and in single winches", bullets(texts)),
+        (VERDICT_NAMES[worst], worst, headline, beside),
+        fleet_ladders(found),
+        _table(["winch", "verdict", "effects"], rows, 3),
+        folded("shared", "Effects in common and in single winches", bullets(texts)),
         _as_json({"effects": [one.to_json() for one in shared], "alarms": dict(chances)}),
     )
 
@@ -269,13 +290,38 @@ def shared_errors_html(
     head, *rows = error_rows(found)
     linked = [[_link(name, pages), *cells] for name, *cells in rows]
     texts = [unbroken(text) for text in error_texts(shared)]
-    return page(
+    above = [name for name, one in found.items() if not all(map(at_noise, one.outputs.values()))]
+    beside = [
+        ("Compared", f"{len(found)} winches, each by itself, with one profile"),
+        ("Error", f"Above the noise, or of unknown noise: {listed(above)}." if above else ""),
+        ("Variance explained by", bullets(texts)),
+        ("Cause", "winchkit diagnose with the same runs and --winch all names missing effects."),
+    ]
+    headline = f"{len(above)} of {len(found)} winches exceed their noise"
+    chip = ("Above the noise", "partly") if above else ("At the noise", "adequate")
+    return _page(
         title,
-        (),
-        section("winches", "Every winch", _table(head, linked, 1)),
-        section("shared", "Share of the errors' variance explained by", bullets(texts)),
+        (*chip, headline, beside),
+        fleet_ladders(found),
+        _table(head, linked, 1),
         _as_json({"outputs": {name: error.to_json() for name, error in shared.items()}}),
     )
+
+
+def _page(
+    title: str,
+    result: tuple[str, str, str, Sequence[tuple[str, str]]],
+    figures: Sequence[Figure],
+    winches: Markup,
+    *others: Markup,
+) -> str:
+    """Summary, errors of all winches as figures, and a row for each winch."""
+    chip, tone, headline, rows = result
+    blocks = [figure_block(figure, _SIDE) for figure in figures]
+    drawn = element("div", *blocks, class_="pair maps output") if blocks else Markup("")
+    each = section("winches", "Every winch", winches)
+    return page(title, figures, lead(title, chip, tone, headline, rows), each, drawn, *others,
+                headed=False)  # fmt: skip
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]], words: int) -> Markup:
@@ -287,4 +333,4 @@ def _link(name: str, pages: Mapping[str, str]) -> Markup:
 
 
 def _as_json(shared: Mapping[str, object]) -> Markup:
-    return details("Common effects as JSON", element("pre", compact(shared, indent=1)))
+    return folded("json", "Common effects as JSON", element("pre", compact(shared, indent=1)))

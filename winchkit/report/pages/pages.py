@@ -8,6 +8,7 @@ from winchkit.diagnosis.add import Grown
 from winchkit.diagnosis.compare import Compared
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.report.figures.figure import Figure
+from winchkit.report.figures.ladder import error_ladder, present
 from winchkit.report.figures.maps import map_figures
 from winchkit.report.figures.residuals import OutputFigures, Residuals, residual_figures
 from winchkit.report.figures.unexplained import unexplained_figures
@@ -68,14 +69,29 @@ def report_html(
     residuals = residuals_of(answer, command.source)
     drawn, cards = _cards(residuals, size_texts(answer.diagnosis.outputs))
     patterns = unexplained_figures(answer, command.source)
-    content = sections(answer, cards, story, truth, command, title, patterns)
-    return page(title, [*drawn, *patterns], content, headed=False)
+    ladder = error_ladder(
+        answer.diagnosis.outputs,
+        grown=residuals.after is not None,
+        changed=residuals.changed,
+        source=command.source,
+    )
+    content = sections(
+        answer, cards, story, truth, command, title=title, unexplained=patterns, ladder=ladder
+    )
+    return page(title, [*present(ladder), *drawn, *patterns], content, headed=False)
 
 
 def report_figures(answer: WinchAnswer, source: str = "") -> list[Figure]:
     """The figures of the page of a diagnosis, the worst output first."""
-    drawn, _ = _cards(residuals_of(answer, source), {})
-    return [*drawn, *unexplained_figures(answer, source)]
+    residuals = residuals_of(answer, source)
+    drawn, _ = _cards(residuals, {})
+    ladder = error_ladder(
+        answer.diagnosis.outputs,
+        grown=residuals.after is not None,
+        changed=residuals.changed,
+        source=source,
+    )
+    return [*present(ladder), *drawn, *unexplained_figures(answer, source)]
 
 
 def residuals_of(answer: WinchAnswer, source: str = "") -> Residuals:
@@ -147,13 +163,17 @@ def comparison_html(
     own = residual_figures(residuals)
     drawn, cards = _cards(residuals, size_texts(compared.comparison.outputs), own)
     over = {one.output: one.followed for one in own if one.followed}
-    content = comparison_sections(compared.comparison, over, cards, command, title)
-    return page(title, drawn, content, headed=False)
+    ladder = error_ladder(compared.comparison.outputs, source=command.source)
+    content = comparison_sections(
+        compared.comparison, over, cards, command, title=title, ladder=ladder
+    )
+    return page(title, [*present(ladder), *drawn], content, headed=False)
 
 
 def comparison_figures(compared: Compared, source: str = "") -> list[Figure]:
     """The figures of the page of a comparison, the worst output first."""
-    return _cards(residuals_of_comparison(compared, source), {})[0]
+    ladder = error_ladder(compared.comparison.outputs, source=source)
+    return [*present(ladder), *_cards(residuals_of_comparison(compared, source), {})[0]]
 
 
 def addition_html(
@@ -180,17 +200,22 @@ def addition_html(
         HTML, self-contained.
     """
     command = Command(grown.regression.dataset, profile, options)
-    drawn, cards = _cards(
-        residuals_of_addition(grown, command.source), size_texts(grown.addition.outputs)
+    outputs, residuals = grown.addition.outputs, residuals_of_addition(grown, command.source)
+    drawn, cards = _cards(residuals, size_texts(outputs))
+    ladder = error_ladder(outputs, grown=True, changed=residuals.changed, source=command.source)
+    content = addition_sections(
+        grown.addition, cards, command, better or "better.toml", title=title, ladder=ladder
     )
-    better = better or "better.toml"
-    content = addition_sections(grown.addition, cards, command, better, title)
-    return page(title, drawn, content, headed=False)
+    return page(title, [*present(ladder), *drawn], content, headed=False)
 
 
 def addition_figures(grown: Grown, source: str = "") -> list[Figure]:
     """The figures of the page of an addition, the worst output first."""
-    return _cards(residuals_of_addition(grown, source), {})[0]
+    residuals = residuals_of_addition(grown, source)
+    ladder = error_ladder(
+        grown.addition.outputs, grown=True, changed=residuals.changed, source=source
+    )
+    return [*present(ladder), *_cards(residuals, {})[0]]
 
 
 def _cards(

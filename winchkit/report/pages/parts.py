@@ -24,7 +24,7 @@ _ICONS = {
     "explained": (
         '<circle cx="8" cy="8" r="6" stroke-dasharray="2.2 1.6"/><path d="M8 5.4v5.2M5.4 8h5.2"/>'
     ),
-    "partly": '<path d="M4.5 6.2h7M4.5 9.8h7"/>',
+    "partly": '<circle cx="8" cy="8" r="6"/><path d="M8 2v12M8 5h4M8 8h5.5M8 11h4"/>',
     "unknown": (
         '<path d="M8 1.8L14.2 8 8 14.2 1.8 8z"/>'
         '<path d="M6.6 6.6c.2-1.8 3-1.6 2.8.1-.1 1-1.4 1-1.4 2.1M8 10.9v.1"/>'
@@ -51,7 +51,7 @@ def lead(
     icon = Markup(f'<svg viewBox="0 0 16 16" aria-hidden="true">{_ICONS[tone]}</svg>')
     head = element(
         "div",
-        element("h2", icon, chip, id="verdict-heading", class_="chip"),
+        element("h2", icon, capital(chip), id="verdict-heading", class_="chip"),
         element("h1", unbroken(headline)),
         class_="lead",
     )

@@ -19,6 +19,7 @@ from winchkit.diagnosis.robot.errors import UNITS, Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.report.figures.axes import Reading, reading
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.ladder import error_ladder, present
 from winchkit.report.figures.pose_traces import NUMBER, Trace, traces
 from winchkit.report.figures.unexplained import unexplained_figures
 from winchkit.report.html.markup import Markup, element, table
@@ -55,6 +56,7 @@ def pose_figures(
     before: Errors,
     after: Errors | None,
     noise: Mapping[str, float | None],
+    *,
     order: Sequence[str] = (),
     changed: str = "with the effect",
     source: str = "",
@@ -224,27 +226,53 @@ def robot_report_html(
     regression = selection.final.regression
     cards = _cards(regression, drawn, before, grown, size_texts(diagnosis.outputs))
     patterns = unexplained_figures(answer, command.source)
-    content = sections(answer, cards, (), None, command, title, patterns)
-    return page(title, [*drawn.values(), *patterns], content, headed=False)
+    ladder = _report_ladder(answer, command.source)
+    content = sections(
+        answer, cards, (), None, command, title=title, unexplained=patterns, ladder=ladder
+    )
+    return page(title, [*present(ladder), *drawn.values(), *patterns], content, headed=False)
 
 
 def robot_report_figures(answer: RobotAnswer, source: str = "") -> list[Figure]:
     """The figures of the page of a robot's diagnosis."""
     drawn = _report_figures(answer, source).values()
-    return [*drawn, *unexplained_figures(answer, source)]
+    ladder = _report_ladder(answer, source)
+    return [*present(ladder), *drawn, *unexplained_figures(answer, source)]
+
+
+def _report_ladder(answer: RobotAnswer, source: str) -> Figure | None:
+    diagnosis = answer.diagnosis
+    return error_ladder(
+        diagnosis.outputs,
+        grown=bool(diagnosis.steps),
+        changed=_changed(answer),
+        source=source,
+    )
+
+
+def _changed(answer: RobotAnswer) -> str:
+    """Name of the changed model."""
+    steps = answer.diagnosis.steps
+    if steps and steps[0].whole:
+        return "calibrated"
+    return f"with {steps[0].effects[0]}" if len(steps) == 1 else f"with {len(steps)} effects"
 
 
 def _report_figures(answer: RobotAnswer, source: str) -> dict[str, Figure]:
     diagnosis, selection = answer.diagnosis, answer.selection
     before, after = selection.errors
     noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
-    steps = diagnosis.steps
-    changed = f"with {steps[0].effects[0]}" if len(steps) == 1 else f"with {len(steps)} effects"
-    if steps and steps[0].whole:
-        changed = "calibrated"
     order = worst_outputs(diagnosis.outputs)
-    grown = after if steps else None
-    return pose_figures(selection.final.regression, before, grown, noise, order, changed, source)
+    grown = after if diagnosis.steps else None
+    return pose_figures(
+        selection.final.regression,
+        before,
+        grown,
+        noise,
+        order=order,
+        changed=_changed(answer),
+        source=source,
+    )
 
 
 def robot_comparison_html(
@@ -272,21 +300,27 @@ def robot_comparison_html(
     command = Command(compared.regression.dataset, profile, options)
     drawn = _comparison_figures(compared, command.source)
     sizes = size_texts(comparison.outputs)
+    ladder = error_ladder(comparison.outputs, source=command.source)
     cards = _cards(compared.regression, drawn, compared.errors, None, sizes)
-    content = comparison_sections(comparison, compared.followed, cards, command, title)
-    return page(title, list(drawn.values()), content, headed=False)
+    content = comparison_sections(
+        comparison, compared.followed, cards, command, title=title, ladder=ladder
+    )
+    return page(title, [*present(ladder), *drawn.values()], content, headed=False)
 
 
 def robot_comparison_figures(compared: RobotCompared, source: str = "") -> list[Figure]:
     """The figures of the page of a robot's comparison."""
-    return list(_comparison_figures(compared, source).values())
+    ladder = error_ladder(compared.comparison.outputs, source=source)
+    return [*present(ladder), *_comparison_figures(compared, source).values()]
 
 
 def _comparison_figures(compared: RobotCompared, source: str) -> dict[str, Figure]:
     outputs = compared.comparison.outputs
     noise = {name: error.noise_rms for name, error in outputs.items()}
     order = worst_outputs(outputs)
-    return pose_figures(compared.regression, compared.errors, None, noise, order, source=source)
+    return pose_figures(
+        compared.regression, compared.errors, None, noise, order=order, source=source
+    )
 
 
 def robot_addition_html(
@@ -322,13 +356,20 @@ def robot_addition_html(
     sizes = size_texts(grown.addition.outputs)
     cards = _cards(grown.regression, drawn, *grown.errors, sizes)
     better = better or "better.toml"
-    content = addition_sections(grown.addition, cards, command, better, title)
-    return page(title, list(drawn.values()), content, headed=False)
+    ladder = _addition_ladder(grown, command.source)
+    content = addition_sections(grown.addition, cards, command, better, title=title, ladder=ladder)
+    return page(title, [*present(ladder), *drawn.values()], content, headed=False)
 
 
 def robot_addition_figures(grown: RobotGrown, source: str = "") -> list[Figure]:
     """The figures of the page of an effect added to a robot."""
-    return list(_addition_figures(grown, source).values())
+    ladder = _addition_ladder(grown, source)
+    return [*present(ladder), *_addition_figures(grown, source).values()]
+
+
+def _addition_ladder(grown: RobotGrown, source: str) -> Figure | None:
+    changed = f"with {grown.addition.added[0].label}"
+    return error_ladder(grown.addition.outputs, grown=True, changed=changed, source=source)
 
 
 def _addition_figures(grown: RobotGrown, source: str) -> dict[str, Figure]:
@@ -337,4 +378,6 @@ def _addition_figures(grown: RobotGrown, source: str) -> dict[str, Figure]:
     before, after = grown.errors
     changed = f"with {grown.addition.added[0].label}"
     order = worst_outputs(outputs)
-    return pose_figures(grown.regression, before, after, noise, order, changed, source)
+    return pose_figures(
+        grown.regression, before, after, noise, order=order, changed=changed, source=source
+    )

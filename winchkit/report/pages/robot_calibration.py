@@ -25,6 +25,7 @@ __all__ = ["calibration_figures", "calibration_html"]
 
 _MM = 1e3
 _MOST = 5
+_SIDE = 560
 
 
 def calibration_html(
@@ -56,11 +57,11 @@ def calibration_html(
     """
     chip, tone = _verdict(found)
     figures = calibration_figures(found, source)
-    pair = [figure_block(figure) for figure in figures]
+    pair = [figure_block(figure, _SIDE) for figure in figures]
     compared, *others = _sentences(found)
     blind = found.observed.unobservable
     rows = [
-        ("Compared", source),
+        ("Compared", _compared(found)),
         ("Error", compared),
         ("Fitted", others[0]),
         ("Cause", others[1] if len(others) > 1 else ""),
@@ -80,6 +81,13 @@ def calibration_html(
         folded("parameters", "Parameters", _parameters(found)),
         headed=False,
     )
+
+
+def _compared(found: Calibrated) -> str:
+    held = len(found.validation_after.distance)
+    fitted = len(found.equations.measured)
+    profile = found.equations.robot.profile.name
+    return f"{fitted} poses fitted, {held} held out; profile {profile}"
 
 
 def _headline(found: Calibrated) -> str:
@@ -116,7 +124,8 @@ def _changes(found: Calibrated) -> Markup:
     rows = []
     for name, estimate in ranked:
         nominal, value, sigma, unit = in_words(estimate)
-        rows.append([name, f"{value} ± {sigma} {unit}", nominal])
+        shown = f"{value} ± {sigma} {unit}".replace("-", "−")
+        rows.append([_readable(name), shown, nominal.replace("-", "−")])
     return table(
         "Largest changes, with the nominal value.", ["parameter", "value", "nominal"], rows
     )
@@ -135,6 +144,13 @@ def _verdict(found: Calibrated) -> tuple[str, str]:
     return "calibrated", "explained"
 
 
+def _readable(name: str) -> str:
+    """``1.exit_point.x`` as ``cable 1, exit point x``."""
+    line, dot, own = name.partition(".")
+    words = (own if dot and line.isdigit() else name).replace("_", " ").replace(".", " ")
+    return f"cable {line}, {words}" if dot and line.isdigit() else words
+
+
 def _sentences(found: Calibrated) -> Iterator[str]:
     from winchkit.calibration.robot.prediction import rms
 
@@ -142,7 +158,7 @@ def _sentences(found: Calibrated) -> Iterator[str]:
     if isfinite(rms(after.distance)):
         yield (
             f"At {len(after.distance)} poses that were not fitted the position error fell from "
-            f"{rms(before.distance) * _MM:.3g} mm to {rms(after.distance) * _MM:.3g} mm rms"
+            f"{quantity(rms(before.distance), 'm')} to {quantity(rms(after.distance), 'm')} rms"
             + (
                 f", and the rotation error from {degrees(rms(before.angle)):.3g}° to "
                 f"{degrees(rms(after.angle)):.3g}°."
@@ -192,7 +208,7 @@ def _figure(name: str, title: str, before: PoseErrors, after: PoseErrors, source
     for one in series[:2]:
         mean = float(np.sqrt(np.mean(one.y**2))) if len(one.y) else float("nan")
         ends = np.array([0.0, len(after.distance) + 1.0])
-        line = Series(f"rms {mean:.3g} mm", one.tone, ends, np.full(2, mean), "line")
+        line = Series(f"rms {quantity(mean / _MM, 'm')}", one.tone, ends, np.full(2, mean), "line")
         series.append(line)
     return Figure(
         f"pose-error-{name}",
@@ -230,7 +246,8 @@ def _parameters(found: Calibrated) -> Markup:
     for name, estimate in found.estimates.items():
         nominal, value, sigma, unit = in_words(estimate)
         at = f", at its {estimate.bound} bound" if estimate.bound else ""
-        rows.append([name, unit + at, nominal, value, sigma])
+        numbers = [text.replace("-", "−") for text in (nominal, value, sigma)]
+        rows.append([name, unit + at, *numbers])
     return table(
         "Values with their posterior standard deviation.",
         ["parameter", "unit", "nominal", "value", "sigma"],

@@ -1,0 +1,132 @@
+"""Error of every output over its noise, today and with the changed model, on one axis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+
+from winchkit.diagnosis.results import Comparison, Diagnosis, OutputError, OutputFit
+from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.words.headline import worst_outputs
+from winchkit.report.words.sentence import capital
+from winchkit.report.words.vocabulary import OUTPUT_NAMES
+
+__all__ = ["error_ladder", "fleet_ladders", "present"]
+
+_ROW = 30.0
+_LEAST, _MOST = 0.8, 1.3
+"""Ends of the axis: below the noise, and beyond the largest ratio by this factor."""
+
+
+@dataclass(frozen=True)
+class _Row:
+    """Errors over the noise of one row."""
+
+    name: str
+    before: float
+    after: float
+
+
+def error_ladder(
+    outputs: Mapping[str, OutputError] | Mapping[str, OutputFit],
+    *,
+    grown: bool = False,
+    changed: str = "with the effect",
+    source: str = "",
+) -> Figure | None:
+    """The ladder of one winch; the worst output first, None where no noise is known.
+
+    Parameters
+    ----------
+    outputs : mapping
+        Errors by output.
+    grown : bool
+        Whether the model was changed, so that there is an error after it.
+    changed : str
+        Name of the changed model.
+    source : str
+        Profile, runs and version, for files.
+
+    Returns
+    -------
+    Figure or None
+    """
+    rows = [
+        row
+        for name in worst_outputs(outputs)
+        if (row := _row(OUTPUT_NAMES.get(name, name), outputs[name])) is not None
+    ]
+    if not rows:
+        return None
+    held = isinstance(next(iter(outputs.values())), OutputFit)
+    title = f"{'Held-out error' if held else 'Error'} over the noise"
+    return _figure("errors", title, rows, changed if grown else "", source)
+
+
+def fleet_ladders(
+    found: Mapping[str, Comparison] | Mapping[str, Diagnosis], source: str = ""
+) -> list[Figure]:
+    """A ladder per output with a row per winch, in their order."""
+    out = []
+    for output in dict.fromkeys(name for one in found.values() for name in one.outputs):
+        rows = [
+            row
+            for winch, one in found.items()
+            if output in one.outputs
+            and (row := _row(winch or "the winch", one.outputs[output])) is not None
+        ]
+        if rows:
+            name = OUTPUT_NAMES.get(output, output)
+            grown = any(isinstance(one, Diagnosis) and one.steps for one in found.values())
+            title = capital(f"{name}: error over the noise")
+            changed = "with named effects" if grown else ""
+            out.append(_figure(f"errors-{output}", title, rows, changed, source))
+    return out
+
+
+def _row(name: str, output: OutputError | OutputFit) -> _Row | None:
+    """Errors over the noise; None where the noise is unknown."""
+    if not output.noise_rms:
+        return None
+    if isinstance(output, OutputFit):
+        before, after = output.heldout_rms_before, output.heldout_rms_after
+        return _Row(name, before / output.noise_rms, after / output.noise_rms)
+    return _Row(name, output.rms / output.noise_rms, float("nan"))
+
+
+def _figure(name: str, title: str, rows: Sequence[_Row], changed: str, source: str) -> Figure:
+    places = np.arange(float(len(rows)), 0.0, -1.0)
+    today = np.array([row.before for row in rows])
+    series = [Series("today", "today", today, places, "points")]
+    if changed:
+        then = np.array([row.after for row in rows])
+        ends = np.column_stack([today, then, np.full(len(rows), np.nan)]).ravel()
+        joined = Series("", "with", ends, np.repeat(places, 3), "line")
+        series = [joined, *series, Series(changed, "with", then, places, "points")]
+    every = [v for one in series for v in one.x.tolist() if isfinite(v)]
+    least = min(_LEAST, *every) if every else _LEAST
+    limits = (0.9 * least if least < _LEAST else _LEAST, max(2.0, _MOST * max(every, default=1.0)))
+    named = tuple((float(at), row.name) for at, row in zip(places, rows, strict=True))
+    return Figure(
+        name,
+        title,
+        "Rms of the error over that of the noise; left of the line at 1 is noise.",
+        Axis("error ÷ noise", logarithmic=True, limits=limits),
+        (
+            Panel(
+                Axis("", limits=(0.4, len(rows) + 0.6), categories=named),
+                tuple(series),
+                floor=1.0,
+            ),
+        ),
+        source=source,
+        height=_ROW * len(rows) + 8,
+    )
+
+
+def present(figure: Figure | None) -> list[Figure]:
+    """A figure as a list, empty for None."""
+    return [] if figure is None else [figure]
