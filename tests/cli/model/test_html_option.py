@@ -1,4 +1,4 @@
-"""``--html`` of compare, diagnose and add: a page beside the answer, and never instead of it."""
+"""``--html`` and ``--figures`` of compare, diagnose and add: a page beside the answer, and never instead of it."""
 
 from __future__ import annotations
 
@@ -97,3 +97,26 @@ def test_the_page_repeats_the_options_that_it_was_asked_with(
     assert asked("compare", runs, html, "--band", "7.5").exit_code == 0
     page = Page(html.read_text(encoding="utf-8"))
     assert "--profile bench-spiral --band 7.5 --html report.html" in page.text
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_figure_of_the_page_is_written_as_png_svg_and_csv(
+    command: str, runs: list[str], tmp_path: Path
+) -> None:
+    html, folder = tmp_path / "page.html", tmp_path / "figures"
+    result = asked(command, runs, html, "--figures", str(folder))
+    assert result.exit_code == 0, result.output
+    shown = Page(html.read_text(encoding="utf-8")).shown
+    assert f"figures: {folder} ({len(shown)} as PNG, SVG and CSV)" in result.stderr
+    expected = {f"{name}.{suffix}" for name in shown for suffix in ("png", "svg", "csv")}
+    assert {path.name for path in folder.iterdir()} == expected
+    assert all(path.stat().st_size > 50 for path in folder.iterdir())
+    assert "bench-spiral" in (folder / f"{shown[0]}.svg").read_text(encoding="utf-8")
+
+
+def test_figures_need_a_folder_whose_parent_exists(runs: list[str], tmp_path: Path) -> None:
+    words = ["compare", runs[0], "-p", "bench-spiral", "--figures", str(tmp_path / "no" / "such")]
+    result = CliRunner().invoke(main, words)
+    assert result.exit_code == 3
+    assert "the figures cannot be written" in result.stderr
+    assert "cable length" in result.stdout

@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from winchkit.report.figures.plots import Residuals, plots_of
 
 from report_answers import recorded
 from report_parsed import HOSTILE, Page
@@ -16,6 +15,7 @@ from winchkit.catalog import find
 from winchkit.diagnosis.compare import Compared, compare, compared
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import OutputError
+from winchkit.report.figures.residuals import Residuals, residual_figures
 from winchkit.report.pages.comparison import distance_text
 from winchkit.report.pages.pages import comparison_html
 from winchkit.schema.read import read_profile
@@ -33,7 +33,7 @@ def page_of(bench: str) -> Page:
 
 
 def outputs_drawn(page: Page, kind: str) -> set[str]:
-    return {name.removeprefix(kind) for name in page.plots if name.startswith(kind)}
+    return {name.removeprefix(kind) for name in page.figures if name.startswith(kind)}
 
 
 def test_the_page_belongs_to_the_figures_of_the_comparison() -> None:
@@ -48,30 +48,31 @@ def test_the_page_belongs_to_the_figures_of_the_comparison() -> None:
 def test_the_page_is_whole_and_needs_nothing_else(bench: str) -> None:
     page = page_of(bench)
     assert page.count("h1") == 1
-    assert page.count("script") == 3
+    assert page.count("script") == 2
     assert page.count("table") == page.count("caption")
     for tag, attributes in page.elements:
         assert tag not in {"link", "iframe", "object", "img"}
-        assert not {"src", "href", "action", "srcset"} & attributes.keys()
+        assert not {"src", "action", "srcset"} & attributes.keys()
+        assert str(attributes.get("href", "#")).startswith("#")
     ids = [a["id"] for _, a in page.elements if "id" in a]
     assert len(ids) == len(set(ids))
-    figures = {a["data-plot"] for _, a in page.elements if "data-plot" in a}
-    assert figures == page.plots.keys()
+    assert set(page.shown) == page.figures.keys()
 
 
 def test_only_the_present_state_is_drawn() -> None:
     page = page_of("demo-elastic-rope")
-    assert {one["name"] for plot in page.plots.values() for one in plot["series"]} == {"residual"}
+    heads = page.figures["time-cable_length"]["head"]
+    assert heads == ["run", "time [s]", "measured [m]", "predicted [m]", "residual [mm]"]
     assert outputs_drawn(page, "time-") == {"cable_length", "tension", "motor_torque"}
-    assert page.plots["over-cable_length"]["xLabel"] == "load [N]"
+    assert "load [N]" in page.figures["over-cable_length"]["head"]
 
 
 def test_the_curves_are_the_residual_of_the_figures() -> None:
     known = held_against("demo-elastic-rope")
-    plots = plots_of(Residuals(known.regression, known.residual, None, {}))
-    for own in plots:
-        (line,) = own.over_time.data["series"]
-        values = np.array([v for v in line["values"] if v is not None]) * own.scale.worth
+    figures = residual_figures(Residuals(known.regression, known.residual, None, {}))
+    for own in figures:
+        (line,) = own.over_time.panels[1].series
+        values = line.y[np.isfinite(line.y)] * own.scale.worth
         error = known.comparison.outputs[own.output]
         assert np.abs(values).max() == pytest.approx(error.max, rel=1e-3)
         assert error.rms <= 1.001 * np.sqrt(np.mean(values**2))
@@ -100,7 +101,8 @@ def test_without_repeats_the_noise_is_not_invented() -> None:
     page = Page(comparison_html(known, "x"))
     assert "Noise unknown" in page.text
     assert "its noise is unknown without repeats" in page.text
-    assert {plot["noise"] for plot in page.plots.values()} == {None}
+    assert "band: noise floor" not in page.text
+    assert "errors" not in page.figures
 
 
 @pytest.mark.parametrize(
@@ -154,7 +156,7 @@ def test_hostile_names_stay_text() -> None:
     known = held_against("demo-adequate")
     said = replace(known, comparison=replace(known.comparison, notes=(HOSTILE,)))
     page = Page(comparison_html(said, HOSTILE, HOSTILE, options=(HOSTILE,)))
-    assert page.count("script") == 3
+    assert page.count("script") == 2
     assert page.count("img") == 0
     assert not any(key.startswith("on") for _, a in page.elements for key in a)
     assert HOSTILE in "".join(page.words)

@@ -44,8 +44,20 @@ class Page(HTMLParser):
         return " ".join("".join(self.words).replace("\u00a0", " ").split())
 
     @property
-    def plots(self) -> dict[str, Any]:
-        return json.loads(self.scripts[0])
+    def figures(self) -> dict[str, Any]:
+        """Data of every figure, by its name."""
+        return dict(json.loads(self.scripts[0])["figures"])
+
+    def column(self, figure: str, name: str) -> list[float | None]:
+        """A column of a figure's data, by the name before its unit."""
+        table = self.figures[figure]
+        (at,) = [n for n, head in enumerate(table["head"]) if head.partition(" [")[0] == name]
+        return list(table["columns"][at])
+
+    @property
+    def shown(self) -> list[str]:
+        """Names of the figures that the page shows, in their order."""
+        return [str(a["data-figure"]) for _, a in self.elements if "data-figure" in a]
 
     def count(self, tag: str) -> int:
         return sum(name == tag for name, _ in self.elements)

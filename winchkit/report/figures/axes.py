@@ -18,6 +18,7 @@ from winchkit.report.words.vocabulary import VARIABLE_NAMES
 __all__ = ["Range", "Reading", "range_of", "reading"]
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+_FEWEST = 3
 _MARGIN = 0.06
 _DECADES = 4
 """Decades of a logarithmic axis from which only its powers of ten have ticks."""
@@ -44,10 +45,11 @@ class Range:
         return np.asarray((values - self.low) / (self.high - self.low))
 
     def ticks(self, count: int) -> list[tuple[float, str]]:
-        """Round values within the range, about ``count``, with their texts."""
+        """Round values within the range, about ``count`` and at least three, with their texts."""
         if self.logarithmic:
             return [(v, plain(v)) for v in _powers(self.low, self.high)]
-        step, values = _even(self.low, self.high, count)
+        every = (_even(self.low, self.high, more * count) for more in (1, 2, 3))
+        step, values = next((e for e in every if len(e[1]) >= _FEWEST), (1.0, []))
         decimals = max(0, -floor(log10(step) + 1e-9))
         if abs(step * 10**decimals - round(step * 10**decimals)) > 1e-6:
             decimals += 1

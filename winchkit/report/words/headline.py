@@ -93,8 +93,9 @@ def size_texts(outputs: Mapping[str, OutputError] | Mapping[str, OutputFit]) -> 
         size, noise = _error(output), output.noise_rms
         text = f"{quantity(size, output.unit)} rms"
         if noise:
-            times = significant(size / noise, 2)
-            text += f", {times} times its noise of {quantity(noise, output.unit)}"
+            above = size >= AT_NOISE * noise
+            times = f"{significant(size / noise, 2)} times" if above else "about"
+            text += f", {times} its noise of {quantity(noise, output.unit)}"
         out[name] = text
     return out
 

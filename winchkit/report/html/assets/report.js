@@ -48,15 +48,22 @@
         ["class", "f-axis xmark"]]) line.setAttribute(key, own);
       group.before(line);
     }
-    for (const label of svg.querySelectorAll(".f-run-label")) {
-      label.dataset.at ??= (label.getAttribute("x") - axis.left) / axis.width;
-      const share = (label.dataset.at - from) / (to - from);
+    const labels = [...svg.querySelectorAll(".f-run-label")];
+    labels.forEach(label => { label.dataset.at ??= (label.getAttribute("x") - axis.left) / axis.width; });
+    const shares = labels.map(label => (label.dataset.at - from) / (to - from));
+    labels.forEach((label, n) => {
+      // The run at the left edge keeps its name there.
+      const next = shares[n + 1] ?? 1.1, share = shares[n] < 0 && next > 0.25 ? 0 : shares[n];
       label.setAttribute("x", px(axis.left + share * axis.width));
-      label.style.display = share < -0.001 || share > 0.97 ? "none" : "";
-    }
+      label.style.display = share < 0 || share > 0.95 ? "none" : "";
+    });
   }
 
   function round(low, high, count) {
+    return [1, 2, 3].map(more => even(low, high, more * count)).find(found => found[0].length >= 3);
+  }
+
+  function even(low, high, count) {
     const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
     const step = power * STEPS.find(one => power * one >= rough * (1 - 1e-9));
     const ticks = [];
