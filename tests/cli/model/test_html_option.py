@@ -1,4 +1,4 @@
-"""``--html`` and ``--figures`` of compare, diagnose and add: a page beside the answer, and never instead of it."""
+"""``--html`` and ``--figures``: a page and pictures beside the answer, never instead of it."""
 
 from __future__ import annotations
 

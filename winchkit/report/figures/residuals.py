@@ -11,9 +11,9 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.data.spectrum import low_pass
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, variables_of
+from winchkit.diagnosis.residuals.traces import Trace, traces_of
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import (
@@ -137,30 +137,22 @@ def run_names(dataset: Dataset) -> list[str]:
 
 def _curves(residuals: Residuals, output: str) -> _Curves:
     regression, noise = residuals.regression, residuals.noise.get(output)
-    recordings = regression.dataset.recordings
-    own = [i for i, s in enumerate(regression.segments) if s.output == output]
-    runs = tuple(regression.segments[i].run for i in own)
+    runs = tuple(s.run for s in regression.segments if s.output == output)
 
-    def compared(values: Array, run: int) -> Array:
-        return np.where(recordings[run].valid[output], values, np.nan)
+    def traces(rows: Array) -> list[Trace]:
+        return [trace for trace in traces_of(regression, rows) if trace.output == output]
 
-    def in_runs(rows: Array) -> tuple[Array, ...]:
-        times = regression.in_time(rows)
-        return tuple(compared(times[i], run) for i, run in zip(own, runs, strict=True))
-
-    measured = []
-    for run in runs:
-        band, values = recordings[run].bands[output], recordings[run].measured[output]
-        if band.cut_off is not None:
-            values = low_pass(values, band.rate, band.cut_off)
-        measured.append(compared(values, run))
-    before = in_runs(residuals.before)
-    after = None if residuals.after is None else in_runs(residuals.after)
+    today = traces(residuals.before)
+    measured = tuple(trace.measured for trace in today)
+    before = tuple(trace.residual for trace in today)
+    after = None
+    if residuals.after is not None:
+        after = tuple(trace.residual for trace in traces(residuals.after))
     size = _rms(before)
     if after is not None and isclose(_rms(after), size, rel_tol=_SAME):
         after = None
     scale = scale_for(3 * size, OUTPUT_UNITS[output])
-    return _Curves(output, scale, runs, tuple(measured), before, after, noise, residuals.changed)
+    return _Curves(output, scale, runs, measured, before, after, noise, residuals.changed)
 
 
 def _rms(parts: Sequence[Array]) -> float:

@@ -138,7 +138,8 @@ def run_figure(
     with _figure(figsize or (_WIDTH, _CHANNEL_HEIGHT * len(names) + 0.4)) as figure:
         axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
         for axis, name in zip(axes, names, strict=True):
-            time, (values,) = decimated(run.time, [run[name]], _POINTS)
+            rows = decimated([run[name]], _POINTS // 2)
+            time, values = run.time[rows], run[name][rows]
             scale = _scale([values], run.channels[name].unit)
             axis.plot(time, values / scale.worth, color=_BLUE)
             axis.set_ylabel(_label(name.replace("_", " "), scale, broken=True))
@@ -256,7 +257,8 @@ def _draw_output(upper: Axes, lower: Axes, traces: Sequence[Trace], noise: float
         ]
         for axis, values, own, color, word, width in lines:
             if values is not None:
-                time, (shown,) = decimated(trace.time, [values], max(200, _POINTS // len(traces)))
+                rows = decimated([values], max(100, _POINTS // (2 * len(traces))))
+                time, shown = trace.time[rows], values[rows]
                 first = trace is traces[0] and word
                 label = word if first else None
                 axis.plot(start + time, shown / own.worth, color=color, lw=width, label=label)

@@ -17,7 +17,8 @@ from winchkit.report.words.numbers import quantity
 from winchkit.report.words.sentence import capital
 
 if TYPE_CHECKING:
-    from winchkit.calibration.robot.calibrate import Calibrated, Estimated
+    from winchkit.calibration.robot.calibrate import Calibrated
+    from winchkit.calibration.robot.parameters import Estimated
     from winchkit.calibration.robot.pose_design import NextPose
     from winchkit.calibration.robot.prediction import PoseErrors
 
