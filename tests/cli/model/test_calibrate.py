@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from calibration_cases import EXACT, Row, csv, elastic_rows, rows
+from report_parsed import Page
 from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.schema.profiles.winch import WinchProfile
@@ -105,14 +106,21 @@ def test_text_page_and_proposals(run: Path, tmp_path: Path) -> None:
     assert "position error" in result.stdout
     assert "measure next:" in result.stdout
     assert "fit: step 1" in result.stderr
+    read = Page(page.read_text())
+    # Every pose is drawn before and after, fitted and held out, and has its name.
+    tables = {name: read.figures[name] for name in ("pose-error-held-out", "pose-error-fitted")}
+    assert sum(len(table["columns"][0]) for table in tables.values()) == 90
+    for table in tables.values():
+        assert table["head"] == ["pose", "before calibration [mm]", "after calibration [mm]"]
+        assert all(v is not None for column in table["columns"] for v in column)
+    names = [name for table in tables.values() for name in table["words"]]
+    assert any(name.startswith(f"row 90 of {run}") for name in names)
+    # One scale for both figures, so that they can be compared.
     text = page.read_text()
-    # Every pose is drawn before and after, fitted and held out, and says which it is.
-    assert text.count('r="3"') == 2 * 90
-    assert f"<title>row 90 of {run}: " in text
-    # One scale for both figures, so that eyes can compare them.
-    heights = re.findall(r'y="([\d.]+)"[^>]*>1</text>', text)
-    assert len(set(heights[:2])) == 1
-    assert "src=" not in text.split("<script")[0]
+    heights = re.findall(r'y="([\d.]+)" text-anchor="end" class="f-tick">1</text>', text)
+    assert len(heights) == 4
+    assert len(set(heights[::2])) == 1
+    assert not any("src" in own for _, own in read.elements)
 
 
 def test_without_a_position_there_is_no_position_error(tmp_path: Path) -> None:

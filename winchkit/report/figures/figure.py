@@ -143,6 +143,8 @@ class Figure:
     """Whether a part of the x axis can be selected on the page."""
     source: str = ""
     """Profile, runs and version, for files."""
+    names: tuple[str, ...] = ()
+    """Names of the x values 1, 2 …; empty where x is a quantity."""
     height: float = 268.0
     """Of all panels together, px."""
 
@@ -176,6 +178,9 @@ def _series_table(figure: Figure) -> Table:
         at += len(own_x)
     head = [figure.x.label, *(_headed(one.name, panel.y.unit) for panel, one in every)]
     data = [_numbers(column) for column in (x, *columns)]
+    if figure.names:
+        places: list[float | None] = [int(place) - 1 for place in x]
+        return Table((figure.x.name, *head[1:]), (places, *data[1:]), figure.names)
     if not figure.marks:
         return Table(tuple(head), tuple(data))
     starts = [mark.at for mark in figure.marks]

@@ -188,37 +188,48 @@ def calibration_figures(found: Calibrated, source: str = "") -> list[Figure]:
         ("held-out", "Poses held out", found.validation_before, found.validation_after),
         ("fitted", "Poses fitted", found.fit_before, found.fit_after),
     ]
+    every = np.concatenate([e.distance for *_, before, after in pairs for e in (before, after)])
+    every = every[every > 0] * _MM
+    if not len(every):
+        return []
+    limits = (float(every.min()) / 1.25, float(every.max()) * 1.25)
+    up = Axis("position error", "mm", logarithmic=True, limits=limits)
     return [
-        _figure(name, title, before, after, source)
+        _figure(name, title, up, (before, after), source)
         for name, title, before, after in pairs
         if any(isfinite(value) for value in after.distance)
     ]
 
 
-def _figure(name: str, title: str, before: PoseErrors, after: PoseErrors, source: str) -> Figure:
+def _figure(
+    name: str, title: str, up: Axis, errors: tuple[PoseErrors, PoseErrors], source: str
+) -> Figure:
     """Points over the poses on a logarithmic axis, rms as lines."""
-    series = []
-    for tone, word, errors in (
+    before, after = errors
+    series, number = [], np.arange(1.0, len(after.distance) + 1)
+    for tone, word, one in (
         ("today", "before calibration", before),
         ("with", "after calibration", after),
     ):
-        size = np.asarray(errors.distance, dtype=float) * _MM
-        number = np.arange(1.0, len(size) + 1)
-        good = np.isfinite(size) & (size > 0)
-        series.append(Series(word, tone, number[good], size[good], "points"))
-    for one in series[:2]:
-        mean = float(np.sqrt(np.mean(one.y**2))) if len(one.y) else float("nan")
+        size = np.asarray(one.distance, dtype=float) * _MM
+        size[~(size > 0)] = np.nan
+        series.append(Series(word, tone, number, size, "points"))
+    for drawn in series[:2]:
+        known = drawn.y[np.isfinite(drawn.y)]
+        mean = float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
         ends = np.array([0.0, len(after.distance) + 1.0])
-        line = Series(f"rms {quantity(mean / _MM, 'm')}", one.tone, ends, np.full(2, mean), "line")
+        text = f"rms {quantity(mean / _MM, 'm')}"
+        line = Series("", drawn.tone, ends, np.full(2, mean), "line", text)
         series.append(line)
     return Figure(
         f"pose-error-{name}",
         title,
         f"{title}: distance of the predicted from the measured position, before and after "
         "calibration.",
-        Axis("number of the pose", limits=(0.0, len(after.distance) + 1.0)),
-        (Panel(Axis("position error", "mm", logarithmic=True), tuple(series)),),
+        Axis("pose", limits=(0.0, len(after.distance) + 1.0)),
+        (Panel(up, tuple(series)),),
         source=source,
+        names=tuple(str(place) for place in after.place),
     )
 
 

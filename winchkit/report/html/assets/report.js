@@ -85,6 +85,7 @@
 
   // Drag to select, double click to reset; a cursor with the values of the nearest sample.
   function listen(figure) {
+    const able = zoomed.includes(figure), part = () => (able ? view : [0, 1]);
     const canvas = figure.querySelector(".canvas"), table = data.figures[figure.dataset.figure];
     const tip = document.createElement("div"), band = document.createElement("div");
     tip.className = "tip";
@@ -100,13 +101,14 @@
     };
     const across = (share, axis, scale) => (axis.left + share * axis.width) * scale;
     canvas.addEventListener("pointerdown", event => {
-      if (event.button || event.pointerType === "touch") return;
+      if (!able || event.button || event.pointerType === "touch") return;
       [start] = shareAt(event);
       canvas.setPointerCapture(event.pointerId);
     });
     canvas.addEventListener("pointermove", event => {
       const [share, axis, scale, svg] = shareAt(event);
-      const value = axis.low + (view[0] + share * (view[1] - view[0])) * (axis.high - axis.low);
+      const [low, high] = part();
+      const value = axis.low + (low + share * (high - low)) * (axis.high - axis.low);
       readout(table, tip, value);
       tip.style.top = `${axis.top * scale}px`;
       const right = share > 0.5;
@@ -127,6 +129,7 @@
     });
     canvas.addEventListener("pointerleave", () => { tip.hidden = band.hidden = true; });
     canvas.addEventListener("pointercancel", () => { start = null; });
+    if (!able) return;
     canvas.addEventListener("dblclick", () => show([0, 1]));
     canvas.tabIndex = 0;
     canvas.setAttribute("aria-label", "Enlarge with + and −, move with the arrow keys, 0 shows the whole time");
@@ -139,7 +142,8 @@
   }
 
   function readout(table, tip, value) {
-    const at = table.words.length ? 1 : 0, x = table.columns[at];
+    const counted = table.head[0] === "pose", at = table.words.length ? 1 : 0;
+    const x = counted ? table.columns[0].map(one => one + 1) : table.columns[at];
     let best = 0;
     for (let n = 1; n < x.length; n++) if (Math.abs(x[n] - value) < Math.abs(x[best] - value)) best = n;
     const lines = table.head.map((name, n) => {
@@ -252,7 +256,8 @@
       if (kind === "png") savePng(figure, `${id}.png`);
     }));
   }
-  zoomed.forEach(listen);
+  const named = figures.filter(figure => data.figures[figure.dataset.figure].head[0] === "pose");
+  [...zoomed, ...named].forEach(listen);
   if (zoomed.length) show(view);
   // What is folded is printed where it holds a figure.
   let opened = [];
