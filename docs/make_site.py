@@ -1,11 +1,14 @@
 """Builds the documentation site: ``python docs/make_site.py``, with the extra ``docs``.
 
-The pages of docs/ and those of the top folder are copied to docs/site/pages, with the links between
-them rewritten; zensical makes docs/site/html of them by docs/zensical.toml. Warnings are errors.
+The pages and notebooks of docs/ and the pages of the top folder are copied to docs/site/pages, with
+the links between them rewritten; zensical makes docs/site/html of them by docs/zensical.toml.
+Warnings are errors.
 """
 
 from __future__ import annotations
 
+import base64
+import json
 import os
 import re
 import shutil
@@ -13,6 +16,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 DOCS = Path(__file__).parent
 ROOT = DOCS.parent
@@ -34,9 +38,12 @@ def sources() -> Iterator[tuple[Path, str]]:
     """Each page and picture, and its place on the site."""
     for path in sorted(DOCS.rglob("*")):
         place = path.relative_to(DOCS)
-        if place.parts[0] in {"site", "changes"} or path.suffix not in {".md", *PICTURES}:
+        if place.parts[0] in {"site", "changes"} or ".ipynb_checkpoints" in place.parts:
             continue
-        yield path, place.as_posix()
+        if path.suffix in {".md", *PICTURES}:
+            yield path, place.as_posix()
+        elif path.suffix == ".ipynb":
+            yield path, place.with_suffix(".md").as_posix()
     for source, place_of_it in OUTSIDE.items():
         yield ROOT / source, place_of_it
 
@@ -51,15 +58,48 @@ def stage(pages: Path) -> list[str]:
         if path.suffix in PICTURES:
             shutil.copy(path, target)
         else:
-            target.write_text(_linked(path, place, places, pages), encoding="utf-8")
+            text = path.read_text(encoding="utf-8")
+            if path.suffix == ".ipynb":
+                text = notebook_page(json.loads(text), target)
+            target.write_text(_linked(text, path, place, places, pages), encoding="utf-8")
     return sorted(place for place in places.values() if place.endswith(".md"))
 
 
-def _linked(page: Path, place: str, places: dict[Path, str], pages: Path) -> str:
+def notebook_page(notebook: dict[str, Any], target: Path) -> str:
+    """A notebook as Markdown: its cells, with texts and pictures that it holds as outputs."""
+    parts = []
+    for cell in notebook["cells"]:
+        source = "".join(cell["source"]).strip()
+        if cell["cell_type"] == "markdown":
+            parts.append(source)
+        elif cell["cell_type"] == "code" and source:
+            parts.append(f"```python\n{source}\n```")
+            parts += [_output(out, target, len(parts)) for out in cell["outputs"]]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _output(output: dict[str, Any], target: Path, number: int) -> str:
+    """One output of a cell; a picture becomes a file beside the page."""
+    data = output.get("data", {})
+    name = f"{target.stem}-{number}"
+    if "image/svg+xml" in data:
+        target.with_name(f"{name}.svg").write_text("".join(data["image/svg+xml"]), encoding="utf-8")
+        return f"![output]({name}.svg)"
+    if "image/png" in data:
+        picture = base64.b64decode("".join(data["image/png"]))
+        target.with_name(f"{name}.png").write_bytes(picture)
+        return f"![output]({name}.png)"
+    text = "".join(output.get("text", data.get("text/plain", ""))).rstrip()
+    return f"```text\n{text}\n```" if text else ""
+
+
+def _linked(text: str, page: Path, place: str, places: dict[Path, str], pages: Path) -> str:
     """Text of a page with links from its place on the site; linked source files are copied."""
 
     def link(match: re.Match[str]) -> str:
         target = (page.parent / match[1]).resolve()
+        if (pages / place).parent.joinpath(match[1]).is_file() and page.suffix == ".ipynb":
+            return match[0]  # the picture of a notebook's output
         if target not in places:
             if target.is_dir():
                 return match[0].replace("](" + match[1], f"]({_relative('index.md', place)}")
@@ -70,7 +110,7 @@ def _linked(page: Path, place: str, places: dict[Path, str], pages: Path) -> str
             return f"]({_relative(places_of_file, place)})"
         return f"]({_relative(places[target], place)}{match[2] or ''})"
 
-    return _LINK.sub(link, page.read_text(encoding="utf-8"))
+    return _LINK.sub(link, text)
 
 
 def _relative(target: str, place: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import runpy
 import subprocess
 import sys
@@ -49,6 +50,30 @@ def test_links_lead_to_the_places_on_the_site(tmp_path: Path) -> None:
     assert "](files/examples/heave.py)" in readme
     assert (tmp_path / "files/examples/heave.py").is_file()
     assert "](../contributing.md)" in (tmp_path / "howto/effect.md").read_text("utf-8")
+
+
+def test_a_notebook_is_a_page_with_its_outputs(tmp_path: Path) -> None:
+    picture = base64.b64encode(b"PNG").decode()
+    cells = [
+        {"cell_type": "markdown", "source": ["# Title\n", "text"]},
+        {
+            "cell_type": "code",
+            "source": ["print(1)\n", "plot()"],
+            "outputs": [
+                {"output_type": "stream", "text": ["1\n"]},
+                {"output_type": "display_data", "data": {"image/png": picture, "text/plain": "x"}},
+                {"output_type": "execute_result", "data": {"text/plain": ["Run(…)"]}},
+            ],
+        },
+        {"cell_type": "code", "source": [], "outputs": []},
+    ]
+    page = made["notebook_page"]({"cells": cells}, tmp_path / "one.md")
+    (file,) = tmp_path.glob("one-*.png")
+    assert file.read_bytes() == b"PNG"
+    assert page == (
+        "# Title\ntext\n\n```python\nprint(1)\nplot()\n```\n\n```text\n1\n```\n\n"
+        f"![output]({file.name})\n\n```text\nRun(…)\n```\n"
+    )
 
 
 @pytest.mark.slow
