@@ -18,7 +18,8 @@ from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.residuals.traces import PoseTrace
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.errors import UsageError
-from winchkit.schema.read import read_profile
+from winchkit.schema.profiles.axis import AxisProfile
+from winchkit.schema.read import read_profile, read_robot
 
 mpl = pytest.importorskip("matplotlib")
 
@@ -132,6 +133,26 @@ def test_errors_of_a_robot_are_drawn_by_pose() -> None:
     assert second.get_ydata()[0] == pytest.approx(-2.0)
     assert axis.get_ylabel() == "Cable length:\nresidual [mm]"
     assert len(result.to_arrow()) == 4
+
+
+def test_a_winch_and_a_robot_are_drawn_from_their_profiles() -> None:
+    """A spiral drum gains the layer growth per turn: its arm falls as the cable is paid out."""
+    profile = read_profile(find("profiles", "bench-spiral"))
+    turns, arm = profile.plot().axes
+    lengths, values = arm.lines[0].get_data()
+    assert (lengths[0], lengths[-1]) == (0.0, profile.reference.cable_length)
+    wound = profile.reference.wound_turns
+    assert values[-1] == pytest.approx(60.0 + 0.08 * wound, abs=0.05)
+    # Stepwise, by a layer per drum turn.
+    drum_turns = np.ptp(turns.lines[0].get_ydata()) / profile.gearbox.ratio
+    assert values[0] - values[-1] == pytest.approx(0.08 * drum_turns, abs=0.081)
+    (space,) = read_robot(find("profiles", "cabtive")).plot().axes
+    x, y, z = (
+        line for line in space.lines if line.get_label() == "exit points"
+    ).__next__().get_data_3d()
+    assert (x[0], y[0], z[0]) == pytest.approx((0.8611, 1.0583, 1.0971))
+    with pytest.raises(UsageError, match="no cable to draw"):
+        AxisProfile("joint").plot()
 
 
 @pytest.mark.parametrize(

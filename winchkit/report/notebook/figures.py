@@ -1,12 +1,8 @@
-"""Figures of results by matplotlib: vector graphics with a unit on every axis.
-
-Colours are those of Okabe and Ito, which readers with colour-vision deficiencies distinguish.
-"""
+"""Figures of runs and results by matplotlib, with a unit on every axis."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +13,7 @@ from winchkit.diagnosis.residuals.traces import PoseTrace, Trace
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.errors import UsageError, suggest
 from winchkit.report.figures.reduction import decimated
+from winchkit.report.notebook.style import BLACK, BLUE, GREY, ORANGE, WIDTH, Size, new_figure
 from winchkit.report.words.numbers import Scale, scale_for
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
@@ -30,34 +27,12 @@ if TYPE_CHECKING:
 
 __all__ = ["answer_figure", "calibration_figure", "result_figure", "run_figure"]
 
-_BLACK, _BLUE, _ORANGE, _GREY = "#333333", "#0072B2", "#D55E00", "#999999"
-_STYLE: dict[Any, Any] = {
-    "font.size": 8,
-    "axes.labelsize": 8,
-    "axes.titlesize": 8,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.6,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "lines.linewidth": 0.9,
-    "legend.frameon": False,
-    "savefig.dpi": 300,
-    "figure.dpi": 120,
-    "axes.formatter.use_mathtext": True,
-    "svg.fonttype": "none",
-    "pdf.fonttype": 42,
-}
-_WIDTH = 7.1
-"""Width of two columns of a journal, inches."""
 _OUTPUT_HEIGHT, _CHANNEL_HEIGHT, _POSE_HEIGHT = 2.5, 1.15, 2.0
 _POINTS = 4000
 _NAMED_RUNS = 8
 _CHANNELS = 8
 _GAP = 0.02
 """Gap between runs that follow each other, as a share of the whole time."""
-
-Size = tuple[float, float] | None
 
 
 def result_figure(
@@ -89,7 +64,7 @@ def result_figure(
         return _pose_figure([t for t in traces if isinstance(t, PoseTrace)], noise, figsize)
     own = [trace for trace in traces if isinstance(trace, Trace)]
     outputs = list(dict.fromkeys(trace.output for trace in own))
-    with _figure(figsize or (_WIDTH, _OUTPUT_HEIGHT * len(outputs) + 0.3)) as figure:
+    with new_figure(figsize or (WIDTH, _OUTPUT_HEIGHT * len(outputs) + 0.3)) as figure:
         # The width of the letters of the labels differs; their axes begin at one place.
         grid = figure.subplots(
             2 * len(outputs), 1, sharex=True, height_ratios=[1.6, 1.0] * len(outputs), squeeze=False
@@ -135,13 +110,13 @@ def run_figure(
     names = there[:_CHANNELS] if channels is None else _known(channels, list(run), "channel")
     if not names:
         raise UsageError(f"run {run.name} has no channel with numbers to draw")
-    with _figure(figsize or (_WIDTH, _CHANNEL_HEIGHT * len(names) + 0.4)) as figure:
+    with new_figure(figsize or (WIDTH, _CHANNEL_HEIGHT * len(names) + 0.4)) as figure:
         axes = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
         for axis, name in zip(axes, names, strict=True):
             rows = decimated([run[name]], _POINTS // 2)
             time, values = run.time[rows], run[name][rows]
             scale = _scale([values], run.channels[name].unit)
-            axis.plot(time, values / scale.worth, color=_BLUE)
+            axis.plot(time, values / scale.worth, color=BLUE)
             axis.set_ylabel(_label(name.replace("_", " "), scale, broken=True))
         axes[0].set_title(run.name, loc="left")
         axes[-1].set_xlabel("time [s]")
@@ -173,7 +148,7 @@ def calibration_figure(found: Calibrated, *, figsize: Size = None) -> Figure:
     rows = [row for row in rows if any(np.isfinite(getattr(s[2], row[2])).any() for s in sides)]
     if not sides:
         raise UsageError("no position was measured: there are no pose errors to draw")
-    with _figure(figsize or (_WIDTH, 2.3 * len(rows) + 0.2)) as figure:
+    with new_figure(figsize or (WIDTH, 2.3 * len(rows) + 0.2)) as figure:
         widths = [max(3.0, np.sqrt(len(side[1].distance))) for side in sides]
         axes = figure.subplots(
             len(rows), len(sides), sharey="row", width_ratios=widths, squeeze=False
@@ -182,7 +157,7 @@ def calibration_figure(found: Calibrated, *, figsize: Size = None) -> Figure:
             scale = _scale([getattr(s[k], field) for s in sides for k in (1, 2)], unit)
             for column, (title, *errors) in enumerate(sides):
                 axis = axes[row, column]
-                for error, color, word in zip(errors, (_ORANGE, _BLUE), _BEFORE_AFTER, strict=True):
+                for error, color, word in zip(errors, (ORANGE, BLUE), _BEFORE_AFTER, strict=True):
                     values = getattr(error, field) / scale.worth
                     _draw_sizes(axis, values, color, word)
                 if row == 0:
@@ -215,20 +190,20 @@ def _pose_figure(
     traces: Sequence[PoseTrace], noise: Mapping[str, float | None], figsize: Size
 ) -> Figure:
     """Errors of every output at every pose, all lines or axes, with the noise band."""
-    with _figure(figsize or (_WIDTH, _POSE_HEIGHT * len(traces) + 0.3)) as figure:
+    with new_figure(figsize or (WIDTH, _POSE_HEIGHT * len(traces) + 0.3)) as figure:
         axes = figure.subplots(len(traces), 1, sharex=True, squeeze=False)[:, 0]
         for axis, trace in zip(axes, traces, strict=True):
             before = trace.residual_before
             parts = [trace.residual] if before is None else [before, trace.residual]
             scale = _scale(parts, trace.unit)
             _band(axis, noise.get(trace.output), scale)
-            tones = [_BLUE] if before is None else [_ORANGE, _BLUE]
+            tones = [BLUE] if before is None else [ORANGE, BLUE]
             words = ["profile"] if before is None else ["profile", "with the named effects"]
             number = np.arange(1, len(trace.residual) + 1)
             for part, color, word in zip(parts, tones, words, strict=True):
                 lines = axis.plot(number, part / scale.worth, ".", ms=2.5, color=color)
                 lines[0].set_label(word)
-            axis.axhline(0.0, color=_BLACK, lw=0.5)
+            axis.axhline(0.0, color=BLACK, lw=0.5)
             axis.set_ylabel(_label(f"{_name(trace.output)}:\nresidual", scale))
         axes[-1].set_xlabel("number of the pose")
         _legend(figure, axes[0])
@@ -249,11 +224,11 @@ def _draw_output(upper: Axes, lower: Axes, traces: Sequence[Trace], noise: float
     after = "with the named effects" if named else "predicted"
     for trace, start in zip(traces, starts, strict=True):
         lines = [
-            (upper, trace.measured, scale, _BLACK, "measured", 1.4),
-            (upper, trace.before, scale, _ORANGE, "predicted by the profile", 0.9),
-            (upper, trace.predicted, scale, _BLUE, after, 0.9),
-            (lower, trace.residual_before, fine, _ORANGE, "", 0.7),
-            (lower, trace.residual, fine, _BLUE, "", 0.7),
+            (upper, trace.measured, scale, BLACK, "measured", 1.4),
+            (upper, trace.before, scale, ORANGE, "predicted by the profile", 0.9),
+            (upper, trace.predicted, scale, BLUE, after, 0.9),
+            (lower, trace.residual_before, fine, ORANGE, "", 0.7),
+            (lower, trace.residual, fine, BLUE, "", 0.7),
         ]
         for axis, values, own, color, word, width in lines:
             if values is not None:
@@ -264,8 +239,8 @@ def _draw_output(upper: Axes, lower: Axes, traces: Sequence[Trace], noise: float
                 axis.plot(start + time, shown / own.worth, color=color, lw=width, label=label)
     for axis in (upper, lower):
         for start in starts[1:]:
-            axis.axvline(start, color=_GREY, lw=0.4, ls=":")
-    lower.axhline(0.0, color=_BLACK, lw=0.5)
+            axis.axvline(start, color=GREY, lw=0.4, ls=":")
+    lower.axhline(0.0, color=BLACK, lw=0.5)
     upper.set_ylabel(_label(_name(traces[0].output), scale, broken=True))
     lower.set_ylabel(_label("residual", fine, broken=True))
 
@@ -290,14 +265,14 @@ def _name_runs(axis: Axes, traces: Sequence[Trace]) -> None:
             textcoords="offset points",
             va="bottom",
             fontsize=7,
-            color=_GREY,
+            color=GREY,
         )
 
 
 def _band(axis: Axes, noise: float | None, scale: Scale) -> None:
     if noise is not None and np.isfinite(noise):
         size = noise / scale.worth
-        axis.axhspan(-size, size, color=_GREY, alpha=0.3, lw=0, label="noise, ± rms")
+        axis.axhspan(-size, size, color=GREY, alpha=0.3, lw=0, label="noise, ± rms")
 
 
 def _legend(figure: Figure, *axes: Axes) -> None:
@@ -354,24 +329,3 @@ def _known(given: str | Sequence[str], there: list[str], kind: str) -> list[str]
             known = f"there are {', '.join(there)}" if there else f"there is no {kind}"
             raise UsageError(f"no {kind} '{name}' to draw; {known}" + suggest(name, there))
     return names
-
-
-@contextmanager
-def _figure(size: tuple[float, float]) -> Iterator[Figure]:
-    """An empty figure in the style of this package; of pyplot where that shows windows."""
-    try:
-        import matplotlib as mpl
-        from matplotlib import pyplot
-        from matplotlib.backends.registry import BackendFilter, backend_registry
-        from matplotlib.figure import Figure
-    except ImportError:
-        raise UsageError(
-            "figures need matplotlib; install it with pip install 'winchkit[plot]'"
-        ) from None
-    with mpl.rc_context(_STYLE):
-        registry: Any = backend_registry
-        windows = registry.list_builtin(BackendFilter.INTERACTIVE)
-        # A notebook shows the returned figure: one of pyplot would be shown twice.
-        shown = pyplot.get_backend().lower() in windows
-        new = pyplot.figure if shown else Figure
-        yield new(figsize=size, layout="constrained")

@@ -10,6 +10,7 @@ from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
 from winchkit.rendering import Renderer, renderers
 from winchkit.report.notebook import figures, html, text
+from winchkit.report.notebook.profile_figures import robot_figure, winch_figure
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
@@ -18,8 +19,8 @@ __all__: list[str] = []
 
 for _kind, _renderer in (
     (Run, Renderer(text.run_screen, html.run_cell, figures.run_figure)),
-    (WinchProfile, Renderer(text.profile_screen, html.profile_cell)),
-    (RobotProfile, Renderer(text.profile_screen, html.profile_cell)),
+    (WinchProfile, Renderer(text.profile_screen, html.profile_cell, winch_figure)),
+    (RobotProfile, Renderer(text.profile_screen, html.profile_cell, robot_figure)),
     (Comparison, Renderer(text.comparison_screen, html.comparison_cell, figures.result_figure)),
     (Diagnosis, Renderer(text.diagnosis_screen, html.diagnosis_cell, figures.result_figure)),
     (Answer, Renderer(text.answer_screen, html.answer_cell, figures.answer_figure)),

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
-from winchkit.rendering import Shown
+from winchkit.rendering import Plotted
 from winchkit.schema.profiles.instruments import InstrumentSpec
 from winchkit.schema.profiles.winch import EffectTable, LedgerEntry, WinchProfile
 from winchkit.schema.quantity import (
@@ -101,7 +101,7 @@ class FittedSpec(Table):
 
 
 @dataclass(frozen=True, repr=False)
-class RobotProfile(Shown, Table):
+class RobotProfile(Plotted, Table):
     """A cable robot as declared; frozen, SI."""
 
     name: str

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import Annotated, Any, Literal
 
-from winchkit.rendering import Shown
+from winchkit.rendering import Plotted
 from winchkit.schema.quantity import (
     Angle,
     Count,
@@ -192,7 +192,7 @@ class EffectTable:
 
 
 @dataclass(frozen=True, repr=False)
-class WinchProfile(Shown, Table):
+class WinchProfile(Plotted, Table):
     """A winch as declared; frozen, SI."""
 
     name: str
