@@ -54,6 +54,7 @@ _NOISE_DIMENSIONS = {
 @click.option("--loss", type=click.Choice(_LOSSES), default="least-squares", show_default=True)
 @click.option("--middle-force", metavar="FORCE", help="Cable force kept near, where not measured.")
 @click.option("--next", "following", type=click.IntRange(0), default=0, help="Poses to propose.")
+@click.option("--fit-report", is_flag=True, help="Print the report of the fit too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 @html_option
 @figures_option
@@ -67,6 +68,7 @@ def command(
     loss: str,
     middle_force: str | None,
     following: int,
+    fit_report: bool,
     as_json: bool,
     html: str | None,
     figures: str | None,
@@ -89,6 +91,8 @@ def command(
     if not found.refusal:
         _write(source, found, Path(output), runs)
     _tell(found, ahead, as_json)
+    if fit_report and not as_json:
+        click.echo(f"\n{found.fit_report()}")
     if html:
         from winchkit.report.pages.robot_calibration import calibration_html
 

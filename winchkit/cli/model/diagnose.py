@@ -45,6 +45,7 @@ __all__ = ["command"]
 @click.option(
     "--as-recorded", is_flag=True, help="Look for effects although a sign or unit looks wrong."
 )
+@click.option("--fit-report", is_flag=True, help="Print the report of the fit too.")
 @json_option
 @html_option
 @figures_option
@@ -54,6 +55,7 @@ def command(
     asked: Asked,
     every_sample: bool,
     as_recorded: bool,
+    fit_report: bool,
     as_json: bool,
     html: str | None,
     figures: str | None,
@@ -213,4 +215,7 @@ def _said(answer: Answer, as_json: bool) -> Any:
         return report_json(answer)
     from winchkit.report.text import report_text
 
-    return report_text(answer)
+    text = report_text(answer)
+    # An option of the command, read here instead of being handed through every kind of answer.
+    with_fit = click.get_current_context().params["fit_report"]
+    return f"{text}\n\n{answer.fit_report()}" if with_fit else text
