@@ -112,6 +112,11 @@ class _Main(LazyGroup):
     cls=_Main,
     table=COMMANDS,
     sections=SECTIONS,
+    examples=(
+        "winchkit demo",
+        "winchkit sim record demo-elastic-rope programme-demo",
+        "winchkit diagnose demo-*.csv -p bench-spiral",
+    ),
     context_settings={
         "auto_envvar_prefix": "WINCHKIT",
         "help_option_names": ["-h", "--help"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -16,6 +17,7 @@ from winchkit.schema.mapping import ImportMapping
 __all__ = ["SUFFIXES", "read_log", "read_run"]
 
 SUFFIXES = (".csv", ".mcap")
+_LOGGER = logging.getLogger(__name__)
 
 
 def read_run(path: str | Path, mapping: str | Path | ImportMapping | None = None) -> Run:
@@ -47,7 +49,9 @@ def read_run(path: str | Path, mapping: str | Path | ImportMapping | None = None
         return read_mapped(path, mapping)
     _format_of(path)
     files = _files(path)
-    return _read_run(files[0]) if len(files) == 1 else aligned(read_log(files))
+    run = _read_run(files[0]) if len(files) == 1 else aligned(read_log(files))
+    _LOGGER.info("read %s: run of %d rows, channels %s", path, len(run), ", ".join(run))
+    return run
 
 
 def read_log(paths: str | Path | Sequence[str | Path]) -> Log:
@@ -72,6 +76,7 @@ def read_log(paths: str | Path | Sequence[str | Path]) -> Log:
     files = [file for path in given for file in _files(path)]
     if len(files) > 1 and not _has_begun(files[-1]):
         files.pop()
+    _LOGGER.info("read %s: log", ", ".join(map(str, files)))
     return joined([_read_log(file, is_part=len(files) > 1) for file in files])
 
 

@@ -7,14 +7,21 @@ import sys
 
 import click
 
-from winchkit.cli.core.options import complete_bench
+from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.options import bench_argument
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
 
 
-@click.command()
-@click.argument("bench", shell_complete=complete_bench)
+@click.command(
+    cls=Command,
+    examples=(
+        Example("winchkit commission bench.toml", "asks somebody beside the winch"),
+        Example("winchkit commission --answers answers.toml", "asks somebody beside the winch"),
+    ),
+)
+@bench_argument
 @click.option(
     "--answers",
     metavar="FILE",

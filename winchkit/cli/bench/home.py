@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import click
 
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -22,7 +23,13 @@ __all__ = ["command"]
 _POLL = 0.02
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit home A --here '2.5 m'",
+        "winchkit home A --method 34 --at '2.4 m' --dry-run",
+    ),
+)
 @winch_argument
 @bench_option
 @click.option("--here", metavar="LENGTH", help="The present cable length; nothing moves.")

@@ -16,6 +16,7 @@ from winchkit.cli.bench.direction_option import (
     magnitude,
     read_direction,
 )
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -38,7 +39,13 @@ _SPEED = "0.05 m/s"
 _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit jog A --pay-out 0.1m/s --for 0.5s",
+        "winchkit jog A --wind-in 50mm -b bench.toml --dry-run",
+    ),
+)
 @winch_argument
 @bench_option
 @direction_options("SPEED|LENGTH")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.bench.remote.interruption import Terminated
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import cell
@@ -22,7 +23,13 @@ if TYPE_CHECKING:
 __all__ = ["command", "status_table"]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit monitor --for 10s",
+        "winchkit monitor -b bench.toml --for 1s --json",
+    ),
+)
 @bench_option
 @click.option("--period", default="0.2 s", show_default=True, help="Between two pictures.")
 @click.option("--for", "duration", metavar="TIME", help="End after this time.")

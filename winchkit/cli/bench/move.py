@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.bench.direction_option import direction_options, read_direction
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -27,7 +28,13 @@ __all__ = ["command"]
 _POLL = 0.05
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit move A --to '3.9 m' --speed '0.2 m/s'",
+        "winchkit move all --pay-out 50mm -b bench.toml",
+    ),
+)
 @winch_argument
 @bench_option
 @click.option("--to", metavar="LENGTH", help="Cable length to go to.")

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import click
 
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option, dry_run_option
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit reset",
+        "winchkit reset -b bench.toml --json",
+    ),
+)
 @bench_option
 @dry_run_option
 @click.option(

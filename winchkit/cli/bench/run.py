@@ -9,11 +9,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import (
+    PROGRAMME,
     bench_option,
-    complete_programme,
     dry_run_option,
     effects_option,
+    output_option,
 )
 from winchkit.cli.core.output import echo_json
 
@@ -25,16 +28,22 @@ __all__ = ["command"]
 _POLL = 0.05
 
 
-@click.command()
-@click.argument("programme", shell_complete=complete_programme)
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit run short.toml -b bench.toml -o runs",
+        "winchkit run programme-demo --dry-run",
+    ),
+)
+@click.argument("programme", type=PROGRAMME)
 @bench_option
-@click.option(
-    "-o",
+@output_option(
+    "Folder for the runs.",
+    "DIR",
     "--out",
     default=".",
     show_default=True,
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the runs.",
 )
 @click.option(
     "--format", "suffix", default="csv", show_default=True, type=click.Choice(["csv", "mcap"])
@@ -53,7 +62,7 @@ def command(
     programme: str,
     *,
     bench: str,
-    out: Path,
+    output: Path,
     suffix: str,
     yes: bool,
     replace: bool,
@@ -65,7 +74,7 @@ def command(
 
     Ctrl-C, a trip or a fault stops the winches; what was logged until then is kept.
     """
-    from winchkit.schema.read import read_programme
+    from winchkit.schema.read import read_bench, read_programme
     from winchkit.sim.bench import programme_path
 
     declared = read_programme(programme_path(programme))
@@ -73,14 +82,18 @@ def command(
         _rehearse(bench, declared, effects, as_json=as_json)
         return
     if not replace:
-        _refuse_to_lose(declared, out, f".{suffix}")
+        _refuse_to_lose(declared, output, f".{suffix}")
     ask = partial(_agree, bench) if yes else _ask
-    written = _execute(bench, effects, declared, out, f".{suffix}", ask, replace=replace)
+    written = _execute(bench, effects, declared, output, f".{suffix}", ask, replace=replace)
     if as_json:
         echo_json({"schema": 1, "programme": declared.name, "runs": written})
     else:
         for path in written:
             click.echo(path)
+    winches = read_bench(bench).winch
+    words = ["-p", next(iter(winches.values())).profile]
+    words += ["--winch", "all"] if len(winches) > 1 else []
+    suggest_next("compare", sorted(map(str, written)), *words)
 
 
 def _execute(
@@ -100,7 +113,7 @@ def _execute(
 
     def tell(repeat: int, number: int, step: Step) -> None:
         place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
-        click.echo(f"{place}: {_words(step)}", err=True)
+        note(f"{place}: {_words(step)}")
 
     name = client_name("run")
     with open_bench(bench, effects=effects, name=name, realtime="try") as opened:
@@ -116,7 +129,7 @@ def _refuse_to_lose(programme: Programme, out: Path, suffix: str) -> None:
     if held := earlier_runs(programme, out, suffix):
         raise click.UsageError(
             f"{held[0]} holds an earlier run of '{programme.name}'; "
-            "name another folder with --out, or --replace."
+            "name another folder with -o, or --replace."
         )
 
 

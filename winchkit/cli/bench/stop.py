@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option, dry_run_option
 from winchkit.cli.core.output import echo_json
 from winchkit.errors import ConnectionLost, MotionError, WinchkitError
@@ -22,7 +23,13 @@ _PATIENCE = 3.0
 _BY_OWNER = "the bench's owner confirms it at rest"
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit stop",
+        "winchkit stop -b bench.toml --dry-run",
+    ),
+)
 @bench_option
 @dry_run_option
 @click.option("--json", "as_json", is_flag=True, help="Print who has confirmed as JSON.")

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.options import bench_option
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.options import bench_option, winch_argument
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
 
 
-@click.command()
-@click.argument("winch", required=False)
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit tare",
+        "winchkit tare A -b bench.toml --json",
+    ),
+)
+@winch_argument
 @bench_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def command(winch: str | None, bench: str, as_json: bool) -> None:

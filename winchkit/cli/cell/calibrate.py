@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from winchkit.cli.core.options import bench_by_default, complete_bench, complete_winch
+from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import TABLE, bench_by_default, complete_bench, complete_winch
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.model.options import figures_option, write_figures, write_page
 
@@ -32,7 +34,16 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     return bench_by_default(ctx, param, value)
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit cell calibrate --points points.csv -o cell-4711.toml -y",
+        Example(
+            "winchkit cell calibrate A --weights '0 5 10 20 kg' --html report.html",
+            "asks somebody to hang weights",
+        ),
+    ),
+)
 @click.argument("cell", required=False, shell_complete=complete_winch, is_eager=True)
 @click.option(
     "-b",
@@ -45,7 +56,11 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
 @click.option("--weights", help='Weights in rising order, e.g. "0 2 5 10 15 20 kg"; or N.')
 @click.option("--series", default=3, show_default=True, help="Times up and down.")
 @click.option(
-    "--points", metavar="CSV", is_eager=True, help="Fit these points instead of measuring."
+    "--points",
+    metavar="CSV",
+    is_eager=True,
+    type=TABLE,
+    help="Fit these points instead of measuring.",
 )
 @click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
 @click.option("--for", "duration", default="3 s", show_default=True, help="Averaged per weight.")
@@ -63,7 +78,7 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
 )
 @click.option("--html", metavar="FILE", help="Also write the report as one page.")
 @figures_option
-@click.option("--yes", is_flag=True, help="Accept the fit without asking.")
+@click.option("-y", "--yes", is_flag=True, help="Accept the fit without asking.")
 @click.option("--json", "as_json", is_flag=True, help="Print the fit as JSON.")
 def command(
     cell: str | None,
@@ -109,12 +124,13 @@ def command(
     if not yes:
         click.confirm(f"Accept, and write {target}?", abort=True, err=True)
     write_text(target, calibration_toml(calibration))
-    click.echo(f"written: {target}", err=True)
+    note(f"written: {target}")
     if as_json:
         echo_json(
             {"schema": 1, "file": str(target), "fit": fit, "points": found.points}
             | {"diagnosis": needed}
         )
+    suggest_next("check", str(target))
 
 
 @dataclass(frozen=True)

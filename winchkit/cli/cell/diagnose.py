@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NoReturn
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
@@ -30,7 +31,13 @@ _MEANINGS = {
 }
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit cell diagnose",
+        "winchkit cell diagnose A --for 2s --json",
+    ),
+)
 @cell_options
 @click.option("--for", "duration", default="10 s", show_default=True, help="Watched for this.")
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:

@@ -19,7 +19,14 @@ COMMANDS = {
 }
 
 
-@click.group(cls=LazyGroup, table=COMMANDS)
+@click.group(
+    cls=LazyGroup,
+    table=COMMANDS,
+    examples=(
+        "winchkit cell info",
+        "winchkit cell diagnose --for 2s",
+    ),
+)
 def command() -> None:
     """Load cells: zero, tare and calibration are three things, and none touches another.
 

@@ -7,12 +7,19 @@ from typing import Any
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit cell info",
+        "winchkit cell info A -b bench.toml --json",
+    ),
+)
 @cell_options
 def command(cell: str | None, bench: str, *, as_json: bool) -> None:
     """Print device file, serial number, calibration, tare, a reading with its times, counters."""

@@ -7,12 +7,19 @@ from typing import Any
 import click
 
 from winchkit.cli.cell.options import cell_options, cells
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit cell rate",
+        "winchkit cell rate A --for 1s",
+    ),
+)
 @cell_options
 @click.option("--for", "duration", default="3 s", show_default=True, help="Measured for this.")
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:

@@ -5,15 +5,23 @@ from __future__ import annotations
 import click
 
 from winchkit.cli.cell.options import cell_options, cells
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.options import yes_option
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit cell store A -y --command 'store'",
+        "winchkit cell store A -b bench.toml -y --json",
+    ),
+)
 @cell_options
 @click.option("--command", "name", default="store", show_default=True, help="Of the device file.")
-@click.option("--yes", is_flag=True, help="Do not ask.")
+@yes_option
 def command(cell: str | None, bench: str, name: str, *, yes: bool, as_json: bool) -> None:
     """Send CELL a command that writes its EEPROM, such as its own store, or a lasting zero.
 

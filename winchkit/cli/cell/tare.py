@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
@@ -20,7 +21,13 @@ _TASKS = {
 """By --clear and --device."""
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit cell tare",
+        "winchkit cell tare A --clear",
+    ),
+)
 @cell_options
 @click.option("--for", "duration", default="1 s", show_default=True, help="Averaged over this.")
 @click.option("--clear", is_flag=True, help="Take the tare away: the host's, or with --device its.")

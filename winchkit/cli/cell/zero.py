@@ -5,12 +5,19 @@ from __future__ import annotations
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit cell zero",
+        "winchkit cell zero A -b bench.toml --for 2s",
+    ),
+)
 @cell_options
 @click.option("--for", "duration", default="1 s", show_default=True, help="Averaged over this.")
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:

@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import click
 from click.shell_completion import CompletionItem
 
+from winchkit.cli.core.command import Group
 from winchkit.units import suggest
 
 __all__ = ["At", "LazyGroup"]
 
 
 _PROGRAM = "WINCHKIT"
-_SHARED = ("bench", "profile")
+_SHARED = ("bench", "profile", "quiet", "verbose")
 """Options with one further variable for all commands, such as WINCHKIT_BENCH."""
 
 
@@ -29,7 +30,7 @@ class At(NamedTuple):
     """Of the click command within the module."""
 
 
-class LazyGroup(click.Group):
+class LazyGroup(Group):
     """A group whose commands stand in a table until one of them is called."""
 
     def __init__(

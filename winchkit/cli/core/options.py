@@ -1,122 +1,77 @@
-"""Options that say which bench, or which CAN bus, a command is about."""
+"""Options and arguments that several commands have: bench, bus, profile, runs, effects."""
 
 from __future__ import annotations
 
-import re
-import tomllib
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.shell_completion import CompletionItem
 
+from winchkit.cli.core.completion import (
+    complete_bench,
+    complete_device,
+    complete_file,
+    complete_profile,
+    complete_programme,
+    complete_run,
+    complete_sim_bench,
+    complete_winch,
+    files_of_kind,
+)
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.standard_input import Readable
 from winchkit.errors import UsageError
-from winchkit.regular_file import regular
 
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
 
 __all__ = [
+    "BENCH",
     "BENCH_VARIABLE",
+    "LETTERS",
+    "PROFILE",
+    "PROGRAMME",
+    "RUN",
+    "SIM_BENCH",
+    "TABLE",
     "BusChoice",
+    "bench_argument",
     "bench_by_default",
     "bench_option",
     "bus_options",
     "complete_bench",
     "complete_device",
-    "complete_programme",
     "complete_winch",
     "dry_run_option",
     "effects_option",
+    "output_option",
     "take_over_option",
     "winch_argument",
+    "yes_option",
 ]
 
-_KIND = re.compile(r'^kind\s*=\s*"([\w-]+)"', re.MULTILINE)
 BENCH_VARIABLE = "WINCHKIT_BENCH"
-_HEAD = 2000
-"""Characters of a file in which its kind stands."""
+_BITRATE = 1_000_000
+LETTERS = {
+    "b": "bench",
+    "c": "column",
+    "h": "help",
+    "o": "output",
+    "p": "profile",
+    "q": "quiet",
+    "v": "verbose",
+    "y": "yes",
+}
+"""The one option of every letter, in all commands."""
 
-
-def complete_bench(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Bench files, and folders that may hold some."""
-    return _files(typed, ("bench",))
-
-
-def complete_programme(
-    ctx: click.Context, _param: click.Parameter, typed: str
-) -> list[CompletionItem]:
-    """Programmes in files, and those that are shipped, by name."""
-    from winchkit import catalog
-
-    shipped = [path.stem for path in catalog.folder("sim").glob("programme-*.toml")]
-    return _names(shipped, typed) + _files(typed, ("programme",))
-
-
-def complete_device(
-    ctx: click.Context, _param: click.Parameter, typed: str
-) -> list[CompletionItem]:
-    """Shipped devices."""
-    from winchkit import catalog
-
-    return _names(catalog.names("devices"), typed)
-
-
-def complete_winch(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Winches of the bench file that stands on the line already, or in the environment."""
-    bench = ctx.params.get("bench") or _from_environment(ctx)
-    if not bench:
-        return []
-    try:
-        with open(bench, "rb", opener=regular) as file:
-            winches = tomllib.load(file).get("winch", {})
-    except (OSError, tomllib.TOMLDecodeError):
-        return []
-    return _names(winches if isinstance(winches, dict) else (), typed)
-
-
-def _from_environment(ctx: click.Context) -> str | None:
-    for option in ctx.command.params:
-        if option.name == "bench":
-            value = option.value_from_envvar(ctx)
-            return value if isinstance(value, str) else None
-    return None
-
-
-def _names(known: Iterable[str], typed: str) -> list[CompletionItem]:
-    return [CompletionItem(name) for name in sorted(known) if name.startswith(typed)]
-
-
-def _files(typed: str, kinds: tuple[str, ...]) -> list[CompletionItem]:
-    """TOML files of these kinds, and folders, that begin with what is typed."""
-    folder, _, name = typed.rpartition("/")
-    lead = f"{folder}/" if "/" in typed else ""
-    try:
-        here = sorted((Path(lead) if lead else Path()).iterdir())
-    except OSError:
-        return []
-    found = [path for path in here if path.name.startswith(name) and not path.name.startswith(".")]
-    folders = [CompletionItem(f"{lead}{path.name}/") for path in found if path.is_dir()]
-    files = [
-        CompletionItem(f"{lead}{path.name}")
-        for path in found
-        if path.suffix == ".toml" and path.is_file() and _kind(path) in kinds
-    ]
-    return files + folders
-
-
-def _kind(path: Path) -> str:
-    """Kind of a declaration by its first lines; empty where it has none."""
-    try:
-        with open(path, encoding="utf-8", errors="replace", opener=regular) as file:
-            found = _KIND.search(file.read(_HEAD))
-    except OSError:
-        return ""
-    return found[1] if found else ""
-
-
+RUN = Readable("run", complete_run)
+PROFILE = Readable("profile", complete_profile)
+PROGRAMME = Readable("programme", complete_programme)
+BENCH = Readable("bench file", complete_bench)
+SIM_BENCH = Readable("simulated bench", complete_sim_bench)
+TABLE = Readable("file", complete_file)
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
@@ -128,12 +83,20 @@ def bench_by_default(ctx: click.Context, _param: click.Parameter, value: str | N
     """
     if value is not None or ctx.resilient_parsing:
         return value
-    here = [str(path) for path in sorted(Path().glob("*.toml")) if _kind(path) == "bench"]
-    if len(here) == 1:
-        click.echo(f"bench: {here[0]}", err=True)
-        return here[0]
+    if (only := _only_bench()) is not None:
+        return only
+    here = [str(path) for path in files_of_kind(Path(), ("bench",))]
     found = f"this folder has {', '.join(here)}" if here else "this folder has no bench file"
     raise UsageError(f"which bench? {found}; give --bench FILE, or set {BENCH_VARIABLE}")
+
+
+def _only_bench() -> str | None:
+    """The one bench file of this folder, reported; None for none and for several."""
+    here = files_of_kind(Path(), ("bench",))
+    if len(here) != 1:
+        return None
+    note(f"bench: {here[0]}")
+    return str(here[0])
 
 
 bench_option: Decorator = click.option(
@@ -149,7 +112,16 @@ effects_option: Decorator = click.option(
     "effects",
     multiple=True,
     metavar="FILE",
+    shell_complete=complete_file,
     help="Python file with effects of your own that a profile has; may be given several times.",
+)
+bench_argument: Decorator = click.argument(
+    "bench",
+    required=False,
+    metavar="[BENCH]",
+    envvar=BENCH_VARIABLE,
+    shell_complete=complete_bench,
+    callback=bench_by_default,
 )
 winch_argument: Decorator = click.argument("winch", required=False, shell_complete=complete_winch)
 take_over_option: Decorator = click.option(
@@ -157,9 +129,15 @@ take_over_option: Decorator = click.option(
     is_flag=True,
     help="Command the winch even where another client does; its motion ends by a ramp.",
 )
+yes_option: Decorator = click.option("-y", "--yes", is_flag=True, help="Do not ask.")
 dry_run_option: Decorator = click.option(
     "--dry-run", is_flag=True, help="Print the frames that it would send; send nothing."
 )
+
+
+def output_option(help: str, metavar: str = "FILE", *names: str, **more: Any) -> Decorator:
+    """The option ``-o``: where a command writes; ``names`` are further spellings of it."""
+    return click.option("-o", "--output", *names, metavar=metavar, help=help, **more)
 
 
 @dataclass(frozen=True)
@@ -172,6 +150,15 @@ class BusChoice:
     bitrate: int
     port: int | None
 
+    @property
+    def words(self) -> tuple[str, ...]:
+        """The options as they were given, to repeat them."""
+        out: list[str] = []
+        for name, value in vars(self).items():
+            if value is not None and (name != "bitrate" or value != _BITRATE):
+                out += [f"--{name}", str(value)]
+        return tuple(out)
+
     def spec(self) -> BenchSpec:
         """The wiring; raises UsageError where neither or both are given, FileError."""
         if self.bench is not None:
@@ -180,6 +167,8 @@ class BusChoice:
             from winchkit.schema.read import read_bench
 
             return read_bench(self.bench)
+        if not self.interface and not self.channel and (bench := _only_bench()):
+            return replace(self, bench=bench).spec()
         if not self.interface or not self.channel:
             raise UsageError("which bus? give --bench FILE, or --interface and --channel")
         from winchkit.bench.drives.node_access import bus_only
@@ -195,11 +184,11 @@ def bus_options(function: Callable[..., Any]) -> Callable[..., Any]:
             "--bench",
             metavar="FILE",
             shell_complete=complete_bench,
-            help="Bench file of the bench.",
+            help="Bench file.  [default: the only one of this folder]",
         ),
         click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
         click.option("--channel", help="Without a bench: e.g. can0."),
-        click.option("--bitrate", default=1_000_000, show_default=True, help="bit/s."),
+        click.option("--bitrate", default=_BITRATE, show_default=True, help="bit/s."),
         click.option("--port", type=int, help="Without a bench: UDP port of udp_multicast."),
     ]
     for option in reversed(options):

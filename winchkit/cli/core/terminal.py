@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 import click
 
+from winchkit.cli.core.messages import detail, is_quiet, is_verbose
 from winchkit.errors import one_line, printable
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = [
     "HEADS",
     "EscapedStream",
+    "ProgressCallback",
     "cell",
     "counter_rows",
     "counter_table",
@@ -39,16 +41,24 @@ __all__ = [
 ]
 
 
+ProgressCallback = Callable[[str, float | None], None]
+"""Called with the present task and the share that is done; None where that is not known."""
+
+
 class EscapedStream:
     """A text stream that writes printable characters, line feeds and tabs only."""
 
     def __init__(self, stream: TextIO) -> None:
         self.rich_proxied_file = stream
         """The stream itself: rich, which steers the terminal, asks for it by this name."""
+        self.names: dict[str, str] = {}
+        """Shown name of a file by its path, where that is a temporary one."""
 
     def write(self, text: str) -> int:
         """Write a text, its control characters as ``\\x1b``."""
         shown, stream = printable(text), self.rich_proxied_file
+        for path, name in self.names.items():
+            shown = shown.replace(path, name)
         try:
             return stream.write(shown)
         except UnicodeEncodeError as error:
@@ -139,27 +149,46 @@ def _decimals(value: float | None, digits: int = 3) -> str:
 
 
 @contextmanager
-def progress_bar() -> Iterator[Callable[[str, float], None]]:
-    """Gives a function to call with the present task and the share (0 to 1) that is done."""
+def progress_bar() -> Iterator[ProgressCallback]:
+    """Gives a function to call with the present task and the share (0 to 1) that is done, or None.
+
+    A bar on a terminal, lines with ``-v``, nothing with ``-q`` or where nobody sees it.
+    """
+    if is_verbose():
+        yield _steps()
+        return
+    if is_quiet() or not sys.stderr.isatty():
+        yield lambda what, share: None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    console = Console(stderr=True)
     columns = (
         BarColumn(),
         TextColumn("{task.percentage:>3.0f} %"),
         TimeElapsedColumn(),
         TextColumn("{task.description}", markup=False),
     )
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
-        task = bar.add_task("reading", total=1.0)
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("reading", total=None)
 
-        def update(what: str, share: float) -> None:
-            bar.update(task, description=one_line(what), completed=share)
+        def update(what: str, share: float | None) -> None:
+            total = None if share is None else 1.0
+            bar.update(task, description=one_line(what), total=total, completed=share)
 
         yield update
+
+
+def _steps() -> ProgressCallback:
+    """Report every new step as a line, as ``-v`` asks for."""
+    last = ""
+
+    def report(what: str, share: float | None) -> None:
+        nonlocal last
+        if what != last:
+            detail(last := what)
+
+    return report
 
 
 @contextmanager

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.options import complete_bench
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.options import bench_argument
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
@@ -15,8 +16,14 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command()
-@click.argument("bench", metavar="BENCH", shell_complete=complete_bench)
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit busload bench.toml",
+        "winchkit busload bench.toml --json",
+    ),
+)
+@bench_argument
 @click.option("--json", "as_json", is_flag=True, help="Print the loads as JSON.")
 @click.pass_context
 def command(ctx: click.Context, bench: str, as_json: bool) -> None:

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.options import BusChoice, bus_options, complete_winch, dry_run_option
+from winchkit.cli.core.command import Group
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import (
+    TABLE,
+    BusChoice,
+    bus_options,
+    complete_winch,
+    dry_run_option,
+    output_option,
+    yes_option,
+)
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
@@ -21,9 +31,8 @@ __all__ = ["command"]
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
 _who = click.argument("who", required=True, metavar="WINCH|NODE", shell_complete=complete_winch)
-_file = click.argument("file", type=_FILE, metavar="FILE")
+_file = click.argument("file", type=TABLE, metavar="FILE")
 _json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-_yes = click.option("-y", "--yes", is_flag=True, help="Do not ask.")
 
 
 @dataclass(frozen=True)
@@ -36,7 +45,13 @@ class Asking:
     as_json: bool
 
 
-@click.group()
+@click.group(
+    cls=Group,
+    examples=(
+        "winchkit config save A -o a.dcf",
+        "winchkit config diff A a.dcf",
+    ),
+)
 def command() -> None:
     """Settings of a drive: save and load a file (.dcf or .json), store and restore its memory.
 
@@ -45,17 +60,23 @@ def command() -> None:
     """
 
 
-@command.command()
+@command.command(
+    examples=(
+        "winchkit config save A -o a.dcf",
+        "winchkit config save A -b bench.toml -o a.json",
+    ),
+)
 @_who
 @bus_options
-@click.option("-o", "--output", type=_FILE, required=True, help="A .dcf or .json file.")
+@output_option("A .dcf or .json file.", required=True, type=_FILE)
 @_json
 def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
     """Read every setting of a drive into a file."""
     from winchkit.bench.drives.node_access import drive_at
     from winchkit.drivers.can.tools.config import read_config, write_config_file
 
-    with drive_at(BusChoice(**bus).spec(), who) as node:
+    choice = BusChoice(**bus)
+    with drive_at(choice.spec(), who) as node:
         config = read_config(node.objects)
         write_config_file(output, config, node.eds, node.node, node.bitrate)
     for reason in config.refused:
@@ -65,21 +86,27 @@ def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
         echo_json({"schema": 1, "output": output, "settings": count, "refused": config.refused})
     else:
         click.echo(f"{output}: {count} settings of {node.name}")
+    suggest_next("config", "diff", who, str(output), *choice.words)
 
 
-@command.command()
+@command.command(
+    examples=(
+        "winchkit config diff A a.dcf",
+        "winchkit config diff A a.dcf -b bench.toml --json",
+    ),
+)
 @_who
 @_file
 @bus_options
 @_json
-def diff(who: str, file: Path, *, as_json: bool, **bus: Any) -> None:
+def diff(who: str, file: str, *, as_json: bool, **bus: Any) -> None:
     """Compare a file with a drive; ends with 1 where they differ."""
     from winchkit.bench.drives.node_access import drive_at
     from winchkit.drivers.can.tools.config import check_fits, difference, read_config_file
     from winchkit.drivers.can.tools.scan import identity_of
 
     with drive_at(BusChoice(**bus).spec(), who) as node:
-        config = read_config_file(file, node.objects.dictionary)
+        config = read_config_file(Path(file), node.objects.dictionary)
         check_fits(config, identity_of(node.objects.port), str(file))
         found = difference(config, node.objects)
     if as_json:
@@ -91,13 +118,18 @@ def diff(who: str, file: Path, *, as_json: bool, **bus: Any) -> None:
     click.get_current_context().exit(1 if found else 0)
 
 
-@command.command()
+@command.command(
+    examples=(
+        "winchkit config load A a.dcf",
+        "winchkit config load A a.dcf -b bench.toml --dry-run",
+    ),
+)
 @_who
 @_file
 @bus_options
 @dry_run_option
 @_json
-def load(who: str, file: Path, *, dry_run: bool, as_json: bool, **bus: Any) -> None:
+def load(who: str, file: str, *, dry_run: bool, as_json: bool, **bus: Any) -> None:
     """Write what differs from a file to a drive, and read it back.
 
     The drive must be disabled. It forgets what was loaded when it is switched off, unless
@@ -112,7 +144,7 @@ def load(who: str, file: Path, *, dry_run: bool, as_json: bool, **bus: Any) -> N
         _show_load(choice, who, file, as_json=as_json)
         return
     with drive_at(choice.spec(), who, writes=True) as node:
-        config = read_config_file(file, node.objects.dictionary)
+        config = read_config_file(Path(file), node.objects.dictionary)
         check_fits(config, identity_of(node.objects.port), str(file))
         changed = write_config(config, node.objects)
     if as_json:
@@ -121,13 +153,20 @@ def load(who: str, file: Path, *, dry_run: bool, as_json: bool, **bus: Any) -> N
     for item in changed:
         click.echo(_line(item))
     same = len(config.values) - len(changed)
-    click.echo(f"{len(changed)} settings written and read back, {same} were so already", err=True)
+    note(f"{len(changed)} settings written and read back, {same} were so already")
+    if changed:
+        suggest_next("config", "store", who, *choice.words)
 
 
-@command.command()
+@command.command(
+    examples=(
+        "winchkit config store A -y",
+        "winchkit config store A -b bench.toml --dry-run",
+    ),
+)
 @_who
 @bus_options
-@_yes
+@yes_option
 @dry_run_option
 @_json
 def store(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> None:
@@ -139,10 +178,15 @@ def store(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> N
     _sign(BusChoice(**bus), who, STORE, write, asking)
 
 
-@command.command()
+@command.command(
+    examples=(
+        "winchkit config restore A -y",
+        "winchkit config restore A -b bench.toml --dry-run",
+    ),
+)
 @_who
 @bus_options
-@_yes
+@yes_option
 @dry_run_option
 @_json
 def restore(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> None:
@@ -178,12 +222,12 @@ def _sign(
         click.echo(f"{node.name}: done")
 
 
-def _show_load(choice: BusChoice, who: str, file: Path, *, as_json: bool) -> None:
+def _show_load(choice: BusChoice, who: str, file: str, *, as_json: bool) -> None:
     from winchkit.bench.drives.node_access import declared_drive
     from winchkit.drivers.can.tools.config import read_config_file, settings
 
     dictionary = declared_drive(choice.spec(), who).dictionary
-    config = read_config_file(file, dictionary)
+    config = read_config_file(Path(file), dictionary)
     known = settings(dictionary)
     values = [(*key, known[key].encode_raw(value)) for key, value in config.values.items()]
     _show(choice, who, values, as_json=as_json)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.options import BusChoice, bus_options, complete_device, complete_winch
 from winchkit.cli.core.output import echo_json
 
@@ -17,7 +18,13 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit info A -b bench.toml",
+        Example("winchkit info 5 --interface socketcan --channel can0", "needs a CAN adapter"),
+    ),
+)
 @click.argument("who", required=False, metavar="WINCH|NODE", shell_complete=complete_winch)
 @bus_options
 @click.option(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from canopen.lss import LssMaster
 
+from winchkit.cli.core.command import Example, Group
 from winchkit.cli.core.dry_run import Frame, show_frames
 from winchkit.cli.core.options import BusChoice, bus_options, dry_run_option
 from winchkit.cli.core.output import echo_json
@@ -88,7 +89,13 @@ def _identity_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return only(function)
 
 
-@click.group()
+@click.group(
+    cls=Group,
+    examples=(
+        "winchkit lss list",
+        "winchkit lss set --only --node 5 --store --dry-run",
+    ),
+)
 def command() -> None:
     """Layer setting services (CiA 305), for drives that have no node number yet.
 
@@ -97,7 +104,13 @@ def command() -> None:
     """
 
 
-@command.command("list")
+@command.command(
+    "list",
+    examples=(
+        "winchkit lss list",
+        "winchkit lss list -b bench.toml --json",
+    ),
+)
 @bus_options
 @_json
 def find(*, as_json: bool, **bus: Any) -> None:
@@ -113,7 +126,15 @@ def find(*, as_json: bool, **bus: Any) -> None:
         click.echo("no device without a node number" if found is None else str(found))
 
 
-@command.command()
+@command.command(
+    examples=(
+        "winchkit lss identify --only",
+        Example(
+            "winchkit lss identify --vendor 1Ah --product 2 --revision 1 --serial 7",
+            "needs a drive of this identity",
+        ),
+    ),
+)
 @_identity_options
 @bus_options
 @_json
@@ -132,7 +153,13 @@ def identify(*, only: bool, as_json: bool, **rest: Any) -> None:
         click.echo(f"{identity}: {'no node number' if number is None else f'node {number}'}")
 
 
-@command.command("set")
+@command.command(
+    "set",
+    examples=(
+        "winchkit lss set --only --node 5 --store --dry-run",
+        "winchkit lss set --only --new-bitrate 500000 --dry-run",
+    ),
+)
 @_identity_options
 @click.option("--node", type=int, help="Node number, 1 to 127.")
 @click.option("--new-bitrate", type=int, help="Bit rate to set, bit/s.")

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import BusChoice, bus_options
 from winchkit.cli.core.output import echo_json
 from winchkit.errors import NoReply
@@ -16,7 +18,13 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit scan -b bench.toml",
+        Example("winchkit scan --interface socketcan --channel can0", "needs a CAN adapter"),
+    ),
+)
 @bus_options
 @click.option("--json", "as_json", is_flag=True, help="Print the nodes as JSON.")
 def command(*, as_json: bool, **bus: Any) -> None:
@@ -28,12 +36,18 @@ def command(*, as_json: bool, **bus: Any) -> None:
     """
     from winchkit.bench.drives.node_access import nodes_on
 
-    spec = BusChoice(**bus).spec()
+    choice = BusChoice(**bus)
+    spec = choice.spec()
+    bench = str(spec.path) if spec.path else None
     found = nodes_on(spec)
     if as_json:
         echo_json({"schema": 1, "nodes": found})
     for item in () if as_json else found:
         click.echo(_line(item))
+    if found and bench is not None:
+        suggest_next("check", bench)
+    elif found:
+        suggest_next("info", str(found[0].node), *choice.words)
     if not found:
         raise NoReply(f"{spec.name}: no node answers; check power, wiring, termination, bit rate")
 

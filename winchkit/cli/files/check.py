@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.options import effects_option
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.options import TABLE, effects_option
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.files.check_computer import about_computer, refusals
 from winchkit.errors import Fault, FileError, one_line
@@ -45,8 +46,15 @@ class Verdict:
         return not self.faults
 
 
-@click.command()
-@click.argument("files", nargs=-1, metavar="FILE...")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit check better.toml bench.toml demo-*.csv",
+        "winchkit check - < better.toml",
+        "winchkit check --computer",
+    ),
+)
+@click.argument("files", nargs=-1, metavar="FILE...", type=TABLE)
 @effects_option
 @click.option("--computer", is_flag=True, help="Check this computer: real-time settings.")
 @click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import click
 
+from winchkit.cli.core.command import Command
+
 __all__ = ["command"]
 
 _SHELLS = ("bash", "zsh", "fish")
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit completion bash",
+        "winchkit completion fish > winchkit.fish",
+    ),
+)
 @click.argument("shell", type=click.Choice(_SHELLS))
 @click.pass_context
 def command(ctx: click.Context, shell: str) -> None:

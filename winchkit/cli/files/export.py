@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.model.options import runs_argument
 
 __all__ = ["command"]
 
 
-@click.command()
-@click.argument("runs", metavar="RUN...", nargs=-1, required=True)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    metavar="FILE",
-    help="Where to: a .csv, .mcap, .parquet or .mf4 file.",
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit export demo-10kg-1.csv -o lift.mcap --replace",
+        "winchkit export lift.mcap -o lift.csv --winch A",
+    ),
 )
+@runs_argument
+@output_option("Where to: a .csv, .mcap, .parquet or .mf4 file.", required=True)
 @click.option("--winch", metavar="NAME", help="Only this winch, its columns without its name.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 def command(runs: tuple[str, ...], output: str, winch: str | None, as_json: bool) -> None:
@@ -29,10 +33,10 @@ def command(runs: tuple[str, ...], output: str, winch: str | None, as_json: bool
     from winchkit.runs.info import summary_of
 
     recording = export(runs, output, winch or "")
-    for note in recording.notes:
-        click.echo(f"{recording.path}: {note} (warning)", err=True)
+    for remark in recording.notes:
+        click.echo(f"{recording.path}: {remark} (warning)", err=True)
     summary = summary_of(recording)
-    click.echo(f"{output}: {summary.text}", err=True)
+    note(f"{output}: {summary.text}")
     if as_json:
         run = runs[0] if len(runs) == 1 else list(runs)
         echo_json({"schema": 1, "run": run, "output": output, "summary": summary})

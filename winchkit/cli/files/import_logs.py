@@ -11,6 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import TABLE, output_option
 from winchkit.cli.core.output import echo_json
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
@@ -27,11 +30,20 @@ __all__ = ["command"]
 _MAPPING = "mapping.toml"
 
 
-@click.command()
-@click.argument("files", nargs=-1, required=True, metavar="FILE...")
-@click.option("-o", "--output", metavar="DIR", help="Folder of the runs; without it, only look.")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit import logger.csv",
+        "winchkit import logger.csv -o runs -y --load-mass '10 kg'",
+        "winchkit import logger.csv -o runs --mapping mapping.toml",
+    ),
+)
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=TABLE)
+@output_option("Folder of the runs; without it, only look.", "DIR")
 @click.option("-y", "--yes", is_flag=True, help="Accept the guess.")
-@click.option("--mapping", metavar="FILE", help="Channels and units of an earlier import.")
+@click.option(
+    "--mapping", metavar="FILE", type=TABLE, help="Channels and units of an earlier import."
+)
 @click.option(
     "--save-mapping", metavar="FILE", help=f"Where to save them; by default DIR/{_MAPPING}."
 )
@@ -129,7 +141,7 @@ def command(
     report["joints"], report["mapping_id"] = joints, _identity(mapping_file)
     report["sanity"] = _inspected([run for _, run in results])
     for joint in joints:
-        click.echo(f"{joint.path}: {joint.text}", err=True)
+        note(f"{joint.path}: {joint.text}")
     for finding in report["sanity"]:
         click.echo(f"{finding['run']}: {finding['channel']}: {finding['text']}", err=True)
     report["runs"] = _written(results, targets, Path(output), as_json=as_json)
@@ -350,7 +362,7 @@ def _saved(mapping: ImportMapping, path: str) -> str:
     from winchkit.runs.importing.mapping import write_mapping
 
     write_mapping(mapping, Path(path))
-    click.echo(f"mapping: {path}", err=True)
+    note(f"mapping: {path}")
     return path
 
 
@@ -460,9 +472,9 @@ def _written(
         target = targets[index] if len(targets) > index else targets[0]
         write_run(run, target)
         summary = summary_of(run)
-        for note in run.notes:
-            click.echo(f"{run.path}: {note} (warning)", err=True)
-        click.echo(f"{target}: {summary.text}", err=True)
+        for remark in run.notes:
+            click.echo(f"{run.path}: {remark} (warning)", err=True)
+        note(f"{target}: {summary.text}")
         if not as_json:
             click.echo(str(target))
         entries.append(

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.options import RUN
 from winchkit.cli.core.output import echo_json
 from winchkit.errors import one_line
 
@@ -18,8 +20,14 @@ __all__ = ["command"]
 _SHOWN = 100
 
 
-@click.command()
-@click.argument("files", metavar="FILE...", nargs=-1, required=True)
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit log info lift.mcap",
+        "winchkit log info demo-10kg-1.csv --json",
+    ),
+)
+@click.argument("files", metavar="FILE...", nargs=-1, required=True, type=RUN)
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def command(files: tuple[str, ...], as_json: bool) -> None:
     """Say what FILE holds: channels, rates, gaps, duration, counters, and whether it was closed.

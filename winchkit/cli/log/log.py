@@ -13,7 +13,13 @@ import click
 
 from winchkit.bench.remote.interruption import Terminated
 from winchkit.cli.core.lazy import At, LazyGroup
-from winchkit.cli.core.options import bench_by_default, complete_bench, effects_option
+from winchkit.cli.core.messages import suggest_next
+from winchkit.cli.core.options import (
+    bench_by_default,
+    complete_bench,
+    effects_option,
+    output_option,
+)
 from winchkit.cli.core.output import echo_json
 from winchkit.errors import WinchkitError
 
@@ -33,15 +39,23 @@ _CHECK_PERIOD = 0.1
 _SHOW_PERIOD = 0.5
 
 
-@click.group(cls=LazyGroup, table=COMMANDS, invoke_without_command=True)
+@click.group(
+    cls=LazyGroup,
+    table=COMMANDS,
+    invoke_without_command=True,
+    examples=(
+        "winchkit log -o lift.mcap --for 10s",
+        "winchkit log -b bench.toml --jsonl --for 1s",
+    ),
+)
 @click.option(
     "-b",
     "--bench",
     metavar="FILE",
     shell_complete=complete_bench,
-    help="Bench file of the bench.",
+    help="Bench file.  [default: the only one of this folder]",
 )
-@click.option("-o", "--output", metavar="FILE", help="Where to: a .csv or .mcap file.")
+@output_option("Where to: a .csv or .mcap file.")
 @click.option("--rotate", metavar="LIMIT", help="Go on in a new file, e.g. after 100MB or 10min.")
 @click.option("--replace", is_flag=True, help="Write over an earlier log of that name.")
 @click.option("--for", "duration", metavar="TIME", help="End after this time, e.g. 10s or '2 min'.")
@@ -97,6 +111,7 @@ def command(
     elif output and not jsonl:
         for file, rows in log.files.items():
             click.echo(f"{file}: {rows} rows")
+        suggest_next("log", "info", next(iter(log.files), output))
     if log.terminated is not None:
         raise log.terminated
 

@@ -4,22 +4,33 @@ from __future__ import annotations
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import suggest_next
+from winchkit.cli.core.options import RUN, output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.standard_input import is_standard_input
+from winchkit.errors import UsageError
 
 __all__ = ["command"]
 
 
-@click.command()
-@click.argument("file", metavar="FILE")
-@click.option(
-    "-o", "--output", metavar="OUT", help="Where to; without it FILE with .recovered in its name."
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit log recover cut.mcap",
+        "winchkit log recover cut.mcap -o whole.mcap --json",
+    ),
 )
+@click.argument("file", metavar="FILE", type=RUN)
+@output_option("Where to; without it FILE with .recovered in its name.", "OUT")
 @click.option("--replace", is_flag=True, help="Write over a file of that name.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def command(*, file: str, output: str | None, replace: bool, as_json: bool) -> None:
     """Save everything whole of FILE (.mcap or .csv), which stays as it is."""
     from winchkit.runs.recover import recover
 
+    if output is None and is_standard_input(file):
+        raise UsageError("FILE -: the log from standard input is saved to a file with -o")
     found = recover(file, output, replace=replace)
     if as_json:
         echo_json({"schema": 1, "file": file, **vars(found)})
@@ -30,3 +41,4 @@ def command(*, file: str, output: str | None, replace: bool, as_json: bool) -> N
         f"{found.dropped_bytes} bytes at the end left out"
         + ("; the file was whole" if found.was_whole else "")
     )
+    suggest_next("log", "info", found.output)

@@ -10,6 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import RUN
+
 if TYPE_CHECKING:
     from winchkit.bench.control.snapshot import BenchSnapshot
     from winchkit.bench.recording.live_sinks import LiveSink
@@ -19,8 +23,14 @@ __all__ = ["command"]
 _SHOW_PERIOD = 0.1
 
 
-@click.command()
-@click.argument("file", metavar="FILE")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit log replay lift.mcap --fast",
+        "winchkit log replay lift.mcap --fast --jsonl",
+    ),
+)
+@click.argument("file", metavar="FILE", type=RUN)
 @click.option("--fast", is_flag=True, help="As fast as it can be shown, not at the log's pace.")
 @click.option("--jsonl", is_flag=True, help="Print every picture to stdout, one JSON a line.")
 @click.option("--udp", metavar="HOST:PORT", help="Send every picture as JSON, e.g. to PlotJuggler.")
@@ -33,7 +43,7 @@ def command(*, file: str, fast: bool, jsonl: bool, udp: str | None) -> None:
     with live_sinks(jsonl=jsonl, udp=udp) as asked, _table_unless(asked) as sinks:
         replay.on_cycle(partial(_show, sinks))
         count = replay.play(fast=fast)
-    click.echo(f"{file}: {count} pictures", err=True)
+    note(f"{file}: {count} pictures")
 
 
 def _show(sinks: Sequence[LiveSink], snapshot: BenchSnapshot) -> None:

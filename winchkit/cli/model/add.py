@@ -8,7 +8,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.completion import complete_effect
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import RUN, output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
     ManyValues,
@@ -18,6 +22,7 @@ from winchkit.cli.model.options import (
     model_options,
     page_title,
     read_all,
+    suggest_with,
     write_figures,
     write_page,
 )
@@ -29,10 +34,24 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command(cls=ManyValues)
-@click.argument("effect")
-@click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs to fit.")
-@click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
+@click.command(
+    cls=ManyValues,
+    examples=(
+        "winchkit add cable-elongation-linear --fit demo-*.csv -p bench-spiral -o better.toml",
+        "winchkit add motor-viscous --fit demo-*.csv -p better.toml -o next.toml --json",
+    ),
+)
+@click.argument("effect", shell_complete=complete_effect)
+@click.option(
+    "--fit",
+    "runs",
+    multiple=True,
+    required=True,
+    metavar="RUN...",
+    type=RUN,
+    help="Runs to fit.",
+)
+@output_option("Profile to write.", "NEW.toml", required=True)
 @model_options
 @json_option
 @html_option
@@ -63,7 +82,10 @@ def command(
         refuse_options(asked.band)
         _to_robot(effect, runs, declared, asked, output, as_json, html, figures)
         return
-    grown = grow(effect, asked.runs(runs), declared, catalogue, asked.band)
+    with progress_bar() as progress:
+        own = asked.runs(runs)
+        progress(f"fitting {effect}", None)
+        grown = grow(effect, own, declared, catalogue, asked.band)
     write_addition(asked.source, grown.addition, names, Path(output))
     _tell(grown.addition, output, as_json)
     if html:
@@ -78,6 +100,7 @@ def command(
 
         source = Command(grown.regression.dataset, asked.profile).source
         write_figures(figures, addition_figures(grown, source))
+    suggest_with("compare", asked, runs, profile=output)
 
 
 def _to_robot(
@@ -96,7 +119,10 @@ def _to_robot(
 
     name, _, place = effect.partition("/")
     line = asked.winch or place or None
-    grown = grow_robot(name, read_all(runs), declared, line, asked.catalogue)
+    with progress_bar() as progress:
+        measured = read_all(runs)
+        progress(f"fitting {effect}", None)
+        grown = grow_robot(name, measured, declared, line, asked.catalogue)
     write_addition(asked.source, grown.addition, [Path(r).name for r in runs], Path(output))
     _tell(grown.addition, output, as_json)
     if html:
@@ -112,10 +138,11 @@ def _to_robot(
 
         source = Command(grown.regression.dataset, asked.profile).source
         write_figures(figures, robot_addition_figures(grown, source))
+    suggest_with("compare", asked, runs, profile=output)
 
 
 def _tell(addition: Addition, output: str, as_json: bool) -> None:
-    click.echo(f"written: {output}", err=True)
+    note(f"written: {output}")
     if as_json:
         echo_json(addition.to_json())
         return

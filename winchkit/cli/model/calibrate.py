@@ -8,13 +8,18 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from winchkit.cli.core.completion import complete_effect
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import PROFILE, RUN, output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     ManyValues,
     figures_option,
     html_option,
     page_title,
     read_all,
+    runs_argument,
     write_figures,
     write_page,
 )
@@ -23,6 +28,7 @@ from winchkit.errors import UsageError, suggest
 if TYPE_CHECKING:
     from winchkit.calibration.robot.calibrate import Calibrated, Options
     from winchkit.calibration.robot.pose_design import NextPose
+    from winchkit.cli.core.terminal import ProgressCallback
 
 __all__ = ["command"]
 
@@ -39,14 +45,32 @@ _NOISE_DIMENSIONS = {
 }
 
 
-@click.command(cls=ManyValues)
-@click.argument("robot")
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
-@click.option(
-    "--validate", "validate", multiple=True, metavar="RUN...", help="Held out; else every tenth."
+@click.command(
+    cls=ManyValues,
+    examples=(
+        "winchkit calibrate cabtive poses.csv -o calibrated.toml",
+        "winchkit calibrate cabtive poses.csv --validate more.csv --next 5 -o calibrated.toml",
+    ),
 )
-@click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
-@click.option("--effect", "effects", multiple=True, metavar="NAME", help="Fit this effect too.")
+@click.argument("robot", type=PROFILE)
+@runs_argument
+@click.option(
+    "--validate",
+    "validate",
+    multiple=True,
+    metavar="RUN...",
+    type=RUN,
+    help="Held out; else every tenth.",
+)
+@output_option("Profile to write.", "NEW.toml", required=True)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME",
+    shell_complete=complete_effect,
+    help="Fit this effect too.",
+)
 @click.option(
     "--noise", "noise", multiple=True, metavar="KIND=VALUE",
     help="A known standard deviation, e.g. position='0.02 mm'; else estimated.",
@@ -84,8 +108,12 @@ def command(
     from winchkit.catalog import find
 
     source = find("profiles", robot)
-    found = _calibrated(source, runs, validate, _options(effects, noise, loss, middle_force))
-    ahead = next_poses(found, following) if following else []
+    with progress_bar() as progress:
+        found = _calibrated(
+            source, runs, validate, _options(effects, noise, loss, middle_force), progress
+        )
+        progress("proposing poses", None)
+        ahead = next_poses(found, following) if following else []
     if len(ahead) < following:
         click.echo(f"only {len(ahead)} of {following} poses can be held by the cables", err=True)
     if not found.refusal:
@@ -105,6 +133,7 @@ def command(
     if found.refusal:
         click.echo(f"winchkit: {found.refusal}", err=True)
         click.get_current_context().exit(1)
+    suggest_next("diagnose", runs, "-p", output)
 
 
 def _source(robot: str, runs: Sequence[str]) -> str:
@@ -126,7 +155,11 @@ def _options(
 
 
 def _calibrated(
-    source: Path, runs: Sequence[str], validate: Sequence[str], options: Options
+    source: Path,
+    runs: Sequence[str],
+    validate: Sequence[str],
+    options: Options,
+    progress: ProgressCallback,
 ) -> Calibrated:
     """Fit all rows where others validate, else nine of ten."""
     from winchkit.calibration.robot.calibrate import calibrate
@@ -137,7 +170,8 @@ def _calibrated(
     profile = read_robot(source)
     measured = read_poses(read_all(runs), profile)
     held = read_poses(read_all(validate), profile) if validate else None
-    return calibrate(robot_of(profile), measured, held, options, lambda t: click.echo(t, err=True))
+    progress("fitting", None)
+    return calibrate(robot_of(profile), measured, held, options, note)
 
 
 def _tell(found: Calibrated, ahead: Sequence[NextPose], as_json: bool) -> None:
@@ -182,4 +216,4 @@ def _write(source: Path, found: Calibrated, out: Path, runs: Sequence[str]) -> N
 
     today = datetime.now(UTC).date()
     write_calibrated(source, found, out, Provenance([Path(run).name for run in runs], today))
-    click.echo(f"written: {out}", err=True)
+    note(f"written: {out}")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_each, echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
@@ -21,8 +22,10 @@ from winchkit.cli.model.options import (
     pages_beside,
     read_all,
     read_each,
+    runs_argument,
     save_figures,
     save_page,
+    suggest_with,
     write_figures,
     write_page,
 )
@@ -35,8 +38,15 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command()
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit compare demo-*.csv -p bench-spiral",
+        "winchkit compare demo-*.csv -p better.toml --html errors.html",
+        "winchkit compare - -p bench-spiral < demo-10kg-1.csv",
+    ),
+)
+@runs_argument
 @model_options
 @json_option
 @html_option
@@ -59,7 +69,10 @@ def command(
     if asked.each:
         _tell_each(runs, declared, asked, as_json, html, figures)
         return
-    answer = compared(asked.runs(runs), declared, asked.catalogue, asked.band)
+    with progress_bar() as progress:
+        own = asked.runs(runs)
+        progress("comparing", None)
+        answer = compared(own, declared, asked.catalogue, asked.band)
     _tell(answer.comparison, as_json)
     if html:
         title = page_title(declared.name, runs)
@@ -67,6 +80,7 @@ def command(
     if figures:
         source = Command(answer.regression.dataset, asked.profile).source
         write_figures(figures, comparison_figures(answer, source))
+    suggest_with("diagnose", asked, runs)
 
 
 def _tell_each(
@@ -115,7 +129,8 @@ def _tell_each(
 
         write_page(html, shared_errors_html(found, shared, title, pages))
     if figures:
-        click.echo(f"figures: {figures}", err=True)
+        note(f"figures: {figures}")
+    suggest_with("diagnose", asked, runs)
 
 
 def _tell_robot(
@@ -129,7 +144,10 @@ def _tell_robot(
     """Poses with a robot's profile."""
     from winchkit.diagnosis.robot.compare import compared_robot
 
-    answer = compared_robot(read_all(runs), declared, asked.catalogue)
+    with progress_bar() as progress:
+        measured = read_all(runs)
+        progress("comparing", None)
+        answer = compared_robot(measured, declared, asked.catalogue)
     _tell(answer.comparison, as_json)
     if html:
         from winchkit.report.pages.robot import robot_comparison_html
@@ -142,6 +160,7 @@ def _tell_robot(
 
         source = Command(answer.regression.dataset, asked.profile).source
         write_figures(figures, robot_comparison_figures(answer, source))
+    suggest_with("diagnose", asked, runs)
 
 
 def _tell(comparison: Comparison, as_json: bool) -> None:

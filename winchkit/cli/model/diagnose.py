@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.core.output import echo_each, echo_json
 from winchkit.cli.core.terminal import progress_bar
@@ -22,8 +24,10 @@ from winchkit.cli.model.options import (
     pages_beside,
     read_all,
     read_each,
+    runs_argument,
     save_figures,
     save_page,
+    suggest_with,
     write_figures,
     write_page,
 )
@@ -38,8 +42,14 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command()
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit diagnose demo-*.csv -p bench-spiral",
+        "winchkit diagnose demo-*.csv -p better.toml --html report.html",
+    ),
+)
+@runs_argument
 @model_options
 @click.option("--every-sample", is_flag=True, help="Do not thin long runs out.")
 @click.option(
@@ -109,6 +119,7 @@ def _tell_one(
         write_page(html, _page(answer, page_title(declared.name, runs), asked))
     if figures:
         write_figures(figures, _figures(answer, asked))
+    _suggest(answer.diagnosis, runs, asked)
 
 
 def _tell_known(known: WinchAnswer, as_json: bool) -> None:
@@ -163,7 +174,7 @@ def _tell_each(
 
         write_page(html, shared_effects_html(found, shared, chances, title, pages))
     if figures:
-        click.echo(f"figures: {figures}", err=True)
+        note(f"figures: {figures}")
 
 
 def _tell_robot(
@@ -191,6 +202,7 @@ def _tell_robot(
 
         source = Command(answer.selection.preparation.dataset, asked.profile).source
         write_figures(figures, robot_report_figures(answer, source))
+    _suggest(answer.diagnosis, runs, asked)
 
 
 def _figures(answer: WinchAnswer, asked: Asked) -> Sequence[Figure]:
@@ -198,6 +210,22 @@ def _figures(answer: WinchAnswer, asked: Asked) -> Sequence[Figure]:
     from winchkit.report.reproducibility import Command
 
     return report_figures(answer, Command(answer.engine.regression.dataset, asked.profile).source)
+
+
+def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
+    """What follows: add the effect that is named alone, else look for what separates or shows."""
+    if diagnosis.interrupted:
+        return
+    named = diagnosis.steps[0] if diagnosis.steps else None
+    if named is not None and len(named.effects) == 1:
+        file = f"{Path(asked.profile).stem}-{Path(named.effects[0]).stem}.toml"
+        words = ("-p", asked.profile, *asked.options, "-o", file)
+        suggest_next("add", named.effects[0], "--fit", runs, *words)
+    elif named is None and diagnosis.verdict == "unknown" and diagnosis.data == "runs":
+        words = ("-p", asked.profile, *asked.options)
+        suggest_next("effects", "new", "own.py", "--fit", runs, *words)
+    else:
+        suggest_with("plan", asked, runs)
 
 
 def _page(answer: WinchAnswer, title: str, asked: Asked) -> str:

@@ -8,11 +8,24 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.completion import complete_effect, complete_file
 from winchkit.cli.core.lazy import At, LazyGroup
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import RUN
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.model.options import Asked, ManyValues, html_option, model_options, write_page
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import (
+    Asked,
+    ManyValues,
+    html_option,
+    model_options,
+    suggest_with,
+    write_page,
+)
 
 if TYPE_CHECKING:
+    from winchkit.cli.core.terminal import ProgressCallback
     from winchkit.diagnosis.results import Diagnosis
     from winchkit.effects.catalogue import Catalogue
     from winchkit.runs.run import Run
@@ -49,6 +62,10 @@ class _Effects(LazyGroup):
         ),
         "new": At("winchkit.cli.model.effects", "Write a file for an effect of your own.", "new"),
     },
+    examples=(
+        "winchkit effects",
+        "winchkit effects cable-creep",
+    ),
 )
 def command() -> None:
     """List the effects that a model may lack, show the card of one, or begin one of your own.
@@ -57,13 +74,21 @@ def command() -> None:
     """
 
 
-@click.command("show")
-@click.argument("effect_id", metavar="[ID]", required=False)
+@click.command(
+    "show",
+    cls=Command,
+    examples=(
+        "winchkit effects show cable-creep",
+        "winchkit effects show --html effects.html",
+    ),
+)
+@click.argument("effect_id", metavar="[ID]", required=False, shell_complete=complete_effect)
 @click.option(
     "--effects",
     "files",
     multiple=True,
     metavar="FILE",
+    shell_complete=complete_file,
     help="Python file with effects of your own; may be given several times.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, complete, in SI units.")
@@ -107,9 +132,17 @@ def _listing(catalogue: Catalogue) -> str:
     return "\n".join([*lines, f"{len(catalogue)} effects; 'winchkit effects ID' shows one."])
 
 
-@click.command(cls=ManyValues)
+@click.command(
+    cls=ManyValues,
+    examples=(
+        "winchkit effects new own.py --fit demo-*.csv -p bench-spiral",
+        "winchkit diagnose demo-*.csv -p bench-spiral --effects own.py",
+    ),
+)
 @click.argument("file", metavar="FILE.py")
-@click.option("--fit", "runs", multiple=True, required=True, metavar="RUN...", help="Runs.")
+@click.option(
+    "--fit", "runs", multiple=True, required=True, metavar="RUN...", type=RUN, help="Runs."
+)
 @click.option("--curve", metavar="ID", help="Empirical effect to begin from; else the strongest.")
 @click.option("--id", "effect_id", metavar="ID", help="Of the new effect; else the file's name.")
 @model_options
@@ -126,24 +159,19 @@ def new(
     refuse_curves(declared_profile(asked.source))
     name = effect_id or Path(file).stem.replace("_", "-")
     check_own(name, Path(file), asked.catalogue)
-    data = (asked.runs(runs), asked.declared, asked.catalogue, asked.band)
-    if curve is None:
-        found = _unexplained(data)
-        order = _order_of_drum(found)
+    with progress_bar() as progress:
+        data = (asked.runs(runs), asked.declared, asked.catalogue, asked.band)
+        found = _unexplained(data, progress) if curve is None else None
+        order = None if found is None else _order_of_drum(found)
         if order is not None:
             write_wave_on_drum(order, name, Path(file))
-            _report(file, name, f"a wave of {order} periods per drum turn")
-            return
-        curve = found.empirical[0]
-    _write_curve(curve, name, Path(file), data)
-    _report(file, name, curve)
-
-
-def _report(file: str, name: str, start: str) -> None:
-    click.echo(
-        f"written: {file}; it holds the effect '{name}', with its initial values from {start}",
-        err=True,
-    )
+            start = f"a wave of {order} periods per drum turn"
+        else:
+            start = found.empirical[0] if found is not None else str(curve)
+            progress(f"fitting {start}", None)
+            _write_curve(start, name, Path(file), data)
+    note(f"written: {file}; it holds the effect '{name}', with its initial values from {start}")
+    suggest_with("diagnose", asked, runs, "--effects", file)
 
 
 def _write_curve(curve: str, name: str, file: Path, data: _Data) -> None:
@@ -159,12 +187,12 @@ def _write_curve(curve: str, name: str, file: Path, data: _Data) -> None:
     write_own(term, name, file)
 
 
-def _unexplained(data: _Data) -> Diagnosis:
+def _unexplained(data: _Data, progress: ProgressCallback) -> Diagnosis:
     """A diagnosis that leaves something, and says where."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.errors import UsageError
 
-    found = diagnose(*data).diagnosis
+    found = diagnose(*data, progress=progress).diagnosis
     if not found.empirical:
         raise UsageError(
             f"the verdict is '{found.verdict}' and nothing unexplained was located; name the "

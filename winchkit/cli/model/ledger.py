@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import click
 
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.model.options import html_option, write_page
+from winchkit.cli.model.options import html_option, profile_option, write_page
 
 __all__ = ["command"]
 
 
-@click.command()
-@click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file.")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit ledger -p better.toml",
+        "winchkit ledger -p better.toml --html ledger.html",
+    ),
+)
+@profile_option
 @click.option("--json", "as_json", is_flag=True, help="Print the ledger as JSON.")
 @html_option
 def command(profile: str, as_json: bool, html: str | None) -> None:

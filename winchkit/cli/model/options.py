@@ -11,6 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.completion import complete_file
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import PROFILE, RUN
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.schema.programme import ALL
 
@@ -31,25 +35,42 @@ __all__ = [
     "model_options",
     "page_title",
     "pages_beside",
+    "profile_option",
     "read_all",
     "read_each",
     "read_runs",
     "refuse_curves",
     "refuse_options",
+    "runs_argument",
     "save_figures",
     "save_page",
+    "suggest_with",
     "write_figures",
     "write_page",
 ]
 
+profile_option = click.option(
+    "-p",
+    "--profile",
+    required=True,
+    metavar="P",
+    type=PROFILE,
+    help="Profile: a name or a file.",
+)
+runs_argument = click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=RUN)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 _MODEL_OPTIONS = (
     click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
     click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),
     click.option(
-        "--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects."
+        "--effects",
+        "effect_files",
+        multiple=True,
+        metavar="FILE",
+        shell_complete=complete_file,
+        help="Your own effects.",
     ),
-    click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file."),
+    profile_option,
 )
 
 
@@ -103,7 +124,7 @@ class Asked:
         return tuple(out)
 
 
-class ManyValues(click.Command):
+class ManyValues(Command):
     """A command whose options shown as ``RUN...`` take several values: ``--fit a.csv b.csv``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -212,13 +233,13 @@ _PAGE_BEGINS = b"<!DOCTYPE html>"
 def write_page(path: str, page: str) -> None:
     """Write a page as :func:`save_page` does and say so on stderr."""
     save_page(path, page)
-    click.echo(f"report: {path}", err=True)
+    note(f"report: {path}")
 
 
 def write_figures(folder: str, figures: Sequence[Figure]) -> None:
     """Write figures as :func:`save_figures` does and report it on stderr."""
     save_figures(folder, figures)
-    click.echo(f"figures: {folder} ({len(figures)} as PNG, SVG and CSV)", err=True)
+    note(f"figures: {folder} ({len(figures)} as PNG, SVG and CSV)")
 
 
 def save_figures(folder: str, figures: Sequence[Figure], winch: str | None = None) -> None:
@@ -276,6 +297,13 @@ def _may_be_replaced(target: Path) -> bool:
     """Whether a file is empty or an earlier page."""
     with target.open("rb") as there:
         return there.read(len(_PAGE_BEGINS)) in {b"", _PAGE_BEGINS}
+
+
+def suggest_with(
+    command: str, asked: Asked, runs: Sequence[str], *more: str, profile: str | None = None
+) -> None:
+    """Suggest a command on the same runs, by the same profile unless another is named."""
+    suggest_next(command, runs, "-p", profile or asked.profile, *asked.options, *more)
 
 
 def declared_profile(path: Path) -> WinchProfile | RobotProfile:

@@ -9,9 +9,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.options import complete_bench
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import BENCH, output_option
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.model.options import Asked, json_option, model_options, read_all, refuse_options
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import (
+    Asked,
+    json_option,
+    model_options,
+    read_all,
+    refuse_options,
+    runs_argument,
+    suggest_with,
+)
 from winchkit.errors import UsageError
 from winchkit.units import suggest
 
@@ -52,13 +63,16 @@ def tell_poses(
         raise UsageError(
             f"-o {output}: a robot's plan is a list of poses and no programme; name a .csv file"
         )
-    plan = plan_poses(diagnose_robot(read_all(runs), declared, asked.catalogue))
+    with progress_bar() as progress:
+        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, progress)
+        progress("designing poses", None)
+        plan = plan_poses(answer)
     best = plan.best
     if output and best is not None:
         from winchkit.runs import write_run
 
         write_run(plan.run(best), output)
-        click.echo(f"written: {output}", err=True)
+        note(f"written: {output}, the poses '{best.kind.name}'")
     elif output:
         click.echo(f"nothing written to {output}: no such poses show more", err=True)
     if as_json:
@@ -143,14 +157,22 @@ _FEW = 2
 """Effects named in a row; --json has them all."""
 
 
-@click.command()
-@click.argument("runs", nargs=-1, required=True, metavar="RUN...")
-@click.option("-o", "--output", metavar="NEXT", help="Programme or poses to write.")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit plan demo-*.csv -p bench-spiral",
+        "winchkit plan demo-*.csv -p bench-spiral -b bench.toml -o next.toml",
+    ),
+)
+@runs_argument
+@output_option(
+    "Programme (.toml) to write, the first of the list; of a robot poses (.csv).", "NEXT"
+)
 @click.option(
     "-b",
     "--bench",
     metavar="FILE",
-    shell_complete=complete_bench,
+    type=BENCH,
     help="Bench file whose limits say how far, how fast and how heavy; else as the RUNs were.",
 )
 @model_options
@@ -188,7 +210,6 @@ def _plan_winch(
     """The next programme of one winch."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.diagnosis.plan import plan
-    from winchkit.errors import UsageError
     from winchkit.schema.profiles.axis import AxisProfile
     from winchkit.schema.programme import write_programme
 
@@ -197,19 +218,36 @@ def _plan_winch(
             f"'{declared.name}' is an axis, and motion programmes are in cable length; "
             "'winchkit diagnose' lists the next runs"
         )
+    path = None if output is None else _programme_file(output)
     limits = None if bench is None else _limits(bench, asked.winch)
-    answer = diagnose(asked.runs(runs), declared, asked.catalogue, asked.band)
-    found = plan(answer, asked.catalogue, limits)
-    if output:
-        path = Path(output)
-        write_programme(found.programme(path.stem), path)
-        click.echo(f"written: {output}", err=True)
+    with progress_bar() as progress:
+        answer = diagnose(
+            asked.runs(runs), declared, asked.catalogue, asked.band, progress=progress
+        )
+        progress("simulating programmes", None)
+        found = plan(answer, asked.catalogue, limits)
     if as_json:
-        echo_json({**found.to_json(), "programme": output})
+        best = found.offers[0].kind.name
+        echo_json({**found.to_json(), "programme": path, "chosen": best if path else None})
     else:
         click.echo(_text(found.offers, found.pairs, named=bool(answer.sets)))
         for line in _silent(found, widened=limits is not None):
             click.echo(line)
+    if path is None:
+        words = () if bench is None else ("-b", bench)
+        suggest_with("plan", asked, runs, *words, "-o", "next.toml")
+        return
+    write_programme(found.programme(path.stem), path)
+    note(f"written: {path}, the first of the list: {found.offers[0].kind.name}")
+    suggest_next("run", str(path), *(() if bench is None else ("-b", bench)))
+
+
+def _programme_file(output: str) -> Path:
+    """Name of a programme's file; raises UsageError for the suffix of another kind of file."""
+    path = Path(output)
+    if path.suffix not in {"", ".toml"}:
+        raise UsageError(f"-o {output}: a motion programme is a .toml file; name one")
+    return path.with_suffix(".toml")
 
 
 def _limits(bench: str, winch: str | None) -> LimitSpec:

@@ -8,8 +8,19 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.completion import complete_effect_of_profile
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import RUN, output_option
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.model.options import Asked, ManyValues, json_option, model_options, read_all
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import (
+    Asked,
+    ManyValues,
+    json_option,
+    model_options,
+    read_all,
+    suggest_with,
+)
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Removal
@@ -17,10 +28,23 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command(cls=ManyValues)
-@click.argument("effect")
-@click.option("--fit", "runs", multiple=True, metavar="RUN...", help="Runs to refit the others on.")
-@click.option("-o", "--output", required=True, metavar="NEW.toml", help="Profile to write.")
+@click.command(
+    cls=ManyValues,
+    examples=(
+        "winchkit remove cable-elongation-linear -p better.toml -o without.toml",
+        "winchkit remove motor-viscous --fit demo-*.csv -p both.toml -o better.toml",
+    ),
+)
+@click.argument("effect", shell_complete=complete_effect_of_profile)
+@click.option(
+    "--fit",
+    "runs",
+    multiple=True,
+    metavar="RUN...",
+    type=RUN,
+    help="Runs to refit the others on.",
+)
+@output_option("Profile to write.", "NEW.toml", required=True)
 @model_options
 @json_option
 def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json: bool) -> None:
@@ -35,19 +59,25 @@ def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json
     from winchkit.schema.profiles.robot import RobotProfile
 
     declared, removal = declared_profile(asked.source), None
-    if isinstance(declared, RobotProfile):
-        from winchkit.diagnosis.robot.add import remove_from_robot
+    with progress_bar() as progress:
+        progress("fitting", None)
+        if isinstance(declared, RobotProfile):
+            from winchkit.diagnosis.robot.add import remove_from_robot
 
-        refuse_options(asked.band)
-        effect = f"{effect}/{asked.winch}" if asked.winch else effect
-        if runs:
-            removal = remove_from_robot(effect, read_all(runs), declared, asked.catalogue)
-    elif runs:
-        removal = remove(effect, asked.runs(runs), declared, asked.catalogue, asked.band)
+            refuse_options(asked.band)
+            effect = f"{effect}/{asked.winch}" if asked.winch else effect
+            if runs:
+                removal = remove_from_robot(effect, read_all(runs), declared, asked.catalogue)
+        elif runs:
+            removal = remove(effect, asked.runs(runs), declared, asked.catalogue, asked.band)
     names = [Path(run).name for run in runs]
     write_removal(asked.source, effect, removal, names, output)
-    click.echo(f"written: {output}", err=True)
+    note(f"written: {output}")
     _tell(effect, removal, as_json)
+    if runs:
+        suggest_with("compare", asked, runs, profile=output)
+    else:
+        suggest_next("ledger", "-p", output)
 
 
 def _tell(effect: str, removal: Removal | None, as_json: bool) -> None:

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.options import TABLE
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
@@ -18,8 +20,14 @@ _SHOWN = {"m": ("mm", 1e-3), "rad/s": ("rpm", 0.10471975511965977)}
 """SI units that a table for people writes in others."""
 
 
-@click.command()
-@click.argument("spec", metavar="SPEC")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit size winding-device.toml",
+        "winchkit size winding-device.toml --json",
+    ),
+)
+@click.argument("spec", metavar="SPEC", type=TABLE)
 @click.option("--json", "as_json", is_flag=True, help="Print the table as JSON, in SI units.")
 @click.pass_context
 def command(ctx: click.Context, spec: str, as_json: bool) -> None:

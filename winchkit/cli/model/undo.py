@@ -6,12 +6,24 @@ from pathlib import Path
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import suggest_next
+from winchkit.cli.core.options import output_option
+from winchkit.cli.core.standard_input import is_standard_input
+from winchkit.cli.model.options import profile_option
+
 __all__ = ["command"]
 
 
-@click.command()
-@click.option("--profile", "-p", required=True, metavar="P", help="Profile: a name or a file.")
-@click.option("-o", "--output", metavar="NEW.toml", help="Profile to write; else the same file.")
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit undo -p better.toml",
+        "winchkit undo -p better.toml -o before.toml",
+    ),
+)
+@profile_option
+@output_option("Profile to write; else the same file.", "NEW.toml")
 def command(profile: str, output: str | None) -> None:
     """Take back what 'add' or 'remove' did last; values that it refitted are as before too."""
     from winchkit.catalog import find
@@ -21,7 +33,10 @@ def command(profile: str, output: str | None) -> None:
 
     source = find("profiles", profile)
     declared_profile(source)
+    if output is None and is_standard_input(profile):
+        raise UsageError("-p -: a profile from standard input is written to a file with -o")
     if output is None and source != Path(profile):
         raise UsageError(f"'{profile}' ships with winchkit; write the copy to a file with -o")
     done = undo(source, Path(output) if output else source)
     click.echo(f"taken back: {done}")
+    suggest_next("ledger", "-p", output or profile)

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import suggest_next
+from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
@@ -26,18 +29,25 @@ _OPENING = (
 )
 
 
-@click.command()
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit demo",
+        "winchkit demo --seed 4 -o demo-4 --json",
+    ),
+)
 @click.option("--seed", default=1, show_default=True, help="Seed of hidden effect and noise.")
-@click.option(
+@output_option(
+    "Folder for runs, profiles and report.",
+    "DIR",
     "--out",
     default="winchkit-demo",
     show_default=True,
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for runs, profiles and report.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.pass_context
-def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
+def command(ctx: click.Context, seed: int, output: Path, as_json: bool) -> None:
     """Find a hidden effect on a simulated bench, from the first CAN frame to the extended profile.
 
     A drive on a CAN bus and instruments on Modbus are simulated, with real protocols; a minute of
@@ -51,7 +61,7 @@ def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
     from winchkit.schema.read import read_profile
     from winchkit.sim import choose_bench
 
-    started = time.monotonic()
+    started, out = time.monotonic(), output
     story = _Story(quiet=as_json)
     bench = choose_bench(seed)
     profile_name = next(iter(bench.bench.winch.values())).profile
@@ -76,6 +86,9 @@ def command(ctx: click.Context, seed: int, out: Path, as_json: bool) -> None:
     story.print(f"Report: {report}   ({seconds:.0f} s)")
     if as_json:
         echo_json(_outcome(seed, findings, truth, seconds, out))
+    if right and findings.addition is not None:
+        improved = str(out / "improved.toml")
+        suggest_next("compare", sorted(str(path) for path in paths), "-p", improved)
     ctx.exit(0 if right else 1)
 
 

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import click
 
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
 __all__ = ["command"]
 
 
-@click.command("list")
+@click.command(
+    "list",
+    cls=Command,
+    examples=(
+        "winchkit sim list",
+        "winchkit sim list --physics --json",
+    ),
+)
 @click.option("--physics", is_flag=True, help="What can be hidden, with its numbers, instead.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, with everything hidden.")
 def command(physics: bool, as_json: bool) -> None:

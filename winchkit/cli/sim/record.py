@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import suggest_next
+from winchkit.cli.core.options import PROGRAMME, SIM_BENCH, output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.runs.run import Run
@@ -16,24 +21,33 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 
-@click.command("record")
-@click.argument("bench")
+@click.command(
+    "record",
+    cls=Command,
+    examples=(
+        "winchkit sim record demo-elastic-rope programme-demo -o runs",
+        "winchkit sim record spiral-bench short.toml --seed 3 --hidden 'elastic rope'",
+    ),
+)
+@click.argument("bench", type=SIM_BENCH)
+@click.argument("programmes", nargs=-1, metavar="[PROGRAMME]...", type=PROGRAMME)
 @click.option(
-    "-p",
     "--programme",
-    "programmes",
+    "more",
     multiple=True,
-    required=True,
-    help="Motion programme: a file, or a shipped name such as programme-demo.",
+    metavar="PROGRAMME",
+    type=PROGRAMME,
+    help="Another motion programme, as PROGRAMME.",
 )
 @click.option("--seed", default=0, show_default=True, help="Of the noise.")
 @click.option("--rate", default="50 Hz", show_default=True, help="Of the samples.")
-@click.option(
+@output_option(
+    "Folder for the runs.",
+    "DIR",
     "--out",
     default=".",
     show_default=True,
     type=click.Path(file_okay=False, path_type=Path),
-    help="Folder for the runs.",
 )
 @click.option(
     "--format", "suffix", default="csv", show_default=True, type=click.Choice(["csv", "mcap"])
@@ -50,14 +64,18 @@ def command(
     *,
     bench: str,
     programmes: tuple[str, ...],
+    more: tuple[str, ...],
     seed: int,
     rate: str,
-    out: Path,
+    output: Path,
     suffix: str,
     hidden: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Run programmes on a simulated BENCH without buses and write one run per load and repeat."""
+    """Run PROGRAMMEs on a simulated BENCH without buses; write one run per load and repeat.
+
+    A PROGRAMME is a file, or a shipped name such as programme-demo.
+    """
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import quantity
     from winchkit.runs import write_csv, write_mcap
@@ -71,18 +89,27 @@ def command(
     profiles = profiles_of(declared)
     hertz = quantity(rate, "frequency")
     write = write_csv if suffix == "csv" else write_mcap
-    written = []
-    for name in programmes:
-        programme = read_programme(programme_path(name))
-        for run in simulate(declared, profiles, programme, seed=seed, rate=hertz):
-            path = out / f"{run.name}.{suffix}"
-            out.mkdir(parents=True, exist_ok=True)
-            write(run, path)
-            written.append(_entry(path, run, programme))
-            if not as_json:
-                click.echo(path)
+    named = (*programmes, *more)
+    if not named:
+        raise UsageError("which programme? name a file, or a shipped one such as programme-demo")
+    written: list[dict[str, object]] = []
+    with progress_bar() as progress:
+        for index, name in enumerate(named):
+            programme = read_programme(programme_path(name))
+            for run in simulate(declared, profiles, programme, seed=seed, rate=hertz):
+                path = output / f"{run.name}.{suffix}"
+                output.mkdir(parents=True, exist_ok=True)
+                write(run, path)
+                written.append(_entry(path, run, programme))
+                progress(f"{programme.name}: {path.name} written", index / len(named))
+                if not as_json:
+                    click.echo(path)
     if as_json:
         echo_json({"schema": 1, "bench": bench, "seed": seed, "runs": written})
+    winches = declared.bench.winch
+    words = ["-p", next(iter(winches.values())).profile]
+    words += ["--winch", "all"] if len(winches) > 1 else []
+    suggest_next("compare", sorted(str(entry["path"]) for entry in written), *words)
 
 
 def _entry(path: Path, run: Run, programme: Programme) -> dict[str, object]:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.completion import complete_sim_bench
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
@@ -24,11 +26,20 @@ _CHECK_EVERY = 0.1
 _TURN = 5e-4
 
 
-@click.command("serve")
-@click.argument("bench")
+@click.command(
+    "serve",
+    cls=Command,
+    examples=(
+        "winchkit sim serve demo-elastic-rope",
+        "winchkit sim serve spiral-bench -o bench.toml --seed 3",
+    ),
+)
+@click.argument("bench", shell_complete=complete_sim_bench)
 @click.option("--seed", default=0, show_default=True, help="Of the noise.")
 @click.option(
+    "-o",
     "--bench-file",
+    "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     help="Bench file to write.  [default: BENCH-bench.toml]",
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import re
 import tomllib
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ KINDS = (
 )
 SCHEMA = 1
 _LARGEST = 4_000_000
+_LOGGER = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,9 @@ def open_source(path: str | Path) -> Source:
         raise FileError(_syntax_fault(str(error), str(path), text)) from None
     except RecursionError:
         raise FileError(Fault("tables or lists are nested too deep", str(path))) from None
-    return _source(str(path), tree, lines_of_keys(text))
+    source = _source(str(path), tree, lines_of_keys(text))
+    _LOGGER.info("read %s: %s", path, source.kind)
+    return source
 
 
 def _text(path: Path) -> str:

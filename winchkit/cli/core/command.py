@@ -1,0 +1,96 @@
+"""A command of winchkit: with examples in its help, ``-q`` and ``-v``, and ``-`` for a file.
+
+>>> @click.command(cls=Command, examples=("winchkit check bench.toml", "winchkit check *.csv"))
+... def command() -> None: ...
+
+A test executes every example (tests/cli/core/test_examples.py).
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from time import monotonic
+from typing import Any, NamedTuple
+
+import click
+from click.core import ParameterSource
+
+from winchkit.cli.core.messages import detail, is_verbose, verbosity_options
+
+__all__ = ["Command", "Example", "Group"]
+
+
+class Example(NamedTuple):
+    """A command line for the help."""
+
+    line: str
+    not_run: str = ""
+    """Why the test only parses it, such as hardware that it needs; empty: it is executed."""
+
+
+class _WithExamples(click.Command):
+    """Help that ends with examples, and the options that all commands share."""
+
+    def __init__(self, *args: Any, examples: Sequence[str | Example] = (), **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.examples = tuple(
+            item if isinstance(item, Example) else Example(item) for item in examples
+        )
+        self.params += verbosity_options()
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples, each in one line, so that it can be copied."""
+        super().format_epilog(ctx, formatter)
+        if self.examples:
+            with formatter.section("Examples"):
+                for example in self.examples:
+                    formatter.write(f"{'':{formatter.current_indent}}{example.line}\n")
+
+
+class Command(_WithExamples):
+    """A command that does something."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Read the arguments; ``-`` is refused where no file is read."""
+        rest = super().parse_args(ctx, args)
+        for param in self.params:
+            given = ctx.params.get(param.name or "")
+            if "-" in (given if isinstance(given, tuple) else (given,)):
+                _refuse_dash(param, ctx)
+        return rest
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; with ``-v`` report what the environment decided, and the duration."""
+        if not is_verbose():
+            return super().invoke(ctx)
+        for param in self.params:
+            if ctx.get_parameter_source(param.name or "") is ParameterSource.ENVIRONMENT:
+                detail(f"{param.opts[-1]} {ctx.params.get(param.name or '')} by {_variable(param)}")
+        began = monotonic()
+        try:
+            return super().invoke(ctx)
+        finally:
+            detail(f"{ctx.command_path}: {monotonic() - began:.3f} s in all")
+
+
+class Group(_WithExamples, click.Group):
+    """A group of commands."""
+
+    command_class = Command
+
+
+def _variable(param: click.Parameter) -> str:
+    named = [param.envvar] if isinstance(param.envvar, str) else param.envvar or ()
+    return next((name for name in named if os.environ.get(name)), "the environment")
+
+
+def _refuse_dash(param: click.Parameter, ctx: click.Context) -> None:
+    """Raise UsageError for ``-`` as the value of a parameter that reads no file."""
+    name = max(param.opts, key=len) if isinstance(param, click.Option) else param.make_metavar(ctx)
+    what = (
+        "this writes a file, and not to standard output"
+        if "output" in param.opts[-1]
+        else "this cannot come from standard input"
+    )
+    raise click.UsageError(f"{name} -: {what}; name it.", ctx)

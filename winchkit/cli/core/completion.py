@@ -1,0 +1,192 @@
+"""What a shell is offered: effects, profiles, benches, programmes, devices, runs, winches.
+
+Nothing is imported but the catalogue of shipped files, and no effect is executed: a shell waits for
+the answer.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+from winchkit.regular_file import regular
+
+__all__ = [
+    "complete_bench",
+    "complete_device",
+    "complete_effect",
+    "complete_effect_of_profile",
+    "complete_file",
+    "complete_profile",
+    "complete_programme",
+    "complete_run",
+    "complete_sim_bench",
+    "complete_winch",
+    "files_of_kind",
+]
+
+_KIND = re.compile(r'^kind\s*=\s*"([\w-]+)"', re.MULTILINE)
+_HEAD = 2000
+"""Characters of a file in which its kind stands."""
+_PROFILES = ("winch", "axis", "robot")
+_RUNS = (".csv", ".mcap")
+
+Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
+
+
+def complete_bench(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Bench files, and folders that may hold some."""
+    return _declarations(typed, ("bench",))
+
+
+def complete_programme(
+    ctx: click.Context, _param: click.Parameter, typed: str
+) -> list[CompletionItem]:
+    """Programmes in files, and those that are shipped, by name."""
+    from winchkit import catalog
+
+    shipped = [path.stem for path in catalog.folder("sim").glob("programme-*.toml")]
+    return _names(shipped, typed) + _declarations(typed, ("programme",))
+
+
+def complete_sim_bench(
+    ctx: click.Context, _param: click.Parameter, typed: str
+) -> list[CompletionItem]:
+    """Simulated benches in files, and those that are shipped, by name."""
+    from winchkit import catalog
+
+    shipped = [name for name in catalog.names("sim") if not name.startswith("programme-")]
+    return _names(shipped, typed) + _declarations(typed, ("sim-bench",))
+
+
+def complete_profile(
+    ctx: click.Context, _param: click.Parameter, typed: str
+) -> list[CompletionItem]:
+    """Profiles in files, and those that are shipped, by name."""
+    from winchkit import catalog
+
+    return _names(catalog.names("profiles"), typed) + _declarations(typed, _PROFILES)
+
+
+def complete_device(
+    ctx: click.Context, _param: click.Parameter, typed: str
+) -> list[CompletionItem]:
+    """Shipped devices."""
+    from winchkit import catalog
+
+    return _names(catalog.names("devices"), typed)
+
+
+def complete_run(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Runs and logs, and folders that may hold some."""
+    return _files(typed, lambda path: path.suffix.lower() in _RUNS)
+
+
+def complete_file(ctx: click.Context, _param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Any file, and folders."""
+    return _files(typed, lambda _path: True)
+
+
+def complete_effect(
+    ctx: click.Context, _param: click.Parameter, typed: str
+) -> list[CompletionItem]:
+    """Effects of the catalogue: a file of winchkit/effects has the name of its effect."""
+    from importlib.resources import files
+
+    folder = Path(str(files("winchkit"))) / "effects"
+    modules = [path.stem for path in folder.glob("on_*/*.py") if path.stem != "__init__"]
+    return _names((name.replace("_", "-") for name in modules), typed)
+
+
+def complete_effect_of_profile(
+    ctx: click.Context, _param: click.Parameter, typed: str
+) -> list[CompletionItem]:
+    """Effects that the profile on the line has already; all effects where there is none."""
+    from winchkit import catalog
+    from winchkit.errors import FileError
+
+    profile = _given(ctx, "profile")
+    if not profile:
+        return complete_effect(ctx, _param, typed)
+    try:
+        effects = _table(catalog.find("profiles", profile)).get("effect", [])
+    except FileError:
+        return []
+    listed = effects if isinstance(effects, list) else []
+    return _names((str(e["id"]) for e in listed if isinstance(e, dict) and "id" in e), typed)
+
+
+def complete_winch(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
+    """Winches of the bench on the line, in the environment, or else of the only bench file here."""
+    bench = _given(ctx, "bench")
+    if not bench:
+        here = files_of_kind(Path(), ("bench",))
+        if len(here) != 1:
+            return []
+        bench = str(here[0])
+    winches = _table(Path(bench)).get("winch", {})
+    return _names(winches if isinstance(winches, dict) else (), typed)
+
+
+def files_of_kind(folder: Path, kinds: tuple[str, ...]) -> list[Path]:
+    """Declarations of these kinds in a folder, sorted by name."""
+    return [path for path in sorted(folder.glob("*.toml")) if _kind(path) in kinds]
+
+
+def _given(ctx: click.Context, option: str) -> str | None:
+    """Value of an option on the line, or in the environment."""
+    value = ctx.params.get(option)
+    if value is None:
+        for param in ctx.command.params:
+            if param.name == option:
+                value = param.value_from_envvar(ctx)
+    return value if isinstance(value, str) and value else None
+
+
+def _table(path: Path) -> dict[str, Any]:
+    """A TOML file; empty where it cannot be read."""
+    try:
+        with open(path, "rb", opener=regular) as file:
+            return tomllib.load(file)
+    except (OSError, ValueError):
+        return {}
+
+
+def _names(known: Iterable[str], typed: str) -> list[CompletionItem]:
+    return [CompletionItem(name) for name in sorted(known) if name.startswith(typed)]
+
+
+def _declarations(typed: str, kinds: tuple[str, ...]) -> list[CompletionItem]:
+    return _files(typed, lambda path: path.suffix == ".toml" and _kind(path) in kinds)
+
+
+def _files(typed: str, wanted: Callable[[Path], bool]) -> list[CompletionItem]:
+    """Files that are wanted, and folders, that begin with what is typed."""
+    folder, _, name = typed.rpartition("/")
+    lead = f"{folder}/" if "/" in typed else ""
+    try:
+        here = sorted((Path(lead) if lead else Path()).iterdir())
+    except OSError:
+        return []
+    found = [path for path in here if path.name.startswith(name) and not path.name.startswith(".")]
+    folders = [CompletionItem(f"{lead}{path.name}/") for path in found if path.is_dir()]
+    files = [
+        CompletionItem(f"{lead}{path.name}") for path in found if path.is_file() and wanted(path)
+    ]
+    return files + folders
+
+
+def _kind(path: Path) -> str:
+    """Kind of a declaration by its first lines; empty where it has none."""
+    try:
+        with open(path, encoding="utf-8", errors="replace", opener=regular) as file:
+            found = _KIND.search(file.read(_HEAD))
+    except OSError:
+        return ""
+    return found[1] if found else ""
