@@ -29,6 +29,7 @@ SLOW = frozenset(
         (
             "bench/control/test_fault_campaign.py",
             "calibration/robot/test_benchmark.py",
+            "cli/core/test_examples.py",
             "cli/model/test_plan.py",
             "cli/model/test_promises.py",
             "cli/model/test_unknown_effect.py",

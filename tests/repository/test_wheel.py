@@ -95,7 +95,7 @@ def test_it_works_where_it_is_installed(wheel: Path, tmp_path: Path) -> None:
     for path in (ROOT / "sim").glob("demo-*.toml"):
         assert path.stem in listed
     python(
-        *("-c", code, "sim", "record", "demo-elastic-rope", "-p", "programme-demo"),
+        *("-c", code, "sim", "record", "demo-elastic-rope", "programme-demo"),
         *("--rate", "5 Hz"),
         cwd=tmp_path,
     )

@@ -153,7 +153,7 @@ def test_the_command_writes_runs_that_can_be_read(suffix: str, tmp_path: Path) -
         'schema = 1\nkind = "programme"\nname = "short"\n'
         '[[step]]\nby = "-0.1 m"\nspeed = "0.2 m/s"\n[[step]]\nhold = "0.2 s"\n'
     )
-    arguments = ["record", "spiral-bench", "-p", str(motion), "--out", str(tmp_path / "runs")]
+    arguments = ["record", "spiral-bench", str(motion), "--out", str(tmp_path / "runs")]
     arguments += ["--format", suffix, "--hidden", "elastic rope, axial_stiffness=90 kN", "--json"]
     result = CliRunner().invoke(command, arguments, catch_exceptions=False)
     assert result.exit_code == 0
@@ -169,13 +169,13 @@ def test_the_command_writes_runs_that_can_be_read(suffix: str, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nothing", "-p", "programme-demo"], "no simulated bench 'nothing'"),
-        (["spiral-bench", "-p", "programme-dem"], "did you mean 'programme-demo'"),
+        (["nothing", "programme-demo"], "no simulated bench 'nothing'"),
+        (["spiral-bench", "programme-dem"], "did you mean 'programme-demo'"),
         (
-            ["spiral-bench", "-p", "programme-demo", "--hidden", "fat dum"],
+            ["spiral-bench", "programme-demo", "--hidden", "fat dum"],
             "did you mean 'fat drum'",
         ),
-        (["spiral-bench", "-p", "programme-demo", "--rate", "50"], "has no unit"),
+        (["spiral-bench", "programme-demo", "--rate", "50"], "has no unit"),
     ],
 )
 def test_the_command_says_what_is_wrong(arguments: list[str], message: str, tmp_path: Path) -> None:

@@ -2,7 +2,7 @@
 
 | language | block |
 |---|---|
-| ``console`` | ``$ commands`` with their output; ``...`` is any text, numbers may differ |
+| ``console`` | ``$ commands`` with their output; ``...`` is any text, numbers may differ, ``next:`` may miss |
 | ``python`` | a programme |
 | ``toml`` | a declaration, read by its schema, or a part of one, parsed |
 | ``csv`` | a run, read by ``winchkit check``, or points of a load cell, fitted |
@@ -39,6 +39,7 @@ _FENCE = re.compile(
     r"^(?:<!-- not run: (?P<reason>[^\n]+) -->\n)?```(?P<info>\w[^\n]*)\n(?P<text>.*?)^```$",
     re.MULTILINE | re.DOTALL,
 )
+_NEXT = re.compile(r"^next: winchkit .*\n?", re.MULTILINE)
 _NUMBER = re.compile(r"[-−]?\d+(?:\.\d+)?(?:e[-+−]?\d+)?")
 _PATIENCE = 120
 FIRST_TERMINAL = 'title="first terminal"'
@@ -83,7 +84,9 @@ def snippets_of(page: Path) -> list[Snippet]:
 
 
 def said(expected: str, printed: str) -> bool:
-    """Whether a page's output is what was printed, numbers and line breaks apart."""
+    """Whether a page's output is what was printed, numbers, line breaks, suggestions apart."""
+    if not _NEXT.search(expected):
+        printed = _NEXT.sub("", printed)
     pieces = [re.escape(_plain(piece)) for piece in expected.split("...")]
     return re.fullmatch(" ?.*? ?".join(pieces), _plain(printed)) is not None
 

@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
+from winchkit.cli.core.command import Example
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.outcome import finish
 from winchkit.version import __version__
@@ -113,7 +114,7 @@ class _Main(LazyGroup):
     table=COMMANDS,
     sections=SECTIONS,
     examples=(
-        "winchkit demo",
+        Example("winchkit demo", "takes half a minute; .ci/run executes it"),
         "winchkit sim record demo-elastic-rope programme-demo",
         "winchkit diagnose demo-*.csv -p bench-spiral",
     ),

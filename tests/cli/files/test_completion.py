@@ -117,14 +117,19 @@ def options_of(
             yield from options_of(inner, below, f"{words} {name}")
 
 
+def variable(words: str) -> str:
+    return words.replace(" ", "_").replace("-", "_").upper()
+
+
 def test_every_option_has_an_environment_variable() -> None:
     possible: dict[int, tuple[click.Option, list[list[str]]]] = {}
     for words, option in every_option():
-        typed = max(option.opts, key=len).lstrip("-")
-        own = f"WINCHKIT_{words}_{typed}".replace(" ", "_").replace("-", "_").upper()
-        shared = [f"WINCHKIT_{typed.upper()}"] if typed in {"bench", "profile"} else []
+        typed = [name[2:] for name in option.opts if name.startswith("--")]
+        own = [variable(f"WINCHKIT_{words}_{name}") for name in typed]
+        for_all = {"bench", "profile", "quiet", "verbose"}
+        shared = [variable(f"WINCHKIT_{name}") for name in typed if name in for_all]
         # A command that stands in two groups has the name by which it was called first.
-        possible.setdefault(id(option), (option, []))[1].append([own, *shared])
+        possible.setdefault(id(option), (option, []))[1].append([*own, *shared])
     for option, names in possible.values():
         assert option.envvar in names, option.opts
     assert len(possible) > 60

@@ -100,7 +100,7 @@ CASES = {
 
 def record(programme: Path, physics: str, folder: Path, seed: int) -> list[str]:
     asked = ("--hidden", physics, "--out", folder, "--seed", seed)
-    told = answer("sim", "record", BENCH, "-p", programme, *asked)
+    told = answer("sim", "record", BENCH, programme, *asked)
     return [run["path"] for run in told["runs"]]
 
 

@@ -26,7 +26,7 @@ __all__ = ["command", "status_table"]
 @click.command(
     cls=Command,
     examples=(
-        "winchkit monitor --for 10s",
+        "winchkit monitor --for 2s",
         "winchkit monitor -b bench.toml --for 1s --json",
     ),
 )

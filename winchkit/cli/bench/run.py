@@ -19,6 +19,8 @@ from winchkit.cli.core.options import (
     output_option,
 )
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.standard_input import is_standard_input
+from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.schema.programme import Programme, Step
@@ -32,7 +34,7 @@ _POLL = 0.05
     cls=Command,
     examples=(
         "winchkit run short.toml -b bench.toml -o runs",
-        "winchkit run programme-demo --dry-run",
+        "winchkit run short.toml -b bench.toml --dry-run",
     ),
 )
 @click.argument("programme", type=PROGRAMME)
@@ -78,6 +80,11 @@ def command(
     from winchkit.sim.bench import programme_path
 
     declared = read_programme(programme_path(programme))
+    if is_standard_input(programme) and not yes and any(step.ask for step in declared.step):
+        raise UsageError(
+            "PROGRAMME -: it asks an operator, whose answers would come from standard input as "
+            "well; give -y"
+        )
     if dry_run:
         _rehearse(bench, declared, effects, as_json=as_json)
         return

@@ -14,6 +14,8 @@ from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import TABLE, bench_by_default, complete_bench, complete_winch
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.model.options import figures_option, write_figures, write_page
+from winchkit.cli.core.standard_input import is_standard_input
+from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import Cells
@@ -107,6 +109,8 @@ def command(
     from winchkit.cli.core.quantities import optional
     from winchkit.report.pages.cell_calibration import effect_lines, report_lines
 
+    if is_standard_input(points) and not yes:
+        raise UsageError("--points -: nobody can be asked whether the fit is accepted; give -y")
     degrees = optional(temperature, "temperature")
     found = _found(cell, bench, points, serial, guided)
     fit, needed = fit_cell(found.points, order), static_effects(found.points)

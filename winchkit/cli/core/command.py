@@ -18,7 +18,23 @@ from click.core import ParameterSource
 
 from winchkit.cli.core.messages import detail, is_verbose, verbosity_options
 
-__all__ = ["Command", "Example", "Group"]
+__all__ = ["LETTERS", "Command", "Example", "Group"]
+
+LETTERS = {
+    "b": "bench",
+    "c": "column",
+    "h": "help",
+    "o": "output",
+    "p": "profile",
+    "q": "quiet",
+    "v": "verbose",
+    "y": "yes",
+}
+"""The one option of every letter, in all commands."""
+
+
+_WRITTEN = frozenset({"--output", "--html", "--save-mapping"})
+"""Options that name a file to write."""
 
 
 class Example(NamedTuple):
@@ -27,6 +43,8 @@ class Example(NamedTuple):
     line: str
     not_run: str = ""
     """Why the test only parses it, such as hardware that it needs; empty: it is executed."""
+    exit_code: int = 0
+    """With which it ends."""
 
 
 class _WithExamples(click.Command):
@@ -53,7 +71,17 @@ class Command(_WithExamples):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the arguments; ``-`` is refused where no file is read."""
-        rest = super().parse_args(ctx, args)
+        try:
+            rest = super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            meaning = LETTERS.get(error.option_name.removeprefix("-"))
+            if meaning is None:
+                raise
+            raise click.UsageError(
+                f"No such option '{error.option_name}': it is --{meaning} in every command, and "
+                "this one has none.",
+                ctx,
+            ) from None
         for param in self.params:
             given = ctx.params.get(param.name or "")
             if "-" in (given if isinstance(given, tuple) else (given,)):
@@ -90,7 +118,7 @@ def _refuse_dash(param: click.Parameter, ctx: click.Context) -> None:
     name = max(param.opts, key=len) if isinstance(param, click.Option) else param.make_metavar(ctx)
     what = (
         "this writes a file, and not to standard output"
-        if "output" in param.opts[-1]
+        if _WRITTEN.intersection(param.opts)
         else "this cannot come from standard input"
     )
     raise click.UsageError(f"{name} -: {what}; name it.", ctx)

@@ -94,10 +94,10 @@ def _name_variables(command: click.Command, prefix: str) -> None:
     """
     for option in command.params:
         if isinstance(option, click.Option) and option.envvar is None:
-            typed = max(option.opts, key=len).lstrip("-")
-            own = _variable(f"{prefix}_{typed}")
-            shared = [f"{_PROGRAM}_{_variable(typed)}"] if typed in _SHARED else []
-            option.envvar = [own, *shared]
+            typed = [name[2:] for name in option.opts if name.startswith("--")]
+            own = [_variable(f"{prefix}_{name}") for name in typed]
+            shared = [f"{_PROGRAM}_{_variable(name)}" for name in typed if name in _SHARED]
+            option.envvar = [*own, *shared]
     if isinstance(command, click.Group):
         for name, inner in command.commands.items():
             _name_variables(inner, f"{prefix}_{name}")

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 __all__ = [
     "BENCH",
     "BENCH_VARIABLE",
-    "LETTERS",
     "PROFILE",
     "PROGRAMME",
     "RUN",
@@ -54,18 +53,6 @@ __all__ = [
 
 BENCH_VARIABLE = "WINCHKIT_BENCH"
 _BITRATE = 1_000_000
-LETTERS = {
-    "b": "bench",
-    "c": "column",
-    "h": "help",
-    "o": "output",
-    "p": "profile",
-    "q": "quiet",
-    "v": "verbose",
-    "y": "yes",
-}
-"""The one option of every letter, in all commands."""
-
 RUN = Readable("run", complete_run)
 PROFILE = Readable("profile", complete_profile)
 PROGRAMME = Readable("programme", complete_programme)

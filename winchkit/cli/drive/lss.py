@@ -7,13 +7,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
-from canopen.lss import LssMaster
 
 from winchkit.cli.core.command import Example, Group
 from winchkit.cli.core.dry_run import Frame, show_frames
 from winchkit.cli.core.options import BusChoice, bus_options, dry_run_option
 from winchkit.cli.core.output import echo_json
-from winchkit.drivers.can.canopen.lss import LssLine
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -34,6 +32,8 @@ _ANSWERED = (0x11, 0x13, 0x17, 0x43, 0x5A, 0x5B, 0x5C, 0x5D, 0x5E)
 @contextmanager
 def rehearsed(*, as_json: bool) -> Iterator[LssLine]:
     """An LSS line to nowhere; its frames are shown at the end."""
+    from winchkit.drivers.can.canopen.lss import LssLine
+
     network = _Network()
     line = LssLine(network)
     yield line
@@ -48,6 +48,8 @@ class _Network:
         self.name = _BUS
         self.network: Any = self
         self.frames: list[Frame] = []
+        from canopen.lss import LssMaster
+
         master: Any = LssMaster()
         master.network = self
         self.lss = master
@@ -128,10 +130,10 @@ def find(*, as_json: bool, **bus: Any) -> None:
 
 @command.command(
     examples=(
-        "winchkit lss identify --only",
+        Example("winchkit lss identify --only", "needs a drive that is alone on its bus"),
         Example(
             "winchkit lss identify --vendor 1Ah --product 2 --revision 1 --serial 7",
-            "needs a drive of this identity",
+            "needs a drive that is alone on its bus",
         ),
     ),
 )

@@ -16,8 +16,8 @@ __all__ = ["command"]
 @click.command(
     cls=Command,
     examples=(
-        "winchkit export demo-10kg-1.csv -o lift.mcap --replace",
-        "winchkit export lift.mcap -o lift.csv --winch A",
+        "winchkit export demo-10kg-1.csv -o run.mcap",
+        "winchkit export lift.mcap -o lift.csv",
     ),
 )
 @runs_argument

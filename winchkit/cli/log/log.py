@@ -44,7 +44,7 @@ _SHOW_PERIOD = 0.5
     table=COMMANDS,
     invoke_without_command=True,
     examples=(
-        "winchkit log -o lift.mcap --for 10s",
+        "winchkit log -o lift.mcap --for 5s",
         "winchkit log -b bench.toml --jsonl --for 1s",
     ),
 )

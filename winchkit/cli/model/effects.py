@@ -135,8 +135,10 @@ def _listing(catalogue: Catalogue) -> str:
 @click.command(
     cls=ManyValues,
     examples=(
-        "winchkit effects new own.py --fit demo-*.csv -p bench-spiral",
-        "winchkit diagnose demo-*.csv -p bench-spiral --effects own.py",
+        "winchkit effects new own.py --curve empirical-motor-torque-speed"
+        " --fit demo-*.csv -p bench-spiral",
+        "winchkit effects new drum.py --id drum-shape --curve empirical-tension-drum-angle"
+        " --fit demo-*.csv -p bench-spiral",
     ),
 )
 @click.argument("file", metavar="FILE.py")

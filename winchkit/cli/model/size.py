@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.options import TABLE
 from winchkit.cli.core.output import echo_json
 
@@ -23,8 +23,8 @@ _SHOWN = {"m": ("mm", 1e-3), "rad/s": ("rpm", 0.10471975511965977)}
 @click.command(
     cls=Command,
     examples=(
-        "winchkit size winding-device.toml",
-        "winchkit size winding-device.toml --json",
+        Example("winchkit size winding-device.toml", exit_code=1),
+        Example("winchkit size winding-device.toml --json", exit_code=1),
     ),
 )
 @click.argument("spec", metavar="SPEC", type=TABLE)

@@ -31,10 +31,10 @@ def command(profile: str, output: str | None) -> None:
     from winchkit.errors import UsageError
     from winchkit.profile_edit.ledger import undo
 
-    source = find("profiles", profile)
-    declared_profile(source)
     if output is None and is_standard_input(profile):
         raise UsageError("-p -: a profile from standard input is written to a file with -o")
+    source = find("profiles", profile)
+    declared_profile(source)
     if output is None and source != Path(profile):
         raise UsageError(f"'{profile}' ships with winchkit; write the copy to a file with -o")
     done = undo(source, Path(output) if output else source)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import echo_json
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _RECORDING_SECONDS = 62.0
+_LONG = "takes half a minute; .ci/run executes it"
 _SHARES_SHOWN = 2
 _OPENING = (
     "A simulated bench with seed {seed}: a winch, a CiA 402 drive on CAN, a load cell, a length "
@@ -32,8 +33,8 @@ _OPENING = (
 @click.command(
     cls=Command,
     examples=(
-        "winchkit demo",
-        "winchkit demo --seed 4 -o demo-4 --json",
+        Example("winchkit demo", _LONG),
+        Example("winchkit demo --seed 3 -o demo-3 --json", _LONG),
     ),
 )
 @click.option("--seed", default=1, show_default=True, help="Seed of hidden effect and noise.")

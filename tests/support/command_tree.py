@@ -1,0 +1,42 @@
+"""Every command of the command line, with its words, options and examples."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import click
+
+from winchkit.cli import COMMANDS, main
+from winchkit.cli.core.command import Example
+
+__all__ = ["commands", "examples"]
+
+
+def commands() -> Iterator[tuple[str, click.Command]]:
+    """Each command and group with its words; the root has none."""
+    yield "", main
+    root = click.Context(main, info_name="winchkit", auto_envvar_prefix="WINCHKIT")
+    for name in COMMANDS:
+        yield from _below(root, main, name, name)
+
+
+def examples() -> Iterator[tuple[str, Example]]:
+    """Every example, with the words of its own command (not of the help that has it)."""
+    known = dict(commands())
+    for _, command in known.items():
+        for example in getattr(command, "examples", ()):
+            words = example.line.split()[1:]
+            two = " ".join(words[:2])
+            yield (two if two in known else words[0]), example
+
+
+def _below(
+    parent: click.Context, group: click.Group, name: str, words: str
+) -> Iterator[tuple[str, click.Command]]:
+    command = group.get_command(parent, name)
+    assert command is not None, words
+    yield words, command
+    if isinstance(command, click.Group):
+        inner = click.Context(command, parent=parent, info_name=name)
+        for below in command.list_commands(inner):
+            yield from _below(inner, command, below, f"{words} {below}")
