@@ -12,7 +12,8 @@ from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.files import write_whole
 from winchkit.runs.formats.csv_read import read_bytes
 from winchkit.runs.formats.csv_write import EVENT_MARK
-from winchkit.runs.formats.mcap_file import MARK, PROFILE, McapFile
+from winchkit.runs.formats.mcap_file import COUNTERS, EVENTS, MARK, PROFILE, McapFile
+from winchkit.runs.formats.mcap_read import read_content
 from winchkit.runs.formats.mcap_records import (
     Body,
     Damage,
@@ -27,6 +28,7 @@ from winchkit.runs.formats.mcap_records import (
 __all__ = ["Recovered", "recover", "recovered_path"]
 
 _COPIED = (Op.SCHEMA, Op.CHANNEL, Op.METADATA)
+_NO_SAMPLES = (EVENTS, COUNTERS)
 _ZSTD = b"\x04\0\0\0zstd"
 _ZSTD_AT = 37
 """Position of the name of the compression in a chunk record, by which chunks are searched."""
@@ -92,11 +94,13 @@ def recover(
     data = read_bytes(source, may_be_empty=True)
     if suffix == ".mcap":
         saved, found = _mcap(data, source, target)
+        samples = _samples(saved)
     elif suffix == ".csv":
         saved, found = _csv(data, target)
+        samples = found.kept
     else:
         raise RunError(Fault(f"'{suffix}' is no format of a log; use .mcap or .csv", str(path)))
-    if not found.kept:
+    if not samples:
         message = "holds no complete sample; there is nothing to recover"
         raise RunError(Fault(message, str(path)))
     write_whole(target, saved)
@@ -136,6 +140,12 @@ def _mcap(data: bytes, source: Path, target: Path) -> tuple[bytes, Recovered]:
     whole = intact and not damaged and data.endswith(MARK)
     lost = 0 if closed else len(data) - max(end, min(len(data), len(MARK)))
     return stream.getvalue(), Recovered(str(target), kept, damaged, lost, whole)
+
+
+def _samples(saved: bytes) -> int:
+    """Number of messages that are samples, and no event or counters."""
+    content = read_content(saved)
+    return sum(content.count(topic) for topic in content.messages if topic not in _NO_SAMPLES)
 
 
 def _whole(data: bytes) -> Iterator[Record | Messages]:

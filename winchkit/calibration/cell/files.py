@@ -129,8 +129,12 @@ def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
         with open(path, newline="", encoding="utf-8-sig", opener=regular) as file:
             table = csv.reader(file)
             rows = [(table.line_num, row) for row in table if row and row[0][:1] != "#"]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FileError(Fault(f"cannot be read: {error}", str(path))) from error
+    except FileNotFoundError:
+        raise FileError(Fault("there is no such file", str(path))) from None
+    except OSError as error:
+        raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FileError(Fault(f"is no CSV text: {error}", str(path))) from None
     if not rows:
         raise FileError(Fault("is empty; it needs the columns load [kg], indicated [N]", str(path)))
     columns = _columns(rows[0][1], str(path))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.core.command import Command
+from winchkit.cli.core.early_checks import check_folder, check_winches
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import (
     PROGRAMME,
@@ -85,6 +86,9 @@ def command(
             "PROGRAMME -: it asks an operator, whose answers would come from standard input as "
             "well; give -y"
         )
+    wired = read_bench(bench)
+    check_winches(declared, wired)
+    check_folder(output)
     if dry_run:
         _rehearse(bench, declared, effects, as_json=as_json)
         return
@@ -97,7 +101,7 @@ def command(
     else:
         for path in written:
             click.echo(path)
-    winches = read_bench(bench).winch
+    winches = wired.winch
     words = ["-p", next(iter(winches.values())).profile]
     words += ["--winch", "all"] if len(winches) > 1 else []
     suggest_next("compare", sorted(map(str, written)), *words)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import TABLE, bench_by_default, complete_bench, complete_winch
 from winchkit.cli.core.output import echo_json
@@ -110,8 +111,10 @@ def command(
     from winchkit.report.pages.cell_calibration import effect_lines, report_lines
 
     if is_standard_input(points) and not yes:
-        raise UsageError("--points -: nobody can be asked whether the fit is accepted; give -y")
+        raise UsageError("--points -: the question whether the fit is accepted has no input left; give -y")
     degrees = optional(temperature, "temperature")
+    if output is not None:
+        check_output(output, (".toml",))
     found = _found(cell, bench, points, serial, guided)
     fit, needed = fit_cell(found.points, order), static_effects(found.points)
     beside = Path(bench or points or "").parent

@@ -36,9 +36,11 @@ def cells(bench: str, cell: str | None) -> Iterator[tuple[Cells, str]]:
     """The instruments of a bench, and the full name of the one that is meant."""
     from winchkit.bench.cells.desk import full_name
     from winchkit.bench.remote.cell_session import at_cells
+    from winchkit.schema.read import read_bench
 
+    name = full_name(read_bench(bench), cell)
     with at_cells(bench) as found:
-        yield found, full_name(found.spec, cell)
+        yield found, name
 
 
 def unit_of(name: str) -> str:

@@ -152,7 +152,7 @@ def _decimals(value: float | None, digits: int = 3) -> str:
 def progress_bar() -> Iterator[ProgressCallback]:
     """Gives a function to call with the present task and the share (0 to 1) that is done, or None.
 
-    A bar on a terminal, lines with ``-v``, nothing with ``-q`` or where nobody sees it.
+    A bar on a terminal, lines with ``-v``, nothing with ``-q`` or without a terminal.
     """
     if is_verbose():
         yield _steps()

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Group
+from winchkit.cli.core.early_checks import check_exists, check_output
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import (
     TABLE,
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
+_FORMATS = (".dcf", ".json")
 _FILE = click.Path(dir_okay=False, path_type=Path)
 _who = click.argument("who", required=True, metavar="WINCH|NODE", shell_complete=complete_winch)
 _file = click.argument("file", type=TABLE, metavar="FILE")
@@ -75,6 +77,7 @@ def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
     from winchkit.bench.drives.node_access import drive_at
     from winchkit.drivers.can.tools.config import read_config, write_config_file
 
+    check_output(output, _FORMATS)
     choice = BusChoice(**bus)
     with drive_at(choice.spec(), who) as node:
         config = read_config(node.objects)
@@ -105,6 +108,7 @@ def diff(who: str, file: str, *, as_json: bool, **bus: Any) -> None:
     from winchkit.drivers.can.tools.config import check_fits, difference, read_config_file
     from winchkit.drivers.can.tools.scan import identity_of
 
+    check_exists(file)
     with drive_at(BusChoice(**bus).spec(), who) as node:
         config = read_config_file(Path(file), node.objects.dictionary)
         check_fits(config, identity_of(node.objects.port), str(file))
@@ -139,6 +143,7 @@ def load(who: str, file: str, *, dry_run: bool, as_json: bool, **bus: Any) -> No
     from winchkit.drivers.can.tools.config import check_fits, read_config_file, write_config
     from winchkit.drivers.can.tools.scan import identity_of
 
+    check_exists(file)
     choice = BusChoice(**bus)
     if dry_run:
         _show_load(choice, who, file, as_json=as_json)

@@ -40,8 +40,11 @@ def command(who: str | None, *, device: str | None, as_json: bool, **bus: Any) -
     Reads by SDO, through the process that owns the bench where there is one; writes nothing.
     """
     from winchkit.bench.drives.node_access import drive_at
+    from winchkit.catalog import find
     from winchkit.drivers.can.tools.info import read_info
 
+    if device is not None:
+        find("devices", device)
     with drive_at(BusChoice(**bus).spec(), who, device=device) as node:
         info = read_info(node.objects)
     if as_json:

@@ -186,6 +186,10 @@ def assign(
     """
     if node is None and new_bitrate is None and not store:
         raise UsageError("nothing to set; give --node, --new-bitrate or --store")
+    from winchkit.drivers.can.canopen.lss import check_bitrate, check_node
+
+    check_node(node)
+    check_bitrate(new_bitrate)
     parts = {part: rest.pop(part) for part in _PARTS}
     choice = BusChoice(**rest)
     if dry_run:

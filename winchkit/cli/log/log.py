@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.bench.remote.interruption import Terminated
+from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import (
@@ -89,6 +90,8 @@ def command(
         return
     bench = bench_by_default(context, context.command.params[0], bench)
     assert bench is not None, "else UsageError"
+    if output is not None:
+        check_output(output, (".csv", ".mcap"))
     _refuse(output, rotate, jsonl=jsonl, udp=udp, as_json=as_json)
     _refuse_to_lose(None if replace else output)
     from winchkit.bench.remote.reconnection import watch

@@ -20,7 +20,7 @@ from winchkit.drivers.can.bus.bus import Handler
 from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.errors import DeviceRefused, NoReply, UsageError
 
-__all__ = ["BIT_RATES", "UNCONFIGURED", "LssLine", "LssPort"]
+__all__ = ["BIT_RATES", "UNCONFIGURED", "LssLine", "LssPort", "check_bitrate", "check_node"]
 
 BIT_RATES = {
     1_000_000: 0,
@@ -47,6 +47,19 @@ _INQUIRIES = (
     CS_INQUIRE_SERIAL_NUMBER,
 )
 _REASONS = {"LSS Error: 1": "this value is inadmissible", "LSS Error: 2": "its memory is at fault"}
+
+
+def check_node(node: int | None) -> None:
+    """Raise UsageError for a number that is no node id; None is none to set."""
+    if node is not None and not 1 <= node <= 127:
+        raise UsageError(f"{node} is no node id; it is a whole number from 1 to 127")
+
+
+def check_bitrate(bitrate: int | None) -> None:
+    """Raise UsageError for a bit rate that the standard does not have; None is none to set."""
+    if bitrate is not None and bitrate not in BIT_RATES:
+        known = ", ".join(map(str, BIT_RATES))
+        raise UsageError(f"{bitrate} bit/s is not in the standard's table: {known}")
 
 
 class LssPort(Protocol):
@@ -101,16 +114,13 @@ class LssLine:
 
     def set_node(self, node: int) -> None:
         """Give the selected device a node id, from its next start of communication on."""
-        if not 1 <= node <= 127:
-            raise UsageError(f"{node} is no node id; it is a whole number from 1 to 127")
+        check_node(node)
         with self._errors(f"set the node id {node}"):
             self._master.configure_node_id(node)
 
     def set_bitrate(self, bitrate: int) -> None:
         """Give the selected device a bit rate, from its next start on once stored."""
-        if bitrate not in BIT_RATES:
-            known = ", ".join(map(str, BIT_RATES))
-            raise UsageError(f"{bitrate} bit/s is not in the standard's table: {known}")
+        check_bitrate(bitrate)
         with self._errors(f"set the bit rate {bitrate}"):
             self._master.configure_bit_timing(BIT_RATES[bitrate])
 

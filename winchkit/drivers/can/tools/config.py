@@ -211,8 +211,12 @@ def read_config_file(path: Path, dictionary: Any) -> Config:
     is_json = _is_json(path)
     try:
         text = read_text(path, "utf-8" if is_json else "latin-1")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(Fault(f"cannot be read: {error}", str(path))) from error
+    except FileNotFoundError:
+        raise FileError(Fault("there is no such file", str(path))) from None
+    except OSError as error:
+        raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
+    except UnicodeDecodeError as error:
+        raise FileError(Fault(f"is not UTF-8 text: {error}", str(path))) from None
     known = settings(dictionary)
     return _from_json(path, text, known) if is_json else _from_dcf(path, text, known)
 

@@ -1,0 +1,47 @@
+"""Checks of names and files before a bus is opened, a person is asked, or anything moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from winchkit.errors import Fault, FileError, UsageError
+from winchkit.schema.programme import ALL
+
+if TYPE_CHECKING:
+    from winchkit.schema.bench import BenchSpec
+    from winchkit.schema.programme import Programme
+
+__all__ = ["check_exists", "check_folder", "check_output", "check_winches"]
+
+
+def check_output(path: str | Path, suffixes: tuple[str, ...]) -> None:
+    """Raise UsageError for an output of another format, in no folder, or that is a folder."""
+    target = Path(path)
+    if target.suffix.lower() not in suffixes:
+        known = " or ".join(suffixes)
+        raise UsageError(f"-o {path}: '{target.suffix}' is no format for it; name a {known} file")
+    if target.is_dir():
+        raise UsageError(f"-o {path}: is a folder; name a file")
+    if not target.parent.is_dir():
+        raise UsageError(f"-o {path}: there is no folder '{target.parent}'; make it first")
+
+
+def check_folder(path: str | Path) -> None:
+    """Raise UsageError for a folder that cannot be made, since a file is in its way."""
+    for place in (Path(path), *Path(path).parents):
+        if place.exists() and not place.is_dir():
+            raise UsageError(f"-o {path}: '{place}' is a file, and no folder can be made there")
+
+
+def check_exists(path: str | Path) -> None:
+    """Raise FileError where there is no such file."""
+    if not Path(path).exists():
+        raise FileError(Fault("there is no such file", str(path)))
+
+
+def check_winches(programme: Programme, bench: BenchSpec) -> None:
+    """Raise UsageError for a step of a winch that the bench lacks."""
+    for step in programme.step:
+        if step.winch != ALL and (step.to is not None or step.by is not None):
+            bench.winch_named(step.winch)
