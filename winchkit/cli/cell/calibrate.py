@@ -14,8 +14,8 @@ from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import TABLE, bench_by_default, complete_bench, complete_winch
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.model.options import figures_option, write_figures, write_page
 from winchkit.cli.core.standard_input import is_standard_input
+from winchkit.cli.model.options import figures_option, write_figures, write_page
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -111,7 +111,9 @@ def command(
     from winchkit.report.pages.cell_calibration import effect_lines, report_lines
 
     if is_standard_input(points) and not yes:
-        raise UsageError("--points -: the question whether the fit is accepted has no input left; give -y")
+        raise UsageError(
+            "--points -: the question whether the fit is accepted has no input left; give -y"
+        )
     degrees = optional(temperature, "temperature")
     if output is not None:
         check_output(output, (".toml",))

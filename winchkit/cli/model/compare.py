@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import note
 from winchkit.cli.core.output import echo_each, echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.messages import suggest_next
+from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.core.output import echo_each, echo_json
 from winchkit.cli.core.terminal import progress_bar
