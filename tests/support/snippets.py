@@ -2,7 +2,7 @@
 
 | language | block |
 |---|---|
-| ``console`` | ``$ commands`` with their output; ``...`` is any text, numbers may differ, ``next:`` may miss |
+| ``console`` | ``$ commands`` with their output; numbers, ``next:`` may differ |
 | ``python`` | a programme |
 | ``toml`` | a declaration, read by its schema, or a part of one, parsed |
 | ``csv`` | a run, read by ``winchkit check``, or points of a load cell, fitted |
