@@ -33,7 +33,7 @@ LETTERS = {
 """The one option of every letter, in all commands."""
 
 
-_WRITTEN = frozenset({"--output", "--html", "--save-mapping"})
+_WRITTEN = frozenset({"--output", "--html", "--save-mapping", "--figures"})
 """Options that name a file to write."""
 
 
