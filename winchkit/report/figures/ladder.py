@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 
 import numpy as np
 
@@ -69,32 +69,37 @@ def error_ladder(
 def fleet_ladders(
     found: Mapping[str, Comparison] | Mapping[str, Diagnosis], source: str = ""
 ) -> list[Figure]:
-    """A ladder per output with a row per winch, in their order."""
-    out = []
+    """A ladder per output with a row per winch, the output with the largest ratio first."""
+    out: list[tuple[float, Figure]] = []
     for output in dict.fromkeys(name for one in found.values() for name in one.outputs):
         rows = [
             row
             for winch, one in found.items()
             if output in one.outputs
-            and (row := _row(winch or "the winch", one.outputs[output])) is not None
+            and (row := _row(winch or "the winch", one.outputs[output], _named(one))) is not None
         ]
         if rows:
             name = OUTPUT_NAMES.get(output, output)
-            grown = any(isinstance(one, Diagnosis) and one.steps for one in found.values())
+            grown = any(_named(one) for one in found.values())
             title = capital(f"{name}: error over the noise")
             changed = "with named effects" if grown else ""
-            out.append(_figure(f"errors-{output}", title, rows, changed, source))
-    return out
+            worst = max(row.before for row in rows)
+            out.append((worst, _figure(f"errors-{output}", title, rows, changed, source)))
+    return [figure for _, figure in sorted(out, key=lambda item: -item[0])]
 
 
-def _row(name: str, output: OutputError | OutputFit) -> _Row | None:
+def _named(one: Comparison | Diagnosis) -> bool:
+    return isinstance(one, Diagnosis) and bool(one.steps)
+
+
+def _row(name: str, output: OutputError | OutputFit, grown: bool = True) -> _Row | None:
     """Errors over the noise; None where the noise is unknown."""
     if not output.noise_rms:
         return None
     if isinstance(output, OutputFit):
         before, after = output.heldout_rms_before, output.heldout_rms_after
-        return _Row(name, before / output.noise_rms, after / output.noise_rms)
-    return _Row(name, output.rms / output.noise_rms, float("nan"))
+        return _Row(name, before / output.noise_rms, after / output.noise_rms if grown else nan)
+    return _Row(name, output.rms / output.noise_rms, nan)
 
 
 def _figure(name: str, title: str, rows: Sequence[_Row], changed: str, source: str) -> Figure:

@@ -265,6 +265,7 @@ def _over_variable(
     noise = None if curves.noise is None else curves.noise / curves.scale.worth
     output = OUTPUT_NAMES.get(curves.output, curves.output)
     over = VARIABLE_NAMES.get(followed.variable, followed.variable)
+    over = "time in the run" if followed.variable == "time" else over
     often = ""
     if followed.order is not None:
         often = f", {often_per_turn(followed.variable, followed.order)}"

@@ -244,6 +244,7 @@ def shared_effects_html(
     kinds = dict.fromkeys(sorted(verdicts, key=_ORDER.index))
     counted = [f"{verdicts.count(v)} {VERDICT_NAMES[v].lower()}" for v in kinds]
     worst = next(iter(kinds), "adequate")
+    chip = ("Effects missing", "explained") if shared else (VERDICT_NAMES[worst], worst)
     beside = [
         ("Compared", f"{len(found)} winches, each by itself, with one profile"),
         ("Verdicts", f"{capital(', '.join(counted))}."),
@@ -255,7 +256,7 @@ def shared_effects_html(
     )
     return _page(
         title,
-        (VERDICT_NAMES[worst], worst, headline, beside),
+        (*chip, headline, beside),
         fleet_ladders(found),
         _table(["winch", "verdict", "effects"], rows, 3),
         folded("shared", "Effects in common and in single winches", bullets(texts)),
@@ -294,7 +295,6 @@ def shared_errors_html(
     beside = [
         ("Compared", f"{len(found)} winches, each by itself, with one profile"),
         ("Error", f"Above the noise, or of unknown noise: {listed(above)}." if above else ""),
-        ("Variance explained by", bullets(texts)),
         ("Cause", "winchkit diagnose with the same runs and --winch all names missing effects."),
     ]
     headline = f"{len(above)} of {len(found)} winches exceed their noise"
@@ -304,6 +304,7 @@ def shared_errors_html(
         (*chip, headline, beside),
         fleet_ladders(found),
         _table(head, linked, 1),
+        folded("shared", "Share of the errors' variance explained by", bullets(texts)),
         _as_json({"outputs": {name: error.to_json() for name, error in shared.items()}}),
     )
 

@@ -65,7 +65,7 @@ def lead(
         "div",
         element("dl", *steps, class_="steps"),
         *([element("div", *beside)] if any(beside) else []),
-        class_="card brief",
+        class_="card brief" if any(beside) else "card",
         id="summary",
     )
     return element(
