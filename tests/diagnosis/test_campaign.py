@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from campaign.case import Plan
+from campaign.logger_case import LoggerPlan, answer, make_logger_case
 from campaign.run import run_case
 from campaign.sizes import CATALOGUE
 
@@ -103,3 +104,29 @@ def test_what_searches_once_missed(
     assert score is not None
     assert score.verdict == "explained"
     assert score.found == len(score.truth) == len(score.steps)
+
+
+@pytest.mark.parametrize(
+    ("fault", "seed", "snr", "hidden"),
+    [
+        # Rounded to several times the noise: the error follows the signal, as repeats do.
+        ("quantised", 90300004, 0.0, ""),
+        ("quantised", 90300014, 3.0, "frame-compliance"),
+        # One direction at one speed: no run alone separates its weight from friction.
+        ("wrong-unit", 90300019, 10.0, "cell-nonlinearity"),
+        ("wrong-unit", 90300013, 1.0, "pulley-capstan"),
+        ("excerpts", 90400000, 0.0, ""),
+        ("gappy", 90400002, 3.0, "motor-coulomb"),
+        ("spikes", 90400003, 10.0, "drum-winding-tension"),
+    ],
+)
+def test_runs_of_a_logger_with_a_fault(
+    fault: str, seed: int, snr: float, hidden: str, tmp_path: Path
+) -> None:
+    # Fault and effect are drawn.
+    case = make_logger_case(seed, LoggerPlan(snr, small=True), tmp_path)
+    assert case is not None
+    score = answer(case)
+    assert (score.fault, "".join(score.hidden)) == (fault, hidden)
+    assert score.identifiable == bool(snr and not score.misread)
+    assert score.ok
