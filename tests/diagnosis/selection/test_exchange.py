@@ -107,6 +107,6 @@ def test_updated_signatures_equal_newly_computed_ones() -> None:
 def test_a_new_signature_requires_all_to_be_computed_again(grown: Term, anew: bool) -> None:
     engine = engine_for([], RIDE)
     lag = CATALOGUE["cell-lag"]
-    silent = replace(engine.signatures, without_signature=((lag, {"time_constant": 0.05}),))
+    silent = replace(engine.signatures, without_signature=((lag, {}, ({"time_constant": 0.05},)),))
     present = engine.initial_model.with_term(grown, engine.regression.n_runs)
     assert (updated_signatures(engine.regression, present, silent) is None) is anew

@@ -15,8 +15,9 @@ Aitken, A. C. (1935). On least squares and linear combination of observations. P
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -30,16 +31,22 @@ _ITERATIONS = 15
 _ITERATIONS_OF_PRODUCTS = 40
 _LEAST_DECREASE = 0.02
 _LEAST_EIGENVALUE = 1e-9
+_LEAST_DAMPING = 1e-6
+_ROWS = 16384
 _FIRST_ITERATIONS = 8
 _KEPT_STARTS = 2
-_TOLERANCE = 1e-5
+_TOLERANCE = 1e-4
+_COARSE_TOLERANCE = 1e-3
+_MOST_FAILURES = 6
 _DISTINCT = 0.02
 _AMBIGUOUS = 4.0
 _SHARE_LEFT = 0.1
 _PER_UNKNOWN = 40.0
+_STEPS_LEFT = 10.0
+_SLACK_PER_UNKNOWN = 10.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """A fitted hypothesis.
 
@@ -51,23 +58,31 @@ class Fit:
         The same as a vector of unknowns.
     residual : ndarray of shape (n_rows,)
         Measured minus predicted, not whitened.
-    jacobian : ndarray of shape (n_rows, n_unknowns)
-        Derivative of the prediction, not whitened.
+    derivative : callable
+        Computes the Jacobian.
     chi_square : float
         Sum of squared whitened residuals.
     n_unknowns : int
         Number of unknowns.
     abandoned : bool
-        Whether the fit was given up far from its target: then it has no Jacobian.
+        Whether the fit was given up far from its target.
     """
 
     hypothesis: Hypothesis
     vector: Array
     residual: Array
-    jacobian: Array
+    derivative: Callable[[], Array]
     chi_square: float
     n_unknowns: int
     abandoned: bool = False
+
+    @cached_property
+    def jacobian(self) -> Array:
+        """Derivative of the prediction, not whitened, (n_rows, n_unknowns).
+
+        Computed when first needed: of most rivals only χ² is compared.
+        """
+        return self.derivative()
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -80,7 +95,9 @@ def fit(
     start: Hypothesis,
     inverse_sigma: Array,
     most: int | None = None,
+    *,
     tolerance: float = 0.0,
+    aim: float = np.inf,
 ) -> Fit:
     """Fit all unknowns within their bounds.
 
@@ -98,41 +115,62 @@ def fit(
     tolerance
         Share of χ² beyond the number of rows whose decrease ends the iteration, where that is more
         than 0.02: a model that misses by thousands is not fitted to the last hundredth.
+    aim
+        χ² that is of interest: the iteration ends where ten times the decrease that its next step
+        promises, and ten per unknown, would not reach it.
 
     Returns
     -------
     Fit
-        The best point reached; the fit has converged unless the number of iterations was the limit.
+        The best point reached; the fit has converged unless the number of iterations was the limit
+        or the aim is out of reach.
+
+    Notes
+    -----
+    Trust region in the unknowns scaled by the lengths of their columns. A step that does not reduce
+    χ² is shortened to the minimum of the parabola through both values and the slope.
     """
-    x = regression.vector(start)
     low, high = regression.bounds(start)
-    x = np.clip(x, low, high)
+    x = np.clip(regression.vector(start), low, high)
     residual = regression.residual(regression.hypothesis(x, start))
     chi_square = _chi_square(residual, inverse_sigma)
-    damping = 1e-6
-    jacobian = regression.jacobian(x, start)
+    region = _TrustRegion()
+    local: _LocalModel | None = None
+    failures = 0
     for _ in range((_iterations(start) if most is None else most) if len(x) else 0):
-        step, expected_decrease = _step(
-            jacobian * inverse_sigma[:, None], residual * inverse_sigma, damping, x, (low, high)
-        )
+        if local is None:
+            jacobian = regression.jacobian(x, start)
+            local = _LocalModel(jacobian, residual, inverse_sigma, x, (low, high))
+            promised = _STEPS_LEFT * local.step(_TrustRegion()).decrease
+            if chi_square - promised - _SLACK_PER_UNKNOWN * len(x) > aim:
+                break
         least = max(_LEAST_DECREASE, tolerance * (chi_square - len(residual)))
-        if expected_decrease < least:
+        step = local.step(region)
+        if step.decrease < least:
             break
-        trial = np.clip(x + step, low, high)
+        trial = np.clip(x + step.change, low, high)
         residual_there = regression.residual(regression.hypothesis(trial, start))
         new = _chi_square(residual_there, inverse_sigma)
-        if new < chi_square:
-            decrease = chi_square - new
-            x, residual, chi_square, damping = trial, residual_there, new, damping / 10
-            jacobian = regression.jacobian(x, start)
-            if decrease < least:
+        region = region.after(step, chi_square - new)
+        if not new < chi_square:
+            failures += 1
+            if failures == _MOST_FAILURES:
                 break
         else:
-            damping = max(damping * 100, 1e-4)
-            if damping > 1e6:
+            failures, decrease = 0, chi_square - new
+            x, residual, chi_square, local = trial, residual_there, new, None
+            if decrease < least:
                 break
     fitted = regression.hypothesis(x, start)
-    return Fit(fitted, x, residual, jacobian, chi_square, len(x))
+    known = None if local is None else jacobian
+    return Fit(fitted, x, residual, _derivative(regression, x, start, known), chi_square, len(x))
+
+
+def _derivative(
+    regression: Regression, x: Array, like: Hypothesis, known: Array | None = None
+) -> Callable[[], Array]:
+    """Jacobian when it is needed, where it is not known already."""
+    return (lambda: regression.jacobian(x, like)) if known is None else (lambda: known)
 
 
 @dataclass(frozen=True)
@@ -167,10 +205,11 @@ def starts_from_coarse_fits(
     starts: Sequence[Hypothesis],
     inverse_sigma: Array,
     problem: CoarseProblem,
-) -> list[Hypothesis] | None:
-    """Optima of the coarse regression as starting values, best first, two at most.
+) -> list[Hypothesis]:
+    """Starting values from fits on the coarse regression, best first, two at most.
 
-    None where one of the given starting values has a smaller χ² on all samples.
+    The best optimum of the coarse regression or, where that has a smaller χ² on all samples, the
+    best of the given starting values; and a second optimum that is nearly as good.
 
     Parameters
     ----------
@@ -185,19 +224,25 @@ def starts_from_coarse_fits(
     """
     coarse = problem.coarse
     reduced = [coarse.reduced(start) for start in starts]
-    fits = _first_fits(coarse.regression, reduced, problem.inverse_sigma, _ITERATIONS)
+    fits = _first_fits(
+        coarse.regression,
+        reduced,
+        problem.inverse_sigma,
+        _ITERATIONS,
+        tolerance=_COARSE_TOLERANCE,
+    )
     best = fits[0]
     near = [
         fitted
         for fitted in fits[1:]
         if _DISTINCT < fitted.chi_square - best.chi_square < _AMBIGUOUS
     ]
-    out = [coarse.extended(fitted.hypothesis) for fitted in (best, *near[:1])]
 
     def chi_square(hypothesis: Hypothesis) -> float:
         return _chi_square(regression.residual(hypothesis), inverse_sigma)
 
-    return out if chi_square(out[0]) <= min(map(chi_square, starts)) else None
+    first = min((coarse.extended(best.hypothesis), *starts), key=chi_square)
+    return [first, *(coarse.extended(fitted.hypothesis) for fitted in near[:1])]
 
 
 def fit_from(
@@ -207,6 +252,7 @@ def fit_from(
     problem: CoarseProblem | None = None,
     target: Target | None = None,
     *,
+    aim: float | None = None,
     optimum: bool = False,
 ) -> Fit:
     """Fit from several starting values and keep the smallest χ².
@@ -225,7 +271,9 @@ def fit_from(
         Coarse regression, on which the best starting values are found; None for none.
     target
         The fit is abandoned at the optimum of the coarse regression, or at starting values that are
-        an optimum, if this χ² is out of reach; None: never.
+        an optimum, if this χ² is out of reach, and on the way; None: never.
+    aim
+        χ² that decides on the fit, which ends where that is out of reach; None: the target's.
     optimum
         Whether the only starting values are an optimum that was found before.
     """
@@ -236,17 +284,23 @@ def fit_from(
         first = _at(regression, found[0], inverse_sigma)
         if target.is_out_of_reach(first.chi_square, first.n_unknowns):
             return first
+    if aim is None:
+        aim = np.inf if target is None else target.chi_square
     if found is not None and problem is not None:
-        return _best(regression, found, inverse_sigma, _ITERATIONS)[0]
-    return _first_fits(regression, starts, inverse_sigma)[0]
+        best = _best(regression, found, inverse_sigma, _ITERATIONS, aim=aim)[0]
+    else:
+        best = _first_fits(regression, starts, inverse_sigma, aim=aim)[0]
+    if target is None or not target.is_out_of_reach(best.chi_square, best.n_unknowns):
+        return best
+    return replace(best, abandoned=True)
 
 
 def _at(regression: Regression, hypothesis: Hypothesis, inverse_sigma: Array) -> Fit:
-    """A hypothesis at its values, without Jacobian."""
+    """A hypothesis at its values."""
     residual, vector = regression.residual(hypothesis), regression.vector(hypothesis)
-    nothing = np.zeros((regression.n_rows, 0))
+    derivative = _derivative(regression, vector, hypothesis)
     chi_square = _chi_square(residual, inverse_sigma)
-    return Fit(hypothesis, vector, residual, nothing, chi_square, len(vector), abandoned=True)
+    return Fit(hypothesis, vector, residual, derivative, chi_square, len(vector), abandoned=True)
 
 
 def _first_fits(
@@ -254,12 +308,17 @@ def _first_fits(
     starts: Sequence[Hypothesis],
     inverse_sigma: Array,
     most: int | None = None,
+    *,
+    aim: float = np.inf,
+    tolerance: float = _TOLERANCE,
 ) -> list[Fit]:
     """Fits from the best starting values, smallest χ² first."""
     if len(starts) > _KEPT_STARTS:
-        first_fits = _best(regression, starts, inverse_sigma, _FIRST_ITERATIONS)
+        first_fits = _best(
+            regression, starts, inverse_sigma, _FIRST_ITERATIONS, aim=aim, tolerance=tolerance
+        )
         starts = [fitted.hypothesis for fitted in first_fits[:_KEPT_STARTS]]
-    return _best(regression, starts, inverse_sigma, most)
+    return _best(regression, starts, inverse_sigma, most, aim=aim, tolerance=tolerance)
 
 
 def _best(
@@ -267,9 +326,15 @@ def _best(
     starts: Sequence[Hypothesis],
     inverse_sigma: Array,
     most: int | None = None,
+    *,
+    aim: float = np.inf,
+    tolerance: float = _TOLERANCE,
 ) -> list[Fit]:
     """Fits from every starting value, smallest χ² first."""
-    fits = [fit(regression, start, inverse_sigma, most, _TOLERANCE) for start in starts]
+    fits = [
+        fit(regression, start, inverse_sigma, most, tolerance=tolerance, aim=aim)
+        for start in starts
+    ]
     return sorted(fits, key=lambda fitted: fitted.chi_square)
 
 
@@ -287,24 +352,100 @@ def _chi_square(residual: Array, inverse_sigma: Array) -> float:
     return float(whitened @ whitened)
 
 
-def _step(
-    whitened: Array, residual: Array, damping: float, x: Array, bounds: tuple[Array, Array]
-) -> tuple[Array, float]:
-    """Damped Gauss-Newton step of the unknowns away from their bounds, and its expected Δχ²."""
-    low, high = bounds
-    gradient = whitened.T @ residual
-    normal = whitened.T @ whitened
-    at_bound = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0))
-    free = ~at_bound & (np.diag(normal) > 0)
-    step = np.zeros_like(x)
-    if not free.any():
-        return step, 0.0
-    inner = normal[np.ix_(free, free)]
-    scale = np.sqrt(np.diag(inner))
-    scaled = inner / np.outer(scale, scale)
-    # Linearly dependent unknowns stay where they are: truncated eigenvalues.
-    values, vectors = np.linalg.eigh(scaled)
-    kept = values > _LEAST_EIGENVALUE * values[-1]
-    along = vectors[:, kept].T @ (gradient[free] / scale)
-    step[free] = (vectors[:, kept] @ (along / (values[kept] + damping))) / scale
-    return step, float(np.sum(along**2 / (values[kept] + damping)))
+@dataclass(frozen=True)
+class _Step:
+    """A step of the unknowns."""
+
+    change: Array
+    decrease: float
+    """Decrease of χ² that the local model promises."""
+    slope: float
+    """Decrease of χ² per step at its beginning."""
+    length: float
+    """In the scaled unknowns."""
+
+
+@dataclass(frozen=True)
+class _TrustRegion:
+    """Region in which the local model is trusted."""
+
+    radius: float = np.inf
+    damping: float = _LEAST_DAMPING
+    """Least damping, of nearly dependent unknowns."""
+
+    def after(self, step: _Step, decrease: float) -> _TrustRegion:
+        """Region after a step with a decrease of χ², which is negative where it failed."""
+        if not decrease > 0.0:
+            bend = step.slope - decrease
+            share = step.slope / (2 * bend) if np.isfinite(bend) else 0.0
+            return _TrustRegion(step.length * float(np.clip(share, 0.05, 0.5)), self.damping)
+        ratio, radius = decrease / step.decrease, self.radius
+        if ratio < 0.25:
+            radius = step.length / 2
+        elif ratio > 0.75:
+            radius = np.inf if step.length < 0.9 * radius else 2 * step.length
+        return _TrustRegion(radius, self.damping / 10)
+
+
+class _LocalModel:
+    """Linearised model about a point: Gauss-Newton steps of the unknowns away from their bounds."""
+
+    def __init__(
+        self,
+        jacobian: Array,
+        residual: Array,
+        inverse_sigma: Array,
+        x: Array,
+        bounds: tuple[Array, Array],
+    ) -> None:
+        low, high = bounds
+        gradient, normal = _normal_equations(jacobian, residual, inverse_sigma)
+        at_bound = ((x <= low) & (gradient < 0)) | ((x >= high) & (gradient > 0))
+        self._free = ~at_bound & (np.diag(normal) > 0)
+        inner = normal[np.ix_(self._free, self._free)]
+        self._scale = np.sqrt(np.diag(inner))
+        scaled = inner / np.outer(self._scale, self._scale)
+        # Linearly dependent unknowns stay where they are: truncated eigenvalues.
+        values, vectors = np.linalg.eigh(scaled) if len(scaled) else (np.zeros(0), scaled)
+        kept = values > _LEAST_EIGENVALUE * np.max(values, initial=0.0)
+        self._values, self._vectors = values[kept], vectors[:, kept]
+        self._along = self._vectors.T @ (gradient[self._free] / self._scale)
+
+    def step(self, region: _TrustRegion) -> _Step:
+        """Step to the minimum of the local model within a region."""
+        damping, along = self._damping(region), self._along
+        damped = self._values + damping
+        turned = along / damped
+        change = np.zeros(len(self._free))
+        change[self._free] = (self._vectors @ turned) / self._scale
+        decrease = float(np.sum(along**2 * (damped + damping) / damped**2))
+        length = float(np.sqrt(turned @ turned))
+        return _Step(change, decrease, 2 * float(along @ turned), length)
+
+    def _damping(self, region: _TrustRegion) -> float:
+        """Least damping with which the step ends within the region."""
+
+        def length(damping: float) -> float:
+            return float(np.linalg.norm(self._along / (self._values + damping)))
+
+        if length(region.damping) <= region.radius:
+            return region.damping
+        low, high = region.damping, float(np.linalg.norm(self._along)) / region.radius
+        while high > 1.05 * low:
+            middle = np.sqrt(low * high)
+            low, high = (middle, high) if length(middle) > region.radius else (low, middle)
+        return high
+
+
+def _normal_equations(
+    jacobian: Array, residual: Array, inverse_sigma: Array
+) -> tuple[Array, Array]:
+    """Whitened gradient, (n_unknowns,), and normal matrix, without a whitened copy."""
+    count = jacobian.shape[1]
+    gradient, normal = np.zeros(count), np.zeros((count, count))
+    for first in range(0, len(residual), _ROWS):
+        rows = slice(first, first + _ROWS)
+        whitened = jacobian[rows].T * inverse_sigma[rows]
+        gradient += whitened @ (residual[rows] * inverse_sigma[rows])
+        normal += whitened @ whitened.T
+    return gradient, normal

@@ -17,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +146,9 @@ def noise_from_repeats(
     return Noise(power, dof, _rms(regression, power), from_repeats=True)
 
 
-def noise_saturated(regression: Regression, residual: Array, *columns: Array) -> Noise:
+def noise_saturated(
+    regression: Regression, residual: Array, *columns: NDArray[np.floating[Any]]
+) -> Noise:
     """Noise variance of the residual beside all candidate effects (saturated model).
 
     Parameters
@@ -177,7 +180,9 @@ def noise_saturated(regression: Regression, residual: Array, *columns: Array) ->
     amplitudes = through @ (through.T @ ((1 / power) @ products))
     left, first = residual.copy(), 0
     for part in columns:
-        left -= part @ amplitudes[first : first + part.shape[1]]
+        own = amplitudes[first : first + part.shape[1]]
+        for segment in regression.segments:
+            left[segment.rows] -= part[segment.rows] @ own
         first += part.shape[1]
     leverage = np.sum((gram @ through) * through, axis=(1, 2)) / power
     dof = np.maximum(total - leverage, 1.0)
@@ -186,7 +191,7 @@ def noise_saturated(regression: Regression, residual: Array, *columns: Array) ->
 
 
 def _inner_products(
-    regression: Regression, residual: Array, columns: Sequence[Array]
+    regression: Regression, residual: Array, columns: Sequence[NDArray[np.floating[Any]]]
 ) -> tuple[Array, Array]:
     """Inner products of columns per band, (n_bands, p, p), and with the residual, (n_bands, p)."""
     p, count = sum(part.shape[1] for part in columns), len(regression.bands)

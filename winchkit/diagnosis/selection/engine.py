@@ -16,7 +16,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.base import Folds, Regression
+from winchkit.diagnosis.regression.base import Coarse, Folds, Regression
 from winchkit.diagnosis.regression.gls import CoarseProblem, Fit, Target, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
@@ -103,6 +103,7 @@ class LastValue(Generic[Answer]):
         return self._kept[2]
 
 
+_TOLERANCE = 1e-6
 _KEPT_REFITS = 4
 """Fits of models without one of their effects, which elimination and exchange have in common."""
 _WHOLE_CORRECTION = 1.0
@@ -127,11 +128,24 @@ class Trial:
 
 def _key(hypothesis: Hypothesis, law: Effect, item: Score) -> Hashable:
     """What a candidate's optimum is kept by: effects beside it, its free unknowns, its shape."""
-    orders = [
-        (t.effect.id, *(t.values[p.name] for p in t.effect.parameters if p.whole))
+    return (
+        *_effects_of(hypothesis),
+        law.id,
+        Coordinates(law).names,
+        *item.candidate.shape.items(),
+    )
+
+
+def _effects_of(hypothesis: Hypothesis) -> tuple[Hashable, ...]:
+    """Effects of a hypothesis with their free unknowns and orders."""
+    return tuple(
+        (
+            t.effect.id,
+            Coordinates(t.effect).names,
+            *(t.values[p.name] for p in t.effect.parameters if p.whole),
+        )
         for t in hypothesis.terms
-    ]
-    return (*orders, law.id, Coordinates(law).names, *item.candidate.shape.items())
+    )
 
 
 class SelectionEngine(ABC):
@@ -166,7 +180,8 @@ class SelectionEngine(ABC):
         self._last_projected: LastValue[Projected] = LastValue()
         self.on_trial: Callable[[str], None] = lambda effect: None
         self._optima: dict[Hashable, Hypothesis] = {}
-        self._refits: list[tuple[Hypothesis, Noise, Fit]] = []
+        self._refits: list[tuple[Hypothesis, Noise, float, Fit]] = []
+        self._refitted: dict[Hashable, Hypothesis] = {}
         self._new_orders(initial_model)
         self.signatures = self._signatures(initial_model)
 
@@ -196,13 +211,20 @@ class SelectionEngine(ABC):
     def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
         """F test of the residual against the noise, band by band."""
 
+    @property
+    def coarse(self) -> Coarse | None:
+        """Coarse regression; None where there is none."""
+        return None
+
     def coarse_problem(self, noise: Noise) -> CoarseProblem | None:
         """Coarse regression for first fits; None where there is none."""
         return None
 
     def _coarse_problem(self, starts: Sequence[Hypothesis], noise: Noise) -> CoarseProblem | None:
         """The coarse regression where a fit from these starting values takes many iterations."""
-        nonlinear = any(Coordinates(term.effect).shapes for term in starts[0].terms)
+        nonlinear = any(
+            term.effect.memory or Coordinates(term.effect).shapes for term in starts[0].terms
+        )
         return self.coarse_problem(noise) if nonlinear or len(starts) > 1 else None
 
     def folds(self, fitted: Fit, noise: Noise) -> Folds:
@@ -232,7 +254,7 @@ class SelectionEngine(ABC):
     def _signatures(self, present: Hypothesis) -> Signatures:
         there = {t.effect.id for t in self.initial_model.terms if not t.effect.repeatable}
         absent = (effect for effect in self._candidates if effect.id not in there)
-        return signatures(self.regression, present, absent)
+        return signatures(self.regression, present, absent, self.coarse)
 
     def _new_orders(self, present: Hypothesis) -> bool:
         """Extend the grids of candidates by orders in the residual; False where there are none."""
@@ -251,7 +273,7 @@ class SelectionEngine(ABC):
         self._last_projected = LastValue()
         grown = None
         if not self._new_orders(present):
-            grown = updated_signatures(self.regression, present, self.signatures)
+            grown = updated_signatures(self.regression, present, self.signatures, self.coarse)
         if grown is None:
             del self.signatures  # Both together would double the peak memory.
             grown = self._signatures(present)
@@ -277,9 +299,12 @@ class SelectionEngine(ABC):
             vector = self.regression.vector(start)
             jacobian = self.regression.jacobian(vector, start)
             noise = self.noise(self.regression.residual(start), jacobian, states)
-        first = fit(self.regression, start, noise.inverse_sigma(self.regression))
+        inverse_sigma = noise.inverse_sigma(self.regression)
+        first = fit(self.regression, start, inverse_sigma, tolerance=_TOLERANCE)
         noise = self.noise(first.residual, first.jacobian, states)
-        return fit(self.regression, first.hypothesis, noise.inverse_sigma(self.regression)), noise
+        inverse_sigma = noise.inverse_sigma(self.regression)
+        second = fit(self.regression, first.hypothesis, inverse_sigma, tolerance=_TOLERANCE)
+        return second, noise
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
         """Signatures with the unknowns of a fit partialled out; the last answer is kept."""
@@ -317,10 +342,14 @@ class SelectionEngine(ABC):
         ----------
         Schwarz, G. (1978). Estimating the dimension of a model. Ann. Stat. 6, 461-464.
         """
-        added = fitted.hypothesis.terms[self.n_initial_terms :]
+        return fitted.chi_square + self.penalty(fitted.hypothesis)
+
+    def penalty(self, hypothesis: Hypothesis) -> float:
+        """Penalty k ln n of the criterion."""
+        added = hypothesis.terms[self.n_initial_terms :]
         n_parameters = sum(Coordinates(term.effect).n_parameters for term in added)
-        states = sum(len(start) for start in fitted.hypothesis.starts[self.n_initial_terms :])
-        return fitted.chi_square + self.penalty_per_parameter * (n_parameters + states)
+        states = sum(len(start) for start in hypothesis.starts[self.n_initial_terms :])
+        return self.penalty_per_parameter * (n_parameters + states)
 
     def trial(
         self,
@@ -330,6 +359,7 @@ class SelectionEngine(ABC):
         *,
         anew: bool = False,
         target: float | None = None,
+        aim: float | None = None,
     ) -> Trial:
         """Fit a candidate beside the present effects, without those that it contains.
 
@@ -349,6 +379,9 @@ class SelectionEngine(ABC):
             Whether to search from all starting values in any case.
         target
             χ² that the trial has to reach: its fit is abandoned where that is out of reach.
+        aim
+            Smaller χ² that decides on a trial which reaches the target: the fit ends where that is
+            out of reach; None for none.
         """
         goal = None if target is None else Target(target, present.chi_square)
         self.on_trial(item.candidate.effect.id)
@@ -362,7 +395,12 @@ class SelectionEngine(ABC):
             key = _key(hypothesis, law, item)
             if not anew and key in self._optima:
                 fitted = fit_from(
-                    self.regression, [self._optima[key]], inverse_sigma, target=goal, optimum=True
+                    self.regression,
+                    [self._optima[key]],
+                    inverse_sigma,
+                    target=goal,
+                    aim=aim,
+                    optimum=True,
                 )
             else:
                 if best is None:
@@ -376,6 +414,7 @@ class SelectionEngine(ABC):
                     inverse_sigma,
                     self._coarse_problem(starts, noise),
                     goal,
+                    aim=aim,
                 )
             if not anew:
                 self._optima[key] = fitted.hypothesis
@@ -489,15 +528,36 @@ class SelectionEngine(ABC):
             self.penalty_per_parameter,
         )
 
-    def refit(self, hypothesis: Hypothesis, noise: Noise) -> Fit:
-        """Fit a hypothesis under a given noise; the last answers are kept."""
-        inverse_sigma = noise.inverse_sigma(self.regression)
-        for known, under, fitted in self._refits:
-            if under is noise and known == hypothesis:
+    def refit(self, hypothesis: Hypothesis, noise: Noise, aim: float = np.inf) -> Fit:
+        """Fit a hypothesis under a given noise; the last answers are kept.
+
+        It starts from the values found for the same effects before, where these fit better.
+
+        Parameters
+        ----------
+        hypothesis
+            Effects at their starting values.
+        noise
+            Noise variance.
+        aim
+            χ² that decides on the fit, which ends where that is out of reach.
+        """
+        for known, under, aimed, fitted in self._refits:
+            if under is noise and known == hypothesis and aimed >= aim:
                 return fitted
-        problem = self._coarse_problem([hypothesis], noise)
-        fitted = fit_from(self.regression, [hypothesis], inverse_sigma, problem)
-        self._refits = [(hypothesis, noise, fitted), *self._refits[: _KEPT_REFITS - 1]]
+        inverse_sigma, effects = noise.inverse_sigma(self.regression), _effects_of(hypothesis)
+        starts, problem = [hypothesis], self._coarse_problem([hypothesis], noise)
+        before = self._refitted.get(effects)
+        if before is not None:
+            chi_square = [
+                float(np.sum((self.regression.residual(start) * inverse_sigma) ** 2))
+                for start in (before, hypothesis)
+            ]
+            if chi_square[0] <= chi_square[1]:
+                starts, problem = [before], None
+        fitted = fit_from(self.regression, starts, inverse_sigma, problem, aim=aim)
+        self._refitted[effects] = fitted.hypothesis
+        self._refits = [(hypothesis, noise, aim, fitted), *self._refits[: _KEPT_REFITS - 1]]
         return fitted
 
     def fixed(self, hypothesis: Hypothesis, noise: Noise) -> Fit:

@@ -78,7 +78,7 @@ class Exchange:
         would nearly reach that value by linear prediction. It is abandoned where even the larger
         χ² ``least`` is out of reach.
         """
-        first_trial = self._engine.trial(self.base, rival, self._noise, target=least)
+        first_trial = self._engine.trial(self.base, rival, self._noise, target=least, aim=target)
         if first_trial.fit.chi_square < target or not self._others.terms:
             return first_trial
         held, least_held, scores = self._held
@@ -86,7 +86,9 @@ class Exchange:
         limit = target + _MARGIN * (self.base.chi_square - target)
         if rival_beside is None or least_held - rival_beside.explained_ss > limit:
             return first_trial
-        second_trial = self._engine.trial(held, rival_beside, self._noise, anew=True)
+        second_trial = self._engine.trial(
+            held, rival_beside, self._noise, anew=True, target=least, aim=target
+        )
         return min(
             first_trial, second_trial, key=lambda trial: (trial.criterion, trial.fit.chi_square)
         )
@@ -140,9 +142,9 @@ def _better(
     for pair in candidates[:tried]:
         # New effects first: one that explained both would keep its old values.
         first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in removed)
-        trial = engine.trial(
-            engine.trial(base, first, noise).fit, second, noise, target=present.chi_square
-        )
+        goal = present.chi_square
+        begun = engine.trial(base, first, noise, aim=goal).fit
+        trial = engine.trial(begun, second, noise, target=goal)
         if trial.criterion < engine.criterion(present) - MIN_GAIN:
             return trial.fit
     return None

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.projection import explained_ss_of_sets
@@ -76,45 +77,59 @@ def screened_pairs(
         single_gain[item.candidate.effect.id] = max(
             item.explained_ss, single_gain.get(item.candidate.effect.id, 0.0)
         )
+    first, second = _pairs(scores)
+    explained_ss = _joint_explained_ss(projected, residual, scores, first, second)
+    parameters = np.array([item.candidate.n_parameters for item in scores], dtype=int)
+    net_gain = explained_ss - penalty_per_parameter * (parameters[first] + parameters[second])
     best: dict[frozenset[str], Pair] = {}
-    pairs = _pairs(scores)
-    for pair, explained_ss in zip(
-        pairs, _joint_explained_ss(projected, residual, pairs), strict=True
-    ):
-        first, second = (item.candidate.effect.id for item in pair)
-        net_gain = explained_ss - penalty_per_parameter * sum(
-            item.candidate.n_parameters for item in pair
-        )
-        ids = frozenset((first, second))
-        if net_gain > 0 and (ids not in best or net_gain > best[ids].net_gain):
-            best[ids] = Pair(pair, explained_ss, net_gain, single_gain[first] + single_gain[second])
-    return sorted(best.values(), key=lambda item: -item.net_gain)
+    for index in np.argsort(-net_gain, kind="stable").tolist():
+        if not net_gain[index] > 0:
+            break
+        pair = scores[first[index]], scores[second[index]]
+        ids = frozenset(item.candidate.effect.id for item in pair)
+        if ids not in best:
+            gain = sum(single_gain[name] for name in ids)
+            best[ids] = Pair(pair, float(explained_ss[index]), float(net_gain[index]), gain)
+    return list(best.values())
 
 
-def _pairs(scores: Sequence[Score]) -> list[tuple[Score, Score]]:
-    """All pairs of different effects of which neither contains the other."""
-    return [
-        (first, second)
-        for first, second in combinations(scores, 2)
-        if first.candidate.effect.id != second.candidate.effect.id
-        and not first.candidate.effect.nested_with(second.candidate.effect)
-    ]
+def _pairs(scores: Sequence[Score]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Places of all pairs of different effects of which neither contains the other."""
+    effects = {item.candidate.effect.id: item.candidate.effect for item in scores}
+    place = {name: index for index, name in enumerate(effects)}
+    allowed = np.zeros((len(effects), len(effects)), dtype=bool)
+    for (i, one), (j, other) in combinations(enumerate(effects.values()), 2):
+        allowed[i, j] = allowed[j, i] = not one.nested_with(other)
+    own = np.array([place[item.candidate.effect.id] for item in scores], dtype=np.intp)
+    first, second = np.triu_indices(len(scores), 1)
+    kept = allowed[own[first], own[second]]
+    return first[kept], second[kept]
 
 
 def _joint_explained_ss(
-    projected: Projected, residual: Array, pairs: Sequence[tuple[Score, Score]]
-) -> list[float]:
+    projected: Projected,
+    residual: Array,
+    scores: Sequence[Score],
+    first: NDArray[np.intp],
+    second: NDArray[np.intp],
+) -> Array:
     """Explained sum of squares of every pair, pairs of equal size at once."""
     products = projected.products(residual)
     size = np.sqrt(np.maximum(np.diag(projected.inner), 1e-300))
     inner, products = projected.inner / np.outer(size, size), products / size
-    columns = [np.r_[a.candidate.columns, b.candidate.columns] for a, b in pairs]
-    counts = np.array([len(own) for own in columns], dtype=int)
-    out = np.zeros(len(pairs))
-    for count in np.unique(counts):
-        alike = np.flatnonzero(counts == count)
-        own = np.array([columns[index] for index in alike])
+    begins = np.array([item.candidate.columns.start for item in scores], dtype=np.intp)
+    ends = np.array([item.candidate.columns.stop for item in scores], dtype=np.intp)
+    counts = np.column_stack([(ends - begins)[first], (ends - begins)[second]])
+    out = np.zeros(len(first))
+    for one, other in np.unique(counts, axis=0).tolist():
+        alike = np.flatnonzero((counts[:, 0] == one) & (counts[:, 1] == other))
+        own = np.hstack(
+            [
+                begins[first[alike], None] + np.arange(one),
+                begins[second[alike], None] + np.arange(other),
+            ]
+        )
         out[alike] = explained_ss_of_sets(
             inner[own[:, :, None], own[:, None, :]], products[own], _UNIDENTIFIABLE
         )
-    return list(map(float, out))
+    return out

@@ -13,9 +13,11 @@ Westfall, P. H., Young, S. S. (1993). Resampling-Based Multiple Testing (maximum
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
@@ -26,6 +28,7 @@ __all__ = ["Projected", "Score", "null_maxima", "score", "zero_score"]
 
 _NOTHING = 1e-300
 _SIMULATIONS = 400
+_WELL_KNOWN = 100.0
 _UNIDENTIFIABLE = 1e-7
 _ROUNDING = 1e-9
 
@@ -82,7 +85,8 @@ class Projected:
         self._jacobian = jacobian
         self._inverse_variance = noise.inverse_sigma(regression) ** 2
         self._dof = noise.dof
-        self._cross, self._normal = _cross(regression, jacobian, signatures.columns)
+        self._regression = regression
+        self._cross, self._normal = _cross(regression, jacobian, signatures)
         self._share = share = 1 / noise.power
         cross, normal, gram = (
             np.tensordot(share, part, axes=1)
@@ -97,7 +101,7 @@ class Projected:
     def products(self, residual: Array) -> Array:
         """Inner products of the whitened residual with the projected columns, shape (p,)."""
         weighted = residual * self._inverse_variance
-        own = self.signatures.columns.T @ weighted
+        own = self.signatures.products(self._regression, weighted)
         return np.asarray(own + self._through.T @ (self._jacobian.T @ weighted))
 
     def explained_ss(self, products: Array) -> Array:
@@ -123,19 +127,40 @@ class Projected:
     def simulated(self, samples: int = _SIMULATIONS) -> Array:
         """Products that noise alone gives, its variance drawn too; shape (p, n_samples)."""
         random = np.random.default_rng(0)
-        out = np.zeros((len(self.inner), samples))
-        bands = zip(
-            self._share, self.signatures.gram, self._cross, self._normal, self._dof, strict=True
-        )
-        for share, gram, cross, normal, n_parameters in bands:
-            part = share * _projected(gram, cross, normal, self._through)
+        out, q = np.zeros((len(self.inner), samples)), len(self._through)
+        for output, bands, dof in self._groups():
+            own = self.signatures.reached[output]
+            gram, cross, normal = (
+                np.tensordot(self._share[bands], part, axes=1)
+                for part in (
+                    self.signatures.gram[bands][:, own[:, None], own],
+                    self._cross[bands][:, :, own],
+                    self._normal[bands],
+                )
+            )
             # No Cholesky factor: columns that the model explains are zero up to rounding.
-            values, vectors = np.linalg.eigh(part)
-            factor = np.sqrt(n_parameters / random.chisquare(n_parameters, samples))
-            noise = random.standard_normal((len(part), samples)) * factor
+            values, vectors = np.linalg.eigh(np.block([[normal, cross], [cross.T, gram]]))
+            factor = np.sqrt(dof / random.chisquare(dof, samples)) if dof < _WELL_KNOWN else 1.0
+            noise = random.standard_normal((len(values), samples)) * factor
             # Symmetric root: the draws do not depend on the signs of the eigenvectors.
-            out += (vectors * np.sqrt(np.maximum(values, 0.0))) @ (vectors.T @ noise)
+            drawn = (vectors * np.sqrt(np.maximum(values, 0.0))) @ (vectors.T @ noise)
+            out[own] += drawn[q:]
+            out += self._through.T @ drawn[:q]
         return out
+
+    def _groups(self) -> Iterator[tuple[str, NDArray[np.intp], float]]:
+        """Output, bands and degrees of freedom of noise that is drawn together.
+
+        Bands whose variance is well known are drawn together, the others by themselves.
+        """
+        outputs = np.array([output for output, _, _ in self._regression.bands])
+        for output in self._regression.outputs:
+            own = np.flatnonzero(outputs == output)
+            known = self._dof[own] >= _WELL_KNOWN
+            if known.any():
+                yield output, own[known], np.inf
+            for band in own[~known]:
+                yield output, np.array([band]), float(self._dof[band])
 
     def _root(self, candidate: Candidate, plain: Array) -> Array:
         """R with R Rᵀ the inverse of a candidate's inner products, as far as identifiable."""
@@ -155,12 +180,14 @@ def _projected(gram: Array, cross: Array, normal: Array, through: Array) -> Arra
     return np.asarray(gram + mixed + mixed.T + through.T @ normal @ through)
 
 
-def _cross(regression: Regression, jacobian: Array, columns: Array) -> tuple[Array, Array]:
+def _cross(regression: Regression, jacobian: Array, signatures: Signatures) -> tuple[Array, Array]:
     """Inner products of unknowns with columns and among unknowns, per band."""
     count, q = len(regression.bands), jacobian.shape[1]
-    cross, normal = np.zeros((count, q, columns.shape[1])), np.zeros((count, q, q))
-    for band, rows in pieces(regression):
-        cross[band] += jacobian[rows].T @ columns[rows]
+    cross, normal = np.zeros((count, q, signatures.count)), np.zeros((count, q, q))
+    for band, rows in pieces(regression) if q else ():
+        output = regression.bands[band][0]
+        columns = signatures.rows_of(output, rows)
+        cross[band][:, signatures.reached[output]] += jacobian[rows].T @ columns.T
         normal[band] += jacobian[rows].T @ jacobian[rows]
     return cross, normal
 

@@ -7,14 +7,15 @@ gradient at zero). Inner products are kept per noise band, to be combined under 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.base import Coarse, Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.selection.candidates import points
 from winchkit.effects.effect import Effect
@@ -59,6 +60,14 @@ class Candidate:
         return replace(self, effect=law, usual_steps=usual_steps)
 
 
+Absent = tuple[Effect, dict[str, float], tuple[dict[str, float], ...]]
+"""An effect at a point of its shape grid, and its usual steps that change nothing there."""
+_BLOCK = 4096
+"""Rows of columns that are converted to double precision at once."""
+_UNCHANGED = 0.01
+"""Change of a column on the coarse regression, relative to it, below which it is kept."""
+
+
 @dataclass(frozen=True)
 class Signatures:
     """Columns of all candidates beside one model.
@@ -67,21 +76,52 @@ class Signatures:
     ----------
     candidates : tuple of Candidate
         Effects at their grid points.
-    columns : ndarray of shape (n_rows, p)
-        Change of the prediction by one usual-size step each.
+    memory : ndarray of float32, shape (at least p, n_rows)
+        Columns, one after another, with room for more. Single precision, whose rounding is far
+        below the uncertainty of every column; sums over them are in double precision.
     gram : ndarray of shape (n_bands, p, p)
         Inner products per noise band.
+    reached : dict of str to ndarray of int
+        Numbers of the columns that change an output.
     model : Hypothesis
         Model beside which the columns were computed.
     without_signature : tuple
-        Effects with values that change nothing beside that model.
+        Effects with usual steps that change nothing beside that model.
+    coarse : ndarray of shape (at least p, coarse rows), optional
+        The columns on the coarse regression, as they were when they were computed on all samples.
     """
 
     candidates: tuple[Candidate, ...]
-    columns: Array
+    memory: NDArray[np.float32]
     gram: Array
+    reached: Mapping[str, NDArray[np.intp]]
     model: Hypothesis
-    without_signature: tuple[tuple[Effect, dict[str, float]], ...] = ()
+    without_signature: tuple[Absent, ...] = ()
+    coarse: NDArray[np.float32] | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of columns p."""
+        return self.candidates[-1].columns.stop if self.candidates else 0
+
+    @property
+    def columns(self) -> NDArray[np.float32]:
+        """Change of the prediction by one usual-size step each, (n_rows, p)."""
+        return self.memory[: self.count].T
+
+    def rows_of(self, output: str, rows: slice) -> Array:
+        """The columns that change an output at some of its rows, in double precision."""
+        return self.memory[self.reached[output], rows].astype(np.float64)
+
+    def products(self, regression: Regression, weighted: Array) -> Array:
+        """Inner products of all columns with a vector (n_rows,), shape (p,)."""
+        out = np.zeros(self.count)
+        for segment in regression.segments:
+            own = self.reached[segment.output]
+            for first in range(segment.rows.start, segment.rows.stop, _BLOCK):
+                rows = slice(first, min(first + _BLOCK, segment.rows.stop))
+                out[own] += self.rows_of(segment.output, rows) @ weighted[rows]
+        return out
 
 
 class _Canvas:
@@ -94,7 +134,7 @@ class _Canvas:
         self._present = present
         self._here = regression.change(present, outputs)
 
-    def draw(self, column: Array, term: Term, outputs: Collection[str]) -> bool:
+    def draw(self, column: NDArray[np.float32], term: Term, outputs: Collection[str]) -> bool:
         """Write the change by a term into its rows of some outputs; False where there is none."""
         if not outputs:
             return False
@@ -103,15 +143,19 @@ class _Canvas:
         )
         size = 0.0
         for rows in self._regression.rows_of(outputs):
-            np.subtract(there[rows], self._here[rows], out=column[rows])
-            size += float(column[rows] @ column[rows])
+            own = column[rows]
+            np.subtract(there[rows], self._here[rows], out=own, casting="same_kind")
+            size += float(own @ own)
         if not np.isfinite(size):
             column[:] = 0.0
         return 0.0 < size < np.inf
 
 
 def signatures(
-    regression: Regression, present: Hypothesis, effects: Iterable[Effect]
+    regression: Regression,
+    present: Hypothesis,
+    effects: Iterable[Effect],
+    coarse: Coarse | None = None,
 ) -> Signatures:
     """Signatures of candidate effects beside a model.
 
@@ -123,73 +167,209 @@ def signatures(
         Model beside which the effects are added.
     effects
         Candidates.
+    coarse
+        Coarse regression, on which later changes of the columns are noticed; None for none.
     """
-    outputs = regression.outputs
-    canvas = _Canvas(regression, present, outputs)
+    canvas = _Canvas(regression, present, regression.outputs)
     tried = list(points(regression, effects))
     candidates: list[Candidate] = []
-    without_signature: list[tuple[Effect, dict[str, float]]] = []
+    without_signature: list[Absent] = []
     # Columns are contiguous in memory, since each is written and read as a whole. Pages of zeros,
     # the rows of outputs that an effect does not act on, are not allocated by the system.
-    columns, count = (
-        np.zeros((sum(len(usual_steps) for *_, usual_steps in tried), regression.n_rows)),
-        0,
-    )
+    most = sum(len(usual_steps) for *_, usual_steps in tried)
+    memory, count = np.zeros((most, regression.n_rows), np.float32), 0
     for effect, shape, usual_steps in tried:
-        own = []
+        own, absent = [], []
         reached = regression.outputs_of(effect.stage)
         for usual_step in usual_steps:
-            values = {**effect.null, **shape, **usual_step}
-            if canvas.draw(columns[count], Term(effect, values), reached):
+            term = Term(effect, {**effect.null, **shape, **usual_step})
+            if canvas.draw(memory[count], term, reached):
                 own.append(usual_step)
                 count += 1
             else:
-                without_signature.append((effect, values))
+                absent.append(usual_step)
+        if absent:
+            without_signature.append((effect, shape, tuple(absent)))
         if own:
             candidates.append(Candidate(effect, shape, slice(count - len(own), count), tuple(own)))
-    kept = columns[:count].T
-    gram = np.zeros((len(regression.bands), count, count))
-    _multiply(gram, regression, kept, outputs)
-    return Signatures(tuple(candidates), kept, gram, present, tuple(without_signature))
+    found = Signatures(
+        tuple(candidates),
+        memory,
+        np.zeros((len(regression.bands), count, count)),
+        _reached(regression, candidates),
+        present,
+        tuple(without_signature),
+    )
+    _multiply(found, regression, dict.fromkeys(regression.outputs))
+    if coarse is None:
+        return found
+    sketch = np.zeros((most, coarse.regression.n_rows), np.float32)
+    _draw(coarse.regression, coarse.reduced(present), candidates, sketch)
+    return replace(found, coarse=sketch)
 
 
 def updated_signatures(
-    regression: Regression, present: Hypothesis, previous: Signatures
+    regression: Regression,
+    present: Hypothesis,
+    previous: Signatures,
+    coarse: Coarse | None = None,
 ) -> Signatures | None:
     """Signatures beside another model, computed in the memory of ``previous``.
 
-    Only outputs that changed effects act on are computed again. None where an effect that had no
-    column has one now.
+    Only outputs that changed effects act on are computed again, and of columns that are known on
+    the coarse regression only those which change there by 1 % or more. None where a further
+    column of a candidate appears.
     """
     changed = [t for t in present.terms if t not in previous.model.terms]
     changed += [t for t in previous.model.terms if t not in present.terms]
     touched = {output for term in changed for output in regression.outputs_of(term.effect.stage)}
-    canvas, spare = _Canvas(regression, present, touched), np.empty(regression.n_rows)
-    for effect, values in previous.without_signature:
-        reached = touched & regression.outputs_of(effect.stage)
-        if canvas.draw(spare, Term(effect, values), reached):
-            return None
+    grown = _with_new_candidates(regression, present, previous, touched)
+    if grown is None:
+        return None
+    found, new = grown
+    again = _changed_columns(found, present, touched, coarse)
+    again[new] = True
+    canvas = _Canvas(regression, present, touched)
     for candidate in previous.candidates:
         reached = touched & regression.outputs_of(candidate.effect.stage)
-        for index, usual_step in enumerate(candidate.usual_steps, candidate.columns.start):
-            term = Term(
-                candidate.effect, {**candidate.effect.null, **candidate.shape, **usual_step}
-            )
-            canvas.draw(previous.columns[:, index], term, reached)
-    _multiply(previous.gram, regression, previous.columns, touched)
-    return replace(previous, model=present)
+        for index, term in _terms(candidate):
+            if again[index]:
+                canvas.draw(found.memory[index], term, reached)
+    drawn = {
+        output: np.flatnonzero(again[found.reached[output]])
+        for output in regression.outputs
+        if output in touched or len(new)
+    }
+    _multiply(found, regression, drawn)
+    return found
+
+
+def _with_new_candidates(
+    regression: Regression, present: Hypothesis, previous: Signatures, touched: Collection[str]
+) -> tuple[Signatures, NDArray[np.intp]] | None:
+    """Signatures with candidates that had no column before, and the numbers of their columns.
+
+    None where a candidate that has columns gets a further one.
+    """
+    canvas, spare = (
+        _Canvas(regression, present, touched),
+        np.empty(regression.n_rows, np.float32),
+    )
+    known = [(candidate.effect.id, candidate.shape) for candidate in previous.candidates]
+    complete: _Canvas | None = None
+    candidates, left, count = list(previous.candidates), [], previous.count
+    for effect, shape, usual_steps in previous.without_signature:
+        stage = regression.outputs_of(effect.stage)
+        terms = [Term(effect, {**effect.null, **shape, **step}) for step in usual_steps]
+        if not any(canvas.draw(spare, term, set(touched) & stage) for term in terms):
+            left.append((effect, shape, usual_steps))
+            continue
+        if (effect.id, shape) in known:
+            return None
+        complete = complete or _Canvas(regression, present, regression.outputs)
+        own: list[dict[str, float]] = []
+        for term, step in zip(terms, usual_steps, strict=True):
+            if complete.draw(previous.memory[count], term, stage):
+                own.append(step)
+                count += 1
+        candidates.append(Candidate(effect, shape, slice(count - len(own), count), tuple(own)))
+        absent = tuple(step for step in usual_steps if step not in own)
+        left += [(effect, shape, absent)] if absent else []
+    first = previous.count
+    gram = np.zeros((len(regression.bands), count, count))
+    gram[:, :first, :first] = previous.gram
+    found = replace(
+        previous,
+        candidates=tuple(candidates),
+        gram=previous.gram if count == first else gram,
+        reached=_reached(regression, candidates),
+        model=present,
+        without_signature=tuple(left),
+    )
+    return found, np.arange(first, count)
+
+
+def _terms(candidate: Candidate) -> Iterator[tuple[int, Term]]:
+    """Number and term of every column of a candidate."""
+    base = {**candidate.effect.null, **candidate.shape}
+    for index, usual_step in enumerate(candidate.usual_steps, candidate.columns.start):
+        yield index, Term(candidate.effect, {**base, **usual_step})
+
+
+def _reached(
+    regression: Regression, candidates: Iterable[Candidate]
+) -> dict[str, NDArray[np.intp]]:
+    """Numbers of the columns that change each output."""
+    out: dict[str, list[int]] = {output: [] for output in regression.outputs}
+    for candidate in candidates:
+        for output in regression.outputs_of(candidate.effect.stage) & set(regression.outputs):
+            out[output] += range(candidate.columns.start, candidate.columns.stop)
+    return {output: np.array(own, dtype=np.intp) for output, own in out.items()}
+
+
+def _draw(
+    regression: Regression,
+    present: Hypothesis,
+    candidates: Iterable[Candidate],
+    memory: NDArray[np.float32],
+) -> None:
+    """Write the columns of candidates beside a model."""
+    canvas = _Canvas(regression, present, regression.outputs)
+    for candidate in candidates:
+        reached = regression.outputs_of(candidate.effect.stage)
+        for index, term in _terms(candidate):
+            canvas.draw(memory[index], term, reached)
+
+
+def _changed_columns(
+    found: Signatures, present: Hypothesis, touched: Collection[str], coarse: Coarse | None
+) -> NDArray[np.bool_]:
+    """Mask of the columns that a new model changes in touched outputs, shape (p,).
+
+    What is known of them on the coarse regression is renewed.
+    """
+    count = found.count
+    if coarse is None or found.coarse is None:
+        return np.ones(count, dtype=bool)
+    here = np.zeros((count, coarse.regression.n_rows), np.float32)
+    _draw(coarse.regression, coarse.reduced(present), found.candidates, here)
+    out = np.zeros(count, dtype=bool)
+    for rows in coarse.regression.rows_of(touched):
+        before, after = found.coarse[:count, rows], here[:, rows]
+        size = np.einsum("ij,ij->i", before, before, dtype=np.float64)
+        change = after - before
+        out |= np.einsum("ij,ij->i", change, change, dtype=np.float64) > _UNCHANGED**2 * size
+    found.coarse[:count][out] = here[out]
+    return out
 
 
 def _multiply(
-    gram: Array, regression: Regression, columns: Array, outputs: Collection[str]
+    found: Signatures,
+    regression: Regression,
+    drawn: Mapping[str, NDArray[np.intp] | None],
 ) -> None:
-    """Inner products per noise band of some outputs, written into (n_bands, p, p)."""
+    """Inner products per noise band of some outputs, written into ``gram``.
+
+    Parameters
+    ----------
+    drawn
+        By output, places of the new columns among those that reach it; None for all.
+    """
     for band, (output, _, _) in enumerate(regression.bands):
-        if output in outputs:
-            gram[band] = 0.0
+        own = found.reached[output]
+        new = own if drawn.get(output, ()) is None else own[drawn.get(output, np.arange(0))]
+        found.gram[band][np.ix_(new, own)] = found.gram[band][np.ix_(own, new)] = 0.0
     for band, rows in pieces(regression):
-        if regression.bands[band][0] in outputs:
-            gram[band] += columns[rows].T @ columns[rows]
+        output = regression.bands[band][0]
+        if output not in drawn:
+            continue
+        places, own, columns = drawn[output], found.reached[output], found.rows_of(output, rows)
+        if places is None:
+            found.gram[band][np.ix_(own, own)] += columns @ columns.T
+        elif len(places):
+            products, old = columns[places] @ columns.T, np.setdiff1d(np.arange(len(own)), places)
+            found.gram[band][np.ix_(own[places], own)] += products
+            found.gram[band][np.ix_(own[old], own[places])] += products[:, old].T
 
 
 def pieces(regression: Regression) -> Iterator[tuple[int, slice]]:

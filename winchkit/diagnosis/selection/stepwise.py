@@ -159,11 +159,10 @@ def _forward_selection(
         seen.add(present.labels)
         grown = None
         if scores and scores[0].net_gain > threshold:
-            first = not tried
-            trials = _short_list(engine, present, noise, scores, complete=first)
+            trials = _short_list(engine, present, noise, scores)
             grown = best_accepted(engine, present, noise, trials)
             if grown is None and any(trial.fit.abandoned for trial in trials):
-                trials = _short_list(engine, present, noise, scores)
+                trials = _short_list(engine, present, noise, scores, complete=True)
                 grown = best_accepted(engine, present, noise, trials)
             tried = tried or _fits(trials)
         grown = grown or _best_pair(engine, present, noise)
@@ -231,7 +230,7 @@ def _short_list(
     noise: Noise,
     scores: list[Score],
     *,
-    complete: bool = True,
+    complete: bool = False,
 ) -> list[Trial]:
     """Trials of the five candidates with the largest scores, in their order.
 
@@ -264,10 +263,11 @@ def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | Non
     # Either may also fail alone because it is wrong where the other acts (one-way friction).
     best = [pair for pair in pairs if pair.suppressed][:_PAIRS]
     best += [pair for pair in pairs[:_PAIRS] if not pair.suppressed]
-    trials = [
-        engine.trial(engine.trial(present, a, noise).fit, b, noise)
-        for a, b in (pair.scores for pair in best)
-    ]
+    trials = []
+    for pair in best:
+        first, second = pair.scores
+        begun = engine.trial(present, first, noise, aim=present.chi_square - pair.explained_ss)
+        trials.append(engine.trial(begun.fit, second, noise))
     return best_accepted(engine, present, noise, trials)
 
 
@@ -323,7 +323,7 @@ def _exchanged_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit
         if index >= len(present.hypothesis.terms):
             break  # A rival replaced two effects.
         own = present.hypothesis.terms[index]
-        base = engine.refit(present.hypothesis.without(index), noise)
+        base = _without(engine, present, noise, index)
         rivals = _rivals_of(own, engine.scores(base, noise))
         trials = [engine.trial(base, item, noise, target=present.chi_square) for item in rivals]
         best = min(trials, key=lambda t: t.criterion, default=None)
@@ -355,8 +355,9 @@ def _without_minor_terms(engine: SelectionEngine, present: Fit, noise: Noise) ->
     excess = float(np.sum(np.maximum(left.excess_power, 0.0)[left.rejected]))
     reduced = present
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
-        without = engine.refit(present.hypothesis.without(index), noise)
-        if without.chi_square - present.chi_square < excess:
+        aim = present.chi_square + excess
+        without = engine.refit(present.hypothesis.without(index), noise, aim)
+        if without.chi_square < aim:
             reduced = engine.refit(reduced.hypothesis.without(index), noise)
     return (
         (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
@@ -366,7 +367,14 @@ def _without_minor_terms(engine: SelectionEngine, present: Fit, noise: Noise) ->
 def _backward_elimination(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
     """Model without the additions whose removal decreases the criterion."""
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
-        without = engine.refit(present.hypothesis.without(index), noise)
+        without = _without(engine, present, noise, index)
         if engine.criterion(without) < engine.criterion(present):
             present = without
     return present
+
+
+def _without(engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> Fit:
+    """The model without one addition, fitted as far as its criterion can be the smaller one."""
+    hypothesis = present.hypothesis.without(index)
+    aim = engine.criterion(present) - engine.penalty(hypothesis)
+    return engine.refit(hypothesis, noise, aim)

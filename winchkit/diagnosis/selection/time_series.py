@@ -8,7 +8,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
-from winchkit.diagnosis.regression.coarse import coarse_regression
+from winchkit.diagnosis.regression.coarse import CoarseTimeSeries, coarse_regression
 from winchkit.diagnosis.regression.cross_validation import extrapolation, held_out_rms
 from winchkit.diagnosis.regression.discretization import without_discretization_error
 from winchkit.diagnosis.regression.gls import CoarseProblem, Fit
@@ -56,8 +56,8 @@ class TimeSeriesSelection(SelectionEngine):
         initial_model: Hypothesis,
         candidates: Iterable[Effect],
     ) -> None:
-        super().__init__(regression, initial_model, candidates)
         self._coarse = coarse_regression(regression)
+        super().__init__(regression, initial_model, candidates)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Noise from the contrasts of repeats; without repeats from the saturated model."""
@@ -66,6 +66,11 @@ class TimeSeriesSelection(SelectionEngine):
             own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
             return noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
         return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
+
+    @property
+    def coarse(self) -> CoarseTimeSeries | None:
+        """Every k-th sample of one run of each set of repeats."""
+        return self._coarse
 
     def coarse_problem(self, noise: Noise) -> CoarseProblem | None:
         """Every k-th sample of one run of each set of repeats, under this noise."""
@@ -154,4 +159,4 @@ class TimeSeriesSelection(SelectionEngine):
             if "temperature" in candidate.effect.needs
             for index in range(candidate.columns.start, candidate.columns.stop)
         ]
-        return self.signatures.columns[:, thermal]
+        return self.signatures.columns[:, thermal].astype(np.float64)
