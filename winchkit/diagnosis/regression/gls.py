@@ -38,6 +38,7 @@ _KEPT_STARTS = 2
 _TOLERANCE = 1e-4
 _COARSE_TOLERANCE = 1e-3
 _MOST_FAILURES = 6
+_SETTLED = 4
 _DISTINCT = 0.02
 _AMBIGUOUS = 4.0
 _SHARE_LEFT = 0.1
@@ -117,7 +118,8 @@ def fit(
         than 0.02: a model that misses by thousands is not fitted to the last hundredth.
     aim
         χ² that is of interest: the iteration ends where ten times the decrease that its next step
-        promises, and ten per unknown, would not reach it.
+        promises, or twice the latest one in every step that is left, and ten per unknown would not
+        reach it.
 
     Returns
     -------
@@ -136,12 +138,15 @@ def fit(
     chi_square = _chi_square(residual, inverse_sigma)
     region = _TrustRegion()
     local: _LocalModel | None = None
-    failures = 0
-    for _ in range((_iterations(start) if most is None else most) if len(x) else 0):
+    failures, latest = 0, np.inf
+    limit = (_iterations(start) if most is None else most) if len(x) else 0
+    for iteration in range(limit):
         if local is None:
             jacobian = regression.jacobian(x, start)
             local = _LocalModel(jacobian, residual, inverse_sigma, x, (low, high))
             promised = _STEPS_LEFT * local.step(_TrustRegion()).decrease
+            if iteration >= _SETTLED:
+                promised = min(promised, 2 * (limit - iteration) * latest)
             if chi_square - promised - _SLACK_PER_UNKNOWN * len(x) > aim:
                 break
         least = max(_LEAST_DECREASE, tolerance * (chi_square - len(residual)))
@@ -157,9 +162,9 @@ def fit(
             if failures == _MOST_FAILURES:
                 break
         else:
-            failures, decrease = 0, chi_square - new
+            failures, latest = 0, chi_square - new
             x, residual, chi_square, local = trial, residual_there, new, None
-            if decrease < least:
+            if latest < least:
                 break
     fitted = regression.hypothesis(x, start)
     known = None if local is None else jacobian

@@ -223,7 +223,8 @@ class SelectionEngine(ABC):
     def _coarse_problem(self, starts: Sequence[Hypothesis], noise: Noise) -> CoarseProblem | None:
         """The coarse regression where a fit from these starting values takes many iterations."""
         nonlinear = any(
-            term.effect.memory or Coordinates(term.effect).shapes for term in starts[0].terms
+            term.effect.memory or term.effect.probes or Coordinates(term.effect).shapes
+            for term in starts[0].terms
         )
         return self.coarse_problem(noise) if nonlinear or len(starts) > 1 else None
 
@@ -252,9 +253,12 @@ class SelectionEngine(ABC):
         return folds is self.regression.groups and len(set(self.regression.group_of_run)) > 1
 
     def _signatures(self, present: Hypothesis) -> Signatures:
+        return signatures(self.regression, present, self._absent(), self.coarse)
+
+    def _absent(self) -> list[Effect]:
+        """Candidates that the initial model lacks."""
         there = {t.effect.id for t in self.initial_model.terms if not t.effect.repeatable}
-        absent = (effect for effect in self._candidates if effect.id not in there)
-        return signatures(self.regression, present, absent, self.coarse)
+        return [effect for effect in self._candidates if effect.id not in there]
 
     def _new_orders(self, present: Hypothesis) -> bool:
         """Extend the grids of candidates by orders in the residual; False where there are none."""
@@ -271,9 +275,8 @@ class SelectionEngine(ABC):
         does.
         """
         self._last_projected = LastValue()
-        grown = None
-        if not self._new_orders(present):
-            grown = updated_signatures(self.regression, present, self.signatures, self.coarse)
+        effects = self._absent() if self._new_orders(present) else []
+        grown = updated_signatures(self.regression, present, self.signatures, effects, self.coarse)
         if grown is None:
             del self.signatures  # Both together would double the peak memory.
             grown = self._signatures(present)

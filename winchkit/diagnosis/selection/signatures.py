@@ -7,7 +7,7 @@ gradient at zero). Inner products are kept per noise band, to be combined under 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -64,6 +64,8 @@ Absent = tuple[Effect, dict[str, float], tuple[dict[str, float], ...]]
 """An effect at a point of its shape grid, and its usual steps that change nothing there."""
 _BLOCK = 4096
 """Rows of columns that are converted to double precision at once."""
+_ROOM = 100
+"""Columns that may be added later; their pages are not allocated before."""
 _UNCHANGED = 0.01
 """Change of a column on the coarse regression, relative to it, below which it is kept."""
 
@@ -176,7 +178,7 @@ def signatures(
     without_signature: list[Absent] = []
     # Columns are contiguous in memory, since each is written and read as a whole. Pages of zeros,
     # the rows of outputs that an effect does not act on, are not allocated by the system.
-    most = sum(len(usual_steps) for *_, usual_steps in tried)
+    most = sum(len(usual_steps) for *_, usual_steps in tried) + _ROOM
     memory, count = np.zeros((most, regression.n_rows), np.float32), 0
     for effect, shape, usual_steps in tried:
         own, absent = [], []
@@ -212,18 +214,39 @@ def updated_signatures(
     regression: Regression,
     present: Hypothesis,
     previous: Signatures,
+    effects: Iterable[Effect] = (),
     coarse: Coarse | None = None,
 ) -> Signatures | None:
     """Signatures beside another model, computed in the memory of ``previous``.
 
     Only outputs that changed effects act on are computed again, and of columns that are known on
     the coarse regression only those which change there by 1 % or more. None where a further
-    column of a candidate appears.
+    column of a candidate appears, or where there is no room for new candidates.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    present
+        The other model.
+    previous
+        Signatures beside another model; not valid afterwards.
+    effects
+        Candidates whose grids may have new points.
+    coarse
+        Coarse regression; None for none.
     """
     changed = [t for t in present.terms if t not in previous.model.terms]
     changed += [t for t in previous.model.terms if t not in present.terms]
     touched = {output for term in changed for output in regression.outputs_of(term.effect.stage)}
-    grown = _with_new_candidates(regression, present, previous, touched)
+    known = [(effect.id, shape) for effect, shape, _ in previous.without_signature]
+    known += [(candidate.effect.id, candidate.shape) for candidate in previous.candidates]
+    new_points = [
+        (effect, shape, tuple(steps))
+        for effect, shape, steps in points(regression, effects)
+        if (effect.id, shape) not in known
+    ]
+    grown = _with_new_candidates(regression, present, previous, touched, new_points)
     if grown is None:
         return None
     found, new = grown
@@ -245,11 +268,15 @@ def updated_signatures(
 
 
 def _with_new_candidates(
-    regression: Regression, present: Hypothesis, previous: Signatures, touched: Collection[str]
+    regression: Regression,
+    present: Hypothesis,
+    previous: Signatures,
+    touched: Collection[str],
+    new_points: Sequence[Absent],
 ) -> tuple[Signatures, NDArray[np.intp]] | None:
     """Signatures with candidates that had no column before, and the numbers of their columns.
 
-    None where a candidate that has columns gets a further one.
+    None where a candidate that has columns gets a further one, or where there is no room.
     """
     canvas, spare = (
         _Canvas(regression, present, touched),
@@ -258,13 +285,16 @@ def _with_new_candidates(
     known = [(candidate.effect.id, candidate.shape) for candidate in previous.candidates]
     complete: _Canvas | None = None
     candidates, left, count = list(previous.candidates), [], previous.count
-    for effect, shape, usual_steps in previous.without_signature:
+    for place, (effect, shape, usual_steps) in enumerate(
+        (*previous.without_signature, *new_points)
+    ):
         stage = regression.outputs_of(effect.stage)
         terms = [Term(effect, {**effect.null, **shape, **step}) for step in usual_steps]
-        if not any(canvas.draw(spare, term, set(touched) & stage) for term in terms):
+        before = place < len(previous.without_signature)
+        if before and not any(canvas.draw(spare, term, set(touched) & stage) for term in terms):
             left.append((effect, shape, usual_steps))
             continue
-        if (effect.id, shape) in known:
+        if (effect.id, shape) in known or count + len(terms) > len(previous.memory):
             return None
         complete = complete or _Canvas(regression, present, regression.outputs)
         own: list[dict[str, float]] = []
@@ -272,7 +302,8 @@ def _with_new_candidates(
             if complete.draw(previous.memory[count], term, stage):
                 own.append(step)
                 count += 1
-        candidates.append(Candidate(effect, shape, slice(count - len(own), count), tuple(own)))
+        if own:
+            candidates.append(Candidate(effect, shape, slice(count - len(own), count), tuple(own)))
         absent = tuple(step for step in usual_steps if step not in own)
         left += [(effect, shape, absent)] if absent else []
     first = previous.count

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,6 +98,7 @@ def ranked_curves(
     partial: PartialRegression,
     outputs: Sequence[str],
     penalty_per_parameter: float,
+    only: Container[tuple[str, str]] | None = None,
 ) -> list[Curve]:
     """Best curve of every place and variable, that of the largest net decrease of χ² first.
 
@@ -111,8 +112,11 @@ def ranked_curves(
         Outputs of which a curve must change one.
     penalty_per_parameter
         Penalty per parameter, ln n.
+    only
+        Places and variables of the curves; None for all.
     """
-    found = _fitted(regression, partial, curves(regression, outputs), penalty_per_parameter)
+    families = curves(regression, outputs, only)
+    found = _fitted(regression, partial, families, penalty_per_parameter)
     return sorted(found, key=lambda curve: -curve.net_gain)
 
 

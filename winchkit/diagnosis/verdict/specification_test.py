@@ -22,6 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, with_pair, without_term
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.curve_fits import Curve, PartialRegression, ranked_curves
@@ -35,6 +38,8 @@ __all__ = ["SpecificationTest", "judge_with_specification_test"]
 
 _LEVEL = 0.005
 """Probability that noise takes away the name of a right effect, over all tests of one result."""
+_LEAST_SHARE = 0.5
+"""Share of the named effects' decrease of χ² that a curve must reach on the coarse regression."""
 _COMPARED = 12
 """Places and variables whose curves are in the null distribution, those of largest gain."""
 _MARGIN = 1e-3
@@ -109,27 +114,32 @@ class SpecificationTest:
         The others are not refitted: a lag that replaces a removed friction lies far from where both
         are right. With ``discretization`` the discretisation error is a free column as well.
         """
-        final = self.result.final
-        free = final.jacobian[:, ~self._own(indices)]
-        free = np.hstack([free, self._discretization_column]) if discretization else free
         inverse_sigma = self.result.noise.inverse_sigma(self.engine.regression)
-        return PartialRegression(final.residual + self._change(indices), free, inverse_sigma)
+        further = self._discretization_column if discretization else None
+        return _partial(self.engine.regression, self.result.final, inverse_sigma, indices, further)
 
-    def _own(self, indices: Sequence[int]) -> NDArray[np.bool_]:
-        """Mask of the unknowns of some terms."""
-        hypothesis = self.result.final.hypothesis
-        own = np.zeros(len(self.result.final.vector), dtype=bool)
-        for index in indices:
-            own |= self.engine.regression.unknowns_of(index, hypothesis)
-        return own
+    @cached_property
+    def _coarse(self) -> tuple[TimeSeriesRegression, Fit, Array] | None:
+        """The final model on the coarse regression, with 1/σ of its rows; None without one."""
+        coarse = self.engine.coarse
+        if coarse is None:
+            return None
+        weights = coarse.inverse_sigma(self.result.noise)
+        hypothesis = coarse.reduced(self.result.final.hypothesis)
+        return coarse.regression, fit(coarse.regression, hypothesis, weights, 0), weights
 
-    def _change(self, indices: Sequence[int]) -> Array | float:
-        """Change of the prediction by some terms beside the others, (rows,)."""
-        regression, hypothesis = self.engine.regression, self.result.final.hypothesis
-        others = hypothesis
-        for index in sorted(indices, reverse=True):
-            others = others.without(index)
-        return regression.change(hypothesis) - regression.change(others) if indices else 0.0
+    def _possible(self, indices: Sequence[int]) -> set[tuple[str, str]] | None:
+        """Places and variables of curves that may explain as much as terms; None for all.
+
+        Those of which the best curve explains at least half as much on the coarse regression.
+        """
+        if self._coarse is None:
+            return None
+        regression, final, weights = self._coarse
+        partial, rest = (_partial(regression, final, weights, own) for own in (indices, ()))
+        least = _LEAST_SHARE * (partial.chi_square - rest.chi_square)
+        ranked = ranked_curves(regression, partial, self._outputs(indices), 0.0)
+        return {(curve.place, curve.variable) for curve in ranked if curve.net_gain >= least}
 
     def explained_ss(self, indices: Sequence[int]) -> float:
         """Decrease of χ² by terms, given the others."""
@@ -159,7 +169,11 @@ class SpecificationTest:
             partial.chi_square - self.partial((), discretization=discretization).chi_square
         )
         ranked = ranked_curves(
-            engine.regression, partial, self._outputs(indices), engine.penalty_per_parameter
+            engine.regression,
+            partial,
+            self._outputs(indices),
+            engine.penalty_per_parameter,
+            self._possible(indices),
         )
         # Initial states of runs are no parameters of the law; they carry no penalty here.
         net_gain = explained_ss - engine.penalty_per_parameter * self._n_parameters(indices)
@@ -172,12 +186,14 @@ class SpecificationTest:
         """Quantile of the excess where the terms are right, for one of all tests of a result."""
         regression, noise = self.engine.regression, self.result.noise
         penalty = self.engine.penalty_per_parameter
-        partial, own = self.partial(indices), self._own(indices)
+        partial, own = self.partial(indices), _own(regression, self.result.final, indices)
         columns = self.result.final.jacobian[:, own] * partial.inverse_sigma[:, None]
         columns = columns[:, np.any(columns, axis=0)]
         columns = columns / np.sqrt(np.sum(columns**2, axis=0))
         columns -= partial.explained @ (partial.explained.T @ columns)
-        change = partial.projected(np.asarray(self._change(indices)))
+        change = partial.projected(
+            np.asarray(_change(regression, self.result.final.hypothesis, indices))
+        )
         outputs = self._outputs(indices)
         ranked = ranked_curves(regression, partial, outputs, penalty)[:_COMPARED]
         places = {(curve.place, curve.variable) for curve in ranked}
@@ -198,6 +214,38 @@ class SpecificationTest:
     def _n_parameters(self, indices: Sequence[int]) -> int:
         terms = self.result.final.hypothesis.terms
         return sum(Coordinates(terms[index].effect).n_parameters for index in indices)
+
+
+def _partial(
+    regression: TimeSeriesRegression,
+    final: Fit,
+    inverse_sigma: Array,
+    indices: Sequence[int],
+    further: Array | None = None,
+) -> PartialRegression:
+    """Residual without some terms, all other unknowns and further columns free."""
+    free = final.jacobian[:, ~_own(regression, final, indices)]
+    free = free if further is None else np.hstack([free, further])
+    residual = final.residual + _change(regression, final.hypothesis, indices)
+    return PartialRegression(residual, free, inverse_sigma)
+
+
+def _own(regression: TimeSeriesRegression, final: Fit, indices: Sequence[int]) -> NDArray[np.bool_]:
+    """Mask of the unknowns of some terms."""
+    own = np.zeros(len(final.vector), dtype=bool)
+    for index in indices:
+        own |= regression.unknowns_of(index, final.hypothesis)
+    return own
+
+
+def _change(
+    regression: TimeSeriesRegression, hypothesis: Hypothesis, indices: Sequence[int]
+) -> Array | float:
+    """Change of the prediction by some terms beside the others, (rows,)."""
+    others = hypothesis
+    for index in sorted(indices, reverse=True):
+        others = others.without(index)
+    return regression.change(hypothesis) - regression.change(others) if indices else 0.0
 
 
 def _withheld_note(terms: Sequence[Term], outperformed: Sequence[Term], curve: Curve) -> str:
