@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -23,6 +24,10 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "bench.toml").write_text(BENCH)
     (tmp_path / "lift.toml").write_text('schema = 1\nkind = "programme"\n')
     (tmp_path / "broken.toml").write_text('kind = "bench"\n[winch')
+    effect = '[[effect]]\nid = "cell-gain"\n'
+    (tmp_path / "mine.toml").write_text(f'schema = 1\nkind = "winch"\n{effect}')
+    for name in ("lift-1.csv", "lift-2.mcap", "lift.txt"):
+        (tmp_path / name).touch()
     (tmp_path / "deep").mkdir()
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -62,6 +67,11 @@ def complete(line: str, **environment: str) -> list[str]:
         ("winchkit run l", {"lift.toml"}),
         ("winchkit busload be", {"bench.toml"}),
         ("winchkit info --device generic-cia402", {"generic-cia402"}),
+        ("winchkit add cable-elongation-l", {"cable-elongation-linear"}),
+        ("winchkit remove -p mine.toml ", {"cell-gain"}),
+        ("winchkit compare -p bench-sp", {"bench-spiral"}),
+        ("winchkit sim serve spiral", {"spiral-bench"}),
+        ("winchkit diagnose l", {"lift-1.csv", "lift-2.mcap"}),
     ],
 )
 def test_what_a_shell_is_offered(line: str, offered: set[str]) -> None:
@@ -86,6 +96,26 @@ def test_the_script_of_each_shell(shell: str) -> None:
     assert f"_WINCHKIT_COMPLETE={shell}_complete" in result.stdout
     if shell == "bash":
         subprocess.run(["bash", "-n"], input=result.stdout, text=True, check=True)
+
+
+@pytest.mark.usefixtures("folder")
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")
+def test_bash_itself_completes() -> None:
+    """With the script as a user evaluates it, and the function that it defines."""
+    programs = str(Path(sys.executable).parent)
+    line = (
+        'eval "$(winchkit completion bash)" && COMP_WORDS=(winchkit ledger -p bench-sp) '
+        '&& COMP_CWORD=3 && _winchkit_completion winchkit bench-sp -p && echo "${COMPREPLY[*]}"'
+    )
+    done = subprocess.run(
+        ["bash", "--norc", "-c", line],
+        env={**os.environ, "PATH": programs + os.pathsep + os.environ["PATH"]},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.stdout.split() == ["bench-spiral"], done.stderr
 
 
 def test_an_unknown_shell() -> None:

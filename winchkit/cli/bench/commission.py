@@ -8,6 +8,7 @@ import sys
 import click
 
 from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import bench_argument
 from winchkit.cli.core.output import echo_json
 
@@ -54,3 +55,4 @@ def command(*, bench: str, answers: str | None, as_json: bool) -> None:
         echo_json({"schema": 1, "path": spec.record_file, **dataclasses.asdict(record)})
     else:
         click.echo(f"{spec.record_file}: commissioned by {record.by}, {record.date}")
+    suggest_next("monitor", "-b", bench)

@@ -8,6 +8,7 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import runs_argument
 
 __all__ = ["command"]
@@ -32,7 +33,9 @@ def command(runs: tuple[str, ...], output: str, winch: str | None, as_json: bool
     from winchkit.runs.export import export
     from winchkit.runs.info import summary_of
 
-    recording = export(runs, output, winch or "")
+    with progress_bar() as progress:
+        progress(f"converting to {output}", None)
+        recording = export(runs, output, winch or "")
     for remark in recording.notes:
         click.echo(f"{recording.path}: {remark} (warning)", err=True)
     summary = summary_of(recording)

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.messages import note
+from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import TABLE, output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:
@@ -131,15 +132,17 @@ def command(
         raise UsageError(_unanswered(guesses))
     mapping_file = declared or _mapping_of(files, guesses)
     targets = _targets(files, Path(output), overwrite=overwrite, is_joined=join)
-    results, joints = _runs(
-        files,
-        [streams_of(guess) for guess in guesses],
-        _Metadata(guesses, mapping_file, masses),
-        is_joined=join,
-        lag=_lag(lag),
-    )
-    report["joints"], report["mapping_id"] = joints, _identity(mapping_file)
-    report["sanity"] = _inspected([run for _, run in results])
+    with progress_bar() as progress:
+        progress("converting", None)
+        results, joints = _runs(
+            files,
+            [streams_of(guess) for guess in guesses],
+            _Metadata(guesses, mapping_file, masses),
+            is_joined=join,
+            lag=_lag(lag),
+        )
+        report["joints"], report["mapping_id"] = joints, _identity(mapping_file)
+        report["sanity"] = _inspected([run for _, run in results])
     for joint in joints:
         note(f"{joint.path}: {joint.text}")
     for finding in report["sanity"]:
@@ -149,6 +152,7 @@ def command(
         report["mapping"] = _saved(mapping_file, save_mapping or str(Path(output) / _MAPPING))
     if as_json:
         echo_json(report)
+    suggest_next("check", [str(entry["path"]) for entry in report["runs"]])
 
 
 def _may_ask(yes: bool, as_json: bool) -> bool:

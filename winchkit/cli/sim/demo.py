@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Command, Example
-from winchkit.cli.core.messages import suggest_next
+from winchkit.cli.core.messages import is_quiet, suggest_next
 from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import echo_json
 
@@ -180,7 +180,8 @@ def _progress(total: float) -> Iterator[ProgressCallback]:
         TimeElapsedColumn(),
         TextColumn("{task.description}"),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
+    hidden = is_quiet() or not console.is_terminal
+    with Progress(*columns, console=console, transient=True, disable=hidden) as bar:
         task = bar.add_task("starting", total=total)
 
         def progress(what: str, recorded: float) -> None:
