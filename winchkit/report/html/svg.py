@@ -71,7 +71,7 @@ def _of_page(figure: Figure, scene: Scene, name: str) -> Markup:
         class_=f"drawn {name}",
         role="img",
         aria_label=f"{figure.title}. {figure.caption}",
-        style=f"max-width:{1.35 * scene.width:.0f}px",
+        style=f"max-width:{(1.35 if scene.width >= WIDE else 1.1) * scene.width:.0f}px",
         data_axis=compact(where),
     )
 
