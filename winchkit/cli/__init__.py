@@ -39,6 +39,9 @@ SECTIONS: dict[str, dict[str, At]] = {
         "remove": At("winchkit.cli.model.remove", "Take an effect out of a profile."),
         "undo": At("winchkit.cli.model.undo", "Take back the last step of a profile's ledger."),
         "ledger": At("winchkit.cli.model.ledger", "Show how a profile grew, step by step."),
+        "serve": At(
+            "winchkit.cli.web.serve", "Serve the page: look, learn, add, watch the error fall."
+        ),
         "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
         "effects": At(
             "winchkit.cli.model.effects", "List the physical effects, or show one's card."

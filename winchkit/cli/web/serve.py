@@ -1,0 +1,80 @@
+"""``winchkit serve``: the page on which one sees where a model fails, and adds what it lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from winchkit.errors import UsageError
+
+__all__ = ["command"]
+
+
+@click.command()
+@click.argument("runs", nargs=-1, metavar="[RUN...]")
+@click.option("--profile", "-p", metavar="P", help="Profile: a name or a file.")
+@click.option("--bench", metavar="BENCH.toml", help="Bench to show; it moves with --allow-motion.")
+@click.option("--sim", "simulated", metavar="NAME", help="Simulated bench to start and show.")
+@click.option("--allow-motion", is_flag=True, help="The page may move the bench.")
+@click.option("--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects.")
+@click.option("--folder", default=".", show_default=True, help="Folder of the library view.")
+@click.option("--port", default=0, metavar="PORT", help="Port; a free one by default.")
+@click.option("--mystery", type=int, metavar="SEED", help="Runs of a bench with a hidden effect.")
+@click.option("--no-browser", is_flag=True, help="Open no browser.")
+def command(
+    *,
+    runs: Sequence[str],
+    profile: str | None,
+    bench: str | None,
+    simulated: str | None,
+    allow_motion: bool,
+    effect_files: Sequence[str],
+    folder: str,
+    port: int,
+    mystery: int | None,
+    no_browser: bool,
+) -> None:
+    """Serve the page on this computer: look, learn, add, and watch the error fall.
+
+    The URL is the first line on stdout. The page answers on the loopback address only; other
+    computers reach it through a tunnel (docs/page.md). Ctrl-C ends it.
+    """
+    if bench and simulated:
+        raise UsageError("--bench and --sim: choose one")
+    if allow_motion and not (bench or simulated):
+        raise UsageError("--allow-motion needs --bench or --sim")
+    if not 0 <= port <= 65535:
+        raise UsageError(f"--port {port}: choose 0 to 65535")
+    if not Path(folder).is_dir():
+        raise UsageError(f"--folder {folder}: is no folder")
+    try:
+        from winchkit.web.server import serve
+    except ImportError as error:
+        raise UsageError(
+            f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
+        ) from None
+    serve(
+        runs,
+        profile,
+        port=port,
+        folder=folder,
+        bench=bench,
+        sim=simulated,
+        allow_motion=allow_motion,
+        effects=effect_files,
+        mystery=mystery,
+        ready=lambda url: _ready(url, browser=not no_browser),
+    )
+
+
+def _ready(url: str, *, browser: bool) -> None:
+    """Print the URL at once, and open the browser where one is wanted."""
+    import sys
+    import webbrowser
+
+    click.echo(url)
+    sys.stdout.flush()
+    if browser:
+        webbrowser.open(url)

@@ -1,0 +1,384 @@
+"""Routes of the page, and what they refuse.
+
+Everything but the page's own files needs the token of the URL. Requests of other origins, under
+other host names, too large or malformed are refused; the content security policy forbids
+everything that does not come from this server.
+
+References
+----------
+W3C (2024). Content Security Policy Level 3. OWASP: Cross-Site WebSocket Hijacking.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import parse_qsl, unquote, urlsplit
+
+from starlette.applications import Starlette
+from starlette.middleware import Middleware
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from winchkit.catalog import names
+from winchkit.errors import UsageError, WinchkitError
+from winchkit.web.foreign import is_run, preview
+from winchkit.web.library import Library
+from winchkit.web.workspace import Workspace
+
+if TYPE_CHECKING:
+    from winchkit.web.bench import BenchView
+
+__all__ = ["Guard", "application"]
+
+_STATIC = Path(__file__).parent / "static"
+_UPLOT = Path(__file__).parent.parent / "report" / "html" / "assets"
+_LARGEST_FILE = 400_000_000
+"""Bytes of a dropped file: 20 channels of 10⁶ samples as text."""
+_MOST_POINTS = 8000
+"""Points of a curve: two per pixel of a screen of 4000."""
+_LARGEST_MESSAGE = 64_000
+"""Bytes of a message that orders something."""
+_POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+_HEADERS = {
+    "content-security-policy": _POLICY,
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cache-control": "no-store",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+}
+_HOSTS = {"127.0.0.1", "localhost", "[::1]"}
+
+
+class Guard:
+    """Refuses foreign hosts, foreign origins and missing tokens, and sets the headers.
+
+    Parameters
+    ----------
+    app : ASGI application
+        What answers the permitted requests.
+    token : str
+        Token of the URL.
+    """
+
+    def __init__(self, app: ASGIApp, token: str) -> None:
+        self.app = app
+        self.token = token
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it with 403."""
+        if scope["type"] not in {"http", "websocket"}:
+            await self.app(scope, receive, send)
+            return
+        refusal = self._refusal(scope)
+        if refusal and scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008, "reason": refusal})
+            return
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                present = list(message.get("headers", []))
+                present += [(k.encode(), v.encode()) for k, v in _HEADERS.items()]
+                message = {**message, "headers": present}
+            await send(message)
+
+        if refusal:
+            await PlainTextResponse(refusal, 403)(scope, receive, with_headers)
+            return
+        await self.app(scope, receive, with_headers)
+
+    def _refusal(self, scope: Scope) -> str:
+        headers = {
+            key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]
+        }
+        host = headers.get("host", "")
+        if _without_port(host) not in _HOSTS:
+            return "this page answers on the loopback address only"
+        origin = headers.get("origin")
+        if origin is not None and urlsplit(origin).netloc != host:
+            return "the request comes from another page"
+        if not scope["path"].startswith(("/api/", "/live")):
+            return ""
+        query = dict(parse_qsl(scope.get("query_string", b"").decode("latin-1")))
+        given = headers.get("x-winchkit-token", query.get("token", ""))
+        if not secrets.compare_digest(given.encode(), self.token.encode()):
+            return "the token is missing or wrong; open the URL that 'winchkit serve' printed"
+        return ""
+
+
+def application(
+    workspace: Workspace, token: str, library: Library, bench: BenchView | None = None
+) -> Starlette:
+    """The page as an ASGI application.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Runs and profile of the Diagnose view.
+    token : str
+        Of the URL.
+    library : Library
+        Runs of the folder.
+    bench : BenchView, optional
+        The bench, where one is attached.
+    """
+    listeners = _Listeners()
+    workspace.changed = listeners.wake
+
+    @asynccontextmanager
+    async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        listeners.loop = asyncio.get_running_loop()
+        yield
+        listeners.loop = None
+        workspace.close()
+
+    routes = [
+        *_Work(workspace, library, has_bench=bench is not None).routes(listeners),
+        *_Drawings(workspace, library).routes(),
+        *([] if bench is None else bench.routes()),
+        Route("/", _page),
+        Mount("/uplot", StaticFiles(directory=_UPLOT)),
+        Mount("/static", StaticFiles(directory=_STATIC)),
+    ]
+    return Starlette(
+        routes=routes,
+        middleware=[Middleware(Guard, token=token)],
+        exception_handlers={
+            WinchkitError: _refused,
+            ValueError: _malformed,
+            KeyError: _malformed,
+        },
+        lifespan=lifespan,
+    )
+
+
+async def _page(request: Request) -> Response:
+    return FileResponse(_STATIC / "index.html", media_type="text/html")
+
+
+class _Listeners:
+    """Open pages that are told of every change of the workspace."""
+
+    def __init__(self) -> None:
+        self.loop: asyncio.AbstractEventLoop | None = None
+        self.events: set[asyncio.Event] = set()
+
+    def wake(self) -> None:
+        """Tell all of them; callable from any thread."""
+        if self.loop is not None:
+            self.loop.call_soon_threadsafe(self._set)
+
+    def _set(self) -> None:
+        for event in self.events:
+            event.set()
+
+
+class _Work:
+    """Routes that change the workspace, and its view."""
+
+    def __init__(self, workspace: Workspace, library: Library, *, has_bench: bool) -> None:
+        self.workspace = workspace
+        self.library = library
+        self.has_bench = has_bench
+
+    def routes(self, listeners: _Listeners) -> list[Route | WebSocketRoute]:
+        """The routes."""
+
+        async def live(socket: WebSocket) -> None:
+            await self._live(socket, listeners)
+
+        return [
+            Route("/api/view", self._view),
+            Route("/api/choices", self._choices),
+            Route("/api/drop", self._drop, methods=["POST"]),
+            Route("/api/guess", self._guess, methods=["POST"]),
+            Route("/api/do", self._order, methods=["POST"]),
+            WebSocketRoute("/live", live),
+        ]
+
+    def _shown(self) -> dict[str, Any]:
+        return self.workspace.view() | {"bench": self.has_bench}
+
+    async def _view(self, request: Request) -> Response:
+        return JSONResponse(self._shown())
+
+    async def _choices(self, request: Request) -> Response:
+        effects = [effect.id for effect in self.workspace.catalogue]
+        return JSONResponse(
+            {"profiles": names("profiles"), "examples": names("sim"), "effects": effects}
+        )
+
+    async def _drop(self, request: Request) -> Response:
+        name = unquote(request.headers.get("x-file-name", ""))
+        path = self.workspace.keep(name, await _body(request, _LARGEST_FILE))
+        if path.suffix == ".toml":
+            self.workspace.open([], str(path))
+        elif await asyncio.to_thread(is_run, path):
+            self.workspace.open([path])
+        else:
+            found = await asyncio.to_thread(preview, path)
+            return JSONResponse({"import": found, "file": path.name})
+        return _accepted()
+
+    async def _guess(self, request: Request) -> Response:
+        asked = await _object(request)
+        path = self.workspace.dropped(str(asked["file"]))
+        found = await asyncio.to_thread(preview, path, dict(asked["answers"]))
+        return JSONResponse({"import": found, "file": path.name})
+
+    async def _order(self, request: Request) -> Response:
+        asked, work = await _object(request), self.workspace
+        actions: dict[str, Callable[[], object]] = {
+            "profile": lambda: work.open([], str(asked["name"])),
+            "example": lambda: work.example(str(asked["name"])),
+            "mystery": lambda: work.mystery(int(asked["seed"])),
+            "use": lambda: work.use(str(asked["name"]), used=bool(asked["used"])),
+            "remove": lambda: work.remove(str(asked["name"])),
+            "import": lambda: work.take(str(asked["file"]), dict(asked["answers"])),
+            "library": lambda: work.open([self.library.path(str(n)) for n in asked["names"]]),
+            "diagnose": work.diagnose,
+            "add": lambda: work.add(str(asked["effect"])),
+            "undo": work.undo,
+            "cancel": work.cancel,
+        }
+        name = str(asked.get("do"))
+        if name not in actions:
+            raise UsageError(f"there is no action '{name}'; there are {', '.join(actions)}")
+        actions[name]()
+        return _accepted()
+
+    async def _live(self, socket: WebSocket, listeners: _Listeners) -> None:
+        await socket.accept()
+        event = asyncio.Event()
+        listeners.events.add(event)
+        closed = asyncio.ensure_future(_until_closed(socket))
+        try:
+            while not closed.done():
+                event.clear()
+                await socket.send_json(self._shown())
+                woken = asyncio.ensure_future(event.wait())
+                await asyncio.wait({woken, closed}, return_when=asyncio.FIRST_COMPLETED)
+                woken.cancel()
+        except (WebSocketDisconnect, RuntimeError):
+            pass
+        finally:
+            listeners.events.discard(event)
+            closed.cancel()
+
+
+class _Drawings:
+    """Routes that read: curves, cards, files to save, and the library."""
+
+    def __init__(self, workspace: Workspace, library: Library) -> None:
+        self.workspace = workspace
+        self.library = library
+
+    def routes(self) -> list[Route]:
+        """The routes."""
+        return [
+            Route("/api/curve", self._curve),
+            Route("/api/multiples", self._multiples),
+            Route("/api/card", self._card),
+            Route("/api/truth", self._truth),
+            Route("/api/profile", self._profile),
+            Route("/api/report", self._report),
+            Route("/api/runs", self._runs),
+            Route("/api/overlay", self._overlay),
+        ]
+
+    async def _curve(self, request: Request) -> Response:
+        query = request.query_params
+        curves = self.workspace.curves(query.get("output", ""))
+        first, last = float(query.get("from", "-inf")), float(query.get("to", "inf"))
+        points = min(_MOST_POINTS, int(query.get("points", "1600")))
+        return JSONResponse(await asyncio.to_thread(curves.over_time, first, last, points))
+
+    async def _multiples(self, request: Request) -> Response:
+        output = request.query_params.get("output", "")
+        curves, known = self.workspace.curves(output), self.workspace.order_of(output)
+        return JSONResponse(await asyncio.to_thread(curves.multiples, known))
+
+    async def _card(self, request: Request) -> Response:
+        effect = request.query_params.get("effect", "")
+        return JSONResponse(await asyncio.to_thread(self.workspace.card, effect))
+
+    async def _truth(self, request: Request) -> Response:
+        return JSONResponse({"truth": self.workspace.truth()})
+
+    async def _profile(self, request: Request) -> Response:
+        name, text = self.workspace.profile_text()
+        return _attachment(text, name, "application/toml")
+
+    async def _report(self, request: Request) -> Response:
+        text = await asyncio.to_thread(self.workspace.report)
+        return _attachment(text, "report.html", "text/html")
+
+    async def _runs(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self.library.rows))
+
+    async def _overlay(self, request: Request) -> Response:
+        query = request.query_params
+        wanted, channel = query.getlist("name"), query.get("channel", "tension")
+        return JSONResponse(await asyncio.to_thread(self.library.overlay, wanted, channel))
+
+
+def _accepted() -> Response:
+    return JSONResponse({"accepted": True}, 202)
+
+
+async def _object(request: Request) -> dict[str, Any]:
+    """Body of a request as a JSON object; raises UsageError."""
+    asked = json.loads(await _body(request, _LARGEST_MESSAGE))
+    if not isinstance(asked, dict):
+        raise UsageError("the request is no JSON object")
+    return asked
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    return JSONResponse({"error": str(error)}, 400)
+
+
+async def _malformed(request: Request, error: Exception) -> Response:
+    return JSONResponse({"error": f"the request is malformed: {error}"}, 400)
+
+
+async def _body(request: Request, largest: int) -> bytes:
+    """Body of a request; raises UsageError where it is too large."""
+    parts, size = [], 0
+    async for part in request.stream():
+        size += len(part)
+        if size > largest:
+            raise UsageError(f"the file has more than {largest / 1e6:g} MB; use the command line")
+        parts.append(part)
+    return b"".join(parts)
+
+
+async def _until_closed(socket: WebSocket) -> None:
+    """Read, and forget, what the browser sends until it closes."""
+    try:
+        while True:
+            await socket.receive_text()
+    except (WebSocketDisconnect, RuntimeError, KeyError):
+        return
+
+
+def _attachment(text: str, name: str, media: str) -> Response:
+    headers = {"content-disposition": f'attachment; filename="{name}"'}
+    return Response(text, media_type=media, headers=headers)
+
+
+def _without_port(host: str) -> str:
+    return host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host

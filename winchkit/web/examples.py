@@ -1,0 +1,61 @@
+"""Simulated runs for the page: an example of the catalogue, or a bench with a hidden effect."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from winchkit.catalog import find
+from winchkit.errors import UsageError
+from winchkit.runs.run import Run
+from winchkit.schema.read import read_profile, read_programme, read_simbench
+from winchkit.schema.simbench import SimBench
+from winchkit.sim import choose_bench
+from winchkit.sim.record import simulate
+
+__all__ = ["Simulated", "example_runs", "mystery_runs"]
+
+_PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Runs of a simulated bench, its nominal profile, and what it hides in words."""
+
+    bench: SimBench
+    seed: int
+
+    @property
+    def profile(self) -> str:
+        """Name of the declared profile."""
+        return next(iter(self.bench.bench.winch.values())).profile
+
+    @property
+    def truth(self) -> str:
+        """Hidden effects, or ``nothing``."""
+        found = [a for t in self.bench.truth.values() for spec in t.hidden for a in spec.answers]
+        return ", ".join(found) or "nothing"
+
+    @property
+    def runs(self) -> Iterator[Run]:
+        """Two programmes under two loads, each twice."""
+        wiring = self.bench.bench.winch
+        profiles = {
+            name: read_profile(find("profiles", winch.profile)) for name, winch in wiring.items()
+        }
+        for name in _PROGRAMMES:
+            programme = read_programme(find("sim", name))
+            yield from simulate(self.bench, profiles, programme, seed=self.seed)
+
+
+def example_runs(name: str) -> Simulated:
+    """An example of the catalogue; raises UsageError for a bench with several winches."""
+    bench = read_simbench(find("sim", name))
+    if len(bench.bench.winch) != 1:
+        raise UsageError(f"'{name}' has {len(bench.bench.winch)} winches; choose one with one")
+    return Simulated(bench, seed=1)
+
+
+def mystery_runs(seed: int) -> Simulated:
+    """The simulated bench of a seed, which determines its hidden effect."""
+    return Simulated(choose_bench(seed), seed)

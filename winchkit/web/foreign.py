@@ -1,0 +1,139 @@
+"""Files of other programs: what their columns may be, and the run that they become."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from winchkit.errors import FileError, UsageError
+from winchkit.plain_json import significant
+from winchkit.report.figures.reduction import decimated
+from winchkit.runs.importing.answers import Answers, read_column
+from winchkit.runs.importing.formats.source import read_table
+from winchkit.runs.importing.guess import guess_columns
+from winchkit.runs.importing.mapping import mapping_id, mapping_of
+from winchkit.runs.importing.runs import metadata_of, run_of
+from winchkit.runs.importing.streams import streams_of
+from winchkit.runs.read import read_run
+from winchkit.runs.run import Run
+from winchkit.schema.mapping import CHANNELS
+from winchkit.units import parse
+
+__all__ = ["imported", "is_run", "preview"]
+
+_FIRST = 5
+_POINTS = 120
+_CONSTANTS = {
+    "rated_torque": "torque",
+    "torque_constant": "torque constant",
+    "counts_per_turn": "ratio",
+    "sensitivity": "ratio",
+    "capacity": "force",
+    "sample_rate": "frequency",
+}
+"""Answers that are quantities, and their dimension."""
+
+
+def is_run(path: Path) -> bool:
+    """Whether a file is a run that needs no mapping."""
+    try:
+        read_run(path)
+    except FileError:
+        return False
+    return True
+
+
+def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Columns of a file of another program with the channels that they may be.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    answers : mapping, optional
+        ``columns`` as the command line takes them (``tension=F [N]``), and constants by name.
+
+    Raises
+    ------
+    FileError
+        Where no reader knows the file.
+    """
+    guess = guess_columns(read_table(path), _answers(answers or {}))
+    columns = {column.source: column for column in guess.table.columns}
+    rows = []
+    for item in guess.assignments:
+        column = columns[item.source]
+        texts = None if column.texts is None else list(column.texts[:_FIRST])
+        values = [] if texts else significant(list(column.values[:_FIRST]), 6)
+        drawn: list[float | None] = []
+        if texts is None and len(column.values) > 1:
+            _, (line,) = decimated(
+                np.arange(len(column.values), dtype=float), [column.values], _POINTS
+            )
+            drawn = significant(line.tolist(), 4)
+        rows.append(
+            {
+                "source": item.source,
+                "channel": item.channel,
+                "unit": item.unit,
+                "confidence": item.confidence if item.channel else "",
+                "reason": item.reason,
+                "first": texts or values,
+                "plot": drawn,
+            }
+        )
+    return {
+        "layout": guess.table.layout,
+        "rows": max((len(column) for column in guess.table.columns), default=0),
+        "columns": rows,
+        "channels": list(CHANNELS),
+        "questions": [{"text": question.text, "key": question.key} for question in guess.questions],
+        "notes": [*guess.table.notes, *guess.notes],
+        "certain": guess.is_certain and not guess.questions,
+    }
+
+
+def imported(path: Path, answers: Mapping[str, Any]) -> Run:
+    """The run of a file with the answers of the page.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    answers : mapping
+        As for :func:`preview`; ``load_mass`` besides.
+
+    Raises
+    ------
+    UsageError
+        Where something is still not known.
+    RunError
+        With every fault of the file.
+    """
+    guess = guess_columns(read_table(path), _answers(answers))
+    if guess.questions:
+        raise UsageError("; ".join(question.text for question in guess.questions))
+    mapping = mapping_of("mapping", [(path.stem, guess)])
+    metadata = metadata_of(guess, {"imported_mapping": mapping_id(mapping)})
+    if mass := str(answers.get("load_mass", "")).strip():
+        metadata["load_mass"] = f"{parse(mass, 'mass'):.12g} kg"
+    return replace(run_of(streams_of(guess), metadata), name=path.stem)
+
+
+def _answers(given: Mapping[str, Any]) -> Answers:
+    columns: Sequence[str] = given.get("columns", ())
+    answers = Answers(columns=tuple(read_column(str(text)) for text in columns))
+    values = {
+        key: parse(str(given[key]), dimension)
+        for key, dimension in _CONSTANTS.items()
+        if str(given.get(key, "")).strip()
+    }
+    return _with(answers, **values)
+
+
+def _with(answers: Answers, **constants: Any) -> Answers:
+    return replace(answers, **constants)

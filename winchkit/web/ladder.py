@@ -1,0 +1,208 @@
+"""The ladder and the candidate cards of the Diagnose view: error ÷ noise floor, by model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
+
+from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.results import Diagnosis, Estimate
+from winchkit.effects.effect import Effect
+from winchkit.report.detectability import effects_of
+from winchkit.report.words.numbers import Scale, quantity, scale_for, significant, with_std
+from winchkit.report.words.sentence import changes_text, sentence, where_text
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
+
+__all__ = ["Rung", "card", "ladder", "verdict"]
+
+_SHOWN = 8
+"""Candidates in the ladder; the others have less evidence."""
+_CHANGE = 0.01
+"""Change of an error that is shown as a number; below it the ladder has a dash."""
+_WORDS = {
+    "adequate": "Adequate",
+    "explained": "Effect missing",
+    "partly": "Partly explained",
+    "unknown": "Unexplained",
+}
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A model of the page's history with its held-out errors, SI."""
+
+    label: str
+    errors: Mapping[str, float]
+
+
+def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Chip, headline and sentence of a diagnosis."""
+    head, _, rest = sentence(diagnosis).partition(". ")
+    head = head.partition(": ")[0] if diagnosis.steps else head
+    return {
+        "verdict": diagnosis.verdict,
+        "chip": _WORDS[diagnosis.verdict],
+        "headline": head.rstrip("."),
+        "sentence": rest,
+        "changes": changes_text(diagnosis),
+        "unexplained": [where_text(where) for where in diagnosis.where],
+        "empirical": list(diagnosis.empirical),
+        "notes": list(diagnosis.notes),
+        "caveats": list(diagnosis.caveats),
+        "sanity": [finding.to_json() for finding in diagnosis.sanity],
+        "used_share": dict(diagnosis.used_share),
+    }
+
+
+def ladder(answer: WinchAnswer, history: Sequence[Rung]) -> dict[str, Any]:
+    """Rows and columns of the ladder.
+
+    Parameters
+    ----------
+    answer : WinchAnswer
+        Diagnosis of the present profile.
+    history : sequence of Rung
+        Earlier profiles of the page, the oldest first.
+
+    Returns
+    -------
+    dict
+        ``columns`` with unit and noise floor; ``rows`` of kind ``history``, ``today``,
+        ``candidate`` or ``floor``, each with its errors as text and over the noise floor.
+    """
+    diagnosis = answer.diagnosis
+    today = {name: out.heldout_rms_before for name, out in diagnosis.outputs.items()}
+    named = [effect for step in diagnosis.steps[:1] for effect in step.effects]
+    scores = [c for c in diagnosis.candidates if c.heldout_rms]
+    known = {c.effect: c for c in scores}
+    first = [known[effect] for effect in named if effect in known]
+    shown = (first + [c for c in scores if c not in first and c.score > 0])[:_SHOWN]
+    scales = {
+        name: scale_for([today[name], *(rung.errors.get(name, 0.0) for rung in history)], out.unit)
+        for name, out in diagnosis.outputs.items()
+    }
+    floors = {name: out.noise_rms for name, out in diagnosis.outputs.items()}
+    effects = effects_of(answer)
+
+    def row(kind: str, label: str, errors: Mapping[str, float], **more: Any) -> dict[str, Any]:
+        cells = {name: _cell(errors.get(name), floors[name], scales[name]) for name in scales}
+        return {"kind": kind, "label": label, "cells": cells, **more}
+
+    rows = [row("history", rung.label, rung.errors) for rung in history]
+    rows.append(row("today", "Present profile", today))
+    for item in shown:
+        errors = {
+            name: value
+            for name, value in item.heldout_rms.items()
+            if abs(value - today.get(name, value)) > _CHANGE * today.get(name, 1.0)
+        }
+        effect = effects.get(item.effect)
+        rows.append(
+            row(
+                "candidate",
+                _name(effect, item.effect),
+                errors,
+                effect=item.effect,
+                equal=item.effect in named and len(named) > 1,
+                named=item.effect in named,
+            )
+        )
+    rows.append(row("floor", "Noise floor", {k: v for k, v in floors.items() if v is not None}))
+    return {
+        "columns": [
+            {
+                "output": name,
+                "name": _capital(OUTPUT_NAMES.get(name, name)),
+                "unit": scales[name].label,
+                "source": out.noise_source,
+            }
+            for name, out in diagnosis.outputs.items()
+        ],
+        "rows": rows,
+        "focus": _focus(diagnosis),
+        "candidates": len(diagnosis.candidates),
+        "shown": len(shown),
+    }
+
+
+def card(
+    answer: WinchAnswer, effect: Effect, values: Mapping[str, Estimate], distinct: Sequence[str]
+) -> dict[str, Any]:
+    """What the card of a candidate says.
+
+    Parameters
+    ----------
+    answer : WinchAnswer
+        Diagnosis of the present profile.
+    effect : Effect
+        The candidate.
+    values : mapping of str to Estimate
+        Its fitted values.
+    distinct : sequence of str
+        Effects that these runs cannot distinguish from it.
+    """
+    runs = [
+        run
+        for run in answer.diagnosis.next_runs
+        if effect.id in run.separates and isfinite(run.power)
+    ]
+    return {
+        "effect": effect.id,
+        "name": _name(effect, effect.id),
+        "what": effect.what,
+        "formula": effect.formula,
+        "source": effect.source,
+        "outputs": list(effect.outputs),
+        "parameters": [
+            {
+                "name": parameter_name(name),
+                "text": with_std(e.value, e.std, e.unit),
+                "interval": None
+                if e.interval is None
+                else f"{quantity(e.interval[0], e.unit)} … {quantity(e.interval[1], e.unit)}",
+            }
+            for name, e in values.items()
+        ],
+        "equal": list(distinct),
+        "told_apart": effect.told_apart,
+        "next": None
+        if not runs
+        else f"{runs[0].programme} separates {' and '.join(runs[0].separates)}"
+        f" with a power of {round(100 * runs[0].power)} %",
+    }
+
+
+def _focus(diagnosis: Diagnosis) -> str:
+    """Output whose error is farthest above its noise floor."""
+
+    def ratio(name: str) -> float:
+        out = diagnosis.outputs[name]
+        return out.heldout_rms_before / out.noise_rms if out.noise_rms else 0.0
+
+    changed = {
+        name
+        for step in diagnosis.steps[:1]
+        for name, out in diagnosis.outputs.items()
+        if out.heldout_rms_after < (1 - _CHANGE) * out.heldout_rms_before
+    }
+    return max(changed or diagnosis.outputs, key=ratio)
+
+
+def _cell(value: float | None, floor: float | None, scale: Scale) -> dict[str, Any] | None:
+    if value is None or not isfinite(value):
+        return None
+    return {
+        "text": significant(value / scale.worth, 3),
+        "ratio": value / floor if floor else None,
+    }
+
+
+def _name(effect: Effect | None, effect_id: str) -> str:
+    """Name of an effect for people: its id in words."""
+    return _capital((effect.id if effect is not None else effect_id).replace("-", " "))
+
+
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,111 @@
+"""Runs the page on the loopback address until it is ended."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+import uvicorn
+
+from winchkit.errors import UsageError
+from winchkit.web.application import application
+from winchkit.web.library import Library
+from winchkit.web.workspace import Workspace, remove_folder
+
+__all__ = ["serve"]
+
+_HOST = "127.0.0.1"
+_SHUTDOWN = 2
+"""For open sockets at the end, s."""
+
+
+def serve(
+    runs: Sequence[str] = (),
+    profile: str | None = None,
+    *,
+    port: int = 0,
+    folder: str | Path = ".",
+    bench: str | None = None,
+    sim: str | None = None,
+    allow_motion: bool = False,
+    effects: Sequence[str] = (),
+    mystery: int | None = None,
+    ready: Callable[[str], None] = print,
+) -> None:
+    """Serve the page until the process is interrupted.
+
+    Parameters
+    ----------
+    runs : sequence of str
+        Run files to open.
+    profile : str, optional
+        Profile to open, a name or a file.
+    port : int
+        0 for a free one.
+    folder : str or Path
+        Whose runs the Library view lists.
+    bench : str, optional
+        A bench file to attach to.
+    sim : str, optional
+        A simulated bench to start and attach to.
+    allow_motion : bool
+        Whether the page may move the bench.
+    effects : sequence of str
+        Files with effects of the user's own.
+    mystery : int, optional
+        Seed of a simulated bench with a hidden effect, whose runs are opened.
+    ready : callable
+        Called with the URL as soon as the page answers.
+
+    Raises
+    ------
+    UsageError
+        Where the port is in use.
+    """
+    token = secrets.token_urlsafe(24)
+    with ExitStack() as stack:
+        own = Path(tempfile.mkdtemp(prefix="winchkit-page-"))
+        stack.callback(remove_folder, own)
+        workspace = Workspace(own, effects)
+        stack.callback(workspace.close)
+        view = None
+        if bench is not None or sim is not None:
+            from winchkit.web.bench import BenchView, simulated_bench
+
+            if sim is not None:
+                bench = stack.enter_context(simulated_bench(sim, own))
+            assert bench is not None
+            view = stack.enter_context(BenchView(bench, effects, allow_motion=allow_motion))
+        app = application(workspace, token, Library(Path(folder)), view)
+        if mystery is not None:
+            workspace.mystery(mystery)
+        elif runs or profile:
+            workspace.open(runs, profile)
+        listening = stack.enter_context(_listening(port))
+        config = uvicorn.Config(
+            app,
+            log_level="error",
+            ws_max_size=64_000,
+            timeout_graceful_shutdown=_SHUTDOWN,
+            lifespan="on",
+        )
+        ready(f"http://{_HOST}:{listening.getsockname()[1]}/?token={token}")
+        uvicorn.Server(config).run(sockets=[listening])
+
+
+def _listening(port: int) -> socket.socket:
+    found = socket.socket()
+    found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        found.bind((_HOST, port))
+    except OSError as error:
+        found.close()
+        raise UsageError(
+            f"--port {port}: cannot be used: {error.strerror}; name another"
+        ) from error
+    found.listen()
+    return found

@@ -1,0 +1,343 @@
+// The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
+import { alarm, ask, attempt, colour, dialog, download, el, fill, icon, number, order, say, svg } from "./page.js";
+import { dots, exporter, legend, line, plot } from "./plots.js";
+
+let view = null, root = null, shown = { effect: null, output: null }, rails = {}, brushed = null, panels = [], cards = {}, span = null;
+
+export function enter(main, state) { root = main; shown = { effect: null, output: null }; brushed = null; update(state); }
+
+export function update(state) {
+  const fresh = !view || view.diagnosis !== state.diagnosis;
+  const signature = JSON.stringify([state.runs, state.profile, state.diagnosis]);
+  const same = root.dataset.signature === signature && root.firstChild;
+  view = state;
+  if (same) { busy(); return; }
+  root.dataset.signature = signature;
+  cards = {}; span = null;
+  if (state.said) say(state.said);
+  render();
+}
+
+function render() {
+  const d = view.diagnosis;
+  fill(root, context(), el("div", { id: "busy" }), faults());
+  if (!view.runs.length) root.append(empty());
+  else if (d) {
+    const focus = d.ladder.columns.some((c) => c.output === shown.output) ? shown.output : d.ladder.focus;
+    shown.output = focus;
+    const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
+    if (!candidates.some((row) => row.effect === shown.effect)) shown.effect = candidates.length && d.verdict !== "adequate" ? candidates[0].effect : null;
+    root.append(head(d), el("div", { class: "grid" },
+      el("section", { class: `panel ${shown.effect ? "w8" : "w12"}`, id: "ladder", "aria-label": "Held-out error of each candidate" }),
+      shown.effect && el("section", { class: "panel w4 card", id: "card", "aria-label": "Candidate" }),
+      el("section", { class: "panel w7", id: "time", "aria-label": "Measured and predicted" }),
+      el("section", { class: "panel w5", id: "over", "aria-label": "Residual against each variable" }),
+      el("section", { class: "panel w12", id: "data" })));
+    drawLadder(); drawTime(); drawMultiples(); drawData();
+    if (shown.effect) drawCard();
+  } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with.")));
+  else if (!view.busy) root.append(el("div", { class: "panel" }, el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")));
+  busy();
+}
+
+function context() {
+  const used = view.runs.filter((run) => run.used), loads = [...new Set(used.map((run) => run.load).filter(Boolean))];
+  const profile = el("button", { onclick: chooseProfile }, el("b", {}, view.profile ? view.profile.name : "choose…"),
+    view.profile && view.profile.added.length ? el("span", { class: "note" }, `+ ${view.profile.added.join(", ")}`) : null);
+  return el("div", { class: "row context" },
+    el("span", { class: "label" }, "Runs"), el("button", { onclick: chooseRuns }, el("b", {}, `${used.length} run${used.length === 1 ? "" : "s"}`), el("span", { class: "note" }, loads.join(", "))),
+    el("span", { class: "label" }, "Profile"), profile,
+    view.winch ? el("span", { class: "label" }, `Winch ${view.winch}`) : null,
+    el("span", { class: "row end" },
+      el("button", { disabled: !view.can_undo || Boolean(view.busy), onclick: () => attempt(() => order("undo")) }, "Undo"),
+      el("button", { disabled: !view.profile, onclick: () => attempt(() => download("/api/profile")) }, "Save profile"),
+      el("button", { disabled: !view.diagnosis, onclick: () => attempt(() => download("/api/report")) }, "Report"),
+      el("button", { disabled: !view.diagnosis, onclick: showCommands }, "Commands")));
+}
+
+function busy() {
+  const box = root.querySelector("#busy");
+  if (!box) return;
+  const there = box.firstChild;
+  if (!view.busy) { if (there) box.replaceChildren(); return; }
+  if (there) { there.querySelector("span").textContent = view.busy.what; there.querySelector("progress").value = view.busy.share; return; }
+  box.append(el("div", { class: "row", style: { paddingBottom: "12px" } }, el("progress", { max: 1, value: view.busy.share, "aria-label": "Progress" }),
+    el("span", { class: "label" }, view.busy.what), el("button", { class: "plain", onclick: () => attempt(() => order("cancel")) }, "Cancel")));
+}
+
+function faults() {
+  return view.faults.length ? el("div", { class: "alert", role: "alert" }, el("div", {}, view.faults.slice(0, 8).map((text) => el("p", {}, text)),
+    view.faults.length > 8 ? el("p", { class: "note" }, `and ${view.faults.length - 8} more`) : null)) : null;
+}
+
+function empty() {
+  const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "files", onchange: (event) => drop(event.target.files) });
+  return el("div", { class: "drop" }, el("h1", {}, "Drop run files here"),
+    el("p", { class: "note" }, "CSV, MCAP, Parquet, MF4 of winchkit, or a file of another program: it opens a table of its columns."),
+    el("div", { class: "row" }, input, el("button", { class: "primary", onclick: () => input.click() }, "Choose files"),
+      el("button", { onclick: openExample }, "Open an example")));
+}
+
+export async function drop(files) {
+  for (const file of files) {
+    await attempt(async () => {
+      const answer = await ask("/api/drop", file, { "x-file-name": encodeURIComponent(file.name) });
+      if (answer.import) showImport(answer.file, answer.import, {});
+    });
+  }
+}
+
+async function openExample() {
+  const choices = await ask("/api/choices");
+  const list = el("select", { "aria-label": "Example" }, choices.examples.filter((name) => !name.startsWith("programme")).map((name) => el("option", {}, name)));
+  list.value = "demo-fat-drum";
+  dialog("Open an example", el("p", { class: "note" }, "Two programmes under two loads, each twice, are simulated with the effect that the name says."),
+    el("div", { class: "row", style: { marginTop: "12px" } }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("example", { name: list.value }); document.getElementById("dialog").close(); }) }, "Open"),
+      el("button", { onclick: () => attempt(async () => { await order("mystery", { seed: 1 + Math.floor(Math.random() * 1e6) }); document.getElementById("dialog").close(); }) }, "Hide the effect")));
+}
+
+async function chooseProfile() {
+  const choices = await ask("/api/choices");
+  const list = el("select", { "aria-label": "Profile" }, choices.profiles.map((name) => el("option", {}, name)));
+  const file = el("input", { type: "file", accept: ".toml", "aria-label": "Profile file", onchange: () => attempt(async () => { await drop(file.files); document.getElementById("dialog").close(); }) });
+  dialog("Profile", el("div", { class: "row" }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("profile", { name: list.value }); document.getElementById("dialog").close(); }) }, "Use")),
+    el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or a file"), file);
+}
+
+function chooseRuns() {
+  const input = el("input", { type: "file", multiple: true, "aria-label": "Run files", onchange: () => { document.getElementById("dialog").close(); drop(input.files); } });
+  dialog("Runs", el("div", { class: "runs" }, view.runs.map((run) => el("label", {},
+    el("input", { type: "checkbox", checked: run.used, style: { minHeight: "auto" }, onchange: (event) => attempt(() => order("use", { name: run.name, used: event.target.checked })) }),
+    el("span", {}, run.name), el("span", { class: "note" }, `${run.load} · ${number(run.seconds, 3)} s · ${run.samples} samples`)))),
+  el("p", { class: "note", style: { margin: "12px 0 4px" } }, "Add files"), input);
+}
+
+function showCommands() {
+  const text = view.commands.join("\n");
+  dialog("What was clicked, as commands", el("pre", { tabindex: 0 }, text), el("button", { onclick: () => navigator.clipboard.writeText(text) }, "Copy"));
+}
+
+function head(d) {
+  return el("div", { class: "verdict" }, el("div", { class: "head" }, el("span", { class: `chip ${d.verdict}` }, icon(d.verdict), d.chip), el("h1", {}, d.headline)),
+    d.sentence ? el("p", {}, d.sentence) : null);
+}
+
+const LOG = (ratio) => Math.log2(Math.max(ratio, 1));
+
+function drawLadder() {
+  const box = root.querySelector("#ladder"), { columns, rows, candidates } = view.diagnosis.ladder;
+  const narrow = matchMedia("(max-width: 699px)").matches;
+  const seen = narrow ? columns.filter((c) => c.output === shown.output) : columns;
+  const most = Math.max(1.2, ...rows.flatMap((row) => columns.map((c) => row.cells[c.output] && row.cells[c.output].ratio ? LOG(row.cells[c.output].ratio) : 0)));
+  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, 190px) ${seen.map((c) => c.output === shown.output && !narrow ? "2fr" : "1fr").join(" ")}` } });
+  grid.append(el("span", {}));
+  for (const c of seen) grid.append(el("button", { class: `head ${c.output === shown.output ? "focus" : ""}`, "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name, el("span", {}, c.unit)));
+  const today = rows.find((row) => row.kind === "today");
+  for (const row of rows) {
+    const chosen = row.kind === "candidate" && row.effect === shown.effect ? "chosen" : "";
+    const name = row.kind === "candidate"
+      ? el("button", { class: `name ${chosen}`, "aria-pressed": String(Boolean(chosen)), title: row.effect, onclick: () => choose(row.effect) }, el("span", {}, row.label), row.equal ? el("b", { title: "cannot be distinguished", "aria-label": "cannot be distinguished" }, "=") : null)
+      : el("div", { class: `name ${row.kind}` }, el("span", {}, row.kind === "today" && view.profile && view.profile.added.length ? `+ ${view.profile.added.at(-1)}` : row.label), row.kind === "today" ? el("i", {}, "today") : null);
+    grid.append(name);
+    for (const c of seen) {
+      const cell = row.cells[c.output], now = today.cells[c.output];
+      grid.append(el("div", { class: `cell ${row.kind} ${chosen} ${c.output === shown.output && !chosen ? "focus" : ""}` }, rung(row, cell, now, most), el("span", { class: "value" }, cell ? cell.text : "–")));
+    }
+  }
+  grid.append(el("div", { class: "axis" }, "error ÷ noise floor"));
+  for (const c of seen) grid.append(el("div", { class: `cell axis ${c.output === shown.output ? "focus" : ""}` }, scale(most), el("span", { class: "value" })));
+  fill(box, el("header", {}, el("h2", {}, "Held-out error of each candidate"), el("span", { class: "note" }, `${rows.filter((r) => r.kind === "candidate").length} of ${candidates} candidates shown; the others have less evidence`)),
+    narrow ? el("div", { class: "row", style: { marginBottom: "8px" } }, columns.map((c) => el("button", { "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name))) : null, grid);
+}
+
+const X = (ratio, most) => 10 + (LOG(ratio) / most) * 84;
+
+function rung(row, cell, now, most) {
+  const parts = [svg("rect", { x: "0%", y: 0, width: "10%", height: 27, fill: "var(--band)" }), svg("line", { x1: "10%", x2: "10%", y1: 0, y2: 27, stroke: "var(--edge)", "stroke-width": 1.5 })];
+  const right = now && now.ratio ? `${X(now.ratio, most)}%` : null;
+  if (right && row.kind !== "history" && row.kind !== "floor") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? 13 : 0, y2: 27, stroke: "var(--today)", "stroke-width": 2, class: "rail" }));
+  const picked = row.effect === shown.effect && row.kind === "candidate";
+  if (cell && cell.ratio) {
+    const at = `${X(cell.ratio, most)}%`;
+    if (row.kind === "candidate") {
+      if (right) parts.push(svg("line", { x1: at, x2: right, y1: 13.5, y2: 13.5, stroke: "var(--with)", "stroke-width": picked ? 3.5 : 1.5, class: "rung" }));
+      parts.push(svg("circle", { cx: at, cy: 13.5, r: picked ? 5.5 : 4, fill: picked ? "var(--with)" : "var(--surface)", stroke: "var(--with)", "stroke-width": 2, class: "dot" }));
+    } else if (row.kind === "today") parts.push(svg("circle", { cx: at, cy: 13.5, r: 5, fill: "var(--today)", class: "dot" }));
+    else if (row.kind === "history") {
+      parts.push(svg("circle", { cx: at, cy: 13.5, r: 4, fill: "var(--surface)", stroke: "var(--muted)", "stroke-width": 1.5 }));
+      parts.push(svg("line", { x1: at, x2: at, y1: 18, y2: 27, stroke: "var(--muted)", "stroke-dasharray": "2 2" }));
+    }
+  }
+  return svg("svg", { "aria-hidden": "true" }, parts);
+}
+
+function scale(most) {
+  const parts = [svg("line", { x1: "10%", x2: "96%", y1: 1, y2: 1, stroke: "var(--edge)" })];
+  const step = Math.max(1, Math.round(most / 3));
+  for (let k = 0; k <= most; k += step) parts.push(svg("text", { x: `${X(2 ** k, most)}%`, y: 17, "text-anchor": "middle", fill: "var(--muted)", "font-size": 12 }, `${2 ** k}×`));
+  return svg("svg", { "aria-hidden": "true" }, parts);
+}
+
+function focus(output) { shown.output = output; span = null; brushed = null; address(); drawLadder(); drawTime(); drawMultiples(); }
+function choose(effect) { shown.effect = effect; address(); drawLadder(); drawCard(); }
+function address() { history.replaceState(null, "", `${location.pathname}${location.search}#diagnose/${shown.output || ""}/${shown.effect || ""}`); }
+export function restore(parts) { if (parts[0]) shown.output = parts[0]; if (parts[1]) shown.effect = parts[1]; }
+
+async function drawCard() {
+  const box = root.querySelector("#card"), effect = shown.effect;
+  if (!box) return;
+  await attempt(async () => {
+    const card = cards[effect] || (cards[effect] = await ask(`/api/card?effect=${encodeURIComponent(effect)}`));
+    if (effect !== shown.effect || !box.isConnected) return;
+    const host = el("div", { class: "plot" });
+    const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}.`) : el("p", { class: "note" }, "✓ Distinguishable from every other candidate with these runs.");
+    fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
+      host, card.signature ? legend(["today", "residual, mean"], ["with", "signature"], ["band", "noise floor ±1σ", true]) : null,
+      el("p", { class: "note" }, card.what), el("div", { class: "formula" }, card.formula),
+      el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
+      equal, card.next ? el("p", { class: "note" }, card.next) : null,
+      el("div", { class: "buttons" }, el("button", { class: "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
+        el("button", { onclick: () => dialog(`How to tell ${card.name} apart`, el("p", {}, card.told_apart), view.diagnosis.next.map((n) => el("p", { class: "note" }, `${n.programme}: separates ${n.separates.join(" and ")}`))) }, "Plan a run")));
+    if (card.signature) drawSignature(host, card.signature);
+  });
+}
+
+function sorted(x, ...others) {
+  const index = x.map((_, i) => i).filter((i) => x[i] !== null).sort((a, b) => x[a] - x[b]);
+  return { index, columns: [x, ...others].map((values) => index.map((i) => values[i])) };
+}
+
+function mixed(x, ys, bins, lines) {
+  const all = [...x, ...bins], part = (values, before, after) => [...Array(before).fill(null), ...values, ...Array(after).fill(null)];
+  const { index, columns } = sorted(all, ...ys.map((y) => part(y, 0, bins.length)), ...lines.map((y) => part(y, x.length, 0)));
+  return { index, data: columns };
+}
+
+function drawSignature(host, s) {
+  const { data } = mixed(s.x, [s.residual], s.bins, [s.means, s.signature]);
+  plot(host, data, [{ paths: dots("today", 0.28, 2), points: { show: false } }, line("today", 2, 1, { spanGaps: true }), line("with", 3, 1, { spanGaps: true })],
+    { height: 140, noise: s.noise, xLabel: unitOf(s.label), range: sym(s.residual), logarithmic: s.logarithmic, label: `Residual and signature over ${s.label}` });
+}
+
+const unitOf = (label) => (/\[(.+)\]$/.exec(label) || ["", ""])[1];
+function sym(values) {
+  const sizes = values.filter((v) => v !== null).map(Math.abs).sort((a, b) => a - b), top = 1.15 * (sizes[Math.floor(0.995 * (sizes.length - 1))] || 1);
+  return () => [-top, top];
+}
+
+export const add = (effect) => attempt(() => order("add", { effect }));
+
+async function drawTime() {
+  const box = root.querySelector("#time"), output = shown.output;
+  if (!box) return;
+  await attempt(async () => {
+    const width = Math.max(300, box.clientWidth - 32);
+    const query = span ? `&from=${span[0]}&to=${span[1]}` : "";
+    const data = await ask(`/api/curve?output=${output}&points=${Math.round(width * 2)}${query}`);
+    if (output !== shown.output || !box.isConnected) return;
+    const upper = el("div", { class: "plot" }), lower = el("div", { class: "plot" });
+    const runs = data.runs.map((run) => ({ ...run, labelled: true }));
+    const zoom = (low, high) => {
+      span = low === null ? null : [Math.max(data.first, low), Math.min(data.last, high)];
+      if (span && span[1] - span[0] > 0.98 * (data.last - data.first)) span = null;
+      clearTimeout(zoom.timer); zoom.timer = setTimeout(drawTime, 60);
+    };
+    const figure = () => ({ title: `${data.name}: measured, predicted [${data.unit}], residual [${data.residual_unit}]; ${view.profile.name}`, xLabel: "time [s]", x: data.x,
+      series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink" }, { name: `predicted [${data.unit}]`, y: data.predicted, tone: "today" }, { name: `residual [${data.residual_unit}]`, y: data.residual, tone: "with" }] });
+    fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise floor ±1σ", true]),
+      el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
+    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 130, top: 22, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
+    const marked = brushed ? brushed.time : null;
+    const { data: low } = marked ? mixed(data.x, [data.residual], marked, [brushed.residual]) : { data: [data.x, data.residual] };
+    plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
+      { height: 150, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
+  });
+}
+
+async function drawMultiples() {
+  const box = root.querySelector("#over"), output = shown.output;
+  if (!box) return;
+  await attempt(async () => {
+    const found = await ask(`/api/multiples?output=${output}`);
+    if (output !== shown.output || !box.isConnected) return;
+    const grid = el("div", { class: "multiples" });
+    fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance explained; drag to mark samples")), grid);
+    const range = sym(found.residual);
+    panels = found.panels.map((panel) => {
+      const host = el("div", { class: "plot" });
+      grid.append(el("div", {}, el("h3", {}, el("span", {}, panel.name, el("span", { class: "note" }, ` ${unitOf(panel.label)}`)), el("span", {}, `${Math.round(100 * panel.share)} %`)), host));
+      const { index, data } = mixed(panel.x, [found.residual, Array(panel.x.length).fill(null)], panel.bins, [panel.means]);
+      const drawn = plot(host, [data[0], data[1], data[2], data[3]], [{ paths: dots("today", 0.28, 2), points: { show: false } }, { paths: dots("brush", 0.9, 3), points: { show: false } }, line("today", 2, 1, { spanGaps: true })],
+        { height: 120, noise: found.noise, range, logarithmic: panel.logarithmic, label: `Residual over ${panel.label}`, select: (low, high) => brush(found, panel, low, high) });
+      return { drawn, index, count: panel.x.length, data };
+    });
+  });
+}
+
+function brush(found, panel, low, high) {
+  const marked = new Set();
+  panel.x.forEach((x, i) => { if (x !== null && x >= low && x <= high) marked.add(i); });
+  const order = [...marked].sort((a, b) => found.time[a] - found.time[b]);
+  brushed = marked.size ? { time: order.map((i) => found.time[i]), residual: order.map((i) => found.residual[i]) } : null;
+  for (const { drawn, index, count, data } of panels) drawn.setData([data[0], data[1], index.map((i) => i < count && marked.has(i) ? found.residual[i] : null), data[3]], false);
+  for (const { drawn } of panels) drawn.redraw();
+  fill(root.querySelector("#brush"), `${marked.size} of ${found.time.length} samples, ${panel.name} ${number(low, 3)} to ${number(high, 3)} ${unitOf(panel.label)} `, el("button", { class: "plain", onclick: clear }, "Clear"));
+  drawTime();
+}
+
+export function clear() {
+  if (!brushed) return false;
+  brushed = null;
+  drawMultiples(); drawTime();
+  return true;
+}
+
+function drawData() {
+  const d = view.diagnosis, box = root.querySelector("#data");
+  const items = (list) => list.length ? el("ul", {}, list.map((text) => el("li", {}, text))) : el("p", { class: "note" }, "none");
+  fill(box, el("details", { open: d.verdict === "unknown" || d.verdict === "partly" }, el("summary", {}, "Data, patterns of the residual, and what would change this result"), el("div", { class: "facts" },
+    el("div", {}, el("h2", {}, "Patterns of the residual"), items(d.unexplained)),
+    el("div", {}, el("h2", {}, "Findings on the runs"), items(d.sanity.map((f) => `${f.run}: ${f.channel}: ${f.text}`))),
+    el("div", {}, el("h2", {}, "Notes"), items([...d.notes, d.changes])))));
+}
+
+function showImport(file, found, answers) {
+  const given = { columns: [], ...answers };
+  const channel = (row) => el("select", { "aria-label": `Channel of ${row.source}`, onchange: (event) => again(row, event.target.value, null) }, ["", ...found.channels].map((name) => el("option", { value: name, selected: name === row.channel }, name || "not used")));
+  const unit = (row) => row.channel ? el("input", { value: row.unit, size: 8, "aria-label": `Unit of ${row.source}`, onchange: (event) => again(row, row.channel, event.target.value) }) : el("span", { class: "note" }, row.unit);
+  const again = (row, name, own) => attempt(async () => {
+    const columns = given.columns.filter((text) => !text.includes(`=${row.source} [`) && text !== `${row.channel}=`);
+    if (name) columns.push(`${name}=${row.source} [${own === null ? row.unit || "1" : own}]`); else columns.push(`${row.channel}=`);
+    await guess({ ...given, columns });
+  });
+  const guess = async (next) => { const answer = await ask("/api/guess", JSON.stringify({ file, answers: next })); showImport(file, answer.import, next); };
+  const questions = found.questions.map((q) => el("p", {}, "? ", q.text, " ", q.key ? el("input", { "aria-label": q.text, placeholder: q.key.replaceAll("_", " "), onchange: (event) => attempt(() => guess({ ...given, [q.key]: event.target.value })) }) : null));
+  const mass = el("input", { size: 8, placeholder: "10 kg", value: given.load_mass || "", "aria-label": "Mass on the cable", onchange: () => { given.load_mass = mass.value; } });
+  dialog(`Import ${file}`, el("p", { class: "note" }, `${found.layout}; ${found.columns.length} columns, ${found.rows} rows`),
+    el("div", { class: "scroll" }, el("table", {}, el("thead", {}, el("tr", {}, ["Column", "Channel", "Unit", "First values", "Plot", "Why"].map((text) => el("th", {}, text)))),
+      el("tbody", {}, found.columns.map((row) => el("tr", {}, el("td", {}, row.source), el("td", {}, channel(row)), el("td", {}, unit(row)), el("td", {}, row.first.slice(0, 3).join(" ")), el("td", {}, spark(row.plot)), el("td", { class: "note" }, [row.confidence, row.reason].filter(Boolean).join(": "))))))),
+    ...questions, found.notes.map((text) => el("p", { class: "note" }, text)),
+    el("div", { class: "row", style: { marginTop: "12px" } }, el("label", { class: "row" }, "Mass on the cable", mass),
+      el("button", { class: "primary", disabled: found.questions.length > 0, onclick: () => attempt(async () => { await order("import", { file, answers: given }); document.getElementById("dialog").close(); }) }, "Import")));
+}
+
+function spark(values) {
+  const known = values.filter((v) => v !== null);
+  if (known.length < 2) return el("span", {});
+  const low = known.reduce((a, b) => Math.min(a, b)), high = known.reduce((a, b) => Math.max(a, b));
+  const points = values.map((v, i) => v === null ? null : `${((i / (values.length - 1)) * 96 + 2).toFixed(1)},${(22 - ((v - low) / (high - low || 1)) * 18).toFixed(1)}`).filter(Boolean).join(" ");
+  return svg("svg", { width: 100, height: 26, role: "img", "aria-label": "values over the record" }, svg("polyline", { points, fill: "none", stroke: "var(--ink2)", "stroke-width": 1 }));
+}
+
+export function keys(event) {
+  if (!view || !view.diagnosis) return false;
+  const rows = view.diagnosis.ladder.rows.filter((row) => row.kind === "candidate"), at = rows.findIndex((row) => row.effect === shown.effect);
+  if (event.key === "j" && rows[at + 1]) choose(rows[at + 1].effect);
+  else if (event.key === "k" && at > 0) choose(rows[at - 1].effect);
+  else if (event.key === "a" && shown.effect && !view.busy) add(shown.effect);
+  else if (event.key === "u" && view.can_undo && !view.busy) attempt(() => order("undo"));
+  else if (event.key === "s") attempt(() => download("/api/profile"));
+  else if (event.key === "Escape") return clear();
+  else return false;
+  return true;
+}

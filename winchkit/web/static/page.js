@@ -1,0 +1,110 @@
+// What all views use: the server, elements, numbers, icons and the dialog.
+const token = new URLSearchParams(location.search).get("token") || "";
+
+export async function ask(path, body, headers = {}) {
+  const options = { headers: { "x-winchkit-token": token, ...headers } };
+  if (body !== undefined) { options.method = "POST"; options.body = body; }
+  const response = await fetch(path, options);
+  const text = await response.text();
+  let data;
+  try { data = JSON.parse(text); } catch { data = { error: text }; }
+  if (!response.ok) throw new Error(data.error || `the server answered ${response.status}`);
+  return data;
+}
+
+export const order = (name, more = {}) => ask("/api/do", JSON.stringify({ do: name, ...more }));
+
+export function socket(path, receive, lost) {
+  let open = true, line;
+  const connect = () => {
+    line = new WebSocket(`ws://${location.host}${path}?token=${encodeURIComponent(token)}`);
+    line.onmessage = (event) => receive(JSON.parse(event.data));
+    line.onclose = () => { if (open) { lost(); setTimeout(connect, 1000); } };
+  };
+  connect();
+  return { send: (message) => line.readyState === 1 && line.send(JSON.stringify(message)), close: () => { open = false; line.close(); } };
+}
+
+export async function download(path) {
+  const response = await fetch(path, { headers: { "x-winchkit-token": token } });
+  if (!response.ok) throw new Error((await response.json()).error);
+  const name = /filename="([^"]+)"/.exec(response.headers.get("content-disposition") || "");
+  keep(await response.blob(), name ? name[1] : "winchkit.txt");
+}
+
+export function keep(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+// Elements are made from names and texts; no text becomes markup.
+export function el(name, attributes = {}, ...children) {
+  const node = document.createElement(name);
+  set(node, attributes);
+  node.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  return node;
+}
+
+// Replaces the children of an element; null and false stand for none.
+export function fill(node, ...children) {
+  node.replaceChildren(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+}
+
+export function svg(name, attributes = {}, ...children) {
+  const node = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  node.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+  return node;
+}
+
+function set(node, attributes) {
+  for (const [key, value] of Object.entries(attributes)) {
+    if (value === null || value === undefined || value === false) continue;
+    if (key.startsWith("on")) node.addEventListener(key.slice(2), value);
+    else if (key === "style") Object.assign(node.style, value);
+    else if (key === "data") Object.assign(node.dataset, value);
+    else node.setAttribute(key, value === true ? "" : value);
+  }
+}
+
+const PATHS = {
+  explained: "M8 5v6M5 8h6", adequate: "M5 8.2l2.2 2.2L11 6", partly: "M8 5v4M8 11v.4", unknown: "M6.2 6.4a1.8 1.8 0 1 1 2.6 1.7c-.6.3-.8.6-.8 1.2M8 11.2v.2",
+};
+export function icon(kind) {
+  const shape = kind === "unknown" ? svg("path", { d: "M8 1.2 14.8 8 8 14.8 1.2 8z" })
+    : svg("circle", { cx: 8, cy: 8, r: 6.3, "stroke-dasharray": kind === "explained" ? "2.5 1.8" : "none" });
+  return svg("svg", { viewBox: "0 0 16 16", fill: "none", stroke: "currentColor", "stroke-width": 1.5, "aria-hidden": "true" }, shape, svg("path", { d: PATHS[kind] }));
+}
+
+export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+export const number = (value, digits = 4) => value === null || !Number.isFinite(value) ? "–" : String(Number(value.toPrecision(digits))).replace("-", "−");
+
+export function say(text) { document.getElementById("live").textContent = text; }
+
+export function alarm(text, kind = "") {
+  const banner = document.getElementById("banner");
+  banner.replaceChildren();
+  if (!text) return;
+  banner.append(el("div", { class: `alert ${kind}`, style: { margin: "12px 24px 0" } },
+    el("div", {}, text), el("button", { class: "plain", onclick: () => alarm("") }, "Close")));
+}
+
+export function dialog(title, ...content) {
+  const box = document.getElementById("dialog");
+  const before = document.activeElement;
+  fill(box, el("div", { class: "row", style: { marginBottom: "12px" } }, el("h2", {}, title),
+    el("button", { class: "plain", style: { marginLeft: "auto" }, onclick: () => box.close() }, "Close")), ...content);
+  box.setAttribute("aria-label", title);
+  box.onclose = () => before && before.focus && before.focus();
+  box.onkeydown = (event) => { if (event.key === "Escape") box.close(); };
+  if (!box.open) box.show();
+  box.querySelector("button, input, select").focus();
+  return box;
+}
+
+export async function attempt(action) {
+  try { await action(); } catch (error) { alarm(error.message); }
+}

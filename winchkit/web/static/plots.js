@@ -1,0 +1,193 @@
+// Curves by uPlot with the page's colours: axis at the bottom, hairlines, zoom, pan, brush, export.
+import { colour, el, keep, number } from "./page.js";
+
+const FONT = "12px Inter, system-ui, sans-serif";
+
+// Ticks as text, the unit beside the last one; of a logarithmic axis only whole powers of ten.
+function label(ticks, unit) {
+  const shown = ticks.map((tick) => (tick === null ? "" : number(tick)));
+  const last = shown.findLastIndex((text) => text !== "");
+  return shown.map((text, index) => (index === last && unit ? `${text} ${unit}` : text));
+}
+
+function axes(xLabel, logarithmic, flat) {
+  const ink = () => colour("muted");
+  return [
+    { stroke: ink, font: FONT, size: 26, space: flat ? 44 : 64, grid: { show: false }, ticks: { stroke: () => colour("line"), size: 4 }, gap: 4,
+      values: (u, ticks) => label(ticks, xLabel) },
+    { stroke: ink, font: FONT, size: flat ? 34 : 44, space: flat ? 24 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
+      values: (u, ticks) => ticks.map((tick) => tick === null ? "" : number(tick)) },
+  ];
+}
+
+// Noise band: filled, with an edge line.
+function band(noise) {
+  return (u) => {
+    if (!noise) return;
+    const { ctx, bbox } = u;
+    const top = Math.max(bbox.top, u.valToPos(noise, "y", true)), bottom = Math.min(bbox.top + bbox.height, u.valToPos(-noise, "y", true));
+    if (bottom <= top) return;
+    ctx.save();
+    ctx.fillStyle = colour("band");
+    ctx.fillRect(bbox.left, top, bbox.width, bottom - top);
+    ctx.strokeStyle = colour("edge"); ctx.lineWidth = devicePixelRatio; ctx.setLineDash([3 * devicePixelRatio, 3 * devicePixelRatio]);
+    for (const y of [top, bottom]) { ctx.beginPath(); ctx.moveTo(bbox.left, y); ctx.lineTo(bbox.left + bbox.width, y); ctx.stroke(); }
+    ctx.restore();
+  };
+}
+
+function marks(runs) {
+  return (u) => {
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.strokeStyle = colour("edge"); ctx.fillStyle = colour("muted"); ctx.lineWidth = devicePixelRatio; ctx.setLineDash([1.5 * devicePixelRatio, 3 * devicePixelRatio]);
+    ctx.font = `${12 * devicePixelRatio}px Inter, system-ui, sans-serif`;
+    let free = -1;
+    ctx.textAlign = "left"; ctx.textBaseline = "alphabetic";
+    for (const run of runs) {
+      const x = u.valToPos(run.at, "x", true);
+      if (x < bbox.left - 1 || x > bbox.left + bbox.width) continue;
+      ctx.beginPath(); ctx.moveTo(x, bbox.top); ctx.lineTo(x, bbox.top + bbox.height); ctx.stroke();
+      const width = ctx.measureText(run.name).width;
+      if (x > free && x + width < bbox.left + bbox.width && run.labelled) { ctx.fillText(run.name, x + 3 * devicePixelRatio, bbox.top - 5 * devicePixelRatio); free = x + width + 12 * devicePixelRatio; }
+    }
+    ctx.restore();
+  };
+}
+
+export function dots(tone, alpha, size = 3) {
+  return (u, index, from, to) => {
+    const { ctx } = u, half = (size * devicePixelRatio) / 2;
+    ctx.save();
+    ctx.fillStyle = colour(tone); ctx.globalAlpha = alpha;
+    const [xs, ys] = [u.data[0], u.data[index]];
+    for (let i = from; i <= to; i++) {
+      if (ys[i] === null || ys[i] === undefined) continue;
+      ctx.fillRect(u.valToPos(xs[i], "x", true) - half, u.valToPos(ys[i], "y", true) - half, 2 * half, 2 * half);
+    }
+    ctx.restore();
+    return null;
+  };
+}
+
+// One plot; `more` are options of uPlot that replace these.
+export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], top = 8, select = null, zoom = null, sync = null, range = null, logarithmic = false, label }) {
+  const drag = { x: Boolean(select || zoom), y: false, setScale: false };
+  const flat = height < 130;
+  const options = {
+    width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, 10, 0, 0],
+    cursor: { drag, points: { show: false }, ...(sync ? { sync: { key: sync } } : {}), y: false },
+    scales: { x: { time: false, ...(logarithmic ? { distr: 3 } : {}) }, y: range ? { range } : {} },
+    axes: axes(xLabel, logarithmic, flat), series: [{}, ...series],
+    hooks: {
+      drawClear: [band(noise)], draw: [marks(runs)],
+      setSelect: [(u) => {
+        if (u.select.width < 3) return;
+        const low = u.posToVal(u.select.left, "x"), high = u.posToVal(u.select.left + u.select.width, "x");
+        if (select) select(low, high); else if (zoom) { u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false); zoom(low, high); }
+      }],
+    },
+  };
+  host.setAttribute("role", "img");
+  host.setAttribute("aria-label", label);
+  host.replaceChildren();
+  const drawn = new uPlot(options, data, host);
+  if (zoom) gestures(drawn, zoom);
+  new ResizeObserver(() => { if (host.isConnected && host.clientWidth > 0 && Math.abs(host.clientWidth - drawn.width) > 1) drawn.setSize({ width: host.clientWidth, height }); }).observe(host);
+  return drawn;
+}
+
+// Wheel and pinch zoom, Shift-drag and two fingers pan, double click resets.
+function gestures(u, zoom) {
+  const over = u.over;
+  const scaled = (at, factor, shift = 0) => {
+    const { min, max } = u.scales.x, centre = u.posToVal(at, "x");
+    zoom(centre - (centre - min) * factor + shift, centre + (max - centre) * factor + shift);
+  };
+  over.addEventListener("wheel", (event) => {
+    if (!event.ctrlKey && !event.altKey && Math.abs(event.deltaY) < Math.abs(event.deltaX)) return;
+    event.preventDefault();
+    scaled(event.offsetX, event.deltaY > 0 ? 1.25 : 0.8);
+  }, { passive: false });
+  over.addEventListener("dblclick", () => zoom(null, null));
+  let fingers = null;
+  over.addEventListener("touchmove", (event) => {
+    if (event.touches.length !== 2) return;
+    event.preventDefault();
+    const box = over.getBoundingClientRect(), [a, b] = [event.touches[0].clientX - box.left, event.touches[1].clientX - box.left];
+    const now = { middle: (a + b) / 2, span: Math.max(20, Math.abs(a - b)) };
+    if (fingers) {
+      const shift = u.posToVal(fingers.middle, "x") - u.posToVal(now.middle, "x");
+      scaled(now.middle, fingers.span / now.span, shift);
+    }
+    fingers = now;
+  }, { passive: false });
+  over.addEventListener("touchend", () => { fingers = null; });
+  over.addEventListener("mousedown", (event) => {
+    if (!event.shiftKey) return;
+    event.stopImmediatePropagation();
+    let last = event.clientX;
+    const move = (e) => {
+      const { min, max } = u.scales.x, shift = ((last - e.clientX) / over.clientWidth) * (max - min);
+      last = e.clientX;
+      zoom(min + shift, max + shift);
+    };
+    addEventListener("mousemove", move);
+    addEventListener("mouseup", () => removeEventListener("mousemove", move), { once: true });
+  }, true);
+}
+
+export const line = (tone, width, alpha = 1, more = {}) => ({ stroke: () => colour(tone), width, alpha, points: { show: false }, spanGaps: false, ...more });
+
+export function legend(...items) {
+  return el("div", { class: "legend" }, items.map(([tone, words, box]) => el("span", {}, el("i", { class: box ? "box" : "", style: { background: `var(--${tone})` } }), words)));
+}
+
+// Exports: CSV and SVG from the data, PNG from the SVG at twice the size; always the light theme.
+export function exporter(name, describe) {
+  const button = (kind) => el("button", { class: "plain", onclick: () => save(kind, name, describe()), "aria-label": `Save ${name} as ${kind}` }, kind);
+  return el("span", {}, button("PNG"), button("SVG"), button("CSV"));
+}
+
+function save(kind, name, figure) {
+  if (kind === "CSV") return keep(new Blob([csv(figure)], { type: "text/csv" }), `${name}.csv`);
+  const text = drawing(figure);
+  if (kind === "SVG") return keep(new Blob([text], { type: "image/svg+xml" }), `${name}.svg`);
+  const image = new Image();
+  image.onload = () => {
+    const canvas = el("canvas", { width: 1600, height: 2 * image.height });
+    canvas.getContext("2d").drawImage(image, 0, 0, 1600, 2 * image.height);
+    canvas.toBlob((blob) => keep(blob, `${name}.png`));
+  };
+  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(text)}`;
+}
+
+function csv(figure) {
+  const quoted = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  const rows = figure.x.map((x, i) => [x, ...figure.series.map((s) => s.y[i] ?? "")].join(","));
+  return `# ${figure.title}\n${[figure.xLabel, ...figure.series.map((s) => s.name)].map(quoted).join(",")}\n${rows.join("\n")}\n`;
+}
+
+const LIGHT = { ink: "#12161C", today: "#C2500F", with: "#0B4A8A", muted: "#5F6B79", line: "#DDE2E8" };
+const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c]);
+
+function drawing(figure) {
+  const [w, h, left, top, right, bottom] = [800, 360, 60, 56, 16, 44];
+  const finite = (values) => values.filter((v) => v !== null && Number.isFinite(v));
+  const xs = finite(figure.x), ys = figure.series.flatMap((s) => finite(s.y));
+  const [x0, x1, y0, y1] = [xs.reduce((a, b) => Math.min(a, b)), xs.reduce((a, b) => Math.max(a, b)), ys.reduce((a, b) => Math.min(a, b)), ys.reduce((a, b) => Math.max(a, b))];
+  const px = (x) => left + ((x - x0) / (x1 - x0 || 1)) * (w - left - right), py = (y) => h - bottom - ((y - y0) / (y1 - y0 || 1)) * (h - top - bottom);
+  const ticks = (a, b) => { const raw = (b - a || 1) / 4, p = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].map((k) => k * p).find((k) => k >= raw); return Array.from({ length: 12 }, (_, i) => (Math.ceil(a / step) + i) * step).filter((v) => v <= b + step * 1e-9); };
+  const parts = [`<svg xmlns="http://www.w3.org/2000/svg" width="${w}" height="${h}" viewBox="0 0 ${w} ${h}" font-family="Inter, system-ui, sans-serif" font-size="12"><rect width="${w}" height="${h}" fill="#fff"/>`,
+    `<text x="${left}" y="20" font-size="14" font-weight="600" fill="${LIGHT.ink}">${escaped(figure.title)}</text>`];
+  for (const v of ticks(y0, y1)) parts.push(`<path d="M${left} ${py(v).toFixed(1)}H${w - right}" stroke="${LIGHT.line}"/><text x="${left - 6}" y="${(py(v) + 4).toFixed(1)}" text-anchor="end" fill="${LIGHT.muted}">${number(v)}</text>`);
+  for (const v of ticks(x0, x1)) parts.push(`<text x="${px(v).toFixed(1)}" y="${h - bottom + 18}" text-anchor="middle" fill="${LIGHT.muted}">${number(v)}</text>`);
+  parts.push(`<text x="${(w + left) / 2}" y="${h - 6}" text-anchor="middle" fill="${LIGHT.muted}">${escaped(figure.xLabel)}</text>`);
+  figure.series.forEach((s, k) => {
+    const tone = LIGHT[s.tone] || LIGHT.ink;
+    let path = "", pen = false;
+    figure.x.forEach((x, i) => { const y = s.y[i]; if (y === null || y === undefined || x === null) { pen = false; return; } path += `${pen ? "L" : "M"}${px(x).toFixed(1)} ${py(y).toFixed(1)}`; pen = true; });
+    parts.push(`<path d="${path}" fill="none" stroke="${tone}" stroke-width="1.3"/><text x="${left + k * 200}" y="42" fill="${tone}">${escaped(s.name)}</text>`);
+  });
+  return `${parts.join("")}</svg>`;
+}
