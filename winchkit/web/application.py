@@ -113,7 +113,7 @@ class Guard:
         if not scope["path"].startswith(("/api/", "/live")):
             return ""
         query = dict(parse_qsl(scope.get("query_string", b"").decode("latin-1")))
-        given = headers.get("x-winchkit-token", query.get("token", ""))
+        given = headers.get("x-winchkit-token") or query.get("token") or ""
         if not secrets.compare_digest(given.encode(), self.token.encode()):
             return "the token is missing or wrong; open the URL that 'winchkit serve' printed"
         return ""

@@ -80,6 +80,9 @@ class State:
     winch: str = ""
     answer: WinchAnswer | None = None
     curves: Mapping[str, OutputCurves] = field(default_factory=dict)
+    before: tuple[WinchAnswer, Mapping[str, OutputCurves]] | None = None
+    """Answer and curves before the last addition, so that undoing it needs no fit; one only, for
+    the memory that an answer holds."""
     rungs: tuple[Rung, ...] = ()
     """Errors of the profiles before the present one."""
     said: str = ""
@@ -313,6 +316,8 @@ class Workspace:
     def _set(self, **changes: Any) -> None:
         if changes.keys() & {"answer", "runs", "versions"}:
             self._cards = {}
+        if changes.keys() & {"runs", "source"}:
+            changes = {"before": None, **changes}
         self._state = replace(self._state, **{"faults": (), **changes})
 
     def _open(self, paths: Sequence[str | Path], profile: str | None) -> None:
@@ -411,13 +416,18 @@ class Workspace:
             said=said,
         )
         self._diagnose()
+        self._set(before=(state.answer, state.curves))
 
     def _undo(self) -> None:
         state = self._state
         if len(state.versions) < 2:
             raise UsageError("there is nothing to undo")
         self._set(versions=state.versions[:-1], rungs=state.rungs[:-1], said="")
-        self._diagnose()
+        if state.before is None:
+            self._diagnose()
+        else:
+            answer, curves = state.before
+            self._set(answer=answer, curves=curves, before=None)
 
     def _card(self, effect_id: str) -> dict[str, Any]:
         state = self._state

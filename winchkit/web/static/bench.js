@@ -82,7 +82,7 @@ function show() {
 
 function banner() {
   const box = document.getElementById("banner"), trips = tripped(), lost = picture ? picture.lost : "The page's server does not answer: Stop cannot reach the bench. Use the emergency stop.";
-  const text = lost ? `lost:${lost}` : trips.join("|");
+  const text = lost ? `lost:${lost}` : trips.length ? `${commands()}|${trips.join("|")}` : "";
   if (box.dataset.text === text) return;
   if (!text && !box.dataset.text) return;
   box.dataset.text = text;
@@ -212,7 +212,7 @@ function refresh() {
   const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, winding = state.cable_speed === null ? null : -state.cable_speed;
   const kind = tripped().length ? "tripped" : MOVING.has(state.phase) ? "moving" : state.phase === "stopping" ? "stopping" : "";
   fill(values, cell("Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell("Tension", state.tension, 1, "N", 0, top * 1.05, tension),
-    cell("Speed, winding in positive", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
+    cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
     el("div", {}, el("span", { class: "note" }, "State"), el("div", { class: `state ${kind}` }, words(state)), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
   drawing(state);
   if (!paused) for (const chart of charts) chart();

@@ -27,7 +27,7 @@ socket("/live", (fresh) => {
   const first = !state;
   if (first) alarm("");
   state = fresh;
-  if (first) { bench.station(state); route(); } else if (name) views[name].update(state);
+  if (first) bench.station(state).finally(route); else if (name) views[name].update(state);
 }, () => alarm("The server does not answer. Trying again; if it was ended, start 'winchkit serve' anew."));
 
 addEventListener("hashchange", route);

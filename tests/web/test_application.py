@@ -1,0 +1,220 @@
+"""The page's server: what it refuses, and the whole story by requests alone."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("starlette")
+pytest.importorskip("httpx2")
+
+from starlette.testclient import TestClient
+from starlette.websockets import WebSocketDisconnect
+
+from winchkit.runs.read import read_run
+from winchkit.runs.writer import write_run
+from winchkit.web.application import application
+from winchkit.web.examples import example_runs
+from winchkit.web.library import Library
+from winchkit.web.workspace import Workspace
+
+TOKEN = "t0ken"
+HEADERS = {"x-winchkit-token": TOKEN}
+PATIENCE = 120.0
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Runs of a bench whose drum is fatter than its profile says."""
+    folder = tmp_path_factory.mktemp("runs")
+    for run in example_runs("demo-fat-drum").runs:
+        write_run(run, folder / f"{run.name}.csv")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def client(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    workspace = Workspace(tmp_path_factory.mktemp("page"))
+    app = application(workspace, TOKEN, Library(recorded))
+    with TestClient(app, base_url="http://127.0.0.1:1234") as opened:
+        opened.workspace = workspace  # type: ignore[attr-defined]
+        yield opened
+
+
+def get(client: TestClient, path: str) -> Any:
+    return client.get(path, headers=HEADERS).json()
+
+
+def do(client: TestClient, action: str, **more: Any) -> None:
+    answer = client.post("/api/do", content=json.dumps({"do": action, **more}), headers=HEADERS)
+    assert answer.status_code == 202, answer.text
+
+
+def settled(client: TestClient) -> Any:
+    """View as soon as nothing is under way."""
+    end = time.monotonic() + PATIENCE
+    client.workspace._pool.submit(lambda: None).result(PATIENCE)  # type: ignore[attr-defined]
+    while time.monotonic() < end:
+        view = get(client, "/api/view")
+        if view["busy"] is None:
+            return view
+        time.sleep(0.01)
+    raise AssertionError("still busy")
+
+
+def test_foreign_requests_are_refused(client: TestClient) -> None:
+    assert client.get("/").status_code == 200
+    assert client.get("/api/view").status_code == 403
+    assert client.get("/api/view", headers={"x-winchkit-token": "wrong"}).status_code == 403
+    foreign = {**HEADERS, "origin": "http://evil.example"}
+    assert client.get("/api/view", headers=foreign).status_code == 403
+    assert client.get("/", headers={"host": "evil.example:1234"}).status_code == 403
+    own = {**HEADERS, "origin": "http://127.0.0.1:1234"}
+    assert client.get("/api/view", headers=own).status_code == 200
+
+
+def test_a_socket_without_the_token_or_from_elsewhere_is_closed(client: TestClient) -> None:
+    for path, headers in (
+        ("/live", {}),
+        (f"/live?token={TOKEN}", {"origin": "http://evil.example"}),
+    ):
+        with (
+            pytest.raises(WebSocketDisconnect) as refused,
+            client.websocket_connect(path, headers=headers),
+        ):
+            pass
+        assert refused.value.code == 1008
+
+
+def test_nothing_but_this_server_may_be_loaded(client: TestClient) -> None:
+    policy = client.get("/").headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "unsafe" not in policy
+    text = client.get("/").text + "".join(
+        client.get(f"/static/{name}").text
+        for name in ("main.js", "page.js", "plots.js", "diagnose.js", "bench.js", "library.js")
+    )
+    assert "https://" not in text
+    assert "innerHTML" not in text, "names in files must not become markup"
+
+
+@pytest.mark.parametrize(
+    "body", ["", "[]", "{}", '{"do": "fly"}', '{"do": "mystery", "seed": "x"}', "{" * 70_000]
+)
+def test_malformed_requests_are_told(client: TestClient, body: str) -> None:
+    answer = client.post("/api/do", content=body, headers=HEADERS)
+    assert answer.status_code == 400
+    assert answer.json()["error"]
+
+
+def test_a_strangers_file_opens_its_columns(client: TestClient) -> None:
+    rows = "\n".join(f"{i * 0.02:.2f};{57.3 * np.sin(0.02 * i):.3f};{9 + i % 3}" for i in range(300))
+    text = f"Zeit [s];Pos [deg];Kraft\n{rows}\n"
+    headers = {**HEADERS, "x-file-name": "..%2F..%2Flogger%20%3Cb%3E.csv"}
+    found = client.post("/api/drop", content=text.encode(), headers=headers).json()
+    assert "/" not in found["file"]
+    assert "<" not in found["file"]
+    channels = {row["source"]: row["channel"] for row in found["import"]["columns"]}
+    assert channels["Pos"] == "motor_angle"
+    assert found["import"]["questions"], "the unit of Kraft is not known"
+    answers = {"columns": ["tension=Kraft [N]"], "load_mass": "1 kg"}
+    again = client.post(
+        "/api/guess", content=json.dumps({"file": found["file"], "answers": answers}), headers=HEADERS
+    ).json()
+    assert again["import"]["questions"] == []
+    before = len(get(client, "/api/view")["runs"])
+    do(client, "import", file=found["file"], answers=answers)
+    view = settled(client)
+    assert len(view["runs"]) == before + 1
+    name = view["runs"][-1]["name"]
+    assert view["runs"][-1]["load"] == "1 kg"
+    do(client, "remove", name=name)
+    assert len(settled(client)["runs"]) == before
+
+
+@pytest.mark.slow
+def test_look_learn_add_and_the_error_falls(client: TestClient, recorded: Path) -> None:
+    for path in sorted(recorded.glob("*.csv")):
+        headers = {**HEADERS, "x-file-name": path.name}
+        assert client.post("/api/drop", content=path.read_bytes(), headers=headers).status_code == 202
+    do(client, "profile", name="bench-spiral")
+    view = settled(client)
+    assert view["faults"] == []
+    first = view["diagnosis"]
+    assert first["verdict"] == "explained"
+    effect = next(row for row in first["ladder"]["rows"] if row["kind"] == "candidate")["effect"]
+    assert effect in {"drum-radius", "gear-ratio"}, "these runs do not distinguish the two"
+
+    card = get(client, f"/api/card?effect={effect}")
+    assert card["parameters"][0]["text"]
+    assert np.corrcoef(card["signature"]["means"], card["signature"]["signature"])[0, 1] > 0.9
+
+    before = _today(first)
+    do(client, "add", effect=effect)
+    view = settled(client)
+    after = _today(view["diagnosis"])
+    assert min(after[o] / before[o] for o in before) < 0.6
+    assert view["diagnosis"]["verdict"] == "adequate"
+    assert [row["kind"] for row in view["diagnosis"]["ladder"]["rows"]].count("history") == 1
+    assert view["profile"]["added"] == [effect]
+    saved = client.get("/api/profile", headers=HEADERS)
+    assert effect in saved.text
+    assert "<!DOCTYPE html>" in client.get("/api/report", headers=HEADERS).text
+    assert any(line.startswith(f"winchkit add {effect}") for line in view["commands"])
+
+    do(client, "undo")  # needs no fit
+    view = settled(client)
+    assert _today(view["diagnosis"]) == pytest.approx(before)
+    assert effect not in client.get("/api/profile", headers=HEADERS).text
+
+
+def _today(diagnosis: Any) -> dict[str, float]:
+    row = next(row for row in diagnosis["ladder"]["rows"] if row["kind"] == "today")
+    return {output: cell["ratio"] for output, cell in row["cells"].items()}
+
+
+@pytest.mark.slow
+def test_curves_keep_the_extremes_and_a_zoom_shows_every_sample(client: TestClient) -> None:
+    settled(client)
+    curves = client.workspace.curves("tension")  # type: ignore[attr-defined]
+    whole = get(client, "/api/curve?output=tension&points=200")
+    worth = curves.scale.worth
+    drawn = np.array([np.nan if v is None else v for v in whole["residual"]])
+    assert np.nanmax(drawn) == pytest.approx(np.nanmax(curves.residual) / worth, rel=1e-4)
+    assert np.nanmin(drawn) == pytest.approx(np.nanmin(curves.residual) / worth, rel=1e-4)
+    first, last = curves.time[100], curves.time[140]
+    part = get(client, f"/api/curve?output=tension&points=400&from={first}&to={last}")
+    assert len(part["x"]) == 41
+    panels = get(client, "/api/multiples?output=tension")
+    shares = [panel["share"] for panel in panels["panels"]]
+    assert shares == sorted(shares, reverse=True)
+    assert {len(panel["x"]) for panel in panels["panels"]} == {len(panels["residual"])}
+    assert client.get("/api/curve?output=speed", headers=HEADERS).status_code == 400
+
+
+def test_a_bad_file_is_told_and_the_others_load(client: TestClient) -> None:
+    headers = {**HEADERS, "x-file-name": "noise.bin"}
+    answer = client.post("/api/drop", content=bytes(range(256)) * 40, headers=headers)
+    assert answer.status_code == 400
+    assert "noise" in answer.json()["error"]
+    do(client, "profile", name="no-such-profile")
+    assert "no-such-profile" in settled(client)["faults"][0]
+
+
+def test_the_library_lists_and_overlays(client: TestClient, recorded: Path) -> None:
+    (recorded / "broken.csv").write_text("time\nx\n")
+    found = get(client, "/api/runs")
+    assert len(found["runs"]) == len(list(recorded.glob("*.csv")))
+    assert "fault" in next(row for row in found["runs"] if row["name"] == "broken.csv")
+    name = next(row["name"] for row in found["runs"] if "fault" not in row)
+    (line,) = get(client, f"/api/overlay?channel=tension&name={name}")["lines"]
+    run = read_run(recorded / name)
+    assert np.nanmax(np.array(line["y"], dtype=float)) == pytest.approx(run["tension"].max(), rel=1e-4)
+    outside = client.get("/api/overlay?name=../../etc/passwd", headers=HEADERS)
+    assert outside.status_code == 400
