@@ -43,6 +43,7 @@ SECTIONS = {
         *("compare_robot", "diagnose_robot", "plan_poses", "add_to_robot", "remove_from_robot"),
     ),
     "Estimators": ("DahlEstimator", "identify_dahl", "ElongationCorrection"),
+    "The page": ("serve",),
     "Errors": (
         *("WinchkitError", "UsageError", "FileError", "Fault", "RunError", "ConnectionLost"),
         *("NoReply", "DeviceRefused", "MotionError", "DriveFault", "LimitTripped", "NotPermitted"),

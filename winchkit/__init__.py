@@ -112,6 +112,7 @@ if TYPE_CHECKING:
     from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live.bench import LiveBench
     from winchkit.sim.record import simulate
+    from winchkit.web.server import serve
 
 __all__ = [
     "Bench",
@@ -202,6 +203,7 @@ __all__ = [
     "run_of",
     "run_programme",
     "scan",
+    "serve",
     "simulate",
     "sized",
     "static_effects",
@@ -334,6 +336,7 @@ _NAMES = {
     "winchkit.sim.clock.simulated_clock": ("SimulatedClock",),
     "winchkit.sim.live.bench": ("LiveBench",),
     "winchkit.sim.record": ("simulate",),
+    "winchkit.web.server": ("serve",),
 }
 # This package contains the results and their renderers, which know nothing of each other.
 renderers.load_from("winchkit.report.notebook.register")

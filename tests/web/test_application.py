@@ -107,14 +107,16 @@ def test_nothing_but_this_server_may_be_loaded(client: TestClient) -> None:
 @pytest.mark.parametrize(
     "body", ["", "[]", "{}", '{"do": "fly"}', '{"do": "mystery", "seed": "x"}', "{" * 70_000]
 )
-def test_malformed_requests_are_told(client: TestClient, body: str) -> None:
+def test_malformed_requests_are_refused(client: TestClient, body: str) -> None:
     answer = client.post("/api/do", content=body, headers=HEADERS)
     assert answer.status_code == 400
     assert answer.json()["error"]
 
 
-def test_a_strangers_file_opens_its_columns(client: TestClient) -> None:
-    rows = "\n".join(f"{i * 0.02:.2f};{57.3 * np.sin(0.02 * i):.3f};{9 + i % 3}" for i in range(300))
+def test_a_file_of_another_program_opens_its_columns(client: TestClient) -> None:
+    rows = "\n".join(
+        f"{i * 0.02:.2f};{57.3 * np.sin(0.02 * i):.3f};{9 + i % 3}" for i in range(300)
+    )
     text = f"Zeit [s];Pos [deg];Kraft\n{rows}\n"
     headers = {**HEADERS, "x-file-name": "..%2F..%2Flogger%20%3Cb%3E.csv"}
     found = client.post("/api/drop", content=text.encode(), headers=headers).json()
@@ -125,7 +127,9 @@ def test_a_strangers_file_opens_its_columns(client: TestClient) -> None:
     assert found["import"]["questions"], "the unit of Kraft is not known"
     answers = {"columns": ["tension=Kraft [N]"], "load_mass": "1 kg"}
     again = client.post(
-        "/api/guess", content=json.dumps({"file": found["file"], "answers": answers}), headers=HEADERS
+        "/api/guess",
+        content=json.dumps({"file": found["file"], "answers": answers}),
+        headers=HEADERS,
     ).json()
     assert again["import"]["questions"] == []
     before = len(get(client, "/api/view")["runs"])
@@ -142,7 +146,9 @@ def test_a_strangers_file_opens_its_columns(client: TestClient) -> None:
 def test_look_learn_add_and_the_error_falls(client: TestClient, recorded: Path) -> None:
     for path in sorted(recorded.glob("*.csv")):
         headers = {**HEADERS, "x-file-name": path.name}
-        assert client.post("/api/drop", content=path.read_bytes(), headers=headers).status_code == 202
+        assert (
+            client.post("/api/drop", content=path.read_bytes(), headers=headers).status_code == 202
+        )
     do(client, "profile", name="bench-spiral")
     view = settled(client)
     assert view["faults"] == []
@@ -198,7 +204,7 @@ def test_curves_keep_the_extremes_and_a_zoom_shows_every_sample(client: TestClie
     assert client.get("/api/curve?output=speed", headers=HEADERS).status_code == 400
 
 
-def test_a_bad_file_is_told_and_the_others_load(client: TestClient) -> None:
+def test_a_bad_file_is_reported_and_the_others_load(client: TestClient) -> None:
     headers = {**HEADERS, "x-file-name": "noise.bin"}
     answer = client.post("/api/drop", content=bytes(range(256)) * 40, headers=headers)
     assert answer.status_code == 400
@@ -215,6 +221,8 @@ def test_the_library_lists_and_overlays(client: TestClient, recorded: Path) -> N
     name = next(row["name"] for row in found["runs"] if "fault" not in row)
     (line,) = get(client, f"/api/overlay?channel=tension&name={name}")["lines"]
     run = read_run(recorded / name)
-    assert np.nanmax(np.array(line["y"], dtype=float)) == pytest.approx(run["tension"].max(), rel=1e-4)
+    assert np.nanmax(np.array(line["y"], dtype=float)) == pytest.approx(
+        run["tension"].max(), rel=1e-4
+    )
     outside = client.get("/api/overlay?name=../../etc/passwd", headers=HEADERS)
     assert outside.status_code == 400

@@ -170,14 +170,14 @@ async def _page(request: Request) -> Response:
 
 
 class _Listeners:
-    """Open pages that are told of every change of the workspace."""
+    """Open pages that are notified of every change of the workspace."""
 
     def __init__(self) -> None:
         self.loop: asyncio.AbstractEventLoop | None = None
         self.events: set[asyncio.Event] = set()
 
     def wake(self) -> None:
-        """Tell all of them; callable from any thread."""
+        """Notify all of them; callable from any thread."""
         if self.loop is not None:
             self.loop.call_soon_threadsafe(self._set)
 

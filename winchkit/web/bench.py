@@ -346,7 +346,7 @@ class BenchView:
     def _is_fresh(self, asked: dict[str, Any]) -> bool:
         """Whether a jog was ordered by somebody who saw the bench within the last 0.4 s.
 
-        Messages that waited on their way would otherwise move the winch after its key was let go.
+        Messages that waited on their way would otherwise move the winch after its key was released.
         """
         now = self._newest.get("time")
         return now is not None and now - float(asked["seen"]) <= _LATEST_PICTURE
@@ -384,7 +384,7 @@ class _Inbox:
 
 
 async def _received(socket: WebSocket, browser: _Browser) -> None:
-    """Read messages until the browser closes; malformed ones are told and dropped."""
+    """Read messages until the browser closes; malformed ones are reported and dropped."""
     with suppress(WebSocketDisconnect):
         while True:
             text = await socket.receive_text()

@@ -9,12 +9,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-import uvicorn
-
 from winchkit.errors import UsageError
-from winchkit.web.application import application
-from winchkit.web.library import Library
-from winchkit.web.workspace import Workspace, remove_folder
 
 __all__ = ["serve"]
 
@@ -64,8 +59,19 @@ def serve(
     Raises
     ------
     UsageError
-        Where the port is in use.
+        Where the port is in use, or the extra ``web`` is not installed.
     """
+    try:
+        import uvicorn
+
+        from winchkit.web.application import application
+    except ImportError as error:
+        raise UsageError(
+            f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
+        ) from None
+    from winchkit.web.library import Library
+    from winchkit.web.workspace import Workspace, remove_folder
+
     token = secrets.token_urlsafe(24)
     with ExitStack() as stack:
         own = Path(tempfile.mkdtemp(prefix="winchkit-page-"))

@@ -168,7 +168,7 @@ class Workspace:
         return self._do("simulating runs", lambda: self._simulate(name, example_runs(name)))
 
     def mystery(self, seed: int) -> Future[None]:
-        """Simulate runs of a bench whose hidden effect is told on request only."""
+        """Simulate runs of a bench whose hidden effect is shown on request only."""
         return self._do("simulating runs", lambda: self._simulate("mystery", mystery_runs(seed)))
 
     def take(self, file: str, answers: Mapping[str, Any]) -> Future[None]:
@@ -263,7 +263,7 @@ class Workspace:
     def truth(self) -> str:
         """What the simulated bench hides; raises UsageError for measured runs."""
         if self._state.truth is None:
-            raise UsageError("these runs were not simulated here; nobody knows their truth")
+            raise UsageError("these runs were not simulated here; their truth is not known")
         return self._state.truth
 
     def dropped(self, name: str) -> Path:

@@ -1,1 +1,4 @@
-"""Commands that serve the page."""
+"""Commands of the page in the browser.
+
+``serve`` has the command; :mod:`winchkit.web` what it serves.
+"""

@@ -49,12 +49,8 @@ def command(
         raise UsageError(f"--port {port}: choose 0 to 65535")
     if not Path(folder).is_dir():
         raise UsageError(f"--folder {folder}: is no folder")
-    try:
-        from winchkit.web.server import serve
-    except ImportError as error:
-        raise UsageError(
-            f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
-        ) from None
+    from winchkit.web.server import serve
+
     serve(
         runs,
         profile,
