@@ -1,8 +1,8 @@
 """The command line: one file per command, in folders by subject.
 
 ``bench``, ``cell``, ``drive``, ``files``, ``log``, ``model``, ``sim`` and ``web`` have the
-commands, ``core`` their common parts. The table below is all that ``--help`` needs: a command imports
-other packages when it runs. :func:`~winchkit.cli.main` is the entry.
+commands, ``core`` their common parts. The table below is all that ``--help`` needs: a command
+imports other packages when it runs. :func:`~winchkit.cli.main` is the entry.
 """
 
 from __future__ import annotations

@@ -18,8 +18,8 @@ from winchkit.diagnosis.residuals.attribution import binned_share, kept_rows, va
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.model.variables import ANGLES
 from winchkit.plain_json import significant
+from winchkit.report.figures.axes import reading
 from winchkit.report.figures.reduction import bin_means, decimated, filled_edges
-from winchkit.report.html.chart import reading
 from winchkit.report.words.numbers import Scale, scale_for
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
@@ -83,7 +83,8 @@ class OutputCurves:
         """
         part = slice(*np.searchsorted(self.time, [first, last + 1e-9]))
         lines = [self.measured[part], self.predicted[part], self.residual[part] / self.scale.worth]
-        x, reduced = decimated(self.time[part], lines, max(points, 16))
+        shown = decimated(lines, max(points, 16) // (2 * len(lines)))
+        x, reduced = self.time[part][shown], [values[shown] for values in lines]
         whole = scale_for(_size(self.measured), OUTPUT_UNITS[self.output])
         measured, predicted = (values / whole.worth for values in reduced[:2])
         return {

@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from winchkit.errors import FileError, UsageError
 from winchkit.plain_json import significant
 from winchkit.report.figures.reduction import decimated
@@ -71,9 +69,7 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
         values = [] if texts else significant(list(column.values[:_FIRST]), 6)
         drawn: list[float | None] = []
         if texts is None and len(column.values) > 1:
-            _, (line,) = decimated(
-                np.arange(len(column.values), dtype=float), [column.values], _POINTS
-            )
+            line = column.values[decimated([column.values], _POINTS // 2)]
             drawn = significant(line.tolist(), 4)
         rows.append(
             {
