@@ -103,17 +103,23 @@ def _tell_one(
     """What one winch lacks, on a page besides where that is asked."""
     from winchkit.diagnosis.diagnose import diagnose
 
-    with progress_bar() as progress:
-        own, catalogue = asked.runs(runs), asked.catalogue
-        answer = diagnose(
-            own,
-            declared,
-            catalogue,
-            asked.band,
-            **how,
-            progress=progress,
-            interrupted=lambda known: _tell_known(known, as_json),
-        )
+    known: list[WinchAnswer] = []
+    try:
+        with progress_bar() as progress:
+            own, catalogue = asked.runs(runs), asked.catalogue
+            answer = diagnose(
+                own,
+                declared,
+                catalogue,
+                asked.band,
+                **how,
+                progress=progress,
+                interrupted=known.append,
+            )
+    except KeyboardInterrupt:
+        for each in known:  # The bar has ended: nothing is printed into its line.
+            _tell_known(each, as_json)
+        raise
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
         write_page(html, _page(answer, page_title(declared.name, runs), asked))
