@@ -1,4 +1,8 @@
-"""Measured poses of a robot's runs: one row per pose, NaN where nothing was measured."""
+"""Measured poses of a robot's runs: one row per pose, NaN where nothing was measured.
+
+A log, whose rows are samples in time, has a pose per hold (:mod:`winchkit.runs.holds`): the mean of
+what was measured there. Its rows in motion are left out.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.model.robot.rotation import angles_of, rotation_from_quaternion
+from winchkit.runs.holds import averaged, holds_of
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.units import suggest
@@ -66,6 +71,8 @@ class Measured:
 
 
 _SCALARS = {"length_zeroed", "session_of_run", "notes"}
+_CIRCULAR = frozenset({"angles", "swivel"})
+"""Whose mean over a hold is the circular one."""
 _ARRAYS = tuple(field.name for field in fields(Measured) if field.name not in _SCALARS)
 
 
@@ -185,9 +192,37 @@ def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
         session_of_run=(run.metadata.get("session", "").strip() or run.path or run.name,),
     )
     moved = np.any(np.isfinite(found.motor_angle), axis=1)
-    messages = [*_partly(run), *_gaps(found, moved)]
+    poses, of_log = _of_holds(found[moved], run)
+    messages = [*_partly(run), *_gaps(found, moved), *of_log]
     notes = [f"{run.path or run.name}: {note}" for note in messages]
-    return replace(found[moved], notes=tuple(notes))
+    return replace(poses, notes=tuple(notes))
+
+
+def _of_holds(rows: Measured, run: Run) -> tuple[Measured, list[str]]:
+    """A pose per hold of a log; the rows themselves where each is a pose."""
+    holds = holds_of(rows.motor_angle)
+    if holds is None:
+        return rows, []
+    means: dict[str, Any] = {
+        name: averaged(getattr(rows, name), holds, angles=name in _CIRCULAR)
+        for name in _ARRAYS
+        if name not in ("run", "place")
+    }
+    sizes = [hold.stop - hold.start for hold in holds]
+    first = [rows.place[hold.start].split(" ")[1] for hold in holds]
+    last = [rows.place[hold.stop - 1].split(" ")[1] for hold in holds]
+    places = [
+        f"rows {a}-{b} of {run.path or run.name}" for a, b in zip(first, last, strict=True)
+    ]
+    found = replace(
+        rows, **means, run=rows.run[[hold.start for hold in holds]], place=np.array(places)
+    )
+    note = (
+        f"a log of {len(rows)} rows in time: {len(holds)} holds of {min(sizes)} to {max(sizes)} "
+        f"rows, in which no winch moves beyond its noise, are the poses; "
+        f"{len(rows) - sum(sizes)} rows in motion were left out"
+    )
+    return found, [note]
 
 
 def _partly(run: Run) -> list[str]:

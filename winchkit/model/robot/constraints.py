@@ -477,7 +477,8 @@ def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSp
     Returns
     -------
     Constraint
-        ``by_robot`` has ``payload``: by mass and centre of mass, (p, 6, 4).
+        ``by_robot`` has ``payload``: by mass and centre of mass, (p, 6, 4), and ``tension``: by
+        cable forces, (p, 6, n).
     """
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     spread = structure @ np.swapaxes(structure, 1, 2)
@@ -487,7 +488,8 @@ def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSp
     left = wrench_residual(structure, tension, gravity_wrench(platform, pose.rotation))
     residual = (whiten @ left[..., None])[..., 0]
     by_payload = whiten @ weight_by_payload(platform, pose.rotation)
-    return Constraint(residual, np.zeros((*residual.shape, 6)), {}, {"payload": by_payload})
+    by = {"payload": by_payload, "tension": whiten @ structure}
+    return Constraint(residual, np.zeros((*residual.shape, 6)), {}, by)
 
 
 def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:

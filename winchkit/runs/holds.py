@@ -1,0 +1,146 @@
+"""Holds in a log of a robot: stretches of rows in which no winch moves beyond its noise.
+
+A run of poses has a row per pose; a log has rows in time, of which some are at rest. The noise of a
+motor angle is estimated from the log itself, by quartiles of its first and third differences: third
+differences remove a smooth motion, first differences are noise alone where most rows are at rest,
+and the smaller estimate is less affected by motion. A hold is a maximal stretch in which every
+winch stays within
+
+    |θ − mean θ| ≤ z σ,      z = Φ⁻¹(1 − α / 2N)
+
+of N angles in all (Bonferroni), or within two counts where an angle alternates between adjacent
+counts. Rows are poses already where consecutive angles differ as much as angles do in general: then σ is of the size of
+their spread and no stretch is looked for.
+
+References
+----------
+J. von Neumann, *Distribution of the Ratio of the Mean Square Successive Difference to the
+Variance*, Ann. Math. Statist. 12, 1941.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from statistics import NormalDist
+
+import numpy as np
+
+from winchkit.arrays import Array
+
+__all__ = ["averaged", "holds_of"]
+
+_LEVEL = 0.01
+"""Probability that noise alone ends a hold anywhere in the log."""
+_LEAST_ROWS = 5
+"""Least rows of a hold: a reversal passes through zero speed in fewer (rule of thumb)."""
+_LEAST_SHARE = 0.25
+"""Least rows of a hold as a share of the median hold's (rule of thumb): a reversal of a fast log
+is at rest for some rows too."""
+_MOST_NOISE = 0.05
+"""Largest noise of an angle, in its spread, in a log: rows that are poses have a ratio near one."""
+_QUARTILE = 0.25
+_ONE_COUNT = 1.5
+_OF_NORMAL = 0.31864
+"""Lower quartile of |x| of a standard normal x."""
+_THIRD = sqrt(20.0)
+"""Standard deviation of third differences of white noise, in that of the noise."""
+
+
+def holds_of(angle: Array) -> list[slice] | None:
+    """Stretches at rest of all winches.
+
+    Parameters
+    ----------
+    angle : (p, n) array
+        Motor angles of n lines in the order of time, rad; NaN where missing.
+
+    Returns
+    -------
+    list of slice or None
+        Rows of each hold; None where the rows are no log, but a pose each.
+    """
+    found = _tolerance(angle)
+    if found is None:
+        return None
+    stretches = [s for s in _stretches(angle, found) if s.stop - s.start >= _LEAST_ROWS]
+    if not stretches:
+        return None
+    least = _LEAST_SHARE * float(np.median([s.stop - s.start for s in stretches]))
+    return [s for s in stretches if s.stop - s.start >= least]
+
+
+def _tolerance(angle: Array) -> Array | None:
+    """Largest deviation of each angle at rest, (n,), rad; None where rows are poses."""
+    count = int(np.count_nonzero(np.isfinite(angle)))
+    if len(angle) < 2 * _LEAST_ROWS or not count:
+        return None
+    width = NormalDist().inv_cdf(1 - _LEVEL / (2 * count))
+    sigma, step = np.zeros(angle.shape[1]), np.zeros(angle.shape[1])
+    moves = False
+    for line, values in enumerate(angle.T):
+        known = values[np.isfinite(values)]
+        if len(known) < 2 * _LEAST_ROWS:
+            continue
+        first, third = np.abs(np.diff(known)), np.abs(np.diff(known, 3))
+        step[line] = _dither(np.diff(known))
+        sigma[line] = min(
+            float(np.quantile(first, _QUARTILE)) / (_OF_NORMAL * sqrt(2.0)),
+            float(np.quantile(third, _QUARTILE)) / (_OF_NORMAL * _THIRD),
+        )
+        spread = float(np.std(known))
+        if sigma[line] < _MOST_NOISE * spread:
+            moves = True
+        elif spread > max(sigma[line], step[line]) * width:
+            return None
+    return np.maximum(width * sigma, 2 * step) if moves else None
+
+
+def _dither(change: Array) -> float:
+    """Size of a count where an angle alternates between adjacent counts, rad; else zero."""
+    change = change[change != 0]
+    if len(change) < 2:
+        return 0.0
+    count = float(np.min(np.abs(change)))
+    small = np.abs(change) < _ONE_COUNT * count
+    back = small[1:] & small[:-1] & (change[1:] * change[:-1] < 0)
+    return count if np.count_nonzero(back) > _QUARTILE * np.count_nonzero(small) else 0.0
+
+
+def _stretches(angle: Array, tolerance: Array) -> list[slice]:
+    """Maximal stretches, from the start, within the tolerance of their running mean."""
+    out, begin = [], 0
+    total, known = np.zeros(angle.shape[1]), np.zeros(angle.shape[1])
+    for row, values in enumerate(angle):
+        there = np.isfinite(values)
+        mean = np.divide(total, known, out=np.where(there, values, 0.0), where=known > 0)
+        if np.any(np.abs(values[there] - mean[there]) > tolerance[there]):
+            out.append(slice(begin, row))
+            begin, total, known = row, np.zeros_like(total), np.zeros_like(known)
+        total[there] += values[there]
+        known[there] += 1
+    return [*out, slice(begin, len(angle))]
+
+
+def averaged(values: Array, holds: list[slice], *, angles: bool = False) -> Array:
+    """Means over holds of what was measured, (h, …); NaN where nothing was.
+
+    Parameters
+    ----------
+    values : (p, ...) array
+        Measurements by row; NaN where missing.
+    holds : list of slice
+        Rows of each hold.
+    angles : bool
+        Whether values are angles, whose mean is the circular one.
+    """
+    out = np.full((len(holds), *values.shape[1:]), np.nan)
+    for number, rows in enumerate(holds):
+        own = values[rows]
+        known = np.isfinite(own)
+        some = known.any(axis=0)
+        if angles:
+            mean = np.angle(np.where(known, np.exp(1j * np.nan_to_num(own)), 0.0).sum(axis=0))
+        else:
+            mean = np.where(known, own, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+        out[number] = np.where(some, mean, np.nan)
+    return out
