@@ -9,8 +9,8 @@ winch stays within
     |θ − mean θ| ≤ z σ,      z = Φ⁻¹(1 − α / 2N)
 
 of N angles in all (Bonferroni), or within two counts where an angle alternates between adjacent
-counts. Rows are poses already where consecutive angles differ as much as angles do in general: then σ is of the size of
-their spread and no stretch is looked for.
+counts. Rows are poses already where consecutive angles differ as much as angles do in general: then
+σ is of the size of their spread and no stretch is looked for.
 
 References
 ----------
@@ -40,6 +40,7 @@ _MOST_NOISE = 0.05
 """Largest noise of an angle, in its spread, in a log: rows that are poses have a ratio near one."""
 _QUARTILE = 0.25
 _ONE_COUNT = 1.5
+_ROUNDING = 1e-9
 _OF_NORMAL = 0.31864
 """Lower quartile of |x| of a standard normal x."""
 _THIRD = sqrt(20.0)
@@ -92,7 +93,8 @@ def _tolerance(angle: Array) -> Array | None:
             moves = True
         elif spread > max(sigma[line], step[line]) * width:
             return None
-    return np.maximum(width * sigma, 2 * step) if moves else None
+    rounding = _ROUNDING * np.nanmax(np.abs(angle), axis=0, initial=1e-9)
+    return np.maximum.reduce([width * sigma, 2 * step, rounding]) if moves else None
 
 
 def _dither(change: Array) -> float:

@@ -1,12 +1,15 @@
 """Measured poses of a robot's runs: one row per pose, NaN where nothing was measured.
 
+Readings are those of instruments whose known numbers (``[instrument]`` of the robot's file: cell
+gains, scales of length counters, zeros of swivels) are corrected.
+
 A log, whose rows are samples in time, has a pose per hold (:mod:`winchkit.runs.holds`): the mean of
 what was measured there. Its rows in motion are left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -178,13 +181,18 @@ def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
     def per_line(kind: str) -> Array:
         return np.stack([_column(run, f"{name}.{kind}") for name in names], axis=1)
 
+    own = profile.instrument
+
+    def known(values: Mapping[str, float] | str) -> Array:
+        return np.array([0.0 if isinstance(values, str) else values.get(n, 0.0) for n in names])
+
     found = Measured(
         motor_angle=per_line("motor_angle"),
         position=np.stack([_column(run, name) for name in _POSITION], axis=1),
         angles=_angles(run),
-        swivel=per_line("swivel"),
-        cable_length=per_line("cable_length"),
-        tension=per_line("tension"),
+        swivel=per_line("swivel") - known(own.swivels.zero),
+        cable_length=per_line("cable_length") / (1 + known(own.length_counters.scale)),
+        tension=per_line("tension") / (1 + known(own.cells.gain)),
         temperature=_temperature(run, names),
         run=np.full(len(run), number, dtype=np.intp),
         place=np.array([f"row {n} of {run.path or run.name}" for n in range(1, len(run) + 1)]),
@@ -211,9 +219,7 @@ def _of_holds(rows: Measured, run: Run) -> tuple[Measured, list[str]]:
     sizes = [hold.stop - hold.start for hold in holds]
     first = [rows.place[hold.start].split(" ")[1] for hold in holds]
     last = [rows.place[hold.stop - 1].split(" ")[1] for hold in holds]
-    places = [
-        f"rows {a}-{b} of {run.path or run.name}" for a, b in zip(first, last, strict=True)
-    ]
+    places = [f"rows {a}-{b} of {run.path or run.name}" for a, b in zip(first, last, strict=True)]
     found = replace(
         rows, **means, run=rows.run[[hold.start for hold in holds]], place=np.array(places)
     )

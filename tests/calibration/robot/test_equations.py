@@ -14,6 +14,8 @@ from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Options, calibrate, equations_of
 from winchkit.calibration.robot.elongation import LAWS
 from winchkit.calibration.robot.equations import Equations
+from winchkit.calibration.robot.instruments import declared_instruments
+from winchkit.calibration.robot.selection import with_instruments
 from winchkit.effects import load_catalogue
 from winchkit.model.drum import drum_of
 from winchkit.model.robot import Pose, rotation_of
@@ -55,6 +57,8 @@ def residuals(made: Equations, state: State) -> dict[str, Array]:
         ("cable-elongation-quartic",),
         ("cable-elongation-exponential", "payload-mass", "payload-centre"),
         ("home-length",),
+        ("gear-ratio",),
+        ("gear-ratio/3",),
     ],
 )
 def test_derivatives_are_those_of_the_residuals(effects: tuple[str, ...]) -> None:
@@ -209,3 +213,23 @@ def test_strain_is_that_of_the_catalogue(law: str, values: list[float]) -> None:
         step[k] = 1e-5 * value
         up, down = (strain_of(law, np.array(values) + s * step, tension)[0] for s in (1, -1))
         np.testing.assert_allclose(by[:, k], (up - down) / (2e-5 * value), rtol=1e-6, atol=1e-14)
+
+
+def test_gains_of_cells_and_scales_of_counters_have_the_derivatives_of_their_residuals() -> None:
+    made, state = equations()
+    own = declared_instruments(made.robot, made.measured)
+    made = with_instruments(made, replace(own, free=frozenset({"cell_gain", "length_scale"})))
+    values = made.parameters.nominal
+    values[made.parameters.block["cell_gain"]] = 0.02
+    values[made.parameters.block["length_scale"]] = -0.01
+    state = State(values, state.pose)
+    for rows_ in made.rows(state):
+        for block in ("cell_gain", "length_scale", "length_offset"):
+            for k in made.parameters.block[block]:
+                step = np.zeros(len(values))
+                step[k] = 1e-6
+                up = residuals(made, State(values + step, state.pose))[rows_.kind]
+                down = residuals(made, State(values - step, state.pose))[rows_.kind]
+                slope = np.nan_to_num((up - down) / 2e-6)
+                found = np.zeros_like(slope) if rows_.by_values is None else rows_.by_values[..., k]
+                np.testing.assert_allclose(np.nan_to_num(found), slope, rtol=1e-6, atol=1e-6)

@@ -17,7 +17,8 @@ less than 3 %, at most eight times. A robust loss ρ is used after the first fit
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from math import isfinite
 from time import perf_counter
 
 import numpy as np
@@ -42,7 +43,8 @@ from winchkit.calibration.robot.parameters import (
     own_effects,
     parameters_of,
 )
-from winchkit.calibration.robot.prediction import PoseErrors, errors_at, rms
+from winchkit.calibration.robot.prediction import PoseErrors, cable_errors, errors_at, rms
+from winchkit.calibration.robot.ratios import Ratios, ratios_of
 from winchkit.calibration.robot.selection import Fitted, fitted_with_instruments
 from winchkit.calibration.robot.statistics import calibration_statistics
 from winchkit.errors import UsageError
@@ -60,9 +62,6 @@ _NAMES = {"rope": "lengths by the drums", "position": "positions"}
 _LARGEST_ERROR = 0.05
 """Held-out position error as a share of the largest distance of two exit points, above which a
 robot is not called calibrated (rule of thumb: far above any camera, far below a wrong pose)."""
-_ODD_SIGMAS, _ODD_SHARE = 5.0, 0.005
-"""Change of one line's cable per motor turn against the others' above which it is reported, in
-standard deviations and as a share (rule of thumb: above tolerances of drums)."""
 _WORSE_ROTATION = 1.5
 """Ratio of the held-out rotation errors after and before above which a warning is due."""
 _COARSE_RATIO = 5.0
@@ -87,8 +86,12 @@ class Calibrated(Plotted, Tabular):
     """Effects that would explain a large part of the remaining cost."""
     seconds: float
     warnings: tuple[str, ...]
+    validation_lengths: tuple[float, float] = (float("nan"), float("nan"))
+    """Rms of cable lengths by drums against geometry at held-out poses, before and after, m."""
+    ratios: Ratios = field(default_factory=lambda: Ratios(()))
+    """Cable per motor turn of each line."""
     found_instruments: frozenset[str] = frozenset()
-    """Numbers of the tracker that the poses require and that the file does not declare unknown."""
+    """Numbers of instruments that the poses require and that the file does not declare unknown."""
 
     @property
     def refusal(self) -> str:
@@ -100,6 +103,14 @@ class Calibrated(Plotted, Tabular):
                 f"the fit, larger than {before * 1e3:.4g} mm with the starting profile; nothing "
                 "was written. Check that the poses are of this robot, record more of them, or fit "
                 "a missing effect beside the geometry (--effect)"
+            )
+        first, last = self.validation_lengths
+        if not isfinite(after) and last > first:
+            return (
+                f"not calibrated: the held-out error of the cable lengths is {last * 1e3:.4g} mm "
+                f"rms after the fit, larger than {first * 1e3:.4g} mm with the starting profile; "
+                "nothing was written. Check that the poses are of this robot, record more of them, "
+                "or fit a missing effect beside the geometry (--effect)"
             )
         exits = self.equations.robot.geometry.exit_point
         size = float(np.max(np.linalg.norm(exits[:, None] - exits, axis=2)))
@@ -202,6 +213,7 @@ def calibrate(
     declared, chosen = fitted_with_instruments(equations, options, progress)
     equations, solution, weights = chosen.equations, chosen.solution, chosen.weights
     observed = observability(equations, solution, weights)
+    ratios = ratios_of(equations, solution)
     seconds = perf_counter() - begin
 
     def held_out(own: Equations) -> Equations:
@@ -211,6 +223,10 @@ def calibrate(
     nominal, values = start.parameters.nominal, solution.state.values
     before = errors_at(held_out(start), nominal)
     after = errors_at(held_out(equations), values)
+    lengths = (float("nan"), float("nan"))
+    if "position" not in equations.kinds and len(validation):
+        own, first = held_out(equations), equations.parameters.nominal
+        lengths = rms(cable_errors(own, first, weights)), rms(cable_errors(own, values, weights))
     return Calibrated(
         equations=equations,
         solution=solution,
@@ -221,14 +237,18 @@ def calibrate(
         validation_before=before,
         validation_after=after,
         observed=observed,
-        candidates=candidates(equations, solution, weights, effects),
+        candidates=candidates(
+            equations, solution, weights, tuple(dict.fromkeys((*effects, *equations.effects)))
+        ),
         seconds=seconds,
         warnings=(
             *_instrument_notes(declared, chosen),
             *_warnings(equations, solution, weights, observed, after.unfound),
             *_worse_rotation(before, after),
-            *_odd_ratios(equations, solution),
+            *ratios.words,
         ),
+        validation_lengths=lengths,
+        ratios=ratios,
         found_instruments=chosen.free
         - (declared.instruments.free if declared.instruments else frozenset()),
     )
@@ -243,7 +263,8 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
     parameters = parameters_of(
         robot,
         options.effects,
-        swivel=bool(np.any(np.isfinite(measured.swivel))),
+        swivel=bool(np.any(np.isfinite(measured.swivel)))
+        and isinstance(robot.profile.instrument.swivels.zero, str),
         length_offset=bool(np.any(np.isfinite(measured.cable_length)))
         and not measured.length_zeroed,
         instruments=instruments,
@@ -313,18 +334,20 @@ _OF_TRACKER = {
     "frame": "the tracker's frame",
     "reflector": "the reflector's offset on the platform",
     "scale": "the tracker's scale",
-    "mounting": "the axes of the target on the platform",
+    "mounting": "the axes of the target, or of the IMU, on the platform",
+    "cell_gain": "the gains of the load cells",
+    "length_scale": "the scales of the length counters",
 }
 
 
 def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
-    """Numbers of the tracker that were fitted, and the datum, in words."""
+    """Numbers of instruments that were fitted, and the datum, in words."""
     before = declared.instruments.free if declared.instruments else frozenset()
     out = []
     if found := [text for name, text in _OF_TRACKER.items() if name in chosen.free - before]:
         out.append(
             f"the poses require {' and '.join(found)} to be other than the robot's file has: "
-            "fitted beside the geometry. Declare it as unknown in [instrument.tracker]"
+            "fitted beside the geometry. Declare it as unknown in [instrument]"
         )
     if "frame" in chosen.free:
         own = chosen.equations.robot.profile.instrument.tracker.datum
@@ -338,33 +361,15 @@ def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
             "datum of the platform: its anchor points at the home pose; a common shift of all "
             "anchor points and of the home pose is the same as another reflector offset"
         )
-    return out
-
-
-def _odd_ratios(equations: Equations, solution: Solution) -> list[str]:
-    """Lines whose cable per motor turn differs from that of the others by more than five sigma.
-
-    The contrast of one line's relative change with the mean of the others' is free of a scale that
-    all lengths of a robot without a tracker share.
-    """
-    parameters = equations.parameters
-    block, names = parameters.block["winding_radius"], equations.robot.names
-    scale = parameters.std
-    posterior = np.linalg.inv(solution.linear.information + np.eye(len(scale)))
-    relative = solution.state.values[block] / parameters.nominal[block] - 1
-    by = scale[block] / parameters.nominal[block]
-    covariance = by[:, None] * posterior[np.ix_(block, block)] * by
-    out = []
-    for i, name in enumerate(names if len(names) > 2 else ()):
-        contrast = np.full(len(names), -1.0 / (len(names) - 1))
-        contrast[i] = 1.0
-        change, std = float(contrast @ relative), float(np.sqrt(contrast @ covariance @ contrast))
-        if abs(change) > _ODD_SIGMAS * std and abs(change) > _ODD_SHARE:
-            out.append(
-                f"line {name}: the cable per motor turn differs by {100 * change:+.2f} ± "
-                f"{100 * std:.2f} % from the profile, compared with the other lines: gear ratio, "
-                "counts per turn or winding radius of its winch"
-            )
+    if "cell_gain" in chosen.free:
+        out.append(
+            "datum of the forces: the platform's mass; a common gain of all cells is the same as "
+            "another mass"
+        )
+    if "mounting" in chosen.free and "position" not in chosen.equations.kinds:
+        out.append(
+            "a bias of roll and pitch is the same as the mounting of the IMU: told as the mounting"
+        )
     return out
 
 

@@ -56,11 +56,14 @@ def candidates(
     Returns
     -------
     tuple of Candidate
-        At most one law of elongation. Payloads, which act on tensions alone, are left out.
+        At most one law of elongation. Payloads, which act on tensions alone, and gear ratios, which
+        have a test of their own, are left out.
     """
     out = []
     for effect in EFFECTS:
-        if effect.startswith("payload") or effect in effects or not _possible(equations, effect):
+        if effect.startswith(("payload", "gear-ratio")) or effect in effects:
+            continue
+        if not _possible(equations, effect):
             continue
         gain = _gain(equations, solution, weights, (*effects, effect))
         if not gain > _LEAST_GAIN:

@@ -45,6 +45,8 @@ from winchkit.schema.profiles.robot import PlatformSpec
 __all__ = ["Equations"]
 
 _FREEDOMS = 6
+_RATIO_STEP = 1e-6
+"""Relative step of a gear ratio for its derivative."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,19 @@ class Equations:
 
     @cached_property
     def winding(self) -> Winding:
-        """Drum angles and winding laws at the measured motor angles."""
+        """Drum angles and winding laws at the measured motor angles, with nominal gear ratios."""
         return winding_of(self.robot.winches, self.measured.motor_angle)
+
+    def winding_at(self, values: Array, share: float = 0.0) -> Winding:
+        """The same with the gear ratios of the parameters, larger by ``share``."""
+        if "gear_ratio" not in self.parameters.block:
+            return self.winding
+        ratios = values[self.parameters.block["gear_ratio"]] * (1 + share)
+        winches = [
+            replace(winch, gearbox=replace(winch.gearbox, ratio=float(ratio)))
+            for winch, ratio in zip(self.robot.winches, ratios, strict=True)
+        ]
+        return winding_of(winches, self.measured.motor_angle)
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:
@@ -91,10 +104,13 @@ class Equations:
 
     @property
     def has_balance(self) -> bool:
-        """Whether cable forces were measured, and the payload is fitted or the platform hangs."""
+        """Whether cable forces were measured, and the platform hangs, or the payload or cell gains
+        are fitted."""
         if self.hangs:
             return True
         block, std = self.parameters.block, self.parameters.std
+        if "cell_gain" in block:
+            return True
         payload = np.concatenate([std[block["payload_mass"]], std[block["payload_centre"]]])
         return bool(np.any(payload > 0) and np.any(np.isfinite(self.measured.tension)))
 
@@ -121,7 +137,7 @@ class Equations:
         if "home_length" in block:
             there = there + values[block["home_length"]]
         radius, growth = values[block["winding_radius"]], float(values[block["layer_growth"][0]])
-        return np.asarray(there - self.winding.wound(radius, growth))
+        return np.asarray(there - self.winding_at(values).wound(radius, growth))
 
     def strain(self, values: Array, pose: Pose) -> Strain | None:
         """Strains of the cables at poses; None where no law of elongation is fitted.
@@ -196,16 +212,24 @@ class Equations:
 
     def _closure(self, state: State) -> Constraint:
         values, block = state.values, self.parameters.block
-        return closure(
+        radius, growth = values[block["winding_radius"]], float(values[block["layer_growth"][0]])
+        winding = self.winding_at(values)
+        found = closure(
             self.geometry(values),
             state.pose,
             self.robot.home,
             self.by_drum(values),
-            winding=self.winding,
-            radius=values[block["winding_radius"]],
+            winding=winding,
+            radius=radius,
             strain=self.strain(values, state.pose),
             dead_length=self.robot.dead_length,
         )
+        if "gear_ratio" not in block:
+            return found
+        change = self.winding_at(values, _RATIO_STEP).wound(radius, growth)
+        change = change - winding.wound(radius, growth)
+        by_ratio = change / (_RATIO_STEP * values[block["gear_ratio"]])
+        return replace(found, by_line={**found.by_line, "gear_ratio": by_ratio})
 
     def _position(self, state: State) -> Constraint:
         tracker = self.tracker(state.values)
@@ -233,7 +257,8 @@ class Equations:
         return replace(found, by_robot=by)
 
     def _swivel(self, state: State) -> Constraint:
-        zero = state.values[self.parameters.block["swivel_zero"]]
+        block = self.parameters.block
+        zero = state.values[block["swivel_zero"]] if "swivel_zero" in block else 0.0
         return swivel(self.geometry(state.values), state.pose, self.measured.swivel, zero)
 
     def _cable_length(self, state: State) -> Constraint:
@@ -241,14 +266,30 @@ class Equations:
         if "length_offset" in block:
             offset = state.values[block["length_offset"]]
         geometry = self.geometry(state.values)
-        return cable_length(geometry, state.pose, self.measured.cable_length, offset)
+        if "length_scale" not in block:
+            return cable_length(geometry, state.pose, self.measured.cable_length, offset)
+        size = 1 + state.values[block["length_scale"]]
+        # A reading (1 + s) L + o, compared as the length that it means.
+        shown = self.measured.cable_length / size
+        found = cable_length(geometry, state.pose, shown, offset / size)
+        by_line = {
+            **found.by_line,
+            "length_offset": np.ones_like(shown) / size,
+            "length_scale": (self.measured.cable_length - offset) / size**2,
+        }
+        return replace(found, by_line=by_line)
 
     def _balance(self, state: State) -> Constraint:
         values = state.values
         equilibrium = hanging_balance if self.hangs else balance
-        return equilibrium(
-            self.geometry(values), state.pose, self.measured.tension, self.platform(values)
+        block, force = self.parameters.block, self.measured.tension
+        gain = 1 + (
+            values[block["cell_gain"]] if "cell_gain" in block else np.zeros(force.shape[1])
         )
+        force = force / gain
+        found = equilibrium(self.geometry(values), state.pose, force, self.platform(values))
+        by_gain = found.by_robot["tension"] * np.nan_to_num(-force / gain)[:, None, :]
+        return replace(found, by_robot={**found.by_robot, "cell_gain": by_gain})
 
     def _by_values(self, constraint: Constraint, count: int) -> Array | None:
         """Derivatives by the vector of parameters; those by what is not a parameter drop out."""

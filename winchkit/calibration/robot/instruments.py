@@ -1,5 +1,7 @@
 """Instruments of a robot's calibration: which of their numbers are unknown, and their parameters.
 
+Load cells have a gain per line and length counters a scale per line beside their offset.
+
 A tracker that was set up anew has another frame, a reflector sits elsewhere on the platform, a
 scale is off by some ppm, a target or an IMU is mounted at an angle. These numbers are parameters
 beside those of the robot (:mod:`winchkit.model.robot.tracker`), one frame per session. Each starts
@@ -23,6 +25,7 @@ from winchkit.runs.poses import Measured
 __all__ = [
     "LARGEST_SCALE",
     "NUMBERS",
+    "OF_LINES",
     "Instruments",
     "declared_instruments",
     "registered_instruments",
@@ -33,16 +36,18 @@ LARGEST_SCALE = 0.01
 system in good order; beyond it units are wrong."""
 NUMBERS = ("frame", "reflector", "scale", "mounting")
 """Numbers of a tracker that may be unknown."""
+OF_LINES = ("cell_gain", "length_scale")
+"""Numbers of each line's load cell and length counter that may be unknown."""
 
 
 @dataclass(frozen=True)
 class Instruments:
-    """Numbers of a tracker: those that are estimated, and the values of all.
+    """Numbers of instruments: those that are estimated, and the values of the tracker's.
 
     Attributes
     ----------
     free : frozenset of str
-        Of :data:`NUMBERS`.
+        Of :data:`NUMBERS` and :data:`OF_LINES`; the latter start at zero.
     sessions : tuple of str
         Names of sessions, each with a frame of its own.
     trackers : tuple of Tracker
@@ -100,13 +105,19 @@ def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
             ("reflector", spec.tracker.reflector),
             ("scale", spec.tracker.scale),
             ("mounting", spec.imu.mounting if spec.imu else spec.tracker.mounting),
+            ("cell_gain", spec.cells.gain),
+            ("length_scale", spec.length_counters.scale),
         )
         if isinstance(value, str)
     }
-    if not np.any(np.isfinite(measured.position)):
-        free &= {"mounting"}
-    if not np.any(np.isfinite(measured.angles)):
-        free -= {"mounting"}
+    for values, names in (
+        (measured.position, {"frame", "reflector", "scale"}),
+        (measured.angles, {"mounting"}),
+        (measured.tension, {"cell_gain"}),
+        (measured.cable_length, {"length_scale"}),
+    ):
+        if not np.any(np.isfinite(values)):
+            free -= names
     sessions = tuple(dict.fromkeys(measured.sessions))
     return Instruments(frozenset(free), sessions, (tracker,) * len(sessions))
 

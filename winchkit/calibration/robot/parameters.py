@@ -91,8 +91,8 @@ Indices = NDArray[np.intp]
 
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius")
 """Effects of the catalogue that every calibration fits."""
-EFFECTS = (*LAWS, "home-length", "payload-mass", "payload-centre")
-"""Effects that are fitted where they are named."""
+EFFECTS = (*LAWS, "home-length", "gear-ratio", "payload-mass", "payload-centre")
+"""Effects that are fitted where they are named; ``gear-ratio/LINE`` on one line."""
 
 _HOME_LENGTH = 1e-3
 _MASS_SHARE, _MASS_LEAST = 0.2, 0.1
@@ -100,6 +100,12 @@ _CENTRE = 20e-3
 _TRACKER_STD = {"m": 1.0, "rad": 1.0, "1": 0.01}
 """Standard deviations of the priors of a tracker's numbers about their registration, by unit: far
 above what the registration leaves, so that the data decide."""
+_RATIO_SHARE = 0.1
+"""Standard deviation of the prior of a gear ratio that is fitted, as a share: rounded ratios and
+wrong counts per turn are per cent off."""
+_OF_LINES_STD = {"cell_gain": 0.2, "length_scale": 0.02}
+"""Standard deviations of the priors of a cell's gain and a length counter's scale: wider than those
+of instruments in use, so that the data decide."""
 _REFLECTOR_STD = 0.1
 """Of a reflector's offset, m: the size of a platform."""
 
@@ -229,6 +235,24 @@ class _Builder:
         ]
         self.add(name, found)
 
+    def ratios(self, effects: Sequence[str]) -> None:
+        """Gear ratios; those that no effect frees have a prior of zero width."""
+        if not any(effect.partition("/")[0] == "gear-ratio" for effect in effects):
+            return
+        found = [
+            Parameter(
+                f"{line}.gear_ratio",
+                "1",
+                winch.gearbox.ratio,
+                _RATIO_SHARE
+                * winch.gearbox.ratio
+                * bool({"gear-ratio", f"gear-ratio/{line}"} & set(effects)),
+                low=1e-3,
+            )
+            for line, winch in zip(self.robot.names, self.robot.winches, strict=True)
+        ]
+        self.add("gear_ratio", found)
+
     def zeros(self, name: str, unit: str, std: float, *, zero: bool) -> None:
         """One number a line that starts at zero."""
         found = [
@@ -257,7 +281,7 @@ def parameters_of(
     swivel, length_offset : bool
         Whether the zeros of swivel angles and the offsets of length instruments are unknown.
     instruments : Instruments, optional
-        Numbers of a tracker that are unknown, with their starting values.
+        Numbers of instruments that are unknown, with their starting values.
 
     Raises
     ------
@@ -277,6 +301,7 @@ def parameters_of(
     swivels = robot.geometry.swivel_radius.tolist()
     build.lengths("swivel_radius", swivels, [radius > 0 for radius in swivels])
     _growth(build, winches)
+    build.ratios(effects)
     if law or "home-length" in effects:
         build.zeros("home_length", "m", _HOME_LENGTH, zero=False)
     if law:
@@ -288,6 +313,9 @@ def parameters_of(
         build.zeros("length_offset", "m", ZERO_STD["cable_length"], zero=True)
     if instruments is not None:
         _tracker(build, instruments)
+        for name, std in _OF_LINES_STD.items():
+            if name in instruments.free:
+                build.zeros(name, "1", std, zero=True)
     found = Parameters(tuple(build.all), build.block, law)
     if offsets := own.get("home-length"):
         found = found.starting("home_length", np.array([offsets[n] for n in robot.names]))
@@ -306,7 +334,9 @@ def _of_law(law: str, spec: LawParameter, own: Mapping[str, float]) -> Parameter
 
 def _known(effects: Sequence[str]) -> None:
     for effect in effects:
-        if effect not in (*GEOMETRY, *EFFECTS):
+        if effect.partition("/")[0] not in (*GEOMETRY, *EFFECTS) or (
+            "/" in effect and not effect.startswith("gear-ratio/")
+        ):
             raise UsageError(
                 f"effect '{effect}' cannot join a robot's calibration; use one of "
                 f"{', '.join(EFFECTS)} ({', '.join(GEOMETRY)} are always in it)"

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
 from winchkit.model.robot import Pose, forward, rotation_of
+from winchkit.model.robot.bundle_adjustment import State, Weights, place
 from winchkit.model.robot.pose_estimation import start_pose
 from winchkit.model.robot.rotation import rotation_vector
 from winchkit.model.robot.tracker import pose_behind, reading_of, registered
 
-__all__ = ["PoseErrors", "errors_at", "predicted_poses", "rms", "start_of"]
+__all__ = ["PoseErrors", "cable_errors", "errors_at", "predicted_poses", "rms", "start_of"]
 
 _ROUNDS = 4
 
@@ -54,6 +55,31 @@ def errors_at(equations: Equations, values: Array) -> PoseErrors:
     seen = np.swapaxes(rotation_of(*measured.angles[whole].T), 1, 2)
     angle[whole] = np.linalg.norm(rotation_vector(pose.rotation[whole] @ seen), axis=1)
     return PoseErrors(distance, angle, measured.place, unfound)
+
+
+def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array:
+    """Cable lengths by drums against geometry, at the poses that all instruments determine.
+
+    The held-out error of a robot whose positions are not measured.
+
+    Parameters
+    ----------
+    equations : Equations
+        Of the p poses.
+    values : (q,) array
+        Parameters in fitted units.
+    weights : Weights
+        Standard deviations by kind.
+
+    Returns
+    -------
+    (p, n) array
+        m; NaN where a motor angle is missing.
+    """
+    # Kinds that were not fitted have unknown zeros and take no part.
+    sigma = {kind: weights.sigma.get(kind, np.inf) for kind in equations.kinds}
+    state = place(equations, State(values, start_of(equations, values)), Weights(sigma))
+    return next(c.residual for kind, c in equations.constraints(state) if kind == "rope")
 
 
 def predicted_poses(equations: Equations, values: Array, start: Pose | None = None) -> Pose:

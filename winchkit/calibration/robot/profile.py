@@ -15,6 +15,7 @@ import tomlkit
 from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Calibrated
 from winchkit.calibration.robot.elongation import LAWS
+from winchkit.calibration.robot.instruments import NUMBERS
 from winchkit.calibration.robot.parameters import Estimated
 from winchkit.calibration.robot.prediction import rms
 from winchkit.catalog import find
@@ -62,6 +63,7 @@ def write_calibrated(source: Path, found: Calibrated, out: Path, where: Provenan
     for line in document["line"]:
         _line(line, source, found)
     _instruments(document, found)
+    _of_lines(document, found)
     _effects(document, found.estimates)
     _platform(document, found.estimates)
     document["fitted"] = _fitted(found, where)
@@ -74,7 +76,7 @@ def _instruments(document: Any, found: Calibrated) -> None:
     A frame of several sessions stays unknown: each session has its own.
     """
     own = found.equations.instruments_at(found.values)
-    if own is None or not own.free:
+    if own is None or not own.free & set(NUMBERS):
         return
     tables = document.setdefault("instrument", tomlkit.table(is_super_table=True))
     table = tables.setdefault("tracker", tomlkit.table())
@@ -101,6 +103,25 @@ def _instruments(document: Any, found: Calibrated) -> None:
         if found.equations.robot.profile.instrument.imu is not None:
             there = tables.setdefault("imu", tomlkit.table())
         there["mounting"] = _vector(angles_of(rotation_by(tracker.mounting)), "deg")
+
+
+def _of_lines(document: Any, found: Calibrated) -> None:
+    """Fitted gains of cells and scales of length counters, with the known errors of before."""
+    own, spec = found.equations.instruments, found.equations.robot.profile.instrument
+    if own is None:
+        return
+    for name, table, key, known in (
+        ("cell_gain", "cells", "gain", spec.cells.gain),
+        ("length_scale", "length_counters", "scale", spec.length_counters.scale),
+    ):
+        if name in own.free:
+            tables = document.setdefault("instrument", tomlkit.table(is_super_table=True))
+            values = tomlkit.inline_table()
+            for line in found.equations.robot.names:
+                before = 0.0 if isinstance(known, str) else known.get(line, 0.0)
+                error = (1 + before) * (1 + found.estimates[f"{line}.{name}"].value) - 1
+                values[line] = format_quantity(error, "%", _DIGITS)
+            tables.setdefault(table, tomlkit.table())[key] = values
 
 
 def _into_frame(document: Any, origin: Array, turned: Array) -> None:
@@ -131,6 +152,8 @@ def _line(line: Any, source: Path, found: Calibrated) -> None:
         line["winch"] = _tables_of(line["winch"], source)
     drum = line["winch"]["drum"]
     drum["winding_radius"] = _written(estimates[f"{name}.winding_radius"])
+    if (ratio := estimates.get(f"{name}.gear_ratio")) is not None:
+        line["winch"]["gearbox"]["ratio"] = _written(ratio)
     if drum["kind"] in LAYERED and (growth := estimates.get("layer_growth")) is not None:
         drum["layer_growth"] = _written(growth)
 

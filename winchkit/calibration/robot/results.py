@@ -56,6 +56,8 @@ def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[s
             "max_after": _largest(after.distance),
             "rotation_rms_before": rms(found.validation_before.angle),
             "rotation_rms_after": rms(angle),
+            "length_rms_before": found.validation_lengths[0],
+            "length_rms_after": found.validation_lengths[1],
             "unfound": after.unfound,
         },
         "parameters": {name: _entry(estimate) for name, estimate in found.estimates.items()},
@@ -72,6 +74,11 @@ def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[s
             {"position": p.position, "rotation": p.angles, "gain": p.gain} for p in following
         ],
         "instruments": instruments_json(found),
+        "ratios": {
+            "lines": [vars(ratio) for ratio in found.ratios.lines],
+            "named": list(found.ratios.named),
+            "alternatives": [list(lines) for lines in found.ratios.alternatives],
+        },
         "refused": found.refusal or None,
         "warnings": list(found.warnings),
         "converged": found.solution.converged,
@@ -227,6 +234,9 @@ def _errors(found: Calibrated) -> Iterator[str]:
             f"rotation error held out: {degrees(rms(before.angle)):.4g} deg before, "
             f"{degrees(rms(after.angle)):.4g} deg after"
         )
+    if not isfinite(rms(after.distance)) and isfinite(found.validation_lengths[1]):
+        first, last = (_shown(value, "m") for value in found.validation_lengths)
+        yield f"cable lengths held out, drums against geometry: {first} before, {last} after"
     yield f"noise (1 sigma): {noise_words(found)}"
     yield (
         f"{found.observed.rank} of {found.observed.free} parameter directions identifiable, "

@@ -7,10 +7,13 @@ compared by the Bayesian information criterion
 
     χ² + 2 Σ n_k ln σ_k + q ln N
 
-with n_k equations of the kind k and its standard deviation σ_k, q numbers of the tracker and N
-equations in all. The prior's part of χ² takes part between models of equally many parts alone: a
-common shift of all anchor points is the same as a reflector's offset, and with the prior it would
-be cheaper as an offset whether or not there is one.
+with n_k equations of the kind k and its standard deviation σ_k, q numbers of instruments and gear
+ratios and N equations in all. Gains of cells, scales of length counters and the axes of an IMU of a
+robot without a tracker are then freed one after another, as long as a score test and the criterion
+ask for them, and the gear ratios of lines whose winding radius left its prior. The prior's part of
+χ² takes part between models of equally many parts alone: a common shift of all anchor points is the
+same as a reflector's offset, and with the prior it would be cheaper as an offset whether or not
+there is one.
 """
 
 from __future__ import annotations
@@ -26,6 +29,7 @@ import numpy as np
 from winchkit.calibration.robot.equations import Equations
 from winchkit.calibration.robot.instruments import (
     LARGEST_SCALE,
+    OF_LINES,
     Instruments,
     declared_instruments,
     registered_instruments,
@@ -39,6 +43,7 @@ from winchkit.calibration.robot.prediction import (
     rms,
     start_of,
 )
+from winchkit.calibration.robot.ratios import ratios_of
 from winchkit.calibration.robot.variance_components import NOISE, re_estimated_weights
 from winchkit.model.robot import Pose
 from winchkit.model.robot.bundle_adjustment import (
@@ -61,12 +66,22 @@ _LEAST_FALL = 0.7
 not fitted (rule of thumb: half of the variance, so that a tracker is not blamed for cables)."""
 _CLEARLY_WORSE = 5.0
 """Ratio of two registrations' errors above which the worse one is not fitted (rule of thumb)."""
+_COUNTED = (
+    "tracker_frame",
+    "reflector",
+    "tracker_scale",
+    "mounting",
+    "gear_ratio",
+    *OF_LINES,
+)
 _COUNTED_AS = {"reflector": 6}
 """Numbers of a reflector's offset in the criterion: as many as of a frame. With a platform that
 hardly turns the two are the same shift, which is then said to be the frame's."""
 _DELTA_CHI_SQUARE = 9.0
 """Difference of criteria below which two explanations count as equal: the true one is worse by this
 much with probability at most 1/740."""
+_BEYOND_PRIOR = 3.0
+"""Standard deviations of its prior beyond which a winding radius imitates another gear ratio."""
 _LEVEL = 1e-6
 """Level of the score test for free numbers of the tracker (rule of thumb)."""
 _PLAINLY = 3.0
@@ -105,9 +120,10 @@ class Fitted:
             )
         )
         block = self.equations.parameters.block
+        std = self.equations.parameters.std
         numbers = sum(
-            _COUNTED_AS.get(name, int(block[name].size))
-            for name in ("tracker_frame", "reflector", "tracker_scale", "mounting")
+            _COUNTED_AS.get(name, int(np.count_nonzero(std[block[name]])))
+            for name in _COUNTED
             if name in block
         )
         return likelihood + numbers * log(max(int(np.count_nonzero(known)), 2))
@@ -117,6 +133,12 @@ class Fitted:
         """The criterion with the prior's part of χ²."""
         prior = self.solution.linear.prior
         return self.criterion + float(prior @ prior)
+
+    @property
+    def at_bound(self) -> bool:
+        """Whether a number of an instrument stopped at a bound."""
+        held, block = self.solution.held, self.equations.parameters.block
+        return any(bool(np.any(held[block[name]])) for name in _COUNTED if name in block)
 
     @property
     def is_plausible(self) -> bool:
@@ -141,7 +163,7 @@ class Fitted:
 def fitted_with_instruments(
     equations: Equations, options: Options, progress: ProgressCallback
 ) -> tuple[Equations, Fitted]:
-    """Fit the declared model, or the one with the tracker that the poses require.
+    """Fit the declared model, or the one with the instruments and ratios that the poses require.
 
     Parameters
     ----------
@@ -160,6 +182,15 @@ def fitted_with_instruments(
     chosen : Fitted
         The fit that is reported.
     """
+    declared, best = _fitted_with_tracker(equations, options, progress)
+    best = _with_more(best, options, progress)
+    return declared, _with_ratios(best, options, progress)
+
+
+def _fitted_with_tracker(
+    equations: Equations, options: Options, progress: ProgressCallback
+) -> tuple[Equations, Fitted]:
+    """Fit the declared model, or the one with the tracker that the poses require."""
     own = _instruments(equations)
     predicted = predicted_poses(equations, equations.parameters.nominal, equations.robot.home)
     declared = _registered(equations, own, own.free, predicted) if own.free else equations
@@ -200,6 +231,52 @@ def fitted_with_instruments(
     if best is None:
         return declared, _fitted(declared, options, progress)
     return declared, best if best is first else _mounted(best, predicted, options, progress)
+
+
+def _with_more(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:
+    """The fit with more numbers of instruments free, while the poses require one of them."""
+    while True:
+        own = _instruments(best.equations)
+        trials = [
+            with_instruments(best.equations, replace(own, free=own.free | {name}))
+            for name in _undeclared(best.equations, own)
+        ]
+        fits = [_fitted(t, options, progress, best) for t in trials if _shows_more(best, t)]
+        fits = [fit for fit in fits if fit.criterion < best.criterion and not fit.at_bound]
+        if not fits:
+            return best
+        best = min(fits, key=lambda fit: fit.criterion)
+
+
+def _undeclared(equations: Equations, own: Instruments) -> list[str]:
+    """Numbers of instruments other than a tracker that may be free beside those that are."""
+    kinds = equations.kinds
+    possible = {
+        "mounting": "rotation" in kinds and "position" not in kinds,
+        "cell_gain": equations.hangs,
+        "length_scale": "cable_length" in kinds,
+    }
+    return [name for name, may in possible.items() if may and name not in own.free]
+
+
+def _with_ratios(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:
+    """The fit with the gear ratios of the lines whose winding radius left its prior.
+
+    A drum with layers distinguishes its ratio from its radius, so that the radius alone would be a
+    wrong model; on other drums the wider prior of the ratio takes the change.
+    """
+    radius = best.equations.parameters.block["winding_radius"]
+    prior, held = best.solution.linear.prior[radius], best.solution.held[radius]
+    beyond = (np.abs(prior) > _BEYOND_PRIOR) | (held != 0)
+    if not np.any(beyond):
+        return best
+    odd = ratios_of(best.equations, best.solution).named
+    if not odd or "gear-ratio" in best.equations.effects:
+        return best
+    effects = (*best.equations.effects, *(f"gear-ratio/{line}" for line in odd))
+    trial = with_instruments(replace(best.equations, effects=effects), _instruments(best.equations))
+    found = _fitted(trial, options, progress, best)
+    return found if found.with_prior < best.with_prior else best
 
 
 def _instruments(equations: Equations) -> Instruments:
@@ -304,11 +381,23 @@ def _mounted(best: Fitted, predicted: Pose, options: Options, progress: Progress
     return found if found.criterion < best.criterion and after < _LEAST_FALL * before else best
 
 
-def _fitted(equations: Equations, options: Options, progress: ProgressCallback) -> Fitted:
-    """Fit and variance components in turn until both have settled."""
-    equations, state = _start(equations, options)
+def _fitted(
+    equations: Equations,
+    options: Options,
+    progress: ProgressCallback,
+    from_fit: Fitted | None = None,
+) -> Fitted:
+    """Fit and variance components in turn until both have settled.
+
+    A model that contains another one starts at the fit of that, so that it fits at least as well.
+    """
     given = options.sigma or {}
-    weights = Weights(_sigma(equations, options))
+    if from_fit is None:
+        equations, state = _start(equations, options)
+        weights = Weights(_sigma(equations, options))
+    else:
+        equations, state = _continued(equations, from_fit)
+        weights = Weights({**_sigma(equations, options), **from_fit.weights.sigma})
     solution = solve(equations, state, weights, _reporter(progress, "fit"))
     for _ in range(_NOISE_ROUNDS):
         found = replace(re_estimated_weights(solution, weights, given), loss=options.loss)
@@ -317,6 +406,17 @@ def _fitted(equations: Equations, options: Options, progress: ProgressCallback) 
         weights = found
         solution = solve(equations, solution.state, weights, _reporter(progress, "refit"))
     return Fitted(equations, solution, weights)
+
+
+def _continued(equations: Equations, fitted: Fitted) -> tuple[Equations, State]:
+    """Equations with the priors of a fit of fewer parameters, and its end as their state."""
+    parameters, own = equations.parameters, fitted.equations.parameters
+    for name, place in own.block.items():
+        parameters = parameters.starting(name, own.nominal[place])
+    values = parameters.nominal
+    for name, place in own.block.items():
+        values[parameters.block[name]] = fitted.solution.state.values[place]
+    return replace(equations, parameters=parameters), State(values, fitted.solution.state.pose)
 
 
 def _start(equations: Equations, options: Options) -> tuple[Equations, State]:

@@ -9,7 +9,7 @@ An unknown number is estimated from the poses beside the parameters of the robot
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -19,9 +19,12 @@ from winchkit.schema.table import Rule, Table
 
 __all__ = [
     "UNKNOWN",
+    "CellsSpec",
     "FrameSpec",
     "ImuSpec",
     "InstrumentSpec",
+    "LengthCountersSpec",
+    "SwivelsSpec",
     "TrackerSpec",
 ]
 
@@ -96,6 +99,39 @@ def _vector(raw: object, marker: Quantity, wanted: str) -> Vector:
     return x, y, z
 
 
+@dataclass(frozen=True)
+class _PerLine(Marker):
+    """Marks a field with a quantity per line by its name, or ``"unknown"``."""
+
+    dimension: str
+    unit: str
+    limit: float = float("inf")
+    """Largest size of a value."""
+
+    @property
+    def wanted(self) -> str:
+        """Description of the expected value."""
+        return f'"{UNKNOWN}" or a value per line: {{ LINE = "{self.unit}", … }}'
+
+    def read(self, raw: object) -> Mapping[str, float] | Unknown:
+        """Convert a value of a file to SI; raises UsageError with the reason."""
+        if raw == UNKNOWN:
+            return "unknown"
+        if not isinstance(raw, dict):
+            raise UsageError(f"expected {self.wanted}, not {raw!r}")
+        marker = Quantity(self.dimension)
+        out = {}
+        for line, value in raw.items():
+            out[str(line)] = marker.read(value)
+            if not abs(out[str(line)]) < self.limit:
+                raise UsageError(
+                    f"line {line}: {value} is not below {self.limit:g} in size; it is a relative "
+                    "error, such as 2 %"
+                )
+        return out
+
+
+PerLine = Mapping[str, float] | Unknown
 Frame = Annotated[FrameSpec | Unknown, _Frame()]
 Place = Annotated[Vector | Unknown, _OrUnknown("length", 3)]
 Turn = Annotated[Vector | Unknown, _OrUnknown("angle", 3)]
@@ -134,8 +170,46 @@ class ImuSpec(Table):
 
 
 @dataclass(frozen=True)
+class CellsSpec(Table):
+    """Load cells of the lines."""
+
+    gain: Annotated[PerLine, _PerLine("ratio", "1 %", 0.9)] = field(default_factory=dict)
+    """Relative error of each cell's span: a reading is (1 + gain) times the cable force."""
+
+
+@dataclass(frozen=True)
+class LengthCountersSpec(Table):
+    """Instruments of ``LINE.cable_length``."""
+
+    scale: Annotated[PerLine, _PerLine("ratio", "0.1 %", 0.5)] = field(default_factory=dict)
+    """Relative error of each instrument: a reading is (1 + scale) times the length, and an
+    offset."""
+
+
+@dataclass(frozen=True)
+class SwivelsSpec(Table):
+    """Encoders of the swivel pulleys."""
+
+    zero: Annotated[PerLine, _PerLine("angle", "1 deg")] = "unknown"
+    """Reading of each encoder at the swivel angle zero; fitted where it is unknown."""
+
+
+@dataclass(frozen=True)
 class InstrumentSpec(Table):
     """Instruments of a robot."""
 
     tracker: TrackerSpec = field(default_factory=TrackerSpec)
     imu: ImuSpec | None = None
+    cells: CellsSpec = field(default_factory=CellsSpec)
+    length_counters: LengthCountersSpec = field(default_factory=LengthCountersSpec)
+    swivels: SwivelsSpec = field(default_factory=SwivelsSpec)
+
+    def lines(self) -> Iterator[tuple[str, str]]:
+        """Keys of the tables with values per line, and the names of their lines."""
+        for key, values in (
+            ("cells.gain", self.cells.gain),
+            ("length_counters.scale", self.length_counters.scale),
+            ("swivels.zero", self.swivels.zero),
+        ):
+            if not isinstance(values, str):
+                yield from ((key, line) for line in values)

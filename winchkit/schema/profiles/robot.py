@@ -123,6 +123,9 @@ class RobotProfile(Plotted, Table):
         names = [line.name for line in self.line]
         for name in sorted({name for name in names if names.count(name) > 1}):
             yield "line", f"{names.count(name)} lines are named '{name}'"
+        for key, name in self.instrument.lines():
+            if name not in names:
+                yield f"instrument.{key}", f"no line '{name}'; the lines are {', '.join(names)}"
         seen: dict[Point, str] = {}
         for n, line in enumerate(self.line):
             other = seen.setdefault(line.exit_point, line.name)
