@@ -411,11 +411,11 @@ def _fitted(
 def _continued(equations: Equations, fitted: Fitted) -> tuple[Equations, State]:
     """Equations with the priors of a fit of fewer parameters, and its end as their state."""
     parameters, own = equations.parameters, fitted.equations.parameters
-    for name, place in own.block.items():
-        parameters = parameters.starting(name, own.nominal[place])
+    for name, indices in own.block.items():
+        parameters = parameters.starting(name, own.nominal[indices])
     values = parameters.nominal
-    for name, place in own.block.items():
-        values[parameters.block[name]] = fitted.solution.state.values[place]
+    for name, indices in own.block.items():
+        values[parameters.block[name]] = fitted.solution.state.values[indices]
     return replace(equations, parameters=parameters), State(values, fitted.solution.state.pose)
 
 
