@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq, minimize
@@ -75,8 +76,7 @@ class Hanging:
 
     def home(self) -> Array:
         """Rest pose with the cables of the upright platform at the home position."""
-        upright = np.array([*HOME, 0.0, 0.0, 0.0])
-        return self.rest(self.lengths(upright), upright)
+        return _home(self.truth, self.centre).copy()
 
     def poses(self, count: int, seed: int) -> Array:
         """Rest poses about home, (count, 6)."""
@@ -206,6 +206,12 @@ class Hanging:
                 f"[line.winch.reference]\nwound_turns = {own.turns}\n"
             )
         return "".join(out)
+
+
+@lru_cache(maxsize=16)
+def _home(truth: Truth, centre: Vector) -> Array:
+    upright, robot = np.array([*HOME, 0.0, 0.0, 0.0]), Hanging(truth, centre=centre)
+    return robot.rest(robot.lengths(upright), upright)
 
 
 def _lengths(point: Sequence[float] | Array) -> str:

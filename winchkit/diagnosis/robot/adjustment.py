@@ -35,7 +35,7 @@ __all__ = ["STD_OF_ZERO", "Adjusted", "adjusted", "instrument_zeros", "placed"]
 _FLAT = 1e3
 """Standard deviation of the prior of an effect's coordinates, which are near one in size."""
 _STEP = 1e-3
-_PLACED_BY = ("rope", "position", "rotation", "tension")
+_PLACED_BY = ("rope", "position", "rotation", "tension", "statics")
 STD_OF_ZERO = {"swivel": ZERO_STD["swivel"], "gauge": ZERO_STD["cable_length"]}
 """Standard deviation of the prior of an instrument's zero, by kind of residual."""
 
@@ -154,6 +154,9 @@ class _Adjustment:
         for kind, own in self.zeros.items():
             found[kind] = found[kind] + values[at : at + len(own)]
             at += len(own)
+        if self.dataset.hangs:
+            # A part of the statics, which have all of it.
+            found.pop("tension")
         return {kind: r for kind, r in found.items() if np.isfinite(r).any()}
 
     def _by_values(
@@ -230,7 +233,9 @@ def _placed(adjustment: _Adjustment, sigma: Mapping[str, float]) -> State:
 
 def instrument_zeros(residuals: Mapping[str, Array], dataset: RobotDataset) -> dict[str, Array]:
     """First estimate of the zeros of swivel angles and length instruments, (n,) by kind."""
-    kinds = ["swivel"] if dataset.measured.length_zeroed else ["swivel", "gauge"]
+    kinds = [] if dataset.measured.length_zeroed else ["gauge"]
+    if isinstance(dataset.robot.instrument.swivels.zero, str):
+        kinds.insert(0, "swivel")
     return {
         kind: mean_offset(residuals[kind], angles=kind == "swivel")
         for kind in kinds

@@ -19,6 +19,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["RobotDataset", "prepare_poses"]
 
+_FREEDOMS = 6
 _LEAST_POSES = 10
 """Least number of poses (rule of thumb)."""
 _ANGLE_TOLERANCE = 0.02
@@ -44,8 +45,22 @@ class RobotDataset(Dataset):
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Outputs: cable lengths, and tensions where they are compared with the weight."""
+        """Outputs: cable lengths, and tensions where they are compared with the weight.
+
+        The statics of a hanging platform determine its pose and are among the rows of the lengths.
+        """
+        return self.shown_outputs if not self.hangs else ("cable_length",)
+
+    @property
+    def shown_outputs(self) -> tuple[str, ...]:
+        """Outputs on which an effect may act."""
         return ("cable_length", "tension") if self.has_balance else ("cable_length",)
+
+    @property
+    def hangs(self) -> bool:
+        """Whether cable forces and the weight determine where the platform stands."""
+        few = len(self.names) < _FREEDOMS and self.robot.platform.mass > 0
+        return few and self.has_balance
 
     @property
     def has_balance(self) -> bool:
@@ -82,6 +97,8 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
         )
     kinds = (measured.motor_angle, measured.position, measured.angles)
     spare = sum(int(np.isfinite(values).sum()) for values in kinds) - 6 * len(measured)
+    if len(robot.line) < _FREEDOMS and robot.platform.mass > 0:
+        spare += 6 * int(np.isfinite(measured.tension).all(axis=1).sum())
     for values in (measured.swivel, measured.cable_length):
         # Each line's instrument has a zero of its own.
         spare += max(0, int(np.isfinite(values).sum()) - values.shape[1])
@@ -89,7 +106,8 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
         raise RunError(
             Fault(
                 "no measurement beyond those that determine the poses themselves; measure the "
-                "platform (platform_x, platform_y, platform_z)",
+                "platform (platform_x, platform_y, platform_z), swivel angles, or, of a hanging "
+                "platform of known mass, the tensions",
                 place,
             )
         )

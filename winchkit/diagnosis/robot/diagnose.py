@@ -288,6 +288,7 @@ def _geometry_step(engine: PoseSelection, reported: SelectionResult, output: Out
 
 _GEOMETRY_LEVEL = 1e-3
 _SINGLE_EFFECT_SHARE = 0.4
+_FEW_EFFECTS = 4
 
 
 def diagnose_robot(
@@ -353,13 +354,21 @@ def _inconsistent(added: Sequence[Term]) -> tuple[Term, ...]:
 
 
 def _geometry_explains_far_more(preparation: Preparation, file_engine: PoseSelection) -> bool:
-    """Whether the whole geometry explains far more χ² than any single effect."""
-    gain = _gain_of_geometry(preparation, file_engine, file_engine.initial_model)
-    if not _is_significant(preparation, gain):
-        return False
+    """Whether the whole geometry explains far more χ² than any single effect, or a significant part
+    of it beside the few that explain most in turn."""
     present, noise = file_engine.fit_with_noise(file_engine.initial_model)
-    best = max((s.explained_ss for s in file_engine.scores(present, noise)), default=0.0)
-    return best < _SINGLE_EFFECT_SHARE * gain
+    for _ in range(_FEW_EFFECTS):
+        gain = _gain_of_geometry(preparation, file_engine, present.hypothesis)
+        if not _is_significant(preparation, gain):
+            return False
+        scores = file_engine.scores(present, noise)
+        best = max(scores, key=lambda s: s.explained_ss, default=None)
+        if best is None or best.explained_ss < _SINGLE_EFFECT_SHARE * gain:
+            return True
+        present = file_engine.trial(present, best, noise).fit
+    return _is_significant(
+        preparation, _gain_of_geometry(preparation, file_engine, present.hypothesis)
+    )
 
 
 def _gain_of_geometry(

@@ -8,6 +8,9 @@ residuals are model less measurement by kind, in SI. Here
   is smaller by the factor 1 − ε;
 * lengths by the drum are those of :class:`winchkit.model.line.Line`, which applies effects; without
   effects they are those of :class:`winchkit.model.robot.constraints.Winding` up to rounding;
+* ``statics`` is the equilibrium of a hanging platform
+  (:mod:`winchkit.model.robot.hanging_balance`), which takes part in its pose; its ``tension`` rows,
+  the part of it that cable forces can carry, are then shown alone;
 * ``gauge`` are the rows ``cable_length`` and ``tension`` the rows ``balance`` of that module;
 * ``tension`` rows are whitened at the pose and geometry of one robot (``basis``), so that they
   stay comparable between hypotheses, and cable forces are computed from the cells' readings;
@@ -38,6 +41,7 @@ from winchkit.model.robot import (
     swivel_sensitivities,
 )
 from winchkit.model.robot.constraints import (
+    Constraint,
     by_geometry,
     by_pose,
     closure_by_geometry,
@@ -50,6 +54,7 @@ from winchkit.model.robot.constraints import (
     winding_of,
     wrench_residual,
 )
+from winchkit.model.robot.hanging_balance import hanging_balance, hanging_residual
 from winchkit.model.robot.pose_estimation import start_pose as completed
 from winchkit.model.robot.robot import standing
 from winchkit.model.robot.tracker import tracked_position, tracked_rotation
@@ -57,7 +62,7 @@ from winchkit.model.stages import At, Stage
 
 __all__ = ["POSED", "Equations", "start_pose"]
 
-POSED = ("rope", "position", "rotation", "swivel", "gauge")
+POSED = ("rope", "position", "rotation", "swivel", "gauge", "statics")
 """Kinds that depend on the pose, in their order."""
 _NEWTON_STEPS, _FORCE_STEP, _LEAST_SLOPE, _FORCE_TOLERANCE = 8, 1e-4, 0.05, 1e-9
 
@@ -112,7 +117,10 @@ class Equations:
             "rotation": self._rotation(robot),
             "swivel": self._swivel(robot),
             "gauge": length - measured.cable_length,
+            "statics": np.full((len(measured), 6), np.nan),
         }
+        if self.dataset.hangs:
+            out["statics"] = hanging_residual(robot.geometry, pose, force, robot.platform)
         if self.dataset.has_balance:
             out["tension"] = self._balance(robot, force)
         return out
@@ -152,13 +160,20 @@ class Equations:
         else:
             place = tracked_position(robot.tracker, pose, measured.position).by_pose
             turned = tracked_rotation(robot.tracker, pose, measured.angles).by_pose
+        statics = np.zeros((len(measured), 6, 6))
+        if self.dataset.hangs:
+            statics = self._statics(robot).by_pose
         return {
             "rope": length,
             "position": place,
             "rotation": turned,
             "swivel": swivel,
             "gauge": length,
+            "statics": statics,
         }
+
+    def _statics(self, robot: Robot) -> Constraint:
+        return hanging_balance(robot.geometry, self.pose, self.forces(robot), robot.platform)
 
     def by_geometry(self, robot: Robot, geometry: Sequence[GeometryPrior]) -> dict[str, Array]:
         """Derivatives of the residuals by numbers of the geometry, (p, k, g), by kind.
@@ -179,12 +194,29 @@ class Equations:
             "gauge": by_geometry(length),
         }
         out = {kind: np.zeros((*angle.shape, len(geometry))) for kind in by_kind}
+        if self.dataset.hangs and geometry:
+            out["statics"] = self._statics_by_geometry(robot, geometry)
         for index, item in enumerate(geometry):
             lines = [robot.names.index(item.line)] if item.line else slice(None)
             for kind, fields in by_kind.items():
                 if (part := fields.get(item.field)) is not None:
                     own = part[..., "xyz".index(item.parameter)] if part.ndim == 3 else part
                     out[kind][:, lines, index] = own[:, lines]
+        return out
+
+    def _statics_by_geometry(self, robot: Robot, geometry: Sequence[GeometryPrior]) -> Array:
+        """Derivatives of the statics by numbers of the geometry, (p, 6, g)."""
+        found = self._statics(robot).by_robot
+        out = np.zeros((len(self.dataset.measured), 6, len(geometry)))
+        for index, item in enumerate(geometry):
+            part = found.get(item.field)
+            if part is None:
+                continue
+            lines = [robot.names.index(item.line)] if item.line else range(len(robot.names))
+            point = part.shape[2] > len(robot.names)
+            for line in lines:
+                column = 3 * line + "xyz".index(item.parameter) if point else line
+                out[..., index] += part[..., column]
         return out
 
     def _position(self, robot: Robot) -> Array:

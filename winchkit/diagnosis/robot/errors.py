@@ -1,7 +1,8 @@
 """Errors of a robot's model in SI: in sample, held out and by noise alone.
 
 ``cable_length`` is the length by the drum less the length by geometry at the measured pose, with
-what unmeasured coordinates of the pose can explain projected out; ``platform_position`` the
+what unmeasured coordinates of the pose can explain projected out (of a hanging platform at the
+pose that all but the drums determine, its statics included); ``platform_position`` the
 position by the motor angles (linearised forward kinematics) less the measured one; ``tension`` the
 whitened wrench that measured cable forces and the weight leave over.
 """
@@ -21,6 +22,7 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.results import OutputFit
 from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.diagnosis.robot.equations import POSED
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
 from winchkit.model.robot.rotation import rotation_by, skew
@@ -40,6 +42,7 @@ __all__ = [
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
 _DEGREES_OF_FREEDOM = 6
+_LEAST_SINGULAR_VALUE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,8 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
     dict
         By output (p, n), (p, 3) or (p, k), SI; NaN where something was not measured.
     """
+    if regression.dataset.hangs:
+        return _errors_of_hanging(regression, residuals)
     at_pose, to_place = _maps(regression)
     known = _measured_coordinates(residuals)
     residuals = _in_base(regression, residuals)
@@ -96,8 +101,50 @@ def column_names(dataset: RobotDataset, errors: Errors) -> dict[str, tuple[str, 
     }
 
 
+def _errors_of_hanging(regression: PoseRegression, residuals: Mapping[str, Array]) -> Errors:
+    """Errors at the poses that everything but the drums determines, to first order."""
+    at_pose, to_length = _hanging_maps(regression)
+    others = _stacked(regression, residuals)
+    closure = residuals["rope"] - (to_length @ others[..., None])[..., 0]
+    rows = np.where(np.isfinite(closure), closure, 0.0)
+    length = (at_pose @ rows[..., None])[..., 0]
+    return {
+        "cable_length": np.where(np.isfinite(closure), -length, np.nan),
+        "tension": -residuals["tension"],
+    }
+
+
+def _stacked(regression: PoseRegression, values: Mapping[str, Array]) -> Array:
+    """All rows of a pose but those of the drums in standard deviations; zero where missing."""
+    sigma, kinds = regression.point.sigma, [k for k in POSED if k != "rope"]
+    return np.concatenate([np.nan_to_num(values[k]) / sigma[k] for k in kinds], axis=1)
+
+
+def _hanging_maps(regression: PoseRegression) -> tuple[Array, Array]:
+    """Projection of closures beside coordinates that nothing else determines (p, n, n), and the map
+    from the other rows to closures, (p, n, r)."""
+    by, here = regression.slope(), regression.residuals(())
+    sigma, kinds = regression.point.sigma, [k for k in POSED if k != "rope"]
+    known = np.concatenate([np.isfinite(here[k]) for k in kinds], axis=1)
+    slope = np.concatenate([by[k] / sigma[k] for k in kinds], axis=1)
+    slope = np.where(known[..., None] & np.isfinite(slope), slope, 0.0)
+    left, size, right = np.linalg.svd(slope, full_matrices=False)
+    seen = size > _LEAST_SINGULAR_VALUE * np.maximum(size[:, :1], 1e-300)
+    inverse = np.where(seen, 1 / np.where(seen, size, 1.0), 0.0)
+    pose_of = (np.swapaxes(right, 1, 2) * inverse[:, None]) @ np.swapaxes(left, 1, 2)
+    rope = np.nan_to_num(by["rope"])
+    free = rope @ (np.swapaxes(right, 1, 2) * ~seen[:, None])
+    undone = free @ np.linalg.pinv(free, rcond=1e-9)
+    return np.eye(rope.shape[1]) - undone, np.asarray(rope @ pose_of)
+
+
 def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     """Rms of the errors by the noise of the instruments alone, by output, SI."""
+    if regression.dataset.hangs:
+        at_pose, to_length = _hanging_maps(regression)
+        variance = noise.sigma["rope"] ** 2 + np.sum(to_length**2, axis=2)
+        length = float(np.sqrt(np.mean(variance * np.diagonal(at_pose, axis1=1, axis2=2))))
+        return {"cable_length": length, "tension": noise.sigma["tension"]}
     at_pose, to_place = _maps(regression)
     sigma, by = noise.sigma, _slope(regression)
     here = regression.residuals(())

@@ -119,11 +119,15 @@ def estimated_noise(
         here = regression.residuals(own)
         columns = _columns(regression, own, candidates, here)
         kinds = [k for k, values in here.items() if np.isfinite(values).any()]
+        if dataset.hangs:
+            kinds.remove("tension")
         slope = {k: v for k, v in regression.slope().items() if k in kinds}
         kept = {k: here[k] for k in kinds}
         stack = Stack(kept, slope, {k: columns[k] for k in kinds})
         found = noise_of(stack, repeated_differences(Stack(kept, slope, {}), dataset.pose))
         found = replace(found, sigma={**START, **found.sigma})
+        if dataset.hangs:
+            found = replace(found, sigma={**found.sigma, "tension": found.sigma["statics"]})
     return found
 
 
@@ -136,7 +140,8 @@ def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
     if not dataset.has_tension:
         return True
     spread = float(np.nanstd(dataset.measured.tension))
-    return noise.unexplained.get("tension", 0.0) <= _MOST_IMBALANCE * spread
+    kind = "statics" if dataset.hangs else "tension"
+    return noise.unexplained.get(kind, 0.0) <= _MOST_IMBALANCE * spread
 
 
 def _columns(

@@ -167,7 +167,7 @@ class PoseRegression(Regression):
         if not effect.on_robot:
             return ["a motion: poses stand still"]
         missing = lacking(effect, self.dataset) or lacking_parts(effect, self.dataset)
-        if not missing and not set(effect.outputs) & set(self.outputs):
+        if not missing and not set(effect.outputs) & set(self.dataset.shown_outputs):
             missing = ["a measured " + " or ".join(effect.outputs)]
         return missing
 
@@ -246,7 +246,10 @@ class PoseRegression(Regression):
         first = self.nuisance_columns.shape[1] - len(geometry)
         by = hypothesis.nuisances[first:] or (0.0,) * len(geometry)
         moved = tuple(b.moved(x) for b, x in zip(geometry, by, strict=True))
-        return self.residuals_at(replace(self.point, geometry=moved), hypothesis.terms)
+        found = self.residuals_at(replace(self.point, geometry=moved), hypothesis.terms)
+        for (kind, line), by_zero in zip(self._zero_of, hypothesis.nuisances, strict=False):
+            found[kind][:, line] += by_zero * STD_OF_ZERO[kind]
+        return found
 
     def in_time(self, rows: Array) -> list[Array]:
         """Rows of each segment: poses have no time."""
@@ -285,7 +288,7 @@ class PoseRegression(Regression):
             place = np.ix_(np.flatnonzero(known[p]), np.arange(count))
             self._basis[p][place] = own[:, :count]
             keep[p] = index < count
-        if self.dataset.has_balance:
+        if "tension" in self.dataset.outputs:
             self._keep["tension"] = np.isfinite(self._start["tension"])
 
     def _rows_of(self, residuals: Mapping[str, Array]) -> Array:
@@ -317,6 +320,7 @@ class PoseRegression(Regression):
         The unit of a geometry column is one standard deviation of its prior.
         """
         columns = []
+        self._zero_of: list[tuple[str, int]] = []
         for kind in self._zeros:
             for i in range(len(self.dataset.names)):
                 moved = {k: np.zeros_like(v) for k, v in self._start.items()}
@@ -324,6 +328,7 @@ class PoseRegression(Regression):
                 column = -self._rows_of(moved)
                 if np.any(column):
                     columns.append(self._beside(column, np.zeros_like(self._prior)))
+                    self._zero_of.append((kind, i))
         for index, change in enumerate(self.change_by_geometry()):
             column = -self._rows_of(change)
             held = np.zeros((_COPIES, len(self.point.geometry)))

@@ -27,6 +27,7 @@ START: Mapping[str, float] = {
     **{kind: COMMON[kind] for kind in ("rope", "position", "rotation", "swivel")},
     "gauge": COMMON["cable_length"],
     "tension": COMMON["balance"],
+    "statics": COMMON["balance"],
 }
 """Standard deviations at the start of the iteration, SI, by kind of residual."""
 _LEAST = 1e-3

@@ -17,15 +17,42 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.robot.constraints import Constraint
+from winchkit.model.robot.constraints import Constraint, wrench_residual
 from winchkit.model.robot.kinematics import Geometry, Pose, structure_matrix
 from winchkit.model.robot.pose_estimation import moved_pose
 from winchkit.model.robot.wrench import gravity_wrench, weight_by_payload
 from winchkit.schema.profiles.robot import PlatformSpec
 
-__all__ = ["hanging_balance"]
+__all__ = ["hanging_balance", "hanging_residual"]
 
 _STEP = 1e-6
+
+
+def hanging_residual(
+    geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSpec
+) -> Array:
+    """Residuals of :func:`hanging_balance` without their derivatives, (p, 6), N.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of n lines.
+    pose : Pose
+        The p poses.
+    tension : (p, n) array
+        Cable forces, N; NaN where missing.
+    platform : PlatformSpec
+        Mass and centre of mass.
+    """
+    structure = structure_matrix(geometry, pose.position, pose.rotation)
+    weight = gravity_wrench(platform, pose.rotation)
+    return _scale(geometry) * wrench_residual(structure, tension, weight)
+
+
+def _scale(geometry: Geometry) -> Array:
+    """Diagonal of S, (6,)."""
+    lever = float(np.sqrt(np.mean(np.sum(geometry.anchor_point**2, axis=1))))
+    return np.repeat([1.0, 1.0 / max(lever, _STEP)], 3)
 
 
 def hanging_balance(
@@ -50,8 +77,7 @@ def hanging_balance(
         ``by_robot`` has ``payload``, (p, 6, 4), ``tension``, (p, 6, n), ``exit_point`` and
         ``anchor_point``, (p, 6, 3 n), and ``swivel_radius``, (p, 6, n).
     """
-    lever = float(np.sqrt(np.mean(np.sum(geometry.anchor_point**2, axis=1))))
-    scale = np.repeat([1.0, 1.0 / max(lever, _STEP)], 3)
+    scale = _scale(geometry)
 
     def pulls(own: Geometry, at: Pose) -> Array:
         """Wrench of each cable's force, (p, 6, n)."""
