@@ -22,6 +22,7 @@ from winchkit.model.robot.rotation import angles_of, rotation_from_quaternion
 from winchkit.runs.holds import averaged, holds_of
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.units import suggest
 
 __all__ = ["Measured", "joined", "read_poses"]
@@ -73,6 +74,8 @@ class Measured:
         return replace(self, **{name: getattr(self, name)[rows] for name in _ARRAYS})
 
 
+_LEAST_TURN = 2e-3
+"""Turn of a drum below which poses are the same, rad: 0.1 mm of cable on a radius of 50 mm."""
 _SCALARS = {"length_zeroed", "session_of_run", "notes"}
 _CIRCULAR = frozenset({"angles", "swivel"})
 """Whose mean over a hold is the circular one."""
@@ -109,7 +112,29 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
             parts.append(_of_run(run, profile, len(parts)))
     if faults:
         raise RunError(faults)
-    return joined(parts)
+    found = joined(parts)
+    if len(found) > 1 and _stands_still(found, profile):
+        place = ", ".join(run.path or run.name for run in runs)
+        raise RunError(
+            Fault(
+                f"all {len(found)} rows are one pose: every drum turns by less than "
+                f"{_LEAST_TURN:g} rad; record different poses",
+                place,
+            )
+        )
+    return found
+
+
+def _stands_still(measured: Measured, profile: RobotProfile) -> bool:
+    """Whether all rows are one pose."""
+    ratio = [
+        line.winch.gearbox.ratio if isinstance(line.winch, WinchProfile) else 1.0
+        for line in profile.line
+    ]
+    known = np.isfinite(measured.motor_angle)
+    low = np.min(np.where(known, measured.motor_angle, np.inf), axis=0)
+    high = np.max(np.where(known, measured.motor_angle, -np.inf), axis=0)
+    return bool(np.all(high - low < _LEAST_TURN * np.array(ratio)))
 
 
 def joined(parts: Sequence[Measured]) -> Measured:

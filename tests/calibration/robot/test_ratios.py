@@ -26,7 +26,7 @@ def test_lines_that_differ_are_named_whatever_the_size_of_the_robot(size: float)
     assert sets(size - 2, size, size + 1.5, size)[0] == {1, 3}
 
 
-def test_two_against_two_is_decided_by_the_size_of_the_robot_or_told_as_such() -> None:
+def test_two_against_two_is_decided_by_the_size_of_the_robot_or_both_are_given() -> None:
     """A step of one per cent between two pairs: either pair may be the wrong one."""
     chosen, others = sets(0.5, 0.5, -0.5, -0.5)
     assert {frozenset(chosen), *map(frozenset, others)} >= {frozenset({1, 2}), frozenset({3, 4})}

@@ -368,7 +368,7 @@ def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
         )
     if "mounting" in chosen.free and "position" not in chosen.equations.kinds:
         out.append(
-            "a bias of roll and pitch is the same as the mounting of the IMU: told as the mounting"
+            "a bias of roll and pitch is the same as the IMU's mounting: reported as the mounting"
         )
     return out
 
