@@ -112,17 +112,17 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
             parts.append(_of_run(run, profile, len(parts)))
     if faults:
         raise RunError(faults)
-    found = joined(parts)
-    if len(found) > 1 and _stands_still(found, profile):
+    poses = joined(parts)
+    if len(poses) > 1 and _stands_still(poses, profile):
         place = ", ".join(run.path or run.name for run in runs)
         raise RunError(
             Fault(
-                f"all {len(found)} rows are one pose: every drum turns by less than "
+                f"all {len(poses)} rows are one pose: every drum turns by less than "
                 f"{_LEAST_TURN:g} rad; record different poses",
                 place,
             )
         )
-    return found
+    return poses
 
 
 def _stands_still(measured: Measured, profile: RobotProfile) -> bool:
