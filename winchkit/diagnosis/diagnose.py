@@ -14,12 +14,13 @@ from winchkit.diagnosis.design.detectability import DetectionThreshold, detectab
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.conditioning import value_covariance
-from winchkit.diagnosis.regression.cross_validation import held_out
+from winchkit.diagnosis.regression.cross_validation import held_out, held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import attributions, harmonics
 from winchkit.diagnosis.residuals.traces import Trace, trace_columns, traces_of
@@ -31,6 +32,7 @@ from winchkit.diagnosis.results import (
     Step,
     Where,
 )
+from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import (
     SelectionResult,
@@ -212,6 +214,13 @@ def diagnose(
     try:
         engine.on_trial = _Trials(progress, "fitting", _SEARCH)
         result = stepwise_selection(engine, known.append)
+        offset = with_run_offsets(dataset, engine.regression, result.final)
+        if offset is not None:
+            other = selection_engine(offset, catalogue)
+            other.on_trial = _Trials(progress, "with an offset per run, fitting", _SEARCH)
+            anew = stepwise_selection(other)
+            if _predicts_better((other, anew), (engine, result)):
+                dataset, engine, result = offset, other, anew
         reduced = without_impacts(dataset, result.last_model)
         if reduced is not None:
             engine = selection_engine(reduced, catalogue)
@@ -223,6 +232,18 @@ def diagnose(
         if interrupted is not None and known:
             interrupted(_known_at_interrupt(engine, known[0]))
         raise
+
+
+def _predicts_better(
+    new: tuple[TimeSeriesSelection, SelectionResult],
+    old: tuple[TimeSeriesSelection, SelectionResult],
+) -> bool:
+    """Whether a search's result predicts blocks of time better than another's on the same runs."""
+    was, now = (
+        held_out_rms(engine.regression, result.final, result.noise, engine.regression.blocks)
+        for engine, result in (old, new)
+    )
+    return min(now[output] / was[output] for output in was) < RELEVANT_RATIO
 
 
 class _Trials:
@@ -300,6 +321,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
         names = ", ".join(dict.fromkeys(f"{each.effect}: {each.reason}" for each in closest))
         judgement = withheld(engine, result, 1.0, f"closest, but not named: {names}")
         reported, pairs = judgement.reported, []
+    spread = spread if reported is found else _spread(engine, reported)
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
         outputs=judgement.outputs,
@@ -324,11 +346,12 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
             reported.initial_model,
             reported.final,
             reported.noise,
-            spread if reported is found else _spread(engine, reported),
+            spread,
             profile=engine.regression.dataset.profile,
         ),
         closest=closest,
         traces=_traces(engine, reported, named=bool(steps)),
+        run_offsets=run_offsets(engine.regression, reported.final, spread),
     )
     return WinchAnswer(engine, reported, diagnosis, sets, pairs)
 

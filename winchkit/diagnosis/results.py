@@ -28,6 +28,7 @@ __all__ = [
     "OutputError",
     "OutputFit",
     "RobotDiagnosis",
+    "RunOffset",
     "Step",
     "Where",
     "effect_and_line",
@@ -151,6 +152,17 @@ class Closest:
         """Dictionary that the command prints."""
         parameters = {name: vars(estimate) for name, estimate in self.parameters.items()}
         return {"effect": self.effect, "parameters": parameters, "reason": self.reason}
+
+
+@dataclass(frozen=True)
+class RunOffset:
+    """Fitted offset of an instrument in one run, SI; no part of the profile."""
+
+    output: str
+    run: str
+    value: float
+    std: float
+    unit: str
 
 
 @dataclass(frozen=True)
@@ -282,6 +294,9 @@ class Diagnosis(Plotted, Tabular):
     """Of the reported model; None without unknowns."""
     closest: tuple[Closest, ...] = ()
     """Effects that are not named since their values cannot be."""
+    run_offsets: tuple[RunOffset, ...] = ()
+    """Offsets of instruments that have another one in every run. Those of a held-out run are its
+    own in every held-out error."""
     traces: tuple[Trace | PoseTrace, ...] = field(default=(), compare=False)
     """Measured and predicted outputs of every run, or errors of every pose."""
 
@@ -327,6 +342,7 @@ class Diagnosis(Plotted, Tabular):
             "used_share": dict(self.used_share),
             "caveats": list(self.caveats),
             "fit": None if self.fit is None else self.fit.to_json(),
+            "run_offsets": [vars(offset) for offset in self.run_offsets],
             "closest": [closest.to_json() for closest in self.closest],
             "notes": list(self.notes),
         }

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
-from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, Where
+from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset, Where
 from winchkit.effects.card import sparkline
 from winchkit.effects.placement import HOME
 from winchkit.profile_edit.history import LADDER_UNITS
@@ -22,7 +22,7 @@ from winchkit.report.figures.unexplained import unexplained_curve
 from winchkit.report.figures.waterfall import waterfall_of
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.columns import aligned, hanging, paragraph
-from winchkit.report.words.numbers import Scale, grouped, percent, scale_for, significant
+from winchkit.report.words.numbers import Scale, grouped, percent, scale_for, significant, with_std
 from winchkit.report.words.sentence import changes_text, main_patterns, sentence, where_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
@@ -43,6 +43,7 @@ __all__ = ["addition_text", "compare_text", "error_lines", "report_text"]
 _MOST_LINES = 70
 _FEW = 3
 _SOONEST = 4
+_MOST_OFFSETS = 6
 _BARS = 40
 
 
@@ -62,7 +63,12 @@ def report_text(answer: Answer) -> str:
     diagnosis = answer.diagnosis
     blocks = [
         [_head(diagnosis), *paragraph(sentence(diagnosis))],
-        error_lines(diagnosis.outputs, grown=bool(diagnosis.steps), data=diagnosis.data),
+        error_lines(
+            diagnosis.outputs,
+            grown=bool(diagnosis.steps),
+            data=diagnosis.data,
+            offsets=diagnosis.run_offsets,
+        ),
         _ladder(answer),
         _confusion(diagnosis),
         _correlations(diagnosis),
@@ -143,7 +149,13 @@ def addition_text(addition: Addition | Removal) -> str:
     return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
 
 
-def error_lines(outputs: Mapping[str, OutputFit], *, grown: bool, data: str = "runs") -> list[str]:
+def error_lines(
+    outputs: Mapping[str, OutputFit],
+    *,
+    grown: bool,
+    data: str = "runs",
+    offsets: Sequence[RunOffset] = (),
+) -> list[str]:
     """Held-out errors per output as lines.
 
     Parameters
@@ -154,6 +166,8 @@ def error_lines(outputs: Mapping[str, OutputFit], *, grown: bool, data: str = "r
         Whether the model was changed, so that there are errors before and after.
     data : str
         Kind of data, ``runs`` or ``poses``.
+    offsets : sequence of RunOffset
+        Offsets that every run has for itself, whether it is held out or not.
 
     Returns
     -------
@@ -169,7 +183,22 @@ def error_lines(outputs: Mapping[str, OutputFit], *, grown: bool, data: str = "r
         before = scale.text(output.heldout_rms_before)
         rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
     held_out = f"held out: each group of {data} is predicted with values fitted without it"
-    return [*aligned(rows), f"  ({held_out})"]
+    if not offsets:
+        return [*aligned(rows), f"  ({held_out})"]
+    own = " and ".join(dict.fromkeys(OUTPUT_NAMES.get(o.output, o.output) for o in offsets))
+    held_out += f"; the offset of the {own} is estimated from every run itself"
+    return [*aligned(rows), *paragraph(f"({held_out})", "  ", "   "), *_offsets(offsets)]
+
+
+def _offsets(offsets: Sequence[RunOffset]) -> list[str]:
+    """Offsets of single runs, which are no part of the profile."""
+    rows = []
+    for offset in offsets[:_MOST_OFFSETS]:
+        value = with_std(offset.value, offset.std, offset.unit)
+        rows.append([offset.run, OUTPUT_NAMES.get(offset.output, offset.output), value])
+    more = len(offsets) - len(rows)
+    last = [f"  and {more} further in --json"] if more else []
+    return ["", "offset of each run", *aligned(rows, words=2), *last]
 
 
 def _ladder(answer: Answer) -> list[str]:
@@ -226,9 +255,9 @@ def _shown(answer: Answer) -> list[str]:
 def _confusion(diagnosis: Diagnosis) -> list[str]:
     rows = []
     for step in (step for step in diagnosis.steps if not step.whole):
-        for effect, angle in step.angles.items():
-            own = next(name for name in step.effects if name not in step.angles)
-            rows.append([f"{own} / {effect}", f"{degrees(angle):.1f}° between signatures"])
+        own = [name for name in step.effects if name not in step.angles]
+        for effect, angle in step.angles.items() if own else ():
+            rows.append([f"{own[0]} / {effect}", f"{degrees(angle):.1f}° between signatures"])
     head = f"cannot be distinguished with these {diagnosis.data}"
     lines = [head, *aligned(rows, words=2)] if rows else []
     determined = [

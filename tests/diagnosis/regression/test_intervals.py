@@ -227,6 +227,32 @@ def test_parts_that_differ_keep_the_level(parts: int, between: float) -> None:
     assert covered(parts, between)[0] == pytest.approx(0.95, abs=0.01)
 
 
+@pytest.mark.parametrize(("parts", "least"), [(6, 0.92), (20, 0.945), (60, 0.945)])
+@pytest.mark.parametrize("between", [1.0, 3.0, 20.0])
+def test_parts_of_unequal_weights_that_differ_keep_the_level(
+    parts: int, least: float, between: float
+) -> None:
+    """Weights with a standard deviation of their logarithm of 1: six are three effective ones."""
+    share, _ = covered(parts, between, 1.0)
+    assert least < share < 0.98
+
+
+def test_one_heavy_part_among_many_has_few_degrees_of_freedom() -> None:
+    """Satterthwaite's formula against the moments of Q in 40 000 draws."""
+    weights = np.array([[0.5], *[[0.5 / 9]] * 9])
+    random = np.random.default_rng(4)
+    between = 30.0
+    values = random.standard_normal((10, 40_000)) * np.sqrt(1 / weights + between)
+    shifts = weights * (values - np.sum(weights * values, axis=0))
+    q = np.sum(shifts**2 / weights, axis=0)
+    expected = 2 * np.mean(q) ** 2 / np.var(q)
+    # Shifts whose Q is its expectation, so that the estimated variance is the true one.
+    at = np.argmin(np.abs(q - np.mean(q)))
+    parted = between_parts(shifts[:, [at]], weights, np.ones(1))
+    assert parted.dof[0] == pytest.approx(expected, rel=0.05)
+    assert parted.dof[0] < 7.0
+
+
 def test_two_parts_that_differ_have_one_degree_of_freedom() -> None:
     """No interval of two values has both the level and a useful length; methods.md states it."""
     assert 0.80 < covered(2, 3.0)[0] < 0.95

@@ -58,8 +58,6 @@ class Filtering:
 NO_REPEATS = "no-repeats"
 OUTLYING = "outlying-repeat"
 ROUNDED_ALIKE = "noise-floor-implausible"
-_ZEROED = ("cable_length", "tension")
-"""Outputs whose instrument may be zeroed before a run."""
 _EQUAL_TEMPERATURE = 0.5
 """Difference of mean temperatures above which repeats may differ by a thermal effect, K."""
 
@@ -200,7 +198,7 @@ def prepare(
         left_out.append(outlying[1])
         runs = [run for index, run in enumerate(runs) if index != outlying[0]]
         dataset = assemble(runs, profile, filtering)
-    anew = [zeroed_anew(output, _repeat_differences(dataset, output)) for output in _ZEROED]
+    anew = [zeroed_anew(output, _repeat_differences(dataset, output)) for output in OUTPUTS]
     zeroed = [finding for finding in anew if finding is not None]
     factor = 1 if decimation is None else decimation.factor
     return replace(

@@ -26,11 +26,11 @@ from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import size
 
-__all__ = ["zeroed_anew"]
+__all__ = ["BLOCKS", "LEVEL", "anew", "wanders", "zeroed_anew"]
 
-_BLOCKS = 8
+BLOCKS = 8
+LEVEL = 1e-4
 _LEAST_SAMPLES = 64
-_LEVEL = 1e-4
 _LEVEL_OF_WANDER = 0.01
 
 
@@ -54,38 +54,54 @@ def zeroed_anew(output: str, differences: Sequence[Array]) -> Finding | None:
     known = [difference[np.isfinite(difference)] for difference in differences]
     means = np.array(
         [
-            [float(part.mean()) for part in np.array_split(own, _BLOCKS)]
+            [float(part.mean()) for part in np.array_split(own, BLOCKS)]
             for own in known
             if len(own) >= _LEAST_SAMPLES
         ]
     )
     if len(means) == 0:
         return None
-    between = _BLOCKS * float(np.mean(means.mean(axis=1) ** 2))
+    between = BLOCKS * float(np.mean(means.mean(axis=1) ** 2))
     within = float(np.mean(means.var(axis=1, ddof=1)))
     if within == 0:
         return None
-    freedom = len(means), (_BLOCKS - 1) * len(means)
+    freedom = len(means), (BLOCKS - 1) * len(means)
     p_value = float(fdtrc(*freedom, between / within))
-    if p_value >= _LEVEL or _wanders(means):
+    if p_value >= LEVEL or wanders(means):
         return None
-    spread = float(np.sqrt((between - within) / _BLOCKS))
+    return anew(output, float(np.sqrt((between - within) / BLOCKS)), p_value, "repeats")
+
+
+def anew(output: str, spread: float, p_value: float, between: str) -> Finding:
+    """Finding ``zeroed-anew``: an offset with this standard deviation between repeats or runs."""
+    limit = (
+        ""
+        if between == "repeats"
+        else "; without repeats an unknown effect of what differs between the runs is the same"
+    )
     text = (
-        f"the offset differs between repeats by {size(spread, OUTPUT_UNITS[output])} (standard "
+        f"the offset differs between {between} by {size(spread, OUTPUT_UNITS[output])} (standard "
         f"deviation, F test p = {p_value:.1g}): the instrument was zeroed anew before each run, "
-        "and an offset per run is fitted"
+        f"and an offset per run is fitted{limit}"
     )
     return Finding("zeroed-anew", "", output, spread, text)
 
 
-def _wanders(means: Array) -> bool:
+def wanders(means: Array) -> bool:
     """Whether the first blocks are no larger than a random walk makes them.
 
+    Parameters
+    ----------
+    means
+        Block means of differences between repeats, or of runs about a common offset, (n, 8).
+
+    Notes
+    -----
     Half the mean square successive difference of block means (von Neumann) is their variance under
     white noise, and that of the first block of a random walk that starts at zero; its degrees of
     freedom are 2 (b − 1)²/(3 b − 4) per difference.
     """
     first = float(np.mean(means[:, 0] ** 2))
     half = float(np.mean(np.diff(means, axis=1) ** 2)) / 2
-    freedom = 2 * (_BLOCKS - 1) ** 2 / (3 * _BLOCKS - 4) * len(means)
+    freedom = 2 * (BLOCKS - 1) ** 2 / (3 * BLOCKS - 4) * len(means)
     return float(fdtrc(len(means), freedom, first / half)) >= _LEVEL_OF_WANDER

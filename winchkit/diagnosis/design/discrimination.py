@@ -175,13 +175,15 @@ def _rows(
     if not (np.isfinite(rival_columns).all() and np.isfinite(signature).all()):
         return None
     states = sum(len(start) for start in rival.starts)
-    nuisances, offset = regression.nuisance_columns.shape[1], int(regression.fits_offset)
+    nuisances, offset = regression.nuisance_columns.shape[1], regression.n_run_offsets
     own = [
-        *range(offset, nuisances),
+        *(i for i in range(nuisances) if i != offset or not regression.fits_offset),
         *range(rival_columns.shape[1] - states, rival_columns.shape[1]),
     ]
     parameter_columns = rival_columns[:, nuisances : rival_columns.shape[1] - states]
-    level = rival_columns[:, :1] if offset else np.zeros((regression.n_rows, 1))
+    level = (
+        rival_columns[:, [offset]] if regression.fits_offset else np.zeros((regression.n_rows, 1))
+    )
     shared_columns = np.column_stack([level, parameter_columns, regression.change(rival) * weight])
     return rival_columns[:, own], shared_columns, signature
 

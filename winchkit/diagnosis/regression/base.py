@@ -66,8 +66,8 @@ class Regression(ABC):
     nuisance_columns : ndarray of shape (n_rows, n_nuisances)
         Regressor columns of the nuisance parameters, which are linear.
     fits_offset : bool
-        Whether the first nuisance parameter is the offset of the length instrument, one of all
-        runs.
+        Whether the first nuisance parameter after the offsets of single runs is the offset of the
+        length instrument, one of all runs.
     n_run_offsets : int
         Number of the first nuisance parameters that are offsets of single runs, of instruments that
         were zeroed anew before each run. As initial states, they keep their run's values whatever
@@ -146,7 +146,8 @@ class Regression(ABC):
     @property
     def nuisance_names(self) -> tuple[str, ...]:
         """Name of every nuisance parameter."""
-        names = ["length offset"] * int(self.fits_offset)
+        names = [f"offset of a run {index + 1}" for index in range(self.n_run_offsets)]
+        names += ["length offset"] * int(self.fits_offset)
         names += ["discretisation correction"] * int(self.fits_discretization)
         count = self.nuisance_columns.shape[1]
         return (*names, *(f"nuisance {index + 1}" for index in range(len(names), count)))

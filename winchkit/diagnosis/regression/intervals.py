@@ -237,7 +237,7 @@ class BetweenParts:
     uncertain : ndarray of shape (n_unknowns,)
         Part of the whole variance that was estimated from the parts.
     dof : ndarray of shape (n_unknowns,)
-        Its degrees of freedom, parts less one.
+        Its degrees of freedom: parts less one where their weights are equal.
     """
 
     variance: Array
@@ -263,15 +263,19 @@ def between_parts(shifts: Array, weights: Array, within: Array) -> BetweenParts:
     of the shifts u gives τ² = v (Q − (G − 1))/(1 − Σw²), at least zero (DerSimonian and Laird). The
     common value is the fit's, with the weights w, so that τ² Σw² is added to its variance; that of
     the mean with the weights 1/(v/w + τ²) would not be larger. Where Q exceeds G − 1, intervals
-    have quantiles of t(G − 1) (Hartung and Knapp). One part with most of the weight makes the
-    divisor small: with fewer than three effective parts, 1/Σw², the variance is multiplied by
-    Q/(G − 1) instead (Birge), which is the same for equal weights.
+    have quantiles of t. Its degrees of freedom are those of Q at the estimated τ² (Satterthwaite),
+    G − 1 for equal weights (Hartung and Knapp) and fewer where few parts have most of the weight.
+    One part with most of it makes the divisor small: with fewer than three effective parts, 1/Σw²,
+    the variance is multiplied by Q/(G − 1) instead (Birge), which is the same for equal weights.
+    With two parts t(1) would make every third interval seven times as long although the parts
+    agree: there only the excess Q - 1 counts as uncertain.
 
     References
     ----------
     DerSimonian, R., Laird, N. (1986). Controlled Clinical Trials 7, 177-188.
     Hartung, J., Knapp, G. (2001). Statistics in Medicine 20, 1771-1782.
     Birge, R. T. (1932). Phys. Rev. 40, 207-227.
+    Satterthwaite, F. E. (1946). Biometrics Bulletin 2, 110-114.
     """
     informative = weights > _NO_INFORMATION
     dof = np.maximum(np.sum(informative, axis=0) - 1.0, 1.0)
@@ -279,11 +283,25 @@ def between_parts(shifts: Array, weights: Array, within: Array) -> BetweenParts:
     q = np.sum(np.where(informative, shifts**2 / scaled, 0.0), axis=0)
     concentration = np.sum(weights**2, axis=0)
     differ = (q > dof) & (np.sum(informative, axis=0) > 1)
+    several = np.maximum(1.0 - concentration, 1e-9)
     many = concentration * _MANY_PARTS < 1.0 + 1e-9
-    share = np.where(many, concentration / np.maximum(1.0 - concentration, 1e-9), 1.0 / dof)
+    share = np.where(many, concentration / several, 1.0 / dof)
     variance = np.where(differ, within * share * (q - dof), 0.0)
-    uncertain = np.where(many & differ, within * share * q, variance)
-    return BetweenParts(variance, uncertain, dof)
+    uncertain = np.where((dof > 1.0) & differ, within * share * q, variance)
+    return BetweenParts(variance, uncertain, _dof_of_q(weights, informative, (q - dof) / several))
+
+
+def _dof_of_q(weights: Array, informative: NDArray[np.bool_], excess: Array) -> Array:
+    """Satterthwaite's degrees of freedom of Cochran's Q where τ²/v is ``excess``, (n_unknowns,).
+
+    With D = diag(1/w + τ²/v) and A = diag(w) - w wᵀ they are (tr AD)²/tr (AD)².
+    """
+    w, there = np.where(informative, weights, 0.0), informative.astype(float)
+    e = there * (1.0 + np.maximum(excess, 0.0) * w)
+    trace = np.sum((there - w) * e, axis=0)
+    square = np.sum(((there - w) * e) ** 2, axis=0)
+    square += np.sum(w * e, axis=0) ** 2 - np.sum((w * e) ** 2, axis=0)
+    return np.maximum(trace**2 / np.maximum(square, 1e-300), 1.0)
 
 
 def effective_dof(variance: Array, kinds: Sequence[BetweenParts]) -> Array:

@@ -244,13 +244,17 @@ def replicate_rms(regression: Regression, residual: Array) -> dict[str, float]:
 
 
 def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContrasts:
-    """Contrasts and means of repeats, transformed again on their common samples."""
+    """Contrasts and means of repeats, transformed again on their common samples.
+
+    Empty where no run repeats another in any output.
+    """
     times = dict(
         zip(((s.run, s.output) for s in regression.segments), regression.in_time(rows), strict=True)
     )
     edges = _edges(regression)
-    parts: tuple[list[Array], list[Array]] = ([], [])
-    bands: tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]] = ([], [])
+    nothing, nowhere = np.zeros(0), np.zeros(0, dtype=np.intp)
+    parts: tuple[list[Array], list[Array]] = ([nothing], [nothing])
+    bands: tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]] = ([nowhere], [nowhere])
     bands_of = {(s.run, s.output): s.band for s in regression.segments}
     for group in regression.replicates:
         for output in regression.outputs:

@@ -235,16 +235,23 @@ class TimeSeriesRegression(Regression):
             out[segment.rows] = self._masked(segment, error)
         return out
 
+    @cached_property
+    def run_offset_segments(self) -> tuple[Segment, ...]:
+        """Segments of instruments that were zeroed anew, each of which has an offset of its own."""
+        recordings = self.dataset.recordings
+        return tuple(
+            s
+            for s in self.segments
+            if s.output in self.dataset.zeroed_anew
+            and not (s.output == "cable_length" and recordings[s.run].zeroed)
+        )
+
     def _run_offset_columns(self) -> list[Array]:
-        """An offset per run of every instrument that was zeroed anew."""
         out = []
-        for segment in self.segments:
-            recording = self.dataset.recordings[segment.run]
-            zeroed = recording.zeroed and segment.output == "cable_length"
-            if segment.output in self.dataset.zeroed_anew and not zeroed:
-                column = np.zeros(self.n_rows)
-                column[segment.rows] = self._masked(segment, np.ones(segment.band.count))
-                out.append(column)
+        for segment in self.run_offset_segments:
+            column = np.zeros(self.n_rows)
+            column[segment.rows] = self._masked(segment, np.ones(segment.band.count))
+            out.append(column)
         return out
 
     def _offset_column(self) -> Array:

@@ -128,7 +128,8 @@ class EquivalenceSet:
         terms, fits = [self.terms[i] for i in kept], [self.fits[i] for i in kept]
         own = self.term if self.term in terms else terms[0]
         names = tuple(term.effect.id for term in terms)
-        angles = {name: self.angles[name] for name in names if name in self.angles}
+        # Angles from the signature of an effect that has left the set are not those of another.
+        angles = {n: self.angles[n] for n in names if n in self.angles and self.term in terms}
         return EquivalenceSet(own, names, tuple(terms), tuple(fits), angles)
 
 

@@ -113,7 +113,12 @@ def diagnosis_screen(diagnosis: Diagnosis) -> str:
     """A diagnosis: verdict, named effects, held-out errors, and the next runs."""
     head = "INTERRUPTED" if diagnosis.interrupted else VERDICT_NAMES[diagnosis.verdict].upper()
     lines = [head, *paragraph(sentence(diagnosis)), ""]
-    lines += error_lines(diagnosis.outputs, grown=bool(diagnosis.steps), data=diagnosis.data)
+    lines += error_lines(
+        diagnosis.outputs,
+        grown=bool(diagnosis.steps),
+        data=diagnosis.data,
+        offsets=diagnosis.run_offsets,
+    )
     if diagnosis.next_runs:
         run = diagnosis.next_runs[0]
         lines += ["", *paragraph(f"next: {run.programme} ({' / '.join(run.separates)})")]

@@ -11,8 +11,9 @@ def size(value: float, unit: str) -> str:
 
 
 def share(part: float) -> str:
-    """A share in per cent with two digits."""
-    return f"{100 * part:.2g} %"
+    """A share in per cent with two digits, never in scientific notation."""
+    percent = 100 * part
+    return f"{percent:.0f} %" if abs(percent) >= 9.95 else f"{percent:.2g} %"
 
 
 def counted(count: int, noun: str) -> str:
