@@ -301,7 +301,7 @@ def _dof_of_q(weights: Array, informative: NDArray[np.bool_], excess: Array) -> 
     trace = np.sum((there - w) * e, axis=0)
     square = np.sum(((there - w) * e) ** 2, axis=0)
     square += np.sum(w * e, axis=0) ** 2 - np.sum((w * e) ** 2, axis=0)
-    return np.maximum(trace**2 / np.maximum(square, 1e-300), 1.0)
+    return np.asarray(np.maximum(trace**2 / np.maximum(square, 1e-300), 1.0))
 
 
 def effective_dof(variance: Array, kinds: Sequence[BetweenParts]) -> Array:
