@@ -20,6 +20,7 @@ NOT_RUN = {
     "asks somebody beside the winch",
     "asks somebody to hang weights",
     "needs a CAN adapter",
+    "serves until Ctrl-C",
     "takes half a minute; .ci/run executes it",
     "needs a drive that is alone on its bus",
 }
@@ -65,7 +66,7 @@ def test_every_example_can_be_parsed(folder: Path) -> None:
         assert example.not_run in NOT_RUN
         rest = shlex.split(example.line)[1 + len(words.split()) :]
         known[words].make_context(words, rest)
-    assert len(not_run) <= 10
+    assert len(not_run) <= 11
 
 
 def test_a_letter_means_one_thing() -> None:

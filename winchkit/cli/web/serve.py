@@ -7,16 +7,37 @@ from pathlib import Path
 
 import click
 
+from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.completion import complete_bench, complete_sim_bench
+from winchkit.cli.core.options import PROFILE, RUN
 from winchkit.errors import UsageError
 
 __all__ = ["command"]
 
 
-@click.command()
-@click.argument("runs", nargs=-1, metavar="[RUN...]")
-@click.option("--profile", "-p", metavar="P", help="Profile: a name or a file.")
-@click.option("--bench", metavar="BENCH.toml", help="Bench to show; it moves with --allow-motion.")
-@click.option("--sim", "simulated", metavar="NAME", help="Simulated bench to start and show.")
+@click.command(
+    cls=Command,
+    examples=(
+        Example("winchkit serve demo-*.csv -p bench-spiral", "serves until Ctrl-C"),
+        Example("winchkit serve --sim demo-elastic-rope --no-browser", "serves until Ctrl-C"),
+    ),
+)
+@click.argument("runs", nargs=-1, metavar="[RUN...]", type=RUN)
+@click.option("-p", "--profile", metavar="P", type=PROFILE, help="Profile: a name or a file.")
+@click.option(
+    "-b",
+    "--bench",
+    metavar="BENCH.toml",
+    shell_complete=complete_bench,
+    help="Bench to show; it moves with --allow-motion.",
+)
+@click.option(
+    "--sim",
+    "simulated",
+    metavar="NAME",
+    shell_complete=complete_sim_bench,
+    help="Simulated bench to start and show.",
+)
 @click.option("--allow-motion", is_flag=True, help="The page may move the bench.")
 @click.option("--effects", "effect_files", multiple=True, metavar="FILE", help="Your own effects.")
 @click.option("--folder", default=".", show_default=True, help="Folder of the library view.")
