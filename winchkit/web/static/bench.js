@@ -107,7 +107,7 @@ function build() {
   const step = (mm) => el("button", { onclick: () => { send("step", { winch, change: -mm / 1000, speed }); watchMotion(); } }, `${mm > 0 ? "+" : "−"}${Math.abs(mm)}`);
   const target = el("input", { size: 7, value: now() ? number(now().cable_length, 4) : "", "aria-label": "Cable length, m" });
   const file = el("input", { size: 16, value: "bench.csv", "aria-label": "Name of the log" });
-  fill(root,
+  fill(root, el("h1", { class: "visually-hidden" }, `Bench ${declared.name}`),
     el("div", { class: "row context" }, el("span", { class: "label" }, "Winch"), el("span", { class: "segments" }, names.map((name) => el("button", { "aria-pressed": String(name === winch), onclick: () => { winch = name; send("show", { winch }); build(); } }, name))),
       el("span", { class: "row end" }, el("span", { id: "recording", class: "note" }), el("span", { id: "says", class: "note" }),
         declared.allow_motion ? el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command") : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),

@@ -20,7 +20,7 @@ function render() {
   const search = el("input", { type: "search", placeholder: "filter", value: filter, "aria-label": "Filter runs", oninput: () => { filter = search.value; fill(body, ...rows()); } });
   const pick = el("select", { "aria-label": "Channel", onchange: () => { channel = pick.value; overlay(); } }, channels.map((name) => el("option", { selected: name === channel }, name)));
   const body = el("tbody", {}, rows());
-  fill(root, el("div", { class: "row context" }, el("span", { class: "label" }, `Folder ${found.folder}: ${found.runs.length} file${found.runs.length === 1 ? "" : "s"}`), search,
+  fill(root, el("h1", { class: "visually-hidden" }, "Library"), el("div", { class: "row context" }, el("span", { class: "label" }, `Folder ${found.folder}: ${found.runs.length} file${found.runs.length === 1 ? "" : "s"}`), search,
     el("span", { class: "row end" }, el("label", { class: "row" }, "Overlay", pick), el("button", { class: "primary", id: "open", disabled: !chosen.size, onclick: () => attempt(async () => { await order("library", { names: [...chosen] }); location.hash = "#diagnose"; }) }, "Compare in Diagnose"))),
   el("div", { class: "grid" }, el("section", { class: "panel w7 scroll", "aria-label": "Runs" }, el("table", { class: "rows" }, el("thead", {}, el("tr", {}, ["", "Run", "Programme", "Load", "Winch", "Length", "Date"].map((text, i) => el("th", { class: i === 5 ? "number" : "" }, text || el("span", { class: "visually-hidden" }, "Choose"))))), body)),
     el("section", { class: "panel w5", "aria-label": "Overlay" }, el("header", {}, el("h2", {}, "Overlay"), el("span", { class: "note" }, "each from its own start")), el("div", { id: "overlay" }, el("p", { class: "note" }, "Choose runs on the left.")))));

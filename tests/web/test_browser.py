@@ -1,0 +1,230 @@
+"""The page in Debian's Chromium: the whole story, accessibility, and a bench that stops."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("starlette")
+playwright = pytest.importorskip("playwright.sync_api")
+
+from winchkit.runs.writer import write_run  # noqa: E402
+from winchkit.web.examples import example_runs  # noqa: E402
+
+CHROMIUM = shutil.which("chromium")
+STARTS = 60.0
+STOPS = 2.0
+"""Bound for a jog to end after its release, s: dead-man 0.2 s, ramp 0.05 / 1 s, pictures 0.1 s,
+and stalls of this computer."""
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium"),
+]
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as driver:
+        opened = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield opened
+        opened.close()
+
+
+class Served:
+    """``winchkit serve`` in a process of its own."""
+
+    def __init__(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "winchkit", "serve", "--no-browser", *arguments]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        assert self.process.stdout is not None
+        self.url = self.process.stdout.readline().strip()
+        assert self.url.startswith("http://127.0.0.1:"), self.url
+
+    def end(self) -> None:
+        """End it like Ctrl-C does."""
+        self.process.terminate()
+        self.process.wait(STARTS)
+
+
+def opened(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:
+    """A page and its complaints: errors of scripts, and requests that leave this computer."""
+    context = browser.new_context(viewport={"width": 1280, "height": 900}, **options)
+    page, complaints = context.new_page(), []
+    page.on("pageerror", lambda error: complaints.append(str(error)))
+    page.on(
+        "console",
+        lambda message: complaints.append(message.text) if message.type == "error" else None,
+    )
+    page.on(
+        "request",
+        lambda request: (
+            None
+            if request.url.startswith(("http://127.0.0.1", "ws://127.0.0.1", "data:", "blob:"))
+            else complaints.append(request.url)
+        ),
+    )
+    page.goto(url)
+    return page, complaints
+
+
+def until(page: Any, condition: Callable[[], bool], seconds: float = STARTS) -> float:
+    """Wait for a condition; the time that it took, s."""
+    start = time.monotonic()
+    while not condition():
+        assert time.monotonic() - start < seconds, "it did not happen"
+        page.wait_for_timeout(20)
+    return time.monotonic() - start
+
+
+def texts(page: Any, selector: str) -> list[str]:
+    return [str(text) for text in page.locator(selector).all_inner_texts()]
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    folder = tmp_path_factory.mktemp("runs")
+    paths = []
+    for run in example_runs("demo-thick-layers").runs:
+        paths.append(folder / f"{run.name}.csv")
+        write_run(run, paths[-1])
+    return paths
+
+
+@pytest.fixture(scope="module")
+def served(recorded: list[Path]) -> Iterator[Served]:
+    found = Served("--folder", str(recorded[0].parent))
+    yield found
+    found.end()
+
+
+def test_drop_see_add_the_ladder_falls_save_and_reload(
+    browser: Any, served: Served, recorded: list[Path], tmp_path: Path
+) -> None:
+    page, complaints = opened(browser, served.url, accept_downloads=True)
+    page.set_input_files("#files", [str(path) for path in recorded])
+    until(page, lambda: "8 runs" in page.inner_text("main"))
+    page.click("text=choose…")
+    page.select_option("#dialog select", "bench-spiral")
+    page.click("#dialog .primary")
+    until(page, lambda: page.locator("#card .primary").count() == 1)
+    assert page.locator(".chip.explained").count() == 1
+    before = float(texts(page, ".ladder .cell.today.focus .value")[0])
+    page.keyboard.press("a")
+    until(page, lambda: page.locator(".chip.adequate").count() == 1)
+    output = page.locator(".ladder .head.focus").inner_text()
+    after = float(texts(page, ".ladder .cell.today.focus .value")[0])
+    history = [float(text) for text in texts(page, ".ladder .cell.history .value") if text != "–"]
+    assert max(history) > 2 * after or before > 2 * after, output
+    with page.expect_download() as saved:
+        page.click("text=Save profile")
+    saved.value.save_as(tmp_path / "better.toml")
+    assert "layer-thickness" in (tmp_path / "better.toml").read_text()
+    page.reload()
+    until(page, lambda: page.locator(".chip.adequate").count() == 1)
+    page.keyboard.press("4")
+    until(page, lambda: page.locator("main input[type=checkbox]").count() == len(recorded))
+    page.locator("main input[type=checkbox]").first.check()
+    until(page, lambda: page.locator("#overlay canvas").count() == 1)
+    assert complaints == []
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_no_view_has_a_violation_of_axe_or_scrolls_sideways(
+    browser: Any, served: Served, scheme: str, tmp_path: Path
+) -> None:
+    npm = shutil.which("npm")
+    if npm is None:
+        pytest.skip("no npm: axe-core comes from it")
+    got = subprocess.run(
+        [npm, "install", "--silent", "axe-core@4"], cwd=tmp_path, capture_output=True, check=False
+    )
+    if got.returncode:
+        pytest.skip("npm has no axe-core here")
+    axe = (tmp_path / "node_modules/axe-core/axe.min.js").read_text()
+    context = browser.new_context(color_scheme=scheme, bypass_csp=True)
+    page = context.new_page()
+    for width in (1280, 390):
+        page.set_viewport_size({"width": width, "height": 844})
+        for view in ("diagnose", "bench", "robot", "library"):
+            page.goto(f"{served.url}#{view}")
+            page.reload()
+            until(page, lambda: page.locator("main > *").count() > 0)
+            page.wait_for_timeout(1500)
+            page.evaluate(axe)
+            found = page.evaluate("async () => (await axe.run()).violations")
+            said = [(v["id"], [node["html"][:120] for node in v["nodes"]][:3]) for v in found]
+            assert said == [], f"{view} at {width} px, {scheme}"
+            wide = page.evaluate("document.documentElement.scrollWidth")
+            assert wide <= width, f"{view}: {wide} px wide at {width} px"
+    context.close()
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Served]:
+    found = Served("--sim", "demo-adequate", "--allow-motion")
+    yield found
+    found.end()
+
+
+def commanding(browser: Any, url: str) -> Any:
+    """A page of the Bench view that commands."""
+    page, _ = opened(browser, f"{url}#bench")
+    until(page, lambda: page.locator("#values .value").count() == 3)
+    page.click("#take")
+    until(page, lambda: "You command" in page.inner_text("#role"))
+    return page
+
+
+def hold(page: Any, button: int = 0) -> None:
+    """Press a jog button until the winch moves."""
+    box = page.locator(".controls .jog").nth(button).bounding_box()
+    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.mouse.down()
+    until(page, lambda: state(page) in {"winding in", "paying out"}, 10.0)
+
+
+def state(page: Any) -> str:
+    return str(page.inner_text("#values .state"))
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("way", ["release", "blur", "leave", "space"])
+def test_a_held_jog_ends(browser: Any, bench: Served, way: str) -> None:
+    page = commanding(browser, bench.url)
+    hold(page)
+    if way == "release":
+        page.mouse.up()
+    elif way == "blur":
+        page.evaluate("window.dispatchEvent(new Event('blur'))")
+    elif way == "leave":
+        page.mouse.move(900, 400)
+    else:
+        page.keyboard.press("Space")
+    until(page, lambda: state(page) not in {"winding in", "paying out"}, STOPS)
+    page.wait_for_timeout(600)
+    assert state(page) in {"at rest", "tripped"}
+    page.context.close()
+
+
+@pytest.mark.realtime
+def test_a_page_that_vanishes_stops_its_winch_and_one_page_commands(
+    browser: Any, bench: Served
+) -> None:
+    page = commanding(browser, bench.url)
+    watcher, _ = opened(browser, f"{bench.url}#bench")
+    until(watcher, lambda: watcher.locator("#values .value").count() == 3)
+    assert watcher.locator("#take").is_disabled()
+    assert watcher.locator(".controls .jog").first.is_disabled()
+    hold(page, 1)
+    page.context.close()
+    until(watcher, lambda: state(watcher) not in {"winding in", "paying out"}, STOPS)
+    until(watcher, lambda: watcher.locator("#take").is_enabled(), 10.0)
+    watcher.context.close()
