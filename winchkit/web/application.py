@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 __all__ = ["Guard", "application"]
 
 _STATIC = Path(__file__).parent / "static"
-_UPLOT = Path(__file__).parent.parent / "report" / "html" / "assets"
 _LARGEST_FILE = 400_000_000
 """Bytes of a dropped file: 20 channels of 10⁶ samples as text."""
 _MOST_POINTS = 8000
@@ -150,7 +149,6 @@ def application(
         *_Drawings(workspace, library).routes(),
         *([] if bench is None else bench.routes()),
         Route("/", _page),
-        Mount("/uplot", StaticFiles(directory=_UPLOT)),
         Mount("/static", StaticFiles(directory=_STATIC)),
     ]
     return Starlette(
