@@ -248,7 +248,8 @@ class PoseRegression(Regression):
         moved = tuple(b.moved(x) for b, x in zip(geometry, by, strict=True))
         found = self.residuals_at(replace(self.point, geometry=moved), hypothesis.terms)
         for (kind, line), by_zero in zip(self._zero_of, hypothesis.nuisances, strict=False):
-            found[kind][:, line] += by_zero * STD_OF_ZERO[kind]
+            # The fit's zeros are whole ones, in place of the mean readings.
+            found[kind][:, line] += by_zero * STD_OF_ZERO[kind] - self._zeros[kind][line]
         return found
 
     def in_time(self, rows: Array) -> list[Array]:
