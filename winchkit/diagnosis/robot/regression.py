@@ -28,6 +28,7 @@ from winchkit.diagnosis.robot.prior import GeometryPrior, profile_with_geometry
 from winchkit.effects.effect import Effect
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot
+from winchkit.model.robot.constraints import mean_offset
 from winchkit.model.robot.tracker import Tracker
 from winchkit.model.stages import At, Stage
 from winchkit.schema.profiles.robot import RobotProfile
@@ -247,9 +248,9 @@ class PoseRegression(Regression):
         by = hypothesis.nuisances[first:] or (0.0,) * len(geometry)
         moved = tuple(b.moved(x) for b, x in zip(geometry, by, strict=True))
         found = self.residuals_at(replace(self.point, geometry=moved), hypothesis.terms)
-        for (kind, line), by_zero in zip(self._zero_of, hypothesis.nuisances, strict=False):
-            # The fit's zeros are whole ones, in place of the mean readings.
-            found[kind][:, line] += by_zero * STD_OF_ZERO[kind] - self._zeros[kind][line]
+        for kind in self._zeros:
+            # A zero is the mean reading beyond the model; the fit's own differs by its noise.
+            found[kind] = found[kind] + mean_offset(found[kind], angles=kind == "swivel")
         return found
 
     def in_time(self, rows: Array) -> list[Array]:
@@ -321,7 +322,6 @@ class PoseRegression(Regression):
         The unit of a geometry column is one standard deviation of its prior.
         """
         columns = []
-        self._zero_of: list[tuple[str, int]] = []
         for kind in self._zeros:
             for i in range(len(self.dataset.names)):
                 moved = {k: np.zeros_like(v) for k, v in self._start.items()}
@@ -329,7 +329,6 @@ class PoseRegression(Regression):
                 column = -self._rows_of(moved)
                 if np.any(column):
                     columns.append(self._beside(column, np.zeros_like(self._prior)))
-                    self._zero_of.append((kind, i))
         for index, change in enumerate(self.change_by_geometry()):
             column = -self._rows_of(change)
             held = np.zeros((_COPIES, len(self.point.geometry)))
