@@ -264,7 +264,10 @@ def _judge_cause(record: Record, reference: tuple[float, float] | None) -> str:
 
 
 def _refused_at_rest(record: Record, right: set[str]) -> bool:
-    """Whether the condition came to rest winches and refused the next command in its words."""
+    """Whether the condition came to winches at rest, which stayed so until it was mended.
+
+    Commands that were given meanwhile were refused in its words: an accepted one enables a drive.
+    """
     for one in record.forbidden:
         moving = any(
             sample.enabled
@@ -272,7 +275,7 @@ def _refused_at_rest(record: Record, right: set[str]) -> bool:
             for sample in _between(samples, one.time - 0.01, record.mended)
         )
         later = [words for moment, words in record.refused if moment >= one.time]
-        if one.kind in right and not moving and later:
+        if one.kind in right and not moving:
             return all(_NUMBER.sub("", words) == _NUMBER.sub("", one.words) for words in later)
     return False
 
