@@ -11,6 +11,7 @@ from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.results import Diagnosis, Estimate
 from winchkit.effects.effect import Effect
 from winchkit.report.detectability import effects_of
+from winchkit.report.words.headline import headline
 from winchkit.report.words.numbers import Scale, quantity, scale_for, significant, with_std
 from winchkit.report.words.sentence import changes_text, sentence, where_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
@@ -39,13 +40,12 @@ class Rung:
 
 def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
     """Chip, headline and sentence of a diagnosis."""
-    head, _, rest = sentence(diagnosis).partition(". ")
-    head = head.partition(": ")[0] if diagnosis.steps else head
+    first, _, rest = sentence(diagnosis).partition(". ")
     return {
         "verdict": diagnosis.verdict,
         "chip": _WORDS[diagnosis.verdict],
-        "headline": head.rstrip("."),
-        "sentence": rest,
+        "headline": headline(diagnosis),
+        "sentence": rest if diagnosis.steps else f"{first}. {rest}".strip(". ") + ".",
         "changes": changes_text(diagnosis),
         "unexplained": [where_text(where) for where in diagnosis.where],
         "empirical": list(diagnosis.empirical),

@@ -207,16 +207,16 @@ function sorted(x, ...others) {
   return { index, columns: [x, ...others].map((values) => index.map((i) => values[i])) };
 }
 
-function mixed(x, ys, bins, lines) {
-  const all = [...x, ...bins], part = (values, before, after) => [...Array(before).fill(null), ...values, ...Array(after).fill(null)];
-  const { index, columns } = sorted(all, ...ys.map((y) => part(y, 0, bins.length)), ...lines.map((y) => part(y, x.length, 0)));
-  return { index, data: columns };
+// Two sets of points over one x, sorted.
+function mixed(x, y, others, marks) {
+  const { columns } = sorted([...x, ...others], [...y, ...others.map(() => null)], [...x.map(() => null), ...marks]);
+  return columns;
 }
 
 function drawSignature(host, s) {
-  const { data } = mixed(s.x, [s.residual], s.bins, [s.means, s.signature]);
-  plot(host, data, [{ paths: dots("today", 0.28, 2), points: { show: false } }, line("today", 2, 1, { spanGaps: true }), line("with", 3, 1, { spanGaps: true })],
-    { height: 140, noise: s.noise, xLabel: unitOf(s.label), range: sym(s.residual), logarithmic: s.logarithmic, label: `Residual and signature over ${s.label}` });
+  const { columns } = sorted(s.x, s.residual);
+  plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 140, noise: s.noise, xLabel: unitOf(s.label), range: sym(s.residual), logarithmic: s.logarithmic,
+    traces: [{ x: s.bins, y: s.means, tone: "today", width: 2 }, { x: s.bins, y: s.signature, tone: "with", width: 3 }], label: `Residual and signature over ${s.label}` });
 }
 
 const unitOf = (label) => (/\[(.+)\]$/.exec(label) || ["", ""])[1];
@@ -248,7 +248,7 @@ async function drawTime() {
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
     plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 130, top: 22, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
     const marked = brushed ? brushed.time : null;
-    const { data: low } = marked ? mixed(data.x, [data.residual], marked, [brushed.residual]) : { data: [data.x, data.residual] };
+    const low = marked ? mixed(data.x, data.residual, marked, brushed.residual) : [data.x, data.residual];
     plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
       { height: 150, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
   });
@@ -266,10 +266,10 @@ async function drawMultiples() {
     panels = found.panels.map((panel) => {
       const host = el("div", { class: "plot" });
       grid.append(el("div", {}, el("h3", {}, el("span", {}, panel.name, el("span", { class: "note" }, ` ${unitOf(panel.label)}`)), el("span", {}, `${Math.round(100 * panel.share)} %`)), host));
-      const { index, data } = mixed(panel.x, [found.residual, Array(panel.x.length).fill(null)], panel.bins, [panel.means]);
-      const drawn = plot(host, [data[0], data[1], data[2], data[3]], [{ paths: dots("today", 0.28, 2), points: { show: false } }, { paths: dots("brush", 0.9, 3), points: { show: false } }, line("today", 2, 1, { spanGaps: true })],
-        { height: 120, noise: found.noise, range, logarithmic: panel.logarithmic, label: `Residual over ${panel.label}`, select: (low, high) => brush(found, panel, low, high) });
-      return { drawn, index, count: panel.x.length, data };
+      const { index, columns: data } = sorted(panel.x, found.residual, Array(panel.x.length).fill(null));
+      const drawn = plot(host, data, [{ paths: dots("today", 0.28, 2), points: { show: false } }, { paths: dots("brush", 0.9, 3), points: { show: false } }],
+        { height: 120, traces: [{ x: panel.bins, y: panel.means, tone: "today", width: 2 }], noise: found.noise, range, logarithmic: panel.logarithmic, label: `Residual over ${panel.label}`, select: (low, high) => brush(found, panel, low, high) });
+      return { drawn, index, data };
     });
   });
 }
@@ -279,7 +279,7 @@ function brush(found, panel, low, high) {
   panel.x.forEach((x, i) => { if (x !== null && x >= low && x <= high) marked.add(i); });
   const order = [...marked].sort((a, b) => found.time[a] - found.time[b]);
   brushed = marked.size ? { time: order.map((i) => found.time[i]), residual: order.map((i) => found.residual[i]) } : null;
-  for (const { drawn, index, count, data } of panels) drawn.setData([data[0], data[1], index.map((i) => i < count && marked.has(i) ? found.residual[i] : null), data[3]], false);
+  for (const { drawn, index, data } of panels) drawn.setData([data[0], data[1], index.map((i) => (marked.has(i) ? found.residual[i] : null))], false);
   for (const { drawn } of panels) drawn.redraw();
   fill(root.querySelector("#brush"), `${marked.size} of ${found.time.length} samples, ${panel.name} ${number(low, 3)} to ${number(high, 3)} ${unitOf(panel.label)} `, el("button", { class: "plain", onclick: clear }, "Clear"));
   drawTime();

@@ -55,6 +55,26 @@ function marks(runs) {
   };
 }
 
+// Means over bins as lines, broken where no sample lies between two bins.
+function traced(traces) {
+  return (u) => {
+    const { ctx, bbox } = u;
+    ctx.save();
+    ctx.beginPath(); ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height); ctx.clip();
+    for (const { x, y, tone, width } of traces) {
+      const steps = x.slice(1).map((value, i) => value - x[i]).sort((a, b) => a - b), wide = 6 * (steps[Math.floor(steps.length / 2)] || 1) + 0.04 * (x.at(-1) - x[0]);
+      ctx.strokeStyle = colour(tone); ctx.lineWidth = width * devicePixelRatio; ctx.lineJoin = "round";
+      ctx.beginPath();
+      x.forEach((value, i) => {
+        const at = [u.valToPos(value, "x", true), u.valToPos(y[i], "y", true)];
+        if (i === 0 || (u.scales.x.distr !== 3 && value - x[i - 1] > wide)) ctx.moveTo(...at); else ctx.lineTo(...at);
+      });
+      ctx.stroke();
+    }
+    ctx.restore();
+  };
+}
+
 export function dots(tone, alpha, size = 3) {
   return (u, index, from, to) => {
     const { ctx } = u, half = (size * devicePixelRatio) / 2;
@@ -71,7 +91,7 @@ export function dots(tone, alpha, size = 3) {
 }
 
 // One plot; `more` are options of uPlot that replace these.
-export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], top = 8, select = null, zoom = null, sync = null, range = null, logarithmic = false, label }) {
+export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, logarithmic = false, label }) {
   const drag = { x: Boolean(select || zoom), y: false, setScale: false };
   const flat = height < 130;
   const options = {
@@ -80,7 +100,7 @@ export function plot(host, data, series, { height, xLabel = "", noise = null, ru
     scales: { x: { time: false, ...(logarithmic ? { distr: 3 } : {}) }, y: range ? { range } : {} },
     axes: axes(xLabel, logarithmic, flat), series: [{}, ...series],
     hooks: {
-      drawClear: [band(noise)], draw: [marks(runs)],
+      drawClear: [band(noise)], draw: [marks(runs), traced(traces)],
       setSelect: [(u) => {
         if (u.select.width < 3) return;
         const low = u.posToVal(u.select.left, "x"), high = u.posToVal(u.select.left + u.select.width, "x");
