@@ -51,7 +51,11 @@ def _missing(steps: Sequence[Step]) -> str:
     if step.whole:
         return "The geometry of the robot differs as a whole"
     kinds = list(dict.fromkeys(kind(effect) for effect in step.effects))
-    return capital(listed(kinds, "or")) if len(kinds) < 3 else f"One of {len(kinds)} effects"
+    return capital(listed(kinds, "or")) if len(kinds) < 3 else _one_of(len(kinds))
+
+
+def _one_of(count: int) -> str:
+    return f"One of {count} effects is missing, which these data cannot distinguish"
 
 
 def comparison_headline(comparison: Comparison) -> str:

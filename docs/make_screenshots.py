@@ -1,0 +1,98 @@
+"""Takes docs/pictures/page-*.png from the page: ``python docs/make_screenshots.py``.
+
+It needs Chromium, the package ``playwright`` and the extra ``web``. The bench is simulated in real
+time, so it wants a quiet computer.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from playwright.sync_api import sync_playwright
+
+from winchkit.runs.writer import write_run
+from winchkit.web.examples import example_runs
+
+PICTURES = Path(__file__).with_name("pictures")
+SIZE = {"width": 1280, "height": 900}
+
+
+@contextmanager
+def served(*arguments: str) -> Iterator[str]:
+    """URL of a page that is served while the block runs."""
+    command = [sys.executable, "-m", "winchkit", "serve", "--no-browser", *arguments]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    try:
+        assert process.stdout is not None
+        yield process.stdout.readline().strip()
+    finally:
+        process.terminate()
+        process.wait(30)
+
+
+def diagnose(page: Any, url: str) -> None:
+    """Diagnose view with marked samples."""
+    page.goto(url)
+    page.wait_for_selector("#card .primary", timeout=120_000)
+    page.wait_for_timeout(2000)
+    box = page.locator("#over .u-over").first.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 30, steps=5)
+    page.mouse.up()
+    page.wait_for_timeout(1500)
+
+
+def bench(page: Any, url: str) -> None:
+    """Bench view while a jog is held."""
+    page.goto(f"{url}#bench")
+    page.wait_for_selector("#values .value", timeout=60_000)
+    page.click("#take")
+    page.wait_for_timeout(25_000)
+    box = page.locator(".controls .jog").first.bounding_box()
+    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.mouse.down()
+    page.wait_for_timeout(8000)
+
+
+def library(page: Any, url: str) -> None:
+    """Library view with two runs laid over each other."""
+    page.goto(f"{url}#library")
+    page.wait_for_selector("main input[type=checkbox]", timeout=60_000)
+    for row in (0, 2):
+        page.locator("main input[type=checkbox]").nth(row).check()
+    page.wait_for_timeout(2000)
+
+
+def main() -> None:
+    """Take all of them."""
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        sys.exit("no Chromium: apt-get install chromium")
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        for run in example_runs("demo-eccentric-drum").runs:
+            write_run(run, Path(folder) / f"{run.name}.csv")
+        browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        views = {
+            "diagnose": (diagnose, ["--mystery", "1"]),
+            "bench": (bench, ["--sim", "demo-adequate", "--allow-motion"]),
+            "library": (library, ["--folder", folder]),
+        }
+        for name, (show, arguments) in views.items():
+            with served(*arguments) as url:
+                page = browser.new_page(viewport=SIZE)
+                show(page, url)
+                page.screenshot(path=PICTURES / f"page-{name}.png", full_page=True)
+                page.close()
+        browser.close()
+
+
+if __name__ == "__main__":
+    main()
