@@ -266,8 +266,10 @@ def _judge_cause(record: Record, reference: tuple[float, float] | None) -> str:
 def _refused_at_rest(record: Record, right: set[str]) -> bool:
     """Whether the condition came to winches at rest, which stayed so until it was mended.
 
-    Commands that were given meanwhile were refused in its words: an accepted one enables a drive.
+    The commands that were given meanwhile were refused in its words; after a jog that its operator
+    released there is none.
     """
+    released = any(planned.kind == "released" for planned, _ in record.onsets)
     for one in record.forbidden:
         moving = any(
             sample.enabled
@@ -275,7 +277,7 @@ def _refused_at_rest(record: Record, right: set[str]) -> bool:
             for sample in _between(samples, one.time - 0.01, record.mended)
         )
         later = [words for moment, words in record.refused if moment >= one.time]
-        if one.kind in right and not moving:
+        if one.kind in right and not moving and (later or released):
             return all(_NUMBER.sub("", words) == _NUMBER.sub("", one.words) for words in later)
     return False
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import logging
 import math
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -84,8 +85,7 @@ class Record:
 def play(case: Case) -> Record:
     """Play a case in a folder of its own."""
     record = Record(case)
-    logging.disable(logging.CRITICAL)
-    with tempfile.TemporaryDirectory() as folder:
+    with _no_messages(), tempfile.TemporaryDirectory() as folder:
         try:
             with opened_world(
                 case.winches,
@@ -103,6 +103,17 @@ def play(case: Case) -> Record:
             record.error = "" if known else f"{type(error).__name__}: {error}"
         _read_log(record, Path(folder))
     return record
+
+
+@contextmanager
+def _no_messages() -> Iterator[None]:
+    """Without messages of the libraries, of which faults cause thousands."""
+    before = logging.root.manager.disable
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(before)
 
 
 def _play(world: World, record: Record) -> None:

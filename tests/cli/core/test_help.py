@@ -73,7 +73,8 @@ def test_a_letter_means_one_thing() -> None:
     meanings = defaultdict(set)
     for words, command in commands():
         for param in command.get_params(click.Context(command, help_option_names=["-h", "--help"])):
-            if isinstance(param, click.Option):
+            # click keeps the help option as the first call had it.
+            if isinstance(param, click.Option) and param.name != "help":
                 spelled = {name[2:] for name in param.opts if name.startswith("--")}
                 for name in param.opts:
                     if not name.startswith("--"):
@@ -83,7 +84,8 @@ def test_a_letter_means_one_thing() -> None:
                 for letter, meaning in LETTERS.items():
                     if meaning in spelled:
                         assert f"-{letter}" in param.opts, f"{words}: {param.opts}"
-    assert set(meanings) == set(LETTERS)
+    assert set(meanings) | {"h"} == set(LETTERS)
+    assert invoke("sim", "record", "-h").stdout == invoke("sim", "record", "--help").stdout
 
 
 def test_a_letter_that_a_command_lacks_is_explained() -> None:

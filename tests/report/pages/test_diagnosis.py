@@ -302,4 +302,4 @@ def test_long_runs_are_made_short() -> None:
     text = report_html(answered(runs), "x")
     tables = Page(text).figures.values()
     assert all(len(table["columns"][0]) <= 2500 for table in tables)
-    assert len(text.encode()) < 600_000
+    assert len(text.encode()) < 1_000_000, "the limit that docs/figures.md states"

@@ -110,7 +110,8 @@ class EquivalenceSet:
     """Equivalence set of one addition, in an order that does not depend on noise.
 
     Effects with the fewest parameters first, of these the ones that the data do not reject against
-    the best of them (Δχ² < 9), in the order of the catalogue.
+    the best of them (Δχ² < 9), those with the fewest measured inputs first, in the order of the
+    catalogue.
     """
 
     term: Term
@@ -216,10 +217,11 @@ def _ordered(engine: SelectionEngine, members: Sequence[_Member]) -> list[_Membe
     for count, _, fitted in members:
         least[count] = min(least.get(count, np.inf), fitted.chi_square)
 
-    def key(member: _Member) -> tuple[int, bool, int]:
+    def key(member: _Member) -> tuple[int, bool, int, int]:
         count, term, fitted = member
         worse = fitted.chi_square > least[count] + _DELTA_CHI_SQUARE
-        return count, worse, engine.place_in_catalogue(term.effect.id)
+        place = engine.place_in_catalogue(term.effect.id)
+        return count, worse, len(term.effect.needs), place
 
     return sorted(members, key=key)
 

@@ -71,7 +71,7 @@ function faults() {
 }
 
 function empty() {
-  const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "files", onchange: (event) => drop(event.target.files) });
+  const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "files", "aria-label": "Run files", tabindex: -1, onchange: (event) => drop(event.target.files) });
   return el("div", { class: "drop" }, el("h1", {}, "Drop run files here"),
     el("p", { class: "note" }, "CSV, MCAP, Parquet, MF4 of winchkit, or a file of another program: it opens a table of its columns."),
     el("div", { class: "row" }, input, el("button", { class: "primary", onclick: () => input.click() }, "Choose files"),
