@@ -210,11 +210,11 @@ def starts_from_coarse_fits(
     starts: Sequence[Hypothesis],
     inverse_sigma: Array,
     problem: CoarseProblem,
-) -> list[Hypothesis]:
-    """Starting values from fits on the coarse regression, best first, two at most.
+) -> list[Hypothesis] | None:
+    """Optima of the coarse regression as starting values, best first, two at most.
 
-    The best optimum of the coarse regression or, where that has a smaller χ² on all samples, the
-    best of the given starting values; and a second optimum that is nearly as good.
+    None where one of the given starting values has a smaller χ² on all samples: the coarse
+    regression is then no guide to which of them leads to the smallest.
 
     Parameters
     ----------
@@ -246,7 +246,9 @@ def starts_from_coarse_fits(
     def chi_square(hypothesis: Hypothesis) -> float:
         return _chi_square(regression.residual(hypothesis), inverse_sigma)
 
-    first = min((coarse.extended(best.hypothesis), *starts), key=chi_square)
+    first = coarse.extended(best.hypothesis)
+    if min(map(chi_square, starts)) < chi_square(first):
+        return None
     return [first, *(coarse.extended(fitted.hypothesis) for fitted in near[:1])]
 
 
