@@ -51,7 +51,7 @@ class Served:
     def end(self) -> None:
         """End it like Ctrl-C does."""
         self.process.terminate()
-        self.process.wait(STARTS)
+        self.process.communicate(timeout=STARTS)
 
 
 def opened(browser: Any, url: str, **options: Any) -> tuple[Any, list[str]]:

@@ -104,7 +104,7 @@ class simulated_bench:
         if self._process is not None:
             self._process.terminate()
             with suppress(subprocess.TimeoutExpired):
-                self._process.wait(_PATIENCE)
+                self._process.communicate(timeout=_PATIENCE)
 
 
 class BenchView:
