@@ -17,7 +17,7 @@ from typing import Any
 
 from playwright.sync_api import sync_playwright
 
-from winchkit.runs.writer import write_run
+from winchkit import write_run
 from winchkit.web.examples import example_runs
 
 PICTURES = Path(__file__).with_name("pictures")
