@@ -142,6 +142,20 @@ def test_a_file_of_another_program_opens_its_columns(client: TestClient) -> None
     assert len(settled(client)["runs"]) == before
 
 
+def test_constants_are_read_as_on_the_command_line(client: TestClient) -> None:
+    rows = "\n".join(f"{i * 0.1:.1f};{i};{i % 7}" for i in range(90))
+    headers = {**HEADERS, "x-file-name": "bridge.csv"}
+    text = f"t [s];Pos [deg];cell [mV/V]\n{rows}\n"
+    found = client.post("/api/drop", content=text.encode(), headers=headers).json()
+    assert {q["key"] for q in found["import"]["questions"]} == {"sensitivity", "capacity"}
+    answers = {"sensitivity": "2 mV/V", "capacity": "500N"}
+    asked = json.dumps({"file": found["file"], "answers": answers})
+    again = client.post("/api/guess", content=asked, headers=HEADERS).json()
+    assert again["import"]["questions"] == []
+    refused = client.post("/api/guess", content=asked.replace("500N", "5 kg"), headers=HEADERS)
+    assert refused.status_code == 400
+
+
 @pytest.mark.slow
 def test_look_learn_add_and_the_error_falls(client: TestClient, recorded: Path) -> None:
     for path in sorted(recorded.glob("*.csv")):
@@ -191,6 +205,11 @@ def test_curves_keep_the_extremes_and_a_zoom_shows_every_sample(client: TestClie
     curves = client.workspace.curves("tension")  # type: ignore[attr-defined]
     whole = get(client, "/api/curve?output=tension&points=200")
     worth = curves.scale.worth
+    torque = client.workspace.curves("motor_torque")  # type: ignore[attr-defined]
+    # Both are within the band of the comparison: a raw torque less a low-passed residual is not.
+    traces = client.workspace.state.answer.diagnosis.traces  # type: ignore[attr-defined]
+    shown = np.concatenate([t.measured for t in traces if t.output == "motor_torque"])
+    np.testing.assert_array_equal(torque.measured, shown)
     drawn = np.array([np.nan if v is None else v for v in whole["residual"]])
     assert np.nanmax(drawn) == pytest.approx(np.nanmax(curves.residual) / worth, rel=1e-4)
     assert np.nanmin(drawn) == pytest.approx(np.nanmin(curves.residual) / worth, rel=1e-4)

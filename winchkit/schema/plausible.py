@@ -7,12 +7,17 @@ wide; valid but unusual values are warnings (:mod:`winchkit.schema.bench_warning
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
 from winchkit.errors import UsageError
+from winchkit.units import parse
 
-__all__ = ["LARGEST", "Bound", "check_size"]
+__all__ = ["LARGEST", "NUMBER", "Bound", "check_size", "typed_quantity"]
+
+NUMBER = re.compile(r"^\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)$")
+"""A number and its unit as people type them: the space between may be missing."""
 
 
 class Bound(NamedTuple):
@@ -65,3 +70,16 @@ def check_size(value: float, dimension: str, text: object) -> float:
         unit = next(iter(UNITS[dimension]))
         raise UsageError(f"'{text}' must be at most {bound.value:g} {unit}: {bound.why}")
     return value
+
+
+def typed_quantity(text: str, dimension: str) -> float:
+    """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError.
+
+    Parameters
+    ----------
+    text : str
+        Number with unit, as people type it.
+    dimension : str
+        Name of the dimension.
+    """
+    return check_size(parse(NUMBER.sub(r"\1 \2", text).strip(), dimension), dimension, text)

@@ -6,21 +6,29 @@ asks again for the part that it shows.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import binned_share, kept_rows, variables_of
+from winchkit.diagnosis.residuals.attribution import (
+    Attribution,
+    binned_share,
+    kept_rows,
+    variables_of,
+)
+from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.model.stages import OUTPUT_UNITS
-from winchkit.model.variables import ANGLES
 from winchkit.plain_json import significant
 from winchkit.report.figures.axes import reading
-from winchkit.report.figures.reduction import bin_means, decimated, filled_edges
+from winchkit.report.figures.reduction import bin_edges, bin_means, decimated
 from winchkit.report.words.numbers import Scale, scale_for
+from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 __all__ = ["OutputCurves", "curves_of"]
@@ -29,11 +37,11 @@ _PANELS = 6
 """Small multiples; the design of the page has six."""
 _SAMPLES = 1500
 """Samples of each small multiple: the same ones in all, so that a brush marks them everywhere."""
-_BINS = 32
-"""Bins of a mean line: eight per period up to four periods."""
 _DIGITS = 5
 _TIME_DIGITS = 7
 _TURN = 2 * np.pi
+
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -89,7 +97,7 @@ class OutputCurves:
         measured, predicted = (values / whole.worth for values in reduced[:2])
         return {
             "output": self.output,
-            "name": _capital(OUTPUT_NAMES.get(self.output, self.output)),
+            "name": capital(OUTPUT_NAMES.get(self.output, self.output)),
             "unit": whole.label,
             "residual_unit": self.scale.label,
             "x": significant(x.tolist(), _TIME_DIGITS),
@@ -97,45 +105,33 @@ class OutputCurves:
             "predicted": significant(predicted.tolist(), _DIGITS),
             "residual": significant(reduced[2].tolist(), _DIGITS),
             "runs": [{"at": at, "name": name} for at, name in self.starts],
-            "noise": None if self.noise is None else self.noise / self.scale.worth,
+            "noise": self._noise,
             "first": float(self.time[0]),
             "last": float(self.time[-1]),
             "samples": len(self.time),
         }
 
     def multiples(self, order: tuple[str, int] | None = None) -> dict[str, Any]:
-        """Residual over each of the variables that explain most of it, at the same samples."""
+        """Residual over each of the variables that explain most of it, at the same samples.
+
+        Parameters
+        ----------
+        order : tuple of str and int, optional
+            An angle, and the periods per turn of the residual over it.
+        """
         compared = np.flatnonzero(np.isfinite(self.residual))
-        kept = compared[:: max(1, -(-len(compared) // _SAMPLES))]
+        kept = _thinned(compared)
         residual = self.residual / self.scale.worth
         panels = []
         for name in list(self.shares)[:_PANELS]:
-            within = order is not None and order[0] == name
-            values = np.mod(self.variables[name], _TURN) if within else self.variables[name]
-            how = reading(name, within_turn=within)
-            bins = max(_BINS, 8 * order[1]) if within and order is not None else _BINS
-            edges = (
-                np.linspace(0, _TURN, bins + 1)[1:-1]
-                if within
-                else filled_edges(values[compared], bins)
-            )
-            centres, (means,) = bin_means(values[compared], [residual[compared]], edges)
-            panels.append(
-                {
-                    "variable": name,
-                    "name": _capital(VARIABLE_NAMES.get(name, name)),
-                    "label": how.label,
-                    "logarithmic": how.logarithmic,
-                    "share": self.shares[name],
-                    "x": significant(how.shown(values[kept]).tolist(), _DIGITS),
-                    "bins": significant(how.shown(centres).tolist(), _DIGITS),
-                    "means": significant(means.tolist(), _DIGITS),
-                }
-            )
+            periods = order[1] if order is not None and order[0] == name else None
+            over, (means,) = self._over(name, periods, [residual], compared, kept)
+            words = _capital_name(name)
+            panels.append(over | {"name": words, "share": self.shares[name], "means": means})
         return {
             "output": self.output,
             "unit": self.scale.label,
-            "noise": None if self.noise is None else self.noise / self.scale.worth,
+            "noise": self._noise,
             "time": significant(self.time[kept].tolist(), _TIME_DIGITS),
             "residual": significant(residual[kept].tolist(), _DIGITS),
             "panels": panels,
@@ -153,30 +149,44 @@ class OutputCurves:
         order : int or None
             Periods per turn, where the variable is an angle.
         """
-        values, within = self.variables[variable], order is not None
         compared = np.flatnonzero(np.isfinite(self.residual) & np.isfinite(change))
-        values = np.mod(values, _TURN) if within else values
-        how = reading(variable, within_turn=within)
-        edges = (
-            np.linspace(0, _TURN, max(_BINS, 8 * (order or 1)) + 1)[1:-1]
-            if within
-            else filled_edges(values[compared], _BINS)
-        )
-        lines = [self.residual[compared] / self.scale.worth, change[compared] / self.scale.worth]
-        centres, means = bin_means(values[compared], lines, edges)
-        kept = compared[:: max(1, -(-len(compared) // _SAMPLES))]
-        return {
+        kept = _thinned(compared)
+        lines = [self.residual / self.scale.worth, change / self.scale.worth]
+        over, (means, signature) = self._over(variable, order, lines, compared, kept)
+        return over | {
             "output": self.output,
             "unit": self.scale.label,
+            "noise": self._noise,
+            "residual": significant(lines[0][kept].tolist(), _DIGITS),
+            "means": means,
+            "signature": signature,
+        }
+
+    @property
+    def _noise(self) -> float | None:
+        return None if self.noise is None else self.noise / self.scale.worth
+
+    def _over(
+        self,
+        variable: str,
+        order: int | None,
+        lines: Sequence[Array],
+        compared: Indices,
+        kept: Indices,
+    ) -> tuple[dict[str, Any], list[list[float | None]]]:
+        """A variable at the kept samples and at the bins, and the means of the lines there."""
+        values = self.variables[variable]
+        values = values if order is None else np.mod(values, _TURN)
+        how = reading(variable, within_turn=order is not None)
+        edges = bin_edges(values[compared], Attribution(self.output, variable, 0.0, order), _TURN)
+        centres, means = bin_means(values[compared], [line[compared] for line in lines], edges)
+        return {
+            "variable": variable,
             "label": how.label,
             "logarithmic": how.logarithmic,
-            "noise": None if self.noise is None else self.noise / self.scale.worth,
             "x": significant(how.shown(values[kept]).tolist(), _DIGITS),
-            "residual": significant((self.residual[kept] / self.scale.worth).tolist(), _DIGITS),
             "bins": significant(how.shown(centres).tolist(), _DIGITS),
-            "means": significant(means[0].tolist(), _DIGITS),
-            "signature": significant(means[1].tolist(), _DIGITS),
-        }
+        }, [significant(mean.tolist(), _DIGITS) for mean in means]
 
 
 def curves_of(
@@ -199,36 +209,26 @@ def curves_of(
         By output, in the order of the data set.
     """
     recordings = regression.dataset.recordings
-    rows = regression.in_time(residual)
+    traces = traces_of(regression, residual)
     out: dict[str, OutputCurves] = {}
     for output in regression.dataset.outputs:
-        times, measured, errors, starts, start = [], [], [], [], 0.0
-        known: list[dict[str, Array]] = []
-        for segment, own in zip(regression.segments, rows, strict=True):
-            if segment.output != output:
-                continue
-            recording = recordings[segment.run]
-            own_time = recording.signals.time - recording.signals.time[0]
-            valid = recording.valid[output]
-            starts.append((start, _label(recording)))
-            times.append(start + own_time)
-            measured.append(np.where(valid, recording.measured[output], np.nan))
-            errors.append(np.where(valid, own, np.nan))
-            known.append(variables_of(recording))
-            start = float(times[-1][-1]) + float(np.median(np.diff(own_time)))
+        own = [trace for trace in traces if trace.output == output]
+        runs = [recordings[part.run] for part in regression.segments if part.output == output]
+        known = [variables_of(run) for run in runs]
+        lasts = [float(trace.time[-1] + np.median(np.diff(trace.time))) for trace in own]
+        starts = [0.0, *np.cumsum(lasts)[:-1].tolist()]
         names = [name for name in known[0] if all(name in one for one in known)]
         variables = {name: np.concatenate([one[name] for one in known]) for name in names}
-        error = np.concatenate(errors)
+        error = np.concatenate([trace.residual for trace in own])
         good, kept = np.isfinite(error), kept_rows(regression, output)
         shares = {name: binned_share(variables[name][good], error[good], kept) for name in names}
-        value = np.concatenate(measured)
         out[output] = OutputCurves(
             output,
-            np.concatenate(times),
-            value,
-            value - error,
+            np.concatenate([at + trace.time for at, trace in zip(starts, own, strict=True)]),
+            np.concatenate([trace.measured for trace in own]),
+            np.concatenate([trace.predicted for trace in own]),
             error,
-            tuple(starts),
+            tuple((at, _label(run)) for at, run in zip(starts, runs, strict=True)),
             noise.get(output),
             variables,
             dict(sorted(shares.items(), key=lambda item: -item[1])),
@@ -243,14 +243,14 @@ def _label(recording: Recording) -> str:
     return " ".join(word for word in words if word) or recording.name
 
 
-def is_angle(variable: str) -> bool:
-    """Whether a variable is an angle, over which a residual may have an order."""
-    return variable in ANGLES
+def _thinned(compared: Indices) -> Indices:
+    """At most ``_SAMPLES`` of them, evenly distributed."""
+    return compared[:: max(1, -(-len(compared) // _SAMPLES))]
+
+
+def _capital_name(variable: str) -> str:
+    return capital(VARIABLE_NAMES.get(variable, variable))
 
 
 def _size(values: Array) -> float:
     return float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]

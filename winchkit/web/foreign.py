@@ -10,7 +10,7 @@ from typing import Any
 from winchkit.errors import FileError, UsageError
 from winchkit.plain_json import significant
 from winchkit.report.figures.reduction import decimated
-from winchkit.runs.importing.answers import Answers, read_column
+from winchkit.runs.importing.answers import CONSTANTS, Answers, read_column, read_constant
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.mapping import mapping_id, mapping_of
@@ -25,15 +25,6 @@ __all__ = ["imported", "is_run", "preview"]
 
 _FIRST = 5
 _POINTS = 120
-_CONSTANTS = {
-    "rated_torque": "torque",
-    "torque_constant": "torque constant",
-    "counts_per_turn": "ratio",
-    "sensitivity": "ratio",
-    "capacity": "force",
-    "sample_rate": "frequency",
-}
-"""Answers that are quantities, and their dimension."""
 
 
 def is_run(path: Path) -> bool:
@@ -124,8 +115,8 @@ def _answers(given: Mapping[str, Any]) -> Answers:
     columns: Sequence[str] = given.get("columns", ())
     answers = Answers(columns=tuple(read_column(str(text)) for text in columns))
     values = {
-        key: parse(str(given[key]), dimension)
-        for key, dimension in _CONSTANTS.items()
+        key: read_constant(key, str(given[key]))
+        for key in CONSTANTS
         if str(given.get(key, "")).strip()
     }
     return _with(answers, **values)

@@ -13,7 +13,7 @@ from winchkit.effects.effect import Effect
 from winchkit.report.detectability import effects_of
 from winchkit.report.words.headline import headline
 from winchkit.report.words.numbers import Scale, quantity, scale_for, significant, with_std
-from winchkit.report.words.sentence import changes_text, sentence, where_text
+from winchkit.report.words.sentence import capital, changes_text, sentence, where_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
 
 __all__ = ["Rung", "card", "ladder", "verdict"]
@@ -114,7 +114,7 @@ def ladder(answer: WinchAnswer, history: Sequence[Rung]) -> dict[str, Any]:
         "columns": [
             {
                 "output": name,
-                "name": _capital(OUTPUT_NAMES.get(name, name)),
+                "name": capital(OUTPUT_NAMES.get(name, name)),
                 "unit": scales[name].label,
                 "source": out.noise_source,
             }
@@ -201,8 +201,4 @@ def _cell(value: float | None, floor: float | None, scale: Scale) -> dict[str, A
 
 def _name(effect: Effect | None, effect_id: str) -> str:
     """Name of an effect for people: its id in words."""
-    return _capital((effect.id if effect is not None else effect_id).replace("-", " "))
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    return capital((effect.id if effect is not None else effect_id).replace("-", " "))

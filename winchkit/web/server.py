@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import secrets
 import socket
-import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from winchkit.errors import UsageError
 
@@ -70,12 +70,12 @@ def serve(
             f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
         ) from None
     from winchkit.web.library import Library
-    from winchkit.web.workspace import Workspace, remove_folder
+    from winchkit.web.workspace import Workspace
 
     token = secrets.token_urlsafe(24)
     with ExitStack() as stack:
-        own = Path(tempfile.mkdtemp(prefix="winchkit-page-"))
-        stack.callback(remove_folder, own)
+        own_folder = TemporaryDirectory(prefix="winchkit-page-", ignore_cleanup_errors=True)
+        own = Path(stack.enter_context(own_folder))
         workspace = Workspace(own, effects)
         stack.callback(workspace.close)
         view = None

@@ -7,7 +7,6 @@ it was. Files are kept in a folder of the server's own: nothing of the user's is
 from __future__ import annotations
 
 import re
-import shutil
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -17,14 +16,17 @@ from typing import Any
 
 import numpy as np
 
+from winchkit.arrays import Array
 from winchkit.catalog import find
 from winchkit.diagnosis.add import grow
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.write import write_addition
 from winchkit.effects.catalogue import Catalogue, load_catalogue
-from winchkit.errors import Fault, FileError, UsageError, WinchkitError
+from winchkit.errors import FileError, UsageError, WinchkitError
+from winchkit.model.variables import ANGLES
 from winchkit.report.words.numbers import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 from winchkit.runs.read import read_run
@@ -32,7 +34,7 @@ from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_profile
-from winchkit.web.curves import OutputCurves, curves_of, is_angle
+from winchkit.web.curves import OutputCurves, curves_of
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
 from winchkit.web.foreign import imported
 from winchkit.web.ladder import Rung, card, ladder, verdict
@@ -222,7 +224,7 @@ class Workspace:
         answer = self._state.answer
         found = () if answer is None else answer.diagnosis.where
         for where in found:
-            if where.output == output and where.order is not None and is_angle(where.variable):
+            if where.output == output and where.order is not None and where.variable in ANGLES:
                 return where.variable, where.order
         return None
 
@@ -460,23 +462,21 @@ class Workspace:
             out["signature"]["variable"] = variable
         return out
 
-    def _most_changed(
-        self, outputs: Sequence[str], change: np.ndarray
-    ) -> tuple[str, np.ndarray] | None:
+    def _most_changed(self, outputs: Sequence[str], change: Array) -> tuple[str, Array] | None:
         """Output that a candidate changes most against its noise, and the change in time."""
         answer = self._state.answer
         assert answer is not None
-        all_noise = dict.fromkeys(self._state.curves)
-        own = curves_of(answer.engine.regression, change, all_noise)
-        best: tuple[float, str] | None = None
+        traces = traces_of(answer.engine.regression, change)
+        best: tuple[float, str, Array] | None = None
         for name in outputs:
-            if name not in own:
+            parts = [trace.residual for trace in traces if trace.output == name]
+            if not parts:
                 continue
-            noise = self._state.curves[name].noise or 1.0
-            size = float(np.sqrt(np.nanmean(own[name].residual ** 2))) / noise
+            own = np.concatenate(parts)
+            size = float(np.sqrt(np.nanmean(own**2))) / (self._state.curves[name].noise or 1.0)
             if best is None or size > best[0]:
-                best = size, name
-        return None if best is None else (best[1], own[best[1]].residual)
+                best = size, name, own
+        return None if best is None else best[1:]
 
 
 def _run_json(item: LoadedRun) -> dict[str, Any]:
@@ -490,13 +490,3 @@ def _run_json(item: LoadedRun) -> dict[str, Any]:
         "programme": run.metadata.get("programme", ""),
         "winches": run.winches(),
     }
-
-
-def remove_folder(folder: Path) -> None:
-    """Remove the server's folder."""
-    shutil.rmtree(folder, ignore_errors=True)
-
-
-def bad_file(name: str, why: str) -> FileError:
-    """A file that cannot be taken from the page."""
-    return FileError(Fault(why, name))

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import re
-
 from winchkit.errors import UsageError
-from winchkit.schema.plausible import check_size
-from winchkit.units import UNITS, parse
+from winchkit.schema.plausible import NUMBER, typed_quantity
+from winchkit.units import UNITS
 
 __all__ = ["dimension", "optional", "quantity", "seconds"]
-
-_NUMBER = re.compile(r"^\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)$")
 
 
 def quantity(text: str, dimension: str) -> float:
     """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError, also for a time below zero."""
-    value = check_size(parse(_NUMBER.sub(r"\1 \2", text).strip(), dimension), dimension, text)
+    value = typed_quantity(text, dimension)
     if dimension == "time" and value < 0:
         raise UsageError(f"'{text}' is below zero; a duration is not")
     return value
@@ -23,7 +19,7 @@ def quantity(text: str, dimension: str) -> float:
 
 def dimension(text: str, among: tuple[str, ...]) -> str:
     """Which of these dimensions the unit of ``text`` has; raises UsageError for none of them."""
-    found = _NUMBER.match(text)
+    found = NUMBER.match(text)
     unit = found[2].strip() if found else ""
     for name in among:
         if unit in UNITS[name]:

@@ -162,10 +162,10 @@ def _may_ask(yes: bool, as_json: bool) -> bool:
 
 def _answers(options: Mapping[str, Any]) -> Answers:
     """Answers of the command line in SI; raises UsageError."""
-    from winchkit.runs.importing.answers import Answers, read_column
+    from winchkit.runs.importing.answers import CONSTANTS, Answers, read_column, read_constant
 
     constants = {
-        key: _quantity(key, str(options[key])) for key in _QUANTITIES if options[key] is not None
+        key: read_constant(key, str(options[key])) for key in CONSTANTS if options[key] is not None
     }
     columns = tuple(read_column(text) for text in options["columns"])
     return _with(Answers(columns=columns, body=options["body"]), **constants)
@@ -173,29 +173,6 @@ def _answers(options: Mapping[str, Any]) -> Answers:
 
 def _with(answers: Answers, **constants: Any) -> Answers:
     return replace(answers, **constants)
-
-
-_QUANTITIES = {
-    "rated_torque": "torque",
-    "torque_constant": "torque constant",
-    "counts_per_turn": "ratio",
-    "sensitivity": "bridge",
-    "capacity": "force",
-    "sample_rate": "frequency",
-}
-"""Dimension of each constant."""
-
-
-def _quantity(key: str, text: str) -> float:
-    """A positive constant in SI; a sensitivity in mV/V."""
-    from winchkit.cli.core.quantities import quantity
-
-    dimension = _QUANTITIES[key]
-    plain = re.sub(r"\s*(mV/V|counts?)\s*$", "", text) if dimension in {"bridge", "ratio"} else text
-    value = quantity(plain, "ratio" if dimension == "bridge" else dimension)
-    if value <= 0:
-        raise UsageError(f"--{key.replace('_', '-')} '{text}' must be above 0")
-    return value
 
 
 def _masses(texts: Sequence[str], count: int) -> list[str | None]:
@@ -312,10 +289,12 @@ def _picked(texts: Sequence[str]) -> str:
 
 def _until(words: str, read: str | Callable[[str], Any]) -> Any:
     """Prompt until the answer can be read."""
+    from winchkit.runs.importing.answers import read_constant
+
     while True:
         text = click.prompt(words, err=True)
         try:
-            return _quantity(read, text) if isinstance(read, str) else read(text)
+            return read_constant(read, text) if isinstance(read, str) else read(text)
         except UsageError as error:
             click.echo(f"  {error}", err=True)
 

@@ -9,9 +9,10 @@ from winchkit.errors import UsageError
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE, read_unit
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
+from winchkit.schema.plausible import typed_quantity
 from winchkit.units import UNITS, suggest
 
-__all__ = ["Answers", "ColumnAnswer", "permitted", "read_column"]
+__all__ = ["CONSTANTS", "Answers", "ColumnAnswer", "permitted", "read_column", "read_constant"]
 
 _COLUMN = re.compile(
     r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<source>.*?)\s*"
@@ -54,6 +55,42 @@ def permitted(channel: str) -> tuple[str, ...]:
 
 def _fits(channel: str, dimension: str) -> bool:
     return dimension in permitted(channel) or column_dimension(channel) in {"ratio", None}
+
+
+CONSTANTS: dict[str, str] = {
+    "rated_torque": "torque",
+    "torque_constant": "torque constant",
+    "counts_per_turn": "ratio",
+    "sensitivity": "ratio",
+    "capacity": "force",
+    "sample_rate": "frequency",
+}
+"""Dimension of each constant of :class:`Answers`; a sensitivity is a number of mV/V."""
+_COUNTED = re.compile(r"\s*(mV/V|counts?)\s*$")
+"""Units of constants that are numbers, which need not be written."""
+
+
+def read_constant(key: str, text: str) -> float:
+    """A constant of :class:`Answers` in SI, ``"2.4 N m"`` or ``"2 mV/V"``.
+
+    Parameters
+    ----------
+    key : str
+        One of :data:`CONSTANTS`.
+    text : str
+        Number with unit.
+
+    Raises
+    ------
+    UsageError
+        For a wrong unit, or a number that is not above zero.
+    """
+    dimension = CONSTANTS[key]
+    plain = _COUNTED.sub("", text) if dimension == "ratio" else text
+    value = typed_quantity(plain, dimension)
+    if value <= 0:
+        raise UsageError(f"--{key.replace('_', '-')} '{text}' must be above 0")
+    return value
 
 
 @dataclass(frozen=True)
