@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from winchkit.diagnosis.add import add
-from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.diagnose import ProgressCallback, diagnose, no_progress
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect_template import check_own, write_own, write_wave_on_drum
@@ -28,6 +28,7 @@ def new_effect(
     *,
     curve: str | None = None,
     effect_id: str = "",
+    progress: ProgressCallback = no_progress,
 ) -> str:
     """Write a Python file with an effect that has the shape of the unexplained residual.
 
@@ -47,6 +48,8 @@ def new_effect(
         Empirical effect to begin from; by default that of the largest share.
     effect_id : str, optional
         Id of the new effect; by default the name of the file.
+    progress : callable, optional
+        Called with the present step and the share of the work done, 0 to 1.
 
     Returns
     -------
@@ -64,7 +67,7 @@ def new_effect(
     name = effect_id or file.stem.replace("_", "-")
     check_own(name, file, catalogue)
     if curve is None:
-        found = _unexplained(runs, profile, catalogue, band)
+        found = _unexplained(runs, profile, catalogue, band, progress)
         order = _order_of_drum(found)
         if order is not None:
             write_wave_on_drum(order, name, file)
@@ -72,16 +75,21 @@ def new_effect(
         curve = found.empirical[0]
     if curve not in EMPIRICAL:
         raise UsageError(f"'{curve}' is no empirical effect{suggest(curve, list(EMPIRICAL))}")
+    progress(f"fitting {curve}", 1.0)
     term, _ = add(curve, runs, profile, catalogue, band).added
     write_own(term, name, file)
     return curve
 
 
 def _unexplained(
-    runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue, band: float | None
+    runs: Sequence[Run],
+    profile: WinchProfile,
+    catalogue: Catalogue,
+    band: float | None,
+    progress: ProgressCallback,
 ) -> Diagnosis:
     """A diagnosis with a located residual."""
-    found = diagnose(runs, profile, catalogue, band).diagnosis
+    found = diagnose(runs, profile, catalogue, band, progress=progress).diagnosis
     if not found.empirical:
         raise UsageError(
             f"the verdict is '{found.verdict}' and nothing unexplained was located; name the "

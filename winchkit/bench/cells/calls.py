@@ -5,6 +5,7 @@ No drive is opened: the instruments of a bench answer alone, or through the proc
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,15 @@ from winchkit.bench.remote.cell_session import at_cells
 from winchkit.calibration.cell.health import Health, Samples, examine, samples_of
 from winchkit.drivers.reading import Quality, Reading
 
-__all__ = ["cell_health", "cell_info", "cell_rate", "cell_store", "cell_tare", "cell_zero"]
+__all__ = [
+    "cell_health",
+    "cell_info",
+    "cell_rate",
+    "cell_store",
+    "cell_tare",
+    "cell_zero",
+    "samples_of_readings",
+]
 
 
 def cell_info(bench: str | Path, cell: str | None = None) -> dict[str, Any]:
@@ -84,7 +93,7 @@ def cell_health(bench: str | Path, cell: str | None = None, *, duration: float =
     RunError
         For fewer than 20 usable readings.
     """
-    return examine(_samples(readings_of(_done("watch", bench, cell, duration))))
+    return examine(samples_of_readings(readings_of(_done("watch", bench, cell, duration))))
 
 
 def cell_tare(
@@ -161,7 +170,8 @@ def _done(task: str, bench: str | Path, cell: str | None, *arguments: Any) -> di
         return found.do(task, full_name(found.spec, cell), *arguments)
 
 
-def _samples(readings: list[Reading]) -> Samples:
+def samples_of_readings(readings: Sequence[Reading]) -> Samples:
+    """Readings as the examination of a cell takes them."""
     saturated = Quality.OVERLOAD | Quality.UNDERLOAD
     return samples_of(
         [

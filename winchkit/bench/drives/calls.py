@@ -15,17 +15,16 @@ from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.drivers.can.canopen.lss import UNCONFIGURED, LssLine
 from winchkit.drivers.can.tools.config import (
     Difference,
-    check_fits,
     difference,
+    fitting_config,
     read_config,
-    read_config_file,
     restore,
     store,
     write_config,
     write_config_file,
 )
 from winchkit.drivers.can.tools.info import DriveInfo, read_info
-from winchkit.drivers.can.tools.scan import Found, identity_of
+from winchkit.drivers.can.tools.scan import Found
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_bench
@@ -151,9 +150,7 @@ def config_diff(bench: Wiring, path: str | Path, who: str | None = None) -> list
         Empty where they agree.
     """
     with drive_at(_spec(bench), who) as node:
-        config = read_config_file(Path(path), node.objects.dictionary)
-        check_fits(config, identity_of(node.objects.port), str(path))
-        return difference(config, node.objects)
+        return difference(fitting_config(Path(path), node.objects), node.objects)
 
 
 def config_load(bench: Wiring, path: str | Path, who: str | None = None) -> list[Difference]:
@@ -175,9 +172,7 @@ def config_load(bench: Wiring, path: str | Path, who: str | None = None) -> list
         Beside a process that owns the bench, and where the drive is enabled.
     """
     with drive_at(_spec(bench), who, writes=True) as node:
-        config = read_config_file(Path(path), node.objects.dictionary)
-        check_fits(config, identity_of(node.objects.port), str(path))
-        return write_config(config, node.objects)
+        return write_config(fitting_config(Path(path), node.objects), node.objects)
 
 
 def config_store(bench: Wiring, who: str | None = None) -> None:
@@ -292,12 +287,7 @@ def lss_set(
         line = LssLine(bus)
         try:
             chosen = _select(line, identity)
-            if node is not None:
-                line.set_node(node)
-            if bitrate is not None:
-                line.set_bitrate(bitrate)
-            if store:
-                line.store()
+            line.configure(node, bitrate, store=store)
         finally:
             line.close()
     return chosen

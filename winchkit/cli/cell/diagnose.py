@@ -14,7 +14,7 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
-    from winchkit.calibration.cell.health import Health, Samples
+    from winchkit.calibration.cell.health import Health
     from winchkit.drivers.reading import Reading
 
 __all__ = ["command"]
@@ -46,6 +46,7 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
     Leave the load alone, or change it once: then creep is reported as well. Exit 1 where something
     is wrong with the readings themselves.
     """
+    from winchkit.bench.cells.calls import samples_of_readings
     from winchkit.bench.cells.tasks import readings_of
     from winchkit.calibration.cell.health import examine
     from winchkit.cli.core.quantities import quantity
@@ -58,7 +59,7 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
     flags = _flags(readings)
     if sum(item.quality.usable for item in readings) < len(readings) / 2:
         _tell_unusable(name, len(readings), flags, counters, as_json)
-    health = examine(_samples(readings))
+    health = examine(samples_of_readings(readings))
     if as_json:
         record = {"cell": name, "unit": unit, **dataclasses.asdict(health)}
         record |= {"flags": flags, "counters": counters}
@@ -96,25 +97,6 @@ def _tell_unusable(
             if flag in _MEANINGS:
                 click.echo(f"  ! {flag}: {_MEANINGS[flag]}")
     click.get_current_context().exit(1)
-
-
-def _samples(readings: list[Reading]) -> Samples:
-    from winchkit.calibration.cell.health import samples_of
-    from winchkit.drivers.reading import Quality
-
-    saturated = Quality.OVERLOAD | Quality.UNDERLOAD
-    return samples_of(
-        [
-            (
-                item.t_sample,
-                item.raw,
-                item.gross,
-                item.quality.usable,
-                bool(item.quality & saturated),
-            )
-            for item in readings
-        ]
-    )
 
 
 def _lines(health: Health, unit: str) -> list[str]:

@@ -105,13 +105,11 @@ def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
 def diff(who: str, file: str, *, as_json: bool, **bus: Any) -> None:
     """Compare a file with a drive; ends with 1 where they differ."""
     from winchkit.bench.drives.node_access import drive_at
-    from winchkit.drivers.can.tools.config import check_fits, difference, read_config_file
-    from winchkit.drivers.can.tools.scan import identity_of
+    from winchkit.drivers.can.tools.config import difference, fitting_config
 
     check_exists(file)
     with drive_at(BusChoice(**bus).spec(), who) as node:
-        config = read_config_file(Path(file), node.objects.dictionary)
-        check_fits(config, identity_of(node.objects.port), str(file))
+        config = fitting_config(Path(file), node.objects)
         found = difference(config, node.objects)
     if as_json:
         echo_json({"schema": 1, "differences": found})
@@ -140,8 +138,7 @@ def load(who: str, file: str, *, dry_run: bool, as_json: bool, **bus: Any) -> No
     `config store` follows. A dry run shows every setting of the file, differing or not.
     """
     from winchkit.bench.drives.node_access import drive_at
-    from winchkit.drivers.can.tools.config import check_fits, read_config_file, write_config
-    from winchkit.drivers.can.tools.scan import identity_of
+    from winchkit.drivers.can.tools.config import fitting_config, write_config
 
     check_exists(file)
     choice = BusChoice(**bus)
@@ -149,8 +146,7 @@ def load(who: str, file: str, *, dry_run: bool, as_json: bool, **bus: Any) -> No
         _show_load(choice, who, file, as_json=as_json)
         return
     with drive_at(choice.spec(), who, writes=True) as node:
-        config = read_config_file(Path(file), node.objects.dictionary)
-        check_fits(config, identity_of(node.objects.port), str(file))
+        config = fitting_config(Path(file), node.objects)
         changed = write_config(config, node.objects)
     if as_json:
         echo_json({"schema": 1, "changed": changed, "same": len(config.values) - len(changed)})

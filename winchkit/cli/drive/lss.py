@@ -219,12 +219,7 @@ def _assign(
     store: bool,
 ) -> Identity:
     identity = _select(line, parts, only=only)
-    if node is not None:
-        line.set_node(node)
-    if bitrate is not None:
-        line.set_bitrate(bitrate)
-    if store:
-        line.store()
+    line.configure(node, bitrate, store=store)
     return identity
 
 

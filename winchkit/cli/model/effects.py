@@ -25,14 +25,7 @@ from winchkit.cli.model.options import (
 )
 
 if TYPE_CHECKING:
-    from winchkit.cli.core.terminal import ProgressCallback
-    from winchkit.diagnosis.results import Diagnosis
     from winchkit.effects.catalogue import Catalogue
-    from winchkit.runs.run import Run
-    from winchkit.schema.profiles.winch import WinchProfile
-
-    _Data = tuple[Sequence[Run], WinchProfile, Catalogue, float | None]
-    """Runs, profile, effects and band, as a diagnosis takes them."""
 
 __all__ = [
     "command",
@@ -156,54 +149,22 @@ def new(
     It is ready for --effects: diagnose with it, then put in the physics that you recognise.
     """
     from winchkit.cli.model.options import declared_profile, refuse_curves
-    from winchkit.effects.effect_template import check_own, write_wave_on_drum
+    from winchkit.diagnosis.new_effect import new_effect
+    from winchkit.effects.effect_template import check_own
 
     refuse_curves(declared_profile(asked.source))
     name = effect_id or Path(file).stem.replace("_", "-")
     check_own(name, Path(file), asked.catalogue)
     with progress_bar() as progress:
-        data = (asked.runs(runs), asked.declared, asked.catalogue, asked.band)
-        found = _unexplained(data, progress) if curve is None else None
-        order = None if found is None else _order_of_drum(found)
-        if order is not None:
-            write_wave_on_drum(order, name, Path(file))
-            start = f"a wave of {order} periods per drum turn"
-        else:
-            start = found.empirical[0] if found is not None else str(curve)
-            progress(f"fitting {start}", None)
-            _write_curve(start, name, Path(file), data)
+        start = new_effect(
+            file,
+            asked.runs(runs),
+            asked.declared,
+            asked.catalogue,
+            asked.band,
+            curve=curve,
+            effect_id=name,
+            progress=progress,
+        )
     note(f"written: {file}; it holds the effect '{name}', with its initial values from {start}")
     suggest_with("diagnose", asked, runs, "--effects", file)
-
-
-def _write_curve(curve: str, name: str, file: Path, data: _Data) -> None:
-    from winchkit.diagnosis.add import add
-    from winchkit.effects.effect_template import write_own
-    from winchkit.effects.empirical import EMPIRICAL
-    from winchkit.errors import UsageError
-    from winchkit.units import suggest
-
-    if curve not in EMPIRICAL:
-        raise UsageError(f"'{curve}' is no empirical effect{suggest(curve, list(EMPIRICAL))}")
-    term, _ = add(curve, *data).added
-    write_own(term, name, file)
-
-
-def _unexplained(data: _Data, progress: ProgressCallback) -> Diagnosis:
-    """A diagnosis that leaves something, and says where."""
-    from winchkit.diagnosis.diagnose import diagnose
-    from winchkit.errors import UsageError
-
-    found = diagnose(*data, progress=progress).diagnosis
-    if not found.empirical:
-        raise UsageError(
-            f"the verdict is '{found.verdict}' and nothing unexplained was located; name the "
-            "curve to begin from with --curve, e.g. empirical-motor-torque-speed"
-        )
-    return found
-
-
-def _order_of_drum(found: Diagnosis) -> int | None:
-    """Order per drum turn that several outputs share: then the drum's own path has it."""
-    orders = [w.order for w in found.where if w.variable == "drum_angle" and w.order is not None]
-    return next((order for order in orders if orders.count(order) > 1), None)

@@ -124,6 +124,15 @@ class LssLine:
         with self._errors(f"set the bit rate {bitrate}"):
             self._master.configure_bit_timing(BIT_RATES[bitrate])
 
+    def configure(self, node: int | None, bitrate: int | None, *, store: bool) -> None:
+        """Set what is given, and let the selected device keep it where ``store`` is true."""
+        if node is not None:
+            self.set_node(node)
+        if bitrate is not None:
+            self.set_bitrate(bitrate)
+        if store:
+            self.store()
+
     def store(self) -> None:
         """Let the selected device keep what was set."""
         with self._errors("store"):

@@ -31,6 +31,7 @@ __all__ = [
     "check_fits",
     "check_quiet",
     "difference",
+    "fitting_config",
     "read_config",
     "read_config_file",
     "restore",
@@ -219,6 +220,13 @@ def read_config_file(path: Path, dictionary: Any) -> Config:
         raise FileError(Fault(f"is not UTF-8 text: {error}", str(path))) from None
     known = settings(dictionary)
     return _from_json(path, text, known) if is_json else _from_dcf(path, text, known)
+
+
+def fitting_config(path: Path, objects: Objects) -> Config:
+    """Settings of a file for a drive; raises FileError where they are those of another kind."""
+    config = read_config_file(path, objects.dictionary)
+    check_fits(config, identity_of(objects.port), str(path))
+    return config
 
 
 def _is_json(path: Path) -> bool:
