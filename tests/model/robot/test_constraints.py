@@ -16,7 +16,8 @@ from winchkit.catalog import find
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, start_pose
 from winchkit.model.robot import Pose, Robot, robot_of, rotation_of, structure_matrix
-from winchkit.model.robot.constraints import balance, force_basis, mean_offset
+from winchkit.model.robot.balance import balance, force_basis
+from winchkit.model.robot.constraints import mean_offset
 from winchkit.model.robot.pose_design import (
     chosen_in_turn,
     determinant_gain,

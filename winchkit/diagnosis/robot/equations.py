@@ -9,7 +9,7 @@ residuals are model less measurement by kind, in SI. Here
 * lengths by the drum are those of :class:`winchkit.model.line.Line`, which applies effects; without
   effects they are those of :class:`winchkit.model.robot.constraints.Winding` up to rounding;
 * ``statics`` is the equilibrium of a hanging platform
-  (:mod:`winchkit.model.robot.hanging_balance`), which takes part in its pose; its ``tension`` rows,
+  (:mod:`winchkit.model.robot.balance`), which takes part in its pose; its ``tension`` rows,
   the part of it that cable forces can carry, are then shown alone;
 * ``gauge`` are the rows ``cable_length`` and ``tension`` the rows ``balance`` of that module;
 * ``tension`` rows are whitened at the pose and geometry of one robot (``basis``), so that they
@@ -40,21 +40,24 @@ from winchkit.model.robot import (
     structure_matrix,
     swivel_sensitivities,
 )
+from winchkit.model.robot.balance import (
+    force_basis,
+    hanging_balance,
+    hanging_residual,
+    wrench_residual,
+)
 from winchkit.model.robot.constraints import (
     Constraint,
     by_geometry,
     by_pose,
     closure_by_geometry,
     closure_residual,
-    force_basis,
     position,
     rotation_by_pose,
     rotation_residual,
     swivel_residual,
     winding_of,
-    wrench_residual,
 )
-from winchkit.model.robot.hanging_balance import hanging_balance, hanging_residual
 from winchkit.model.robot.pose_estimation import start_pose as completed
 from winchkit.model.robot.robot import standing
 from winchkit.model.robot.tracker import tracked_position, tracked_rotation

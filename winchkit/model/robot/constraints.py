@@ -32,13 +32,7 @@ else the differences of the measured angles, with the rates of
 
 ``cable_length``: L plus the offset of the length instrument less the reading.
 
-``balance`` (IPAnema paper, Eq. 7). The wrench Aᵀ f + w of measured cable forces f and weight w,
-multiplied by a matrix V with V Aᵀ A Vᵀ = 1, so that each row has the variance of one force reading.
-With the mass m and the centre of mass s of the platform
-
-    ∂w/∂m = [g; (R s) × g]                   ∂w/∂s_k = [0; R e_k × m g]
-
-The derivatives of V Aᵀ by pose and geometry are left out: the wrench that is left over is small.
+The balance of forces at the platform is in :mod:`winchkit.model.robot.balance`.
 
 References
 ----------
@@ -62,13 +56,10 @@ from winchkit.model.robot.kinematics import (
     Sensitivities,
     linearised,
     sensitivities,
-    structure_matrix,
     swivel_angle,
     swivel_sensitivities,
 )
 from winchkit.model.robot.rotation import angle_rates, angles_of, rotation_of, rotation_vector
-from winchkit.model.robot.wrench import gravity_wrench, weight_by_payload
-from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = [
@@ -76,14 +67,12 @@ __all__ = [
     "Constraint",
     "Strain",
     "Winding",
-    "balance",
     "by_geometry",
     "by_pose",
     "cable_length",
     "closure",
     "closure_by_geometry",
     "closure_residual",
-    "force_basis",
     "mean_offset",
     "position",
     "rotation",
@@ -93,14 +82,9 @@ __all__ = [
     "swivel_residual",
     "winding_of",
     "wrapped",
-    "wrench_residual",
 ]
 
 _TURN = 2 * np.pi
-_SEEN = 1e-6
-"""Singular values of a structure matrix below this share of the largest count as zero: rule of
-thumb, far above rounding and far below a robot that can be controlled."""
-
 
 ZERO_STD = {"swivel": 0.2, "cable_length": 0.05}
 """Standard deviation of the prior of an instrument's zero about its mean reading, rad and m (rule
@@ -455,88 +439,6 @@ def cable_length(
     length, by = linearised(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "length_offset": np.ones_like(measured)}
     return Constraint(length + offset - measured, by_pose(by), by_line)
-
-
-def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSpec) -> Constraint:
-    """Whitened wrench of measured cable forces and weight, (p, 6), N.
-
-    V is the inverse of the Cholesky factor of Aᵀ A, so that the rows are NaN at poses where a force
-    is missing or the cables do not hold all six degrees of freedom.
-
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    pose : Pose
-        The p poses.
-    tension : (p, n) array
-        Measured cable forces, N.
-    platform : PlatformSpec
-        Mass and centre of mass.
-
-    Returns
-    -------
-    Constraint
-        ``by_robot`` has ``payload``: by mass and centre of mass, (p, 6, 4), and ``tension``: by
-        cable forces, (p, 6, n).
-    """
-    structure = structure_matrix(geometry, pose.position, pose.rotation)
-    spread = structure @ np.swapaxes(structure, 1, 2)
-    whiten = np.full_like(spread, np.nan)
-    good = np.all(np.isfinite(spread), axis=(1, 2)) & (np.linalg.matrix_rank(structure) == 6)
-    whiten[good] = np.linalg.inv(np.linalg.cholesky(spread[good]))
-    left = wrench_residual(structure, tension, gravity_wrench(platform, pose.rotation))
-    residual = (whiten @ left[..., None])[..., 0]
-    by_payload = whiten @ weight_by_payload(platform, pose.rotation)
-    by = {"payload": by_payload, "tension": whiten @ structure}
-    return Constraint(residual, np.zeros((*residual.shape, 6)), {}, by)
-
-
-def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:
-    """Wrench Aᵀ f + w that cable forces and weight leave over, (p, 6), N and N m.
-
-    Parameters
-    ----------
-    structure : (p, 6, n) array
-        Structure matrices Aᵀ.
-    tension : (p, n) array
-        Cable forces f, N.
-    weight : (p, 6) array
-        Wrench w of the weight, N and N m.
-
-    Returns
-    -------
-    (p, 6) array
-        N and N m.
-    """
-    return np.asarray((structure @ tension[..., None])[..., 0] + weight)
-
-
-def force_basis(structure: Array) -> tuple[Array, Array]:
-    """Matrices from a wrench to whitened forces, and from these to cable forces.
-
-    Parameters
-    ----------
-    structure : (p, 6, n) array
-        Structure matrices Aᵀ = U S Wᵀ (singular value decomposition).
-
-    Returns
-    -------
-    to_forces : (p, k, 6) array
-        V = S⁻¹ Uᵀ with k = min(6, n): a whitening as in :func:`balance`, from which it differs
-        by an orthogonal matrix. A row is NaN where the cables cannot carry its wrench, so that
-        robots of fewer than six cables keep the rows that they do carry.
-    to_cables : (p, n, k) array
-        W: the least change of cable forces that carries each of these forces.
-    """
-    good = np.all(np.isfinite(structure), axis=(1, 2))
-    left, size, right = np.linalg.svd(
-        np.where(good[:, None, None], structure, 0.0), full_matrices=False
-    )
-    seen = size > _SEEN * np.maximum(size[:, :1], 1e-300)
-    inverse = np.where(seen, 1 / np.where(seen, size, 1.0), np.nan)
-    to_forces = np.asarray(inverse[..., None] * np.swapaxes(left, 1, 2))
-    return to_forces, np.asarray(np.swapaxes(right, 1, 2))
 
 
 def mean_offset(residual: Array, *, angles: bool) -> Array:
