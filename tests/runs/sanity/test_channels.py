@@ -117,6 +117,31 @@ def test_spikes_are_outliers_and_nothing_else_is(seed: int, count: int, size: fl
     assert np.count_nonzero(mask[places]) >= 0.6 * count - 1
 
 
+@given(SEEDS, st.integers(0, 2**31), st.floats(200.0, 1e4), st.sampled_from([-1.0, 1.0]))
+@settings(max_examples=40, deadline=None)
+def test_two_spikes_with_one_sample_between_them_are_outliers(
+    seed: int, place: int, size: float, sign: float
+) -> None:
+    # White noise about a constant: both spikes are certain.
+    values = 150 + np.random.default_rng(seed).normal(0, 0.8, COUNT)
+    first = 10 + place % (COUNT - 20)
+    values[first] += size
+    values[first + 2] += sign * size
+    assert np.flatnonzero(outlier_mask(values)).tolist() == [first, first + 2]
+
+
+@given(SEEDS, st.floats(5.0, 24.0), st.integers(3, 20))
+@settings(max_examples=40, deadline=None)
+def test_a_vibration_of_short_duration_loses_a_few_samples_at_its_ends(
+    seed: int, frequency: float, periods: int
+) -> None:
+    values = 150 + np.random.default_rng(seed).normal(0, 0.05, COUNT)
+    time = np.arange(COUNT) / RATE
+    window = (time > 10.0) & (time < 10.0 + periods / frequency)
+    values += np.where(window, 20 * np.sin(2 * np.pi * frequency * (time - 10.0)), 0.0)
+    assert np.count_nonzero(outlier_mask(values)) <= 4
+
+
 @given(SEEDS, st.floats(0.55, 0.95), st.booleans())
 @settings(max_examples=40, deadline=None)
 def test_a_limit_of_the_instrument_is_saturation(seed: int, share: float, low: bool) -> None:

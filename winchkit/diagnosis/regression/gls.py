@@ -1,6 +1,7 @@
-"""Generalised least squares by the Levenberg-Marquardt method with bounds and several starts.
+"""Generalised least squares in a trust region (Levenberg-Marquardt), with bounds, several starts.
 
-The fit minimises χ² = Σ (rᵢ/σᵢ)², the sum of squared whitened residuals. The normal equations are
+The fit minimises χ² = Σ (rᵢ/σᵢ)², the sum of squared whitened residuals. The damping of a step
+follows from the radius within which the linear model is trusted (Moré). The normal equations are
 solved in scaled form, directions that the data do not determine are left out (truncated
 eigenvalues), and the iteration stops where it would reduce χ² by less than 0.02. With 10⁵ rows and
 a handful of unknowns this is about ten times faster than a general solver.
@@ -9,6 +10,8 @@ References
 ----------
 Marquardt, D. W. (1963). An algorithm for least-squares estimation of nonlinear parameters. J. Soc.
 Ind. Appl. Math. 11, 431-441.
+Moré, J. J. (1978). The Levenberg-Marquardt algorithm: implementation and theory. Lecture Notes in
+Mathematics 630, 105-116.
 Aitken, A. C. (1935). On least squares and linear combination of observations. Proc. R. Soc. Edinb.
 55, 42-48.
 """

@@ -63,7 +63,7 @@ def fit_statistics(
     return FitStatistics(
         correlations=correlations_of(covariance.names, covariance.matrix),
         condition=covariance.condition,
-        method=f"generalised least squares (Levenberg-Marquardt), noise from {source}",
+        method=f"generalised least squares (trust region), noise from {source}",
         data=runs + ", ".join(output.replace("_", " ") for output in regression.outputs),
         n_observations=regression.n_observations + regression.n_priors,
         n_unknowns=len(fit.vector) + scanned,

@@ -40,7 +40,9 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
     -----
     The deviation from the median of two neighbours on each side exceeds twelve local standard
     deviations (of the deviations, by their median over 50 samples), and the neighbours agree within
-    a quarter of it. A peak that lasts two samples, or a step, is none.
+    a quarter of it. Where one of the two at a distance of two samples deviates as much, it is left
+    out: of two spikes with one sample between them, neither hides the other. A peak that lasts two
+    samples, a step, or an oscillation is none.
     """
     return _spikes(values)[0]
 
@@ -106,8 +108,12 @@ def _spikes(values: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     # Neighbours that are equal in a quantised or held channel have a local deviation of zero.
     floor = float(np.sqrt(np.mean(np.minimum(deviation, np.quantile(deviation, 0.95)) ** 2)))
     scale = np.maximum(_local(deviation), floor)
+    large = deviation > _LIMIT * scale
+    before, after = np.append([False, False], large[:-2]), np.append(large[2:], [False, False])
+    around[0] = np.where(before & ~after, around[1], around[0])
+    around[3] = np.where(after & ~before, around[2], around[3])
     agree = np.ptp(around, axis=0) < _AGREEMENT * deviation
-    out[rows[2:-2][(deviation > _LIMIT * scale) & agree]] = True
+    out[rows[2:-2][large & agree]] = True
     event[rows[2:-2][deviation > _SAME_EVENT * scale]] = True
     return out, event
 
