@@ -22,6 +22,7 @@ from winchkit.runs.writer import write_run
 from winchkit.web.application import application
 from winchkit.web.examples import example_runs
 from winchkit.web.library import Library
+from winchkit.web.robot import RobotWork
 from winchkit.web.workspace import Workspace
 
 TOKEN = "t0ken"
@@ -41,7 +42,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def client(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     workspace = Workspace(tmp_path_factory.mktemp("page"))
-    app = application(workspace, TOKEN, Library(recorded))
+    app = application(workspace, TOKEN, Library(recorded), RobotWork(workspace.folder))
     with TestClient(app, base_url="http://127.0.0.1:1234") as opened:
         opened.workspace = workspace  # type: ignore[attr-defined]
         yield opened
@@ -98,7 +99,16 @@ def test_nothing_but_this_server_may_be_loaded(client: TestClient) -> None:
     assert "unsafe" not in policy
     text = client.get("/").text + "".join(
         client.get(f"/static/{name}").text
-        for name in ("main.js", "page.js", "plots.js", "diagnose.js", "bench.js", "library.js")
+        for name in (
+            "main.js",
+            "page.js",
+            "plots.js",
+            "diagnose.js",
+            "bench.js",
+            "library.js",
+            "robot.js",
+            "exports.js",
+        )
     )
     assert "https://" not in text
     assert "innerHTML" not in text, "names in files must not become markup"

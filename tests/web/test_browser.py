@@ -15,6 +15,7 @@ import pytest
 pytest.importorskip("starlette")
 playwright = pytest.importorskip("playwright.sync_api")
 
+from robot_poses.truth import Truth, csv, poses  # noqa: E402
 from winchkit.runs.writer import write_run  # noqa: E402
 from winchkit.web.examples import example_runs  # noqa: E402
 
@@ -136,9 +137,48 @@ def test_drop_see_add_the_ladder_falls_save_and_reload(
     assert complaints == []
 
 
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    path = tmp_path_factory.mktemp("robot") / "poses.csv"
+    path.write_text(csv(poses(Truth(), 60, 7), angles=True))
+    found = Served(str(path), "-p", "cabtive")
+    yield found
+    found.end()
+
+
+def test_a_robot_is_calibrated_turned_and_saved(
+    browser: Any, robot: Served, tmp_path: Path
+) -> None:
+    page, complaints = opened(browser, robot.url, accept_downloads=True)
+    until(page, lambda: page.locator("#details svg").count() == 2)
+    assert "Pose error falls from" in page.inner_text("h1")
+    assert page.locator("#picture svg circle").count() >= 9
+    until(page, lambda: "margin 0 to" in page.inner_text("#picture"))
+    page.focus("#row")
+    page.keyboard.press("ArrowRight")
+    until(page, lambda: "Pose 1 of 60" in page.inner_text("#picture"))
+    page.click("text=Top")
+    with page.expect_download() as drawn:
+        page.click("[aria-label='Save robot as SVG']")
+    drawn.value.save_as(tmp_path / "robot.svg")
+    text = (tmp_path / "robot.svg").read_text()
+    assert "poses.csv" in text
+    assert "var(" not in text
+    with page.expect_download() as saved:
+        page.click("text=Save profile")
+    saved.value.save_as(tmp_path / "better.toml")
+    assert "[fitted]" in (tmp_path / "better.toml").read_text()
+    for width in (1280, 390):
+        page.set_viewport_size({"width": width, "height": 844})
+        page.reload()
+        until(page, lambda: page.locator("#details svg").count() == 2)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+    assert complaints == []
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_no_view_has_a_violation_of_axe_or_scrolls_sideways(
-    browser: Any, served: Served, scheme: str, tmp_path: Path
+    browser: Any, served: Served, robot: Served, scheme: str, tmp_path: Path
 ) -> None:
     npm = shutil.which("npm")
     if npm is None:
@@ -154,7 +194,8 @@ def test_no_view_has_a_violation_of_axe_or_scrolls_sideways(
     for width in (1280, 390):
         page.set_viewport_size({"width": width, "height": 844})
         for view in ("diagnose", "bench", "robot", "library"):
-            page.goto(f"{served.url}#{view}")
+            url = robot.url if view == "robot" else f"{served.url}#{view}"
+            page.goto(url)
             page.reload()
             until(page, lambda: page.locator("main > *").count() > 0)
             page.wait_for_timeout(1500)

@@ -14,7 +14,7 @@ from __future__ import annotations
 import asyncio
 import json
 import secrets
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,12 +33,13 @@ from winchkit.catalog import names
 from winchkit.errors import UsageError, WinchkitError
 from winchkit.web.foreign import is_run, preview
 from winchkit.web.library import Library
+from winchkit.web.robot import RobotWork, is_robot
 from winchkit.web.workspace import Workspace
 
 if TYPE_CHECKING:
     from winchkit.web.bench import BenchView
 
-__all__ = ["Guard", "application"]
+__all__ = ["Guard", "application", "open_robot"]
 
 _STATIC = Path(__file__).parent / "static"
 _LARGEST_FILE = 400_000_000
@@ -119,7 +120,11 @@ class Guard:
 
 
 def application(
-    workspace: Workspace, token: str, library: Library, bench: BenchView | None = None
+    workspace: Workspace,
+    token: str,
+    library: Library,
+    robot: RobotWork,
+    bench: BenchView | None = None,
 ) -> Starlette:
     """The page as an ASGI application.
 
@@ -131,6 +136,8 @@ def application(
         Of the URL.
     library : Library
         Runs of the folder.
+    robot : RobotWork
+        Profile and poses of the Robot view.
     bench : BenchView, optional
         The bench, where one is attached.
     """
@@ -145,8 +152,9 @@ def application(
         workspace.close()
 
     routes = [
-        *_Work(workspace, library, has_bench=bench is not None).routes(listeners),
+        *_Work(workspace, library, robot, has_bench=bench is not None).routes(listeners),
         *_Drawings(workspace, library).routes(),
+        *_RobotDrawings(robot).routes(),
         *([] if bench is None else bench.routes()),
         Route("/", _page),
         Mount("/static", StaticFiles(directory=_STATIC)),
@@ -187,9 +195,12 @@ class _Listeners:
 class _Work:
     """Routes that change the workspace, and its view."""
 
-    def __init__(self, workspace: Workspace, library: Library, *, has_bench: bool) -> None:
+    def __init__(
+        self, workspace: Workspace, library: Library, robot: RobotWork, *, has_bench: bool
+    ) -> None:
         self.workspace = workspace
         self.library = library
+        self.robot = robot
         self.has_bench = has_bench
 
     def routes(self, listeners: _Listeners) -> list[Route | WebSocketRoute]:
@@ -208,7 +219,7 @@ class _Work:
         ]
 
     def _shown(self) -> dict[str, Any]:
-        return self.workspace.view() | {"bench": self.has_bench}
+        return self.workspace.view() | {"bench": self.has_bench, "robot": self.robot.summary()}
 
     async def _view(self, request: Request) -> Response:
         return JSONResponse(self._shown())
@@ -216,16 +227,24 @@ class _Work:
     async def _choices(self, request: Request) -> Response:
         effects = [effect.id for effect in self.workspace.catalogue]
         return JSONResponse(
-            {"profiles": names("profiles"), "examples": names("sim"), "effects": effects}
+            {
+                "profiles": [name for name in names("profiles") if not is_robot(name)],
+                "robots": [name for name in names("profiles") if is_robot(name)],
+                "examples": names("sim"),
+                "effects": effects,
+            }
         )
 
     async def _drop(self, request: Request) -> Response:
         name = unquote(request.headers.get("x-file-name", ""))
         path = self.workspace.keep(name, await _body(request, _LARGEST_FILE))
         if path.suffix == ".toml":
-            self.workspace.open([], str(path))
+            self._open_profile(str(path))
         elif await asyncio.to_thread(is_run, path):
-            self.workspace.open([path])
+            if request.headers.get("x-view") == "robot":
+                open_robot(self.workspace, self.robot, [path])
+            else:
+                self.workspace.open([path])
         else:
             found = await asyncio.to_thread(preview, path)
             return JSONResponse({"import": found, "file": path.name})
@@ -240,7 +259,9 @@ class _Work:
     async def _order(self, request: Request) -> Response:
         asked, work = await _object(request), self.workspace
         actions: dict[str, Callable[[], object]] = {
-            "profile": lambda: work.open([], str(asked["name"])),
+            "profile": lambda: self._open_profile(str(asked["name"])),
+            "calibrate": lambda: work.task("calibrating", self.robot.calibrate),
+            "propose": lambda: work.task("proposing poses", self.robot.propose),
             "example": lambda: work.example(str(asked["name"])),
             "mystery": lambda: work.mystery(int(asked["seed"])),
             "use": lambda: work.use(str(asked["name"]), used=bool(asked["used"])),
@@ -257,6 +278,12 @@ class _Work:
             raise UsageError(f"there is no action '{name}'; there are {', '.join(actions)}")
         actions[name]()
         return _accepted()
+
+    def _open_profile(self, name: str) -> None:
+        if is_robot(name):
+            open_robot(self.workspace, self.robot, [], name)
+        else:
+            self.workspace.open([], name)
 
     async def _live(self, socket: WebSocket, listeners: _Listeners) -> None:
         await socket.accept()
@@ -331,6 +358,64 @@ class _Drawings:
         query = request.query_params
         wanted, channel = query.getlist("name"), query.get("channel", "tension")
         return JSONResponse(await asyncio.to_thread(self.library.overlay, wanted, channel))
+
+
+class _RobotDrawings:
+    """Routes of the Robot view that read."""
+
+    def __init__(self, robot: RobotWork) -> None:
+        self.robot = robot
+
+    def routes(self) -> list[Route]:
+        """The routes."""
+        return [
+            Route("/api/robot", self._view),
+            Route("/api/robot/picture", self._picture),
+            Route("/api/robot/slice", self._slice),
+            Route("/api/robot/profile", self._profile),
+            Route("/api/robot/report", self._report),
+        ]
+
+    async def _view(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self.robot.view))
+
+    async def _picture(self, request: Request) -> Response:
+        query = request.query_params
+        limits = float(query["low"]), float(query["high"])
+        return JSONResponse(await asyncio.to_thread(self.robot.picture, int(query["row"]), limits))
+
+    async def _slice(self, request: Request) -> Response:
+        query = request.query_params
+        limits = float(query["low"]), float(query["high"])
+        height, row = float(query["z"]), int(query["row"])
+        return JSONResponse(await asyncio.to_thread(self.robot.slice, height, row, limits))
+
+    async def _profile(self, request: Request) -> Response:
+        name, text = await asyncio.to_thread(self.robot.profile_text)
+        return _attachment(text, name, "application/toml")
+
+    async def _report(self, request: Request) -> Response:
+        text = await asyncio.to_thread(self.robot.report)
+        return _attachment(text, "calibration.html", "text/html")
+
+
+def open_robot(
+    workspace: Workspace, robot: RobotWork, runs: Sequence[str | Path], profile: str | None = None
+) -> None:
+    """Open a robot's profile or its poses in the thread of the workspace.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Whose thread works, and which shows faults.
+    robot : RobotWork
+        What opens them.
+    runs : sequence of str or Path
+        Recordings of poses.
+    profile : str, optional
+        Name or file.
+    """
+    workspace.task("calibrating", lambda: robot.open(runs, profile))
 
 
 def _accepted() -> Response:

@@ -64,12 +64,13 @@ def serve(
     try:
         import uvicorn
 
-        from winchkit.web.application import application
+        from winchkit.web.application import application, open_robot
     except ImportError as error:
         raise UsageError(
             f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
         ) from None
     from winchkit.web.library import Library
+    from winchkit.web.robot import RobotWork, is_robot
     from winchkit.web.workspace import Workspace
 
     token = secrets.token_urlsafe(24)
@@ -86,9 +87,13 @@ def serve(
                 bench = stack.enter_context(simulated_bench(sim, own))
             assert bench is not None
             view = stack.enter_context(BenchView(bench, effects, allow_motion=allow_motion))
-        app = application(workspace, token, Library(Path(folder)), view)
+        robot = RobotWork(own)
+        app = application(workspace, token, Library(Path(folder)), robot, view)
+        of_robot = profile is not None and is_robot(profile)
         if mystery is not None:
             workspace.mystery(mystery)
+        elif of_robot:
+            open_robot(workspace, robot, runs, profile)
         elif runs or profile:
             workspace.open(runs, profile)
         listening = stack.enter_context(_listening(port))
@@ -99,7 +104,8 @@ def serve(
             timeout_graceful_shutdown=_SHUTDOWN,
             lifespan="on",
         )
-        ready(f"http://{_HOST}:{listening.getsockname()[1]}/?token={token}")
+        at = "#robot" if of_robot else ""
+        ready(f"http://{_HOST}:{listening.getsockname()[1]}/?token={token}{at}")
         uvicorn.Server(config).run(sockets=[listening])
 
 

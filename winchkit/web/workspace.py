@@ -146,40 +146,40 @@ class Workspace:
 
     def open(self, paths: Sequence[str | Path], profile: str | None = None) -> Future[None]:
         """Load run files, and a profile by name or file."""
-        return self._do("reading files", lambda: self._open(paths, profile))
+        return self.task("reading files", lambda: self._open(paths, profile))
 
     def use(self, name: str, *, used: bool) -> Future[None]:
         """Take a run into the comparison or leave it out."""
-        return self._do("reading files", lambda: self._use(name, used=used))
+        return self.task("reading files", lambda: self._use(name, used=used))
 
     def remove(self, name: str) -> Future[None]:
         """Forget a run."""
         kept = tuple(item for item in self._state.runs if item.name != name)
-        return self._do("reading files", lambda: self._set(runs=kept, answer=None, curves={}))
+        return self.task("reading files", lambda: self._set(runs=kept, answer=None, curves={}))
 
     def diagnose(self) -> Future[None]:
         """Diagnose the present profile on the runs that are used."""
-        return self._do("diagnosing", self._diagnose)
+        return self.task("diagnosing", self._diagnose)
 
     def add(self, effect: str) -> Future[None]:
         """Add an effect to the profile, refitted, and diagnose again."""
-        return self._do(f"adding {effect}", lambda: self._add(effect))
+        return self.task(f"adding {effect}", lambda: self._add(effect))
 
     def example(self, name: str) -> Future[None]:
         """Simulate runs of a bench of the catalogue, and open them with its profile."""
-        return self._do("simulating runs", lambda: self._simulate(name, example_runs(name)))
+        return self.task("simulating runs", lambda: self._simulate(name, example_runs(name)))
 
     def mystery(self, seed: int) -> Future[None]:
         """Simulate runs of a bench whose hidden effect is shown on request only."""
-        return self._do("simulating runs", lambda: self._simulate("mystery", mystery_runs(seed)))
+        return self.task("simulating runs", lambda: self._simulate("mystery", mystery_runs(seed)))
 
     def take(self, file: str, answers: Mapping[str, Any]) -> Future[None]:
         """Import a dropped file of another program with the answers to its questions."""
-        return self._do("importing", lambda: self._take(file, answers))
+        return self.task("importing", lambda: self._take(file, answers))
 
     def undo(self) -> Future[None]:
         """Take the last addition back, and diagnose again."""
-        return self._do("undoing", self._undo)
+        return self.task("undoing", self._undo)
 
     # What routes read.
 
@@ -287,7 +287,8 @@ class Workspace:
 
     # The work.
 
-    def _do(self, what: str, call: Callable[[], None]) -> Future[None]:
+    def task(self, what: str, call: Callable[[], None]) -> Future[None]:
+        """Let the thread do something after what it has to do; its errors become faults."""
         return self._pool.submit(self._run, what, call)
 
     def _run(self, what: str, call: Callable[[], None]) -> None:

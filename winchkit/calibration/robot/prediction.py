@@ -29,6 +29,10 @@ class PoseErrors:
     """(p,), m; NaN where no position was measured or no pose was found."""
     angle: Array
     """(p,), rad; NaN where the rotation was not measured whole."""
+    vector: Array
+    """Predicted minus measured position, (p, 3), m; NaN as above."""
+    measured: Array
+    """Measured positions, (p, 3), m, as the tracker shows them."""
     place: NDArray[np.str_]
     """Run and row of each pose, (p,)."""
     unfound: int
@@ -49,12 +53,13 @@ def errors_at(equations: Equations, values: Array) -> PoseErrors:
     unfound = int(np.count_nonzero(_known(equations) & ~np.isfinite(found.position[:, 0])))
     measured = equations.measured
     pose = _reading(equations, values, found)
-    distance = np.linalg.norm(pose.position - measured.position, axis=1)
+    vector = pose.position - measured.position
+    distance = np.linalg.norm(vector, axis=1)
     angle = np.full(len(distance), np.nan)
     whole = np.all(np.isfinite(measured.angles), axis=1) & np.isfinite(pose.rotation[:, 0, 0])
     seen = np.swapaxes(rotation_of(*measured.angles[whole].T), 1, 2)
     angle[whole] = np.linalg.norm(rotation_vector(pose.rotation[whole] @ seen), axis=1)
-    return PoseErrors(distance, angle, measured.place, unfound)
+    return PoseErrors(distance, angle, vector, measured.position, measured.place, unfound)
 
 
 def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from winchkit.calibration.robot.pose_design import NextPose
     from winchkit.calibration.robot.prediction import PoseErrors
 
-__all__ = ["calibration_figures", "calibration_html"]
+__all__ = ["calibration_figures", "calibration_html", "headline", "largest_changes"]
 
 _MM = 1e3
 _MOST = 5
@@ -73,7 +73,7 @@ def calibration_html(
     return page(
         title,
         figures,
-        lead(title, chip, tone, _headline(found), rows, _changes(found)),
+        lead(title, chip, tone, headline(found), rows, _changes(found)),
         element("div", *pair, class_="pair maps output") if pair else Markup(""),
         folded("blind", "Not identifiable from these poses", bullets(blind)),
         folded("missing", "Candidate effects", bullets(candidate_lines(found))),
@@ -91,7 +91,19 @@ def _compared(found: Calibrated) -> str:
     return f"{fitted} poses fitted, {held} held out; profile {profile}"
 
 
-def _headline(found: Calibrated) -> str:
+def headline(found: Calibrated) -> str:
+    """Return the result of a calibration in a sentence.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+
+    Returns
+    -------
+    str
+        Pose error before and after, held out.
+    """
     from winchkit.calibration.robot.prediction import rms
 
     if found.refusal:
@@ -113,8 +125,19 @@ def _decides(following: Sequence[NextPose], blind: Sequence[str]) -> str:
     return "Poses at other places that the calibrated model does not predict to within its noise."
 
 
-def _changes(found: Calibrated) -> Markup:
-    """The largest changes in multiples of their standard deviation."""
+def largest_changes(found: Calibrated) -> list[list[str]]:
+    """Return the largest changes in multiples of their standard deviation.
+
+    Parameters
+    ----------
+    found : Calibrated
+        The calibration.
+
+    Returns
+    -------
+    list of [str, str, str]
+        Parameter, value with standard deviation and unit, nominal value.
+    """
 
     def size(item: tuple[str, Estimated]) -> float:
         one = item[1]
@@ -127,8 +150,14 @@ def _changes(found: Calibrated) -> Markup:
         nominal, value, sigma, unit = in_words(estimate)
         shown = f"{value} ± {sigma} {unit}".replace("-", "−")
         rows.append([_readable(name), shown, nominal.replace("-", "−")])
+    return rows
+
+
+def _changes(found: Calibrated) -> Markup:
     return table(
-        "Largest changes, with the nominal value.", ["parameter", "value", "nominal"], rows
+        "Largest changes, with the nominal value.",
+        ["parameter", "value", "nominal"],
+        largest_changes(found),
     )
 
 
