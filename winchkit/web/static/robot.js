@@ -2,15 +2,15 @@
 import { alarm, ask, attempt, dialog, download, el, fill, icon, number, order, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
 
-let root = null, view = null, told = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
+let root = null, view = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
 
-export function enter(main, state) { root = main; told = null; update(state); }
+export function enter(main, state) { root = main; signature = null; update(state); }
 
 export function update(state) {
   const now = JSON.stringify([state.robot, state.busy, state.faults]);
-  if (now === told && root.firstChild) return;
-  const fresh = !told || !state.robot || JSON.parse(told)[0]?.number !== state.robot.number;
-  told = now;
+  if (now === signature && root.firstChild) return;
+  const fresh = !signature || !state.robot || JSON.parse(signature)[0]?.number !== state.robot.number;
+  signature = now;
   if (!state.robot) { view = null; fill(root, faults(state), empty()); return; }
   if (!fresh && view) { render(state); return; }
   attempt(async () => {
