@@ -120,7 +120,7 @@ class RobotWork:
     # What routes read.
 
     def summary(self) -> dict[str, Any] | None:
-        """What every page is told at every change; None without a robot."""
+        """What every page gets at every change; None without a robot."""
         state = self._state
         if state.profile is None:
             return None
