@@ -25,6 +25,7 @@ from winchkit.schema.quantity import (
     Whole,
     WholeNumber,
 )
+from winchkit.schema.robot_bench import RobotWiring
 from winchkit.schema.table import Rule, Table
 from winchkit.units import suggest
 
@@ -183,6 +184,8 @@ class BenchSpec(Table):
     """Whether a stop of one winch stops all winches. A trip always stops all."""
     effects: tuple[str, ...] = ()
     """Python files with user effects that profiles of its winches may contain."""
+    robot: RobotWiring | None = None
+    """The robot whose platform the winches move; None for winches with a load each."""
     description: str = ""
     path: str = field(default="", compare=False)
     """The file it was read from; relative paths of profiles and effects start there."""

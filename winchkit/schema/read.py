@@ -413,11 +413,11 @@ def _named_winch(reading: Reading, name: str, at: Key) -> WinchProfile | None:
 
 
 def _bench(reading: Reading, tree: dict[str, Any]) -> BenchSpec | None:
-    return benches.bench(reading, tree, read_device)
+    return benches.bench(reading, tree, read_device, read_robot)
 
 
 def _simbench(reading: Reading, tree: dict[str, Any]) -> SimBench | None:
-    return benches.sim_bench(reading, tree, read_device)
+    return benches.sim_bench(reading, tree, read_device, read_robot)
 
 
 def _programme(reading: Reading, tree: dict[str, Any]) -> Programme | None:

@@ -10,11 +10,13 @@ from typing import Any
 from winchkit.errors import FileError
 from winchkit.schema.bench import BenchSpec, latch_path
 from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.parts import Reading
 from winchkit.schema.reading.source import spelled
 from winchkit.schema.reading.tables import marker_at
+from winchkit.schema.robot_bench import RobotWiring
 from winchkit.schema.simbench import FaultSpec, HiddenSpec, NoiseSpec, SimBench, WinchTruth
 from winchkit.units import suggest
 
@@ -22,6 +24,7 @@ __all__ = ["bench", "sim_bench"]
 
 ROLES = ("servo", "cell", "load", "length", "temperature")
 DeviceReader = Callable[[str | Path], DeviceSpec]
+RobotReader = Callable[[str | Path], RobotProfile]
 _FITTING = {
     "servo": ("can",),
     "modbus": ("modbus-rtu", "modbus-tcp"),
@@ -31,7 +34,9 @@ _FITTING = {
 """Kinds of buses by the kind of a device."""
 
 
-def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> BenchSpec | None:
+def bench(
+    reading: Reading, tree: dict[str, Any], read_device: DeviceReader, read_robot: RobotReader
+) -> BenchSpec | None:
     """Read a bench and check its references."""
     for key in tree.keys() & {"path", "latch_file"}:
         reading.fault((key,), "unknown key")
@@ -45,10 +50,43 @@ def bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> 
             reading.fault(at, f"no such file of effects: {file}; paths start at this file's folder")
     if spec is not None and not spec.winch:
         reading.fault(("winch",), "a bench has at least one winch, in a table [winch.NAME]")
+    if spec is not None and spec.robot is not None:
+        _check_robot(reading, spec, spec.robot, read_robot)
     return spec
 
 
-def sim_bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader) -> SimBench | None:
+def _check_robot(
+    reading: Reading, spec: BenchSpec, robot: RobotWiring, read_robot: RobotReader
+) -> None:
+    """Each line of the robot is a winch of the bench, within the winch's limits."""
+    at: Key = ("robot", "profile")
+    path = reading.shipped("profiles", robot.profile, at)
+    if path is None:
+        return
+    try:
+        profile = read_robot(path)
+    except FileError as error:
+        reading.faults += error.faults
+        return
+    for line in profile.line:
+        if line.name not in spec.winch:
+            near = suggest(line.name, list(spec.winch))
+            message = f"line {line.name} of robot '{profile.name}' is no winch of this bench{near}"
+            reading.fault(at, message)
+            continue
+        limits, (low, high) = spec.winch[line.name].limits, robot.tension
+        upper, slack = limits.tension_high, limits.tension_slack
+        if upper is not None and high > upper:
+            message = f"{high:g} N is above tension_high of winch {line.name}, {upper:g} N"
+            reading.fault(("robot", "tension"), message)
+        if slack is not None and low < slack:
+            message = f"{low:g} N is below tension_slack of winch {line.name}, {slack:g} N"
+            reading.fault(("robot", "tension"), message)
+
+
+def sim_bench(
+    reading: Reading, tree: dict[str, Any], read_device: DeviceReader, read_robot: RobotReader
+) -> SimBench | None:
     """Read a simulated bench: a bench, its true values, hidden effects, noise and faults."""
     tree = dict(tree)
     noise = reading.table(NoiseSpec, tree.pop("noise", {}), ("noise",))
@@ -62,7 +100,7 @@ def sim_bench(reading: Reading, tree: dict[str, Any], read_device: DeviceReader)
                 tree["winch"][name] = wiring = dict(winch)
                 truth = wiring.pop("truth", {})
                 truths[name] = _truth(reading, name, truth, wiring.pop("hidden", []))
-    wired = bench(reading, tree, read_device)
+    wired = bench(reading, tree, read_device, read_robot)
     if wired is None or noise is None or None in truths.values():
         return None
     known = {name: truth for name, truth in truths.items() if truth is not None}

@@ -6,7 +6,7 @@ import dataclasses
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_args, get_origin, get_type_hints
 
 from winchkit.catalog import Kind, find, folder
 from winchkit.errors import FileError
@@ -76,7 +76,8 @@ def _located(key: str, value: Any, beside: str) -> Any:
 
 def _text(value: Any, hint: Any) -> str:
     if isinstance(value, tuple):
-        inner = next((arg for arg in get_args(hint) if arg is not type(None)), hint)
+        of_alternatives = (arg for arg in get_args(hint) if arg is not type(None))
+        inner = hint if get_origin(hint) is tuple else next(of_alternatives, hint)
         item = next(iter(get_args(inner)), inner)
         return "[" + ", ".join(_text(one, item) for one in value) + "]"
     marker = _marker(hint)

@@ -1,0 +1,68 @@
+"""Contents of the table ``[robot]`` of a bench file: the platform that its winches move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated, Literal
+from urllib.parse import urlsplit
+
+from winchkit.schema.quantity import (
+    PositiveAcceleration,
+    PositiveForce,
+    PositiveSpeed,
+    Quantity,
+)
+from winchkit.schema.table import Rule, Table
+
+__all__ = ["LostWinch", "RobotWiring", "TrackerWiring"]
+
+LostWinch = Literal["stop-together", "hold-tension"]
+"""Declared reaction of the other winches where one is lost."""
+_DEG = 0.017453292519943295
+
+
+@dataclass(frozen=True)
+class TrackerWiring(Table):
+    """A tracker that sends poses as JSON datagrams."""
+
+    listen: str
+    """Address at which this computer receives them, ``udp://HOST:PORT``."""
+    frame: str = "tracker"
+    """Name of the frame in which the poses are given."""
+
+    def rules(self) -> Iterator[Rule]:
+        """The address has a host and a port."""
+        try:
+            parts = urlsplit(self.listen)
+            complete = parts.scheme == "udp" and parts.hostname and parts.port
+        except ValueError:
+            complete = False
+        if not complete:
+            yield "listen", f"'{self.listen}' is no address such as 'udp://127.0.0.1:5100'"
+
+
+@dataclass(frozen=True)
+class RobotWiring(Table):
+    """The robot that a bench's winches move together, with the limits of its platform, SI."""
+
+    profile: str
+    """Profile of kind ``robot``; the name of each line is that of a winch of the bench."""
+    speed: PositiveSpeed
+    tension: tuple[PositiveForce, PositiveForce]
+    """Limits of the force distribution, N."""
+    acceleration: PositiveAcceleration = 0.5
+    rotation_speed: Annotated[float, Quantity("angular speed", 0.0, above=True)] = 20 * _DEG
+    """rad/s."""
+    rotation_acceleration: Annotated[float, Quantity("angular acceleration", 0.0, above=True)] = (
+        60 * _DEG
+    )
+    """rad/s^2."""
+    lost_winch: LostWinch = "stop-together"
+    tracker: TrackerWiring | None = None
+
+    def rules(self) -> Iterator[Rule]:
+        """The lower tension limit lies below the upper one."""
+        low, high = self.tension
+        if low >= high:
+            yield "tension", f"the lower limit {low:g} N is not below the upper limit {high:g} N"
