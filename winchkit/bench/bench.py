@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Generator, Iterable, Iterator,
 from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.commissioning.validity import require_commissioned, trust_record
@@ -46,9 +46,13 @@ from winchkit.errors import (
     LimitTripped,
     MotionError,
     NotPermitted,
+    UsageError,
 )
 from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
+
+if TYPE_CHECKING:
+    from winchkit.bench.robot.platform import Platform
 
 __all__ = ["Bench", "Stations"]
 
@@ -132,6 +136,7 @@ class Bench:
                 name: Winch(self, name, spec.winch[name], parts, dict(self._wired.sensors[name]))
                 for name, parts in self.loop.winches.items()
             }
+            self._platform = self._robot_platform()
             self.commanders = Commanders(
                 self.loop.winches,
                 clock,
@@ -164,6 +169,24 @@ class Bench:
         return CellDesk(
             self.spec, self.clock, wired.lines, wired.slow, wired.sensors, permit=permit
         )
+
+    def _robot_platform(self) -> Platform | None:
+        robot, wiring = self._wired.robot, self.spec.robot
+        if robot is None or wiring is None:
+            return None
+        from winchkit.bench.robot.platform import Platform
+
+        return Platform(self, wiring, robot, self.winch)
+
+    @property
+    def robot(self) -> Platform:
+        """The platform that the winches move; raises UsageError for a bench without ``[robot]``."""
+        if self._platform is None:
+            raise UsageError(
+                f"bench '{self.spec.name}' declares no robot; write a table [robot] with its "
+                "profile, speed and tension (docs/formats.md)"
+            )
+        return self._platform
 
     def __enter__(self) -> Self:
         return self

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
 from winchkit import catalog
 from winchkit.bench.cells.instruments import can_buses, device_of, instruments
@@ -23,6 +24,7 @@ from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.snapshot import Direction, Phase, Trip
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
+from winchkit.bench.robot.wiring import line_profiles, robot_of_bench
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
@@ -36,6 +38,9 @@ from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
 from winchkit.schema.bench_warnings import bench_warnings
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.version import __version__
+
+if TYPE_CHECKING:
+    from winchkit.model.robot import Robot
 
 __all__ = ["Wired", "wire"]
 
@@ -64,6 +69,8 @@ class Wired:
     lines: Sequence[SlowLine]
     slow: SlowDevices
     metadata: Mapping[str, str]
+    robot: Robot | None = None
+    """The robot that the winches move."""
 
     def disarm(self) -> None:
         """Switch off the host watchdog of the drives that are at rest.
@@ -82,6 +89,9 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> W
     from winchkit.estimation.cable_state import RopeNow
 
     profiles = {name: _profile(spec, winch) for name, winch in spec.winch.items()}
+    robot = robot_of_bench(spec)
+    if robot is not None:
+        profiles |= line_profiles(robot)
     catalogue = load_catalogue(spec.effect_files)
     cables = {
         name: CableMap.of(RopeNow(profile, terms_of(profile, catalogue), _weight(spec.winch[name])))
@@ -116,7 +126,7 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> W
         longest_gap=max(stale, _LEAST_GAP * spec.cycle),
     )
     _warn_of_sync(buses, loop)
-    return Wired(loop, axes, buses, sensors, lines, slow, _metadata(spec, profiles))
+    return Wired(loop, axes, buses, sensors, lines, slow, _metadata(spec, profiles), robot)
 
 
 def _supervisor(

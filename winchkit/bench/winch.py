@@ -307,7 +307,7 @@ class Winch:
         Move
             The move, for :meth:`begin`.
         """
-        self._require_length()
+        self.require_length()
         cable = self._parts.cable
         move = Move(
             cable,
@@ -338,13 +338,13 @@ class Winch:
             self._jog = None
             self._controller.begin(source, gate)
 
-    def ready_for(self, move: Move) -> bool:
-        """Whether the drive is enabled and waits for nothing but this move's gate.
+    def ready_for(self, move: MotionSource) -> bool:
+        """Whether the drive is enabled and waits for nothing but this motion's gate.
 
         Parameters
         ----------
-        move : Move
-            A move that was started.
+        move : MotionSource
+            A motion that was begun.
 
         Returns
         -------
@@ -401,7 +401,7 @@ class Winch:
                 f"winch {self.name} is {self._controller.phase.value}; stop it first"
             )
 
-    def _require_length(self) -> None:
+    def require_length(self) -> None:
         """Raise NotPermitted where the cable length is not known: no limit of it can be kept."""
         if not self.snapshot.turns_known:
             raise NotPermitted(
@@ -414,7 +414,7 @@ class Winch:
     def _refresh(self, winding_speed: float, hold: float, *, held: bool) -> None:
         self._bench.permit(self.name, direction_of(winding_speed), held=held)
         if winding_speed:
-            self._require_length()
+            self.require_length()
         expires = self._bench.clock.now() + hold
         with self._bench.commanders.claimed(self.name):
             jog = self._jog

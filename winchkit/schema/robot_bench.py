@@ -17,8 +17,8 @@ from winchkit.schema.table import Rule, Table
 
 __all__ = ["LostWinch", "RobotWiring", "TrackerWiring"]
 
-LostWinch = Literal["stop-together", "hold-tension"]
-"""Declared reaction of the other winches where one is lost."""
+LostWinch = Literal["stop-together"]
+"""Declared reaction of the other winches where one is lost: all make a quick stop."""
 _DEG = 0.017453292519943295
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.motion import MotionSource, RunDown, StartGate, Target
+from winchkit.bench.control.motion import MotionSource, PathStop, RunDown, StartGate, Stop, Target
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
 from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
@@ -165,7 +165,7 @@ class Controller:
         self._begun: _Order | None = None
         self._ordered: Phase | None = None
         self._lock = threading.Lock()
-        self._down = RunDown(cable, limits)
+        self._down: Stop = RunDown(cable, limits)
         self._angle = 0.0
         self._held: float | None = None
         self._reported = True
@@ -392,7 +392,11 @@ class Controller:
         )
 
     def _begin_run_down(self, now: float) -> None:
-        self._down = RunDown(self.cable, self.limits)
+        source: object = self.source
+        if isinstance(source, PathStop):
+            self._down = source.run_down()
+        else:
+            self._down = RunDown(self.cable, self.limits)
         self._down.start(self._time, self._angle, self.commanded)
         self._enter(Phase.RUN_DOWN, now)
         self.source, self.done = None, self._wanted is None

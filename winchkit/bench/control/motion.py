@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from winchkit.bench.control.cable import CableMap, LineModel
 from winchkit.bench.control.dead_man import DEAD_MAN, FIRST_PRESS
@@ -18,12 +18,18 @@ from winchkit.schema.bench import LimitSpec
 __all__ = [
     "DEAD_MAN",
     "FIRST_PRESS",
+    "GAIN",
+    "JERK_TIME",
+    "SETTLED",
+    "SETTLE_TIME",
     "Jog",
     "MotionSource",
     "Move",
+    "PathStop",
     "Ramp",
     "RunDown",
     "StartGate",
+    "Stop",
     "Target",
     "Trim",
 ]
@@ -87,13 +93,13 @@ class Trim:
 
 JERK_TIME = 0.3
 """Time in which a move's acceleration builds up, s."""
-_GAIN = 8.0
+GAIN = 8.0
 """Of the position loop around a speed-controlled drive, 1/s."""
 _MARGIN = 2e-3
 """Of cable, kept to a length limit, m."""
-_SETTLED = 1e-4
+SETTLED = 1e-4
 """Of cable, from the target of a move that counts as done, m."""
-_SETTLE_TIME = 1.0
+SETTLE_TIME = 1.0
 """A move counts as done this long after its end at the latest, s."""
 
 
@@ -128,6 +134,22 @@ class MotionSource(Protocol):
         Time of motion advances by exactly one cycle a cycle, so that a late cycle makes no jump;
         ``now`` (s) is the true time, for whatever expires.
         """
+
+
+class Stop(MotionSource, Protocol):
+    """A motion source that ends at rest."""
+
+    @property
+    def duration(self) -> float:
+        """Time to rest, s; known once started."""
+
+
+@runtime_checkable
+class PathStop(Protocol):
+    """A motion source with a ramp to rest of its own, on the path that it shares with others."""
+
+    def run_down(self) -> Stop:
+        """Ramp to rest from the present motion."""
 
 
 class Ramp:
@@ -201,16 +223,21 @@ class RunDown:
     joins = True
 
     def __init__(self, cable: CableMap, limits: LimitSpec) -> None:
-        self.duration = 0.0
+        self._duration = 0.0
         self._cable, self._acceleration = cable, limits.acceleration
         self._ramp = Ramp(self._acceleration)
         self._angle = self._last = 0.0
+
+    @property
+    def duration(self) -> float:
+        """Time to rest, s; known once started."""
+        return self._duration
 
     def start(self, time: float, angle: float, winding_speed: float) -> None:
         """Begin from the target angle and the speed that were in force."""
         self._ramp = Ramp(self._acceleration, winding_speed)
         self._ramp.follow(0.0, time)
-        self.duration = abs(winding_speed) / self._acceleration
+        self._duration = abs(winding_speed) / self._acceleration
         self._angle, self._last = angle, time
 
     def target(self, time: float, angle: float, _now: float) -> Target:
@@ -295,17 +322,17 @@ class Move:
         position, speed, _ = (float(value) for value in self._plan.at(elapsed * pace))
         speed *= pace
         planned, slope = self._angle_at(position)
-        velocity = speed * slope + _GAIN * (planned - angle)
+        velocity = speed * slope + GAIN * (planned - angle)
         late = elapsed - self.duration
-        arrived = late >= 0 and abs(planned - angle) <= _SETTLED * abs(slope)
-        self._ended = arrived or late >= _SETTLE_TIME
+        arrived = late >= 0 and abs(planned - angle) <= SETTLED * abs(slope)
+        self._ended = arrived or late >= SETTLE_TIME
         done = self._ended and self._trim is None
         return Target(velocity, planned, -speed, done=done)
 
     def _trimmed(self, trim: Trim, time: float, angle: float) -> Target:
         """Where the correction after the plan's end is."""
         planned, velocity, speed = trim.at(time, self._knots[-1])
-        return Target(velocity + _GAIN * (planned - angle), planned, speed, done=trim.done)
+        return Target(velocity + GAIN * (planned - angle), planned, speed, done=trim.done)
 
     def _angle_at(self, position: float) -> tuple[float, float]:
         """Motor angle at a distance from the start, and its derivative by that distance."""

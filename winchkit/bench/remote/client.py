@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
+from collections.abc import Mapping
 from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -171,6 +172,30 @@ class RemoteStation:
             m/s and m/s²; by default the limits of the winch.
         """
         self._call("move", winch, to, by, speed, acceleration)
+
+    def move_pose(
+        self,
+        change: Mapping[str, float],
+        relative: bool,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start to move the platform of the robot on a line.
+
+        Parameters
+        ----------
+        change : mapping of str to float
+            Some of x, y, z (m), roll, pitch, yaw (rad); the others keep their values.
+        relative : bool
+            Whether they are added to those of the present pose.
+        speed, acceleration : float, optional
+            m/s and m/s²; by default the limits of the bench's ``[robot]``.
+        """
+        self._call("move_pose", dict(change), relative, speed, acceleration)
+
+    def pose(self) -> dict[str, float]:
+        """Pose of the platform by the motor angles: x, y, z (m), roll, pitch, yaw (rad)."""
+        return dict(self._call("pose"))
 
     def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
         """Bytes of an object of a drive.

@@ -26,6 +26,8 @@ OPERATIONS = (
     "jog",
     "step",
     "move",
+    "move_pose",
+    "pose",
     "take_over",
     "moving",
     "home",

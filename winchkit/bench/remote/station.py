@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict
 from typing import Any, Protocol
@@ -52,6 +52,22 @@ class Station(Protocol):
 
         "all" moves all as one.
         """
+
+    def move_pose(
+        self,
+        change: Mapping[str, float],
+        relative: bool,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start to move the platform of the robot on a line.
+
+        ``change`` has some of x, y, z (m), roll, pitch, yaw (rad); with ``relative`` they are
+        added to those of the present pose.
+        """
+
+    def pose(self) -> dict[str, float]:
+        """Pose of the platform by the motor angles: x, y, z (m), roll, pitch, yaw (rad)."""
 
     def take_over(self, winch: str | None) -> None:
         """Command a winch, or "all", that another client commands; its motion ends by a ramp."""
@@ -159,6 +175,23 @@ class LocalStation:
         }
         with self._acting():
             self._bench.move_together(lengths, speed, acceleration, wait=False)
+
+    def move_pose(
+        self,
+        change: Mapping[str, float],
+        relative: bool,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> None:
+        """Start to move the platform of the robot on a line."""
+        platform = self._bench.robot
+        goal = platform.moved(change, relative=relative)
+        with self._acting():
+            platform.move(goal, speed, acceleration, wait=False)
+
+    def pose(self) -> dict[str, float]:
+        """Pose of the platform by the motor angles."""
+        return self._bench.robot.coordinates()
 
     def take_over(self, winch: str | None) -> None:
         """Command a winch that another client commands."""

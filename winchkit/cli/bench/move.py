@@ -1,4 +1,4 @@
-"""``winchkit move``: moves a winch, or all as one, to a cable length."""
+"""``winchkit move``: moves a winch, or all as one, to a cable length, or a robot to a pose."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.bench.direction_option import direction_options, read_direction
+from winchkit.cli.bench.pose_option import pose_line, read_pose
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import (
     bench_option,
@@ -19,6 +20,7 @@ from winchkit.cli.core.options import (
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
+from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
     from winchkit.bench.remote.station import Station
@@ -33,16 +35,20 @@ _POLL = 0.05
     examples=(
         "winchkit move A --to '3.9 m' --speed '0.2 m/s'",
         "winchkit move all --pay-out 50mm -b bench.toml",
+        "winchkit move --pose x=0.1m,z=0.3m,yaw=2deg --speed 50mm/s -b robot.toml",
+        "winchkit move --pose-by z=20mm -b robot.toml",
     ),
 )
 @winch_argument
 @bench_option
 @click.option("--to", metavar="LENGTH", help="Cable length to go to.")
 @direction_options("LENGTH")
+@click.option("--pose", metavar="POSE", help="Pose of the robot's platform, x=0.1m,yaw=2deg.")
+@click.option("--pose-by", metavar="POSE", help="Change of that pose.")
 @click.option(
-    "--speed", metavar="SPEED", help="How fast; no direction.  [default: the winch's limit]"
+    "--speed", metavar="SPEED", help="How fast; no direction.  [default: limit of winch or robot]"
 )
-@click.option("--acceleration", metavar="ACCELERATION", help="[default: the winch's limit]")
+@click.option("--acceleration", metavar="ACCELERATION", help="[default: limit of winch or robot]")
 @take_over_option
 @effects_option
 @dry_run_option
@@ -54,6 +60,8 @@ def command(
     to: str | None,
     pay_out: str | None,
     wind_in: str | None,
+    pose: str | None,
+    pose_by: str | None,
     speed: str | None,
     acceleration: str | None,
     take_over: bool,
@@ -63,6 +71,10 @@ def command(
 ) -> None:
     """Move WINCH to a cable length, or by one, on an S-curve; then disable it.
 
+    With --pose or --pose-by the platform of the bench's robot moves on a line: before it begins,
+    cable lengths, speeds and forces along the whole path are compared with their limits. A
+    coordinate (x, y, z, roll, pitch, yaw) that is not named stays as it is.
+
     WINCH may be left out where there is one, and be "all": then all winches start in one control
     cycle and arrive together. Ctrl-C stops. Attaches to the process that owns the bench where
     there is one; then the motion ends with this command too.
@@ -71,17 +83,38 @@ def command(
     from winchkit.cli.core.quantities import optional
 
     direction = read_direction(pay_out, wind_in)
+    speeds = optional(speed, "speed"), optional(acceleration, "acceleration")
+    if pose is not None or pose_by is not None:
+        if winch is not None or to is not None or direction is not None:
+            raise UsageError("a pose is of the platform: give neither WINCH nor a LENGTH with it")
+        if pose is not None and pose_by is not None:
+            raise UsageError("give one of --pose and --pose-by")
+        goal = read_pose(pose or pose_by or "")
+        with station_for(
+            bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects
+        ) as station:
+            if take_over:
+                station.take_over(ALL)
+            station.move_pose(goal, pose is None, *speeds)
+            _wait(station, ALL)
+            status, there = station.status(), station.pose()
+        if as_json and not dry_run:
+            echo_json({**status, "pose": there})
+        elif not dry_run:
+            click.echo(pose_line(there))
+        return
     if (to is None) == (direction is None):
-        raise UsageError("where to? give one of --to, --pay-out and --wind-in, each a LENGTH")
+        raise UsageError(
+            "where to? give one of --to, --pay-out and --wind-in, each a LENGTH; or --pose"
+        )
     target = optional(to, "length")
     change = None if direction is None else direction.change
-    fastest, ramp = optional(speed, "speed"), optional(acceleration, "acceleration")
     with station_for(
         bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
     ) as station:
         if take_over:
             station.take_over(winch)
-        station.move(winch, target, change, fastest, ramp)
+        station.move(winch, target, change, *speeds)
         _wait(station, winch)
         status = station.status()
     if dry_run:

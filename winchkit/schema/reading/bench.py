@@ -59,6 +59,9 @@ def _check_robot(
     reading: Reading, spec: BenchSpec, robot: RobotWiring, read_robot: RobotReader
 ) -> None:
     """Each line of the robot is a winch of the bench, within the winch's limits."""
+    if not spec.stop_together:
+        message = "is false; the winches of a robot stop together, or cables go slack or break"
+        reading.fault(("stop_together",), message)
     at: Key = ("robot", "profile")
     path = reading.shipped("profiles", robot.profile, at)
     if path is None:

@@ -1,0 +1,192 @@
+"""A robot's platform moved by eight simulated winches, in simulated time.
+
+The drives are simulated independently of the model; where the platform is follows from their motor
+angles by forward kinematics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bare_winches import bare_winches
+from winchkit import open_bench
+from winchkit.arrays import Array
+from winchkit.bench.bench import Bench
+from winchkit.bench.control.loop import Callback
+from winchkit.bench.control.snapshot import BenchSnapshot
+from winchkit.bench.robot.path import Waypoint
+from winchkit.bench.robot.platform import Platform
+from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.robot_bench import RobotWiring
+from winchkit.sim.clock.simulated_clock import SimulatedClock
+from winchkit.sim.live.bench import LiveBench
+
+NAMES = "12345678"
+ROBOT = RobotWiring("cabtive", speed=0.1, tension=(5.0, 300.0), acceleration=0.3)
+
+
+@pytest.fixture(scope="module")
+def clock() -> SimulatedClock:
+    return SimulatedClock()
+
+
+@pytest.fixture(scope="module")
+def live(clock: SimulatedClock) -> Iterator[LiveBench]:
+    sim = bare_winches(NAMES, cycle=0.02, heartbeat=0.2)
+    sim = replace(sim, bench=replace(sim.bench, robot=ROBOT))
+    with LiveBench(sim, seed=1, simulated_time=clock) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def opened(live: LiveBench, clock: SimulatedClock) -> Iterator[Bench]:
+    with open_bench(live.bench_spec, clock) as bench:
+        yield bench
+
+
+@pytest.fixture
+def bench(opened: Bench) -> Bench:
+    """At home."""
+    home = opened.robot.robot.home
+    opened.robot.move(home)
+    return opened
+
+
+def _appended(seen: list[BenchSnapshot]) -> Callback:
+    def take(snapshot: BenchSnapshot) -> None:
+        seen.append(snapshot)
+
+    return take
+
+
+def errors(platform: Platform, snapshots: list[BenchSnapshot], start: Array, end: Array) -> Array:
+    """Distances from the line of the poses by the motor angles, m."""
+    names = platform.robot.names
+    angles = np.array([[s.winch[name].motor_angle for name in names] for s in snapshots])
+    places = platform.robot.poses_at(angles).pose.position
+    along = (end - start) / np.linalg.norm(end - start)
+    off = places - start
+    return np.asarray(np.linalg.norm(off - np.outer(off @ along, along), axis=1))
+
+
+def test_the_platform_goes_to_a_pose_on_a_line(bench: Bench) -> None:
+    platform = bench.robot
+    start = platform.pose
+    goal = platform.moved({"x": 0.06, "z": 0.05, "pitch": 0.05}, relative=True)
+    seen: list[BenchSnapshot] = []
+    remove = bench.on_cycle(_appended(seen))
+    platform.move(goal)
+    remove()
+    there = platform.pose
+    assert there.position == pytest.approx(goal.position, abs=2e-4)
+    assert there.rotation == pytest.approx(goal.rotation, abs=2e-3)
+    assert errors(platform, seen, start.position[0], goal.position[0]).max() < 2e-3
+    assert bench.snapshot.at_rest
+
+
+def test_a_stop_ends_on_the_path_and_all_cables_come_to_rest_together(bench: Bench) -> None:
+    platform = bench.robot
+    start = platform.pose
+    goal = platform.moved({"x": 0.08, "y": 0.06}, relative=True)
+    platform.move(goal, wait=False)
+    bench.clock.sleep(0.9)
+    seen: list[BenchSnapshot] = []
+    remove = bench.on_cycle(_appended(seen))
+    bench.stop()
+    remove()
+    assert errors(platform, seen, start.position[0], goal.position[0]).max() < 2e-3
+    left = np.linalg.norm(platform.pose.position - goal.position)
+    assert 0.01 < left < 0.09, "it stopped on the way"
+    velocity = np.array([[s.winch[n].motor_velocity for n in NAMES] for s in seen])
+    fastest = np.abs(velocity[0]).max()
+    shares = velocity / velocity[0]
+    moving = np.abs(velocity).max(axis=1) > 0.2 * fastest
+    quick = np.abs(velocity[0]) > 0.3 * fastest
+    assert np.ptp(shares[moving][:, quick], axis=1).max() < 0.15, "in the same proportion"
+    with pytest.raises(MotionError, match="stopped it before the motion's end"):
+        platform.wait()
+
+
+def test_what_the_cables_cannot_hold_is_refused_before_anything_moves(bench: Bench) -> None:
+    before = bench.snapshot
+    far = bench.robot.moved({"x": 0.5}, relative=True)
+    with pytest.raises(NotPermitted, match=r"at \d+ mm of the path.*no cable forces.*cable \S+ "):
+        bench.robot.move(far)
+    with pytest.raises(NotPermitted, match=r"speed 0\.2 m/s of the platform"):
+        bench.robot.move(bench.robot.pose, 0.2)
+    assert bench.snapshot.at_rest
+    assert bench.snapshot.winch["1"].motor_angle == pytest.approx(
+        before.winch["1"].motor_angle, abs=1e-3
+    )
+
+
+@pytest.mark.parametrize(
+    ("limits", "words"),
+    [
+        ({"speed": 0.02}, "speed of cable 3 is .* limits.speed of its winch is 0.02 m/s"),
+        ({"acceleration": 0.01}, "acceleration of cable 3 .* 0.01 m/s\\^2"),
+        ({"length": (0.0, 0.2)}, "cable 3 would be .* m long, limits.length of its winch is 0 m"),
+    ],
+)
+def test_limits_of_a_winch_hold_along_the_path(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, limits: dict[str, object], words: str
+) -> None:
+    platform = bench.robot
+    own = replace(platform._limits["3"], **limits)  # type: ignore[arg-type] # by name
+    monkeypatch.setitem(platform._limits, "3", own)
+    goal = platform.moved({"x": 0.06, "y": 0.06}, relative=True)
+    with pytest.raises(NotPermitted, match=words):
+        platform.planned([Waypoint(goal.position[0], goal.rotation[0])])
+
+
+def test_forces_of_the_plan_are_within_limits_and_balance_the_platform(bench: Bench) -> None:
+    platform = bench.robot
+    goal = platform.moved({"x": 0.06, "y": -0.05, "z": 0.03}, relative=True)
+    (planned,) = platform.planned([Waypoint(goal.position[0], goal.rotation[0])])
+    low, high = ROBOT.tension
+    assert planned.force.min() >= low - 1e-6
+    assert planned.force.max() <= high + 1e-6
+    structure, mass = platform.robot.structure(planned.pose), platform.robot.platform.mass
+    force = np.einsum("kij,kj->ki", structure, planned.force)[:, :3]
+    expected = mass * (planned.acceleration + np.array([0.0, 0.0, 9.80665]))
+    assert force == pytest.approx(expected, abs=1e-3)
+    assert np.abs(np.diff(planned.force, axis=0)).max() < 10.0, "forces are continuous"
+
+
+def test_a_fault_of_one_drive_stops_all(live: LiveBench, bench: Bench) -> None:
+    platform = bench.robot
+    platform.move(platform.moved({"x": 0.08}, relative=True), wait=False)
+    bench.clock.sleep(0.6)
+    live.inject("4.servo", "over-current")
+    with pytest.raises(DriveFault, match="winch 4"):
+        platform.wait()
+    bench.wait_at_rest(NAMES)
+    assert bench.snapshot.at_rest
+    bench.reset()
+
+
+def test_cables_that_fit_no_pose_are_refused(bench: Bench) -> None:
+    bench.winch["2"].move_by(wind_in=0.09)
+    with pytest.raises(NotPermitted, match="fit no pose: cable"):
+        _ = bench.robot.pose
+    bench.winch["2"].move_by(pay_out=0.09)
+
+
+def test_a_bench_without_robot_has_no_platform(opened: Bench) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(opened, "_platform", None)
+        with pytest.raises(UsageError, match=r"declares no robot; write a table \[robot\]"):
+            _ = opened.robot
+
+
+def test_winches_of_a_robot_have_their_cables_length_at_home(opened: Bench) -> None:
+    assert isinstance(opened.spec, BenchSpec)
+    robot = opened.robot.robot
+    assert [line.profile.reference.cable_length for line in robot.lines] == pytest.approx(
+        robot.home_length
+    )

@@ -1,0 +1,55 @@
+"""Poses of a platform as typed: ``x=0.1m,z=0.4m,yaw=5deg``."""
+
+from __future__ import annotations
+
+from math import degrees
+
+from winchkit.cli.core.quantities import quantity
+from winchkit.errors import UsageError
+from winchkit.units import suggest
+
+__all__ = ["COORDINATES", "pose_line", "read_pose"]
+
+COORDINATES = {
+    "x": "length",
+    "y": "length",
+    "z": "length",
+    "roll": "angle",
+    "pitch": "angle",
+    "yaw": "angle",
+}
+
+
+def read_pose(text: str) -> dict[str, float]:
+    """Coordinates by name, m and rad; raises UsageError.
+
+    Parameters
+    ----------
+    text : str
+        ``NAME=QUANTITY``, separated by commas.
+
+    Returns
+    -------
+    dict of str to float
+        At least one; those that are not named keep their value.
+    """
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
+        if name not in COORDINATES or not equals:
+            known = ", ".join(COORDINATES)
+            raise UsageError(
+                f"'{part.strip()}' is no coordinate of a pose; write such as "
+                f"x=0.1m,z=40cm,yaw=5deg with {known}" + suggest(name, list(COORDINATES))
+            )
+        if name in found:
+            raise UsageError(f"'{text}': {name} is given twice")
+        found[name] = quantity(value, COORDINATES[name])
+    return found
+
+
+def pose_line(pose: dict[str, float]) -> str:
+    """One line for a terminal."""
+    place = ", ".join(f"{name} {pose[name]:.4f} m" for name in ("x", "y", "z"))
+    turned = ", ".join(f"{name} {degrees(pose[name]):.3f} deg" for name in ("roll", "pitch", "yaw"))
+    return f"platform: {place}, {turned}"
