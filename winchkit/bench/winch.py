@@ -344,7 +344,7 @@ class Winch:
         Parameters
         ----------
         move : MotionSource
-            A motion that was begun.
+            A motion that was started.
 
         Returns
         -------
