@@ -27,6 +27,7 @@ from winchkit.schema.reading import bench as benches
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.parts import Reading
 from winchkit.schema.reading.source import open_source
+from winchkit.schema.robot_programme import RobotProgramme
 from winchkit.schema.simbench import SimBench
 
 __all__ = [
@@ -42,6 +43,7 @@ __all__ = [
     "read_profile",
     "read_programme",
     "read_robot",
+    "read_robot_programme",
     "read_simbench",
     "read_size",
     "read_tares",
@@ -52,6 +54,7 @@ Declared = (
     | RobotProfile
     | BenchSpec
     | Programme
+    | RobotProgramme
     | SimBench
     | DeviceSpec
     | SizeSpec
@@ -176,6 +179,27 @@ def read_programme(path: PathLike) -> Programme:
         With every fault of the file, each with its line.
     """
     return _read(path, "programme", Programme)
+
+
+def read_robot_programme(path: PathLike) -> RobotProgramme:
+    """Read a programme of a robot's platform.
+
+    Parameters
+    ----------
+    path : str or Path
+        File in TOML of the kind ``robot-programme``.
+
+    Returns
+    -------
+    RobotProgramme
+        Poses, arcs, blended corners and holds, in SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file, each with its line.
+    """
+    return _read(path, "robot-programme", RobotProgramme)
 
 
 def read_simbench(path: PathLike) -> SimBench:
@@ -424,6 +448,10 @@ def _programme(reading: Reading, tree: dict[str, Any]) -> Programme | None:
     return reading.table(Programme, {"name": reading.stem, **tree})
 
 
+def _robot_programme(reading: Reading, tree: dict[str, Any]) -> RobotProgramme | None:
+    return reading.table(RobotProgramme, {"name": reading.stem, **tree})
+
+
 def _size(reading: Reading, tree: dict[str, Any]) -> SizeSpec | None:
     return reading.table(SizeSpec, {"name": reading.stem, **tree})
 
@@ -467,6 +495,7 @@ _READERS: dict[str, Callable[[Reading, dict[str, Any]], Declared | None]] = {
     "robot": _robot,
     "bench": _bench,
     "programme": _programme,
+    "robot-programme": _robot_programme,
     "sim-bench": _simbench,
     "device": _device,
     "size": _size,

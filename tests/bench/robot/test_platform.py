@@ -6,14 +6,11 @@ angles by forward kinematics.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from bare_winches import bare_winches
-from winchkit import open_bench
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.loop import Callback
@@ -22,39 +19,9 @@ from winchkit.bench.robot.path import Waypoint
 from winchkit.bench.robot.platform import Platform
 from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
 from winchkit.schema.bench import BenchSpec
-from winchkit.schema.robot_bench import RobotWiring
-from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 
 NAMES = "12345678"
-ROBOT = RobotWiring("cabtive", speed=0.1, tension=(5.0, 300.0), acceleration=0.3)
-
-
-@pytest.fixture(scope="module")
-def clock() -> SimulatedClock:
-    return SimulatedClock()
-
-
-@pytest.fixture(scope="module")
-def live(clock: SimulatedClock) -> Iterator[LiveBench]:
-    sim = bare_winches(NAMES, cycle=0.02, heartbeat=0.2)
-    sim = replace(sim, bench=replace(sim.bench, robot=ROBOT))
-    with LiveBench(sim, seed=1, simulated_time=clock) as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def opened(live: LiveBench, clock: SimulatedClock) -> Iterator[Bench]:
-    with open_bench(live.bench_spec, clock) as bench:
-        yield bench
-
-
-@pytest.fixture
-def bench(opened: Bench) -> Bench:
-    """At home."""
-    home = opened.robot.robot.home
-    opened.robot.move(home)
-    return opened
 
 
 def _appended(seen: list[BenchSnapshot]) -> Callback:
@@ -137,18 +104,20 @@ def test_limits_of_a_winch_hold_along_the_path(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, limits: dict[str, object], words: str
 ) -> None:
     platform = bench.robot
-    own = replace(platform._limits["3"], **limits)  # type: ignore[arg-type] # by name
-    monkeypatch.setitem(platform._limits, "3", own)
+    own = replace(platform.planner.limits["3"], **limits)  # type: ignore[arg-type] # by name
+    monkeypatch.setitem(platform.planner.limits, "3", own)
     goal = platform.moved({"x": 0.06, "y": 0.06}, relative=True)
     with pytest.raises(NotPermitted, match=words):
-        platform.planned([Waypoint(goal.position[0], goal.rotation[0])])
+        platform.planner.plan([Waypoint(goal.position[0], goal.rotation[0])], platform.pose)
 
 
 def test_forces_of_the_plan_are_within_limits_and_balance_the_platform(bench: Bench) -> None:
     platform = bench.robot
     goal = platform.moved({"x": 0.06, "y": -0.05, "z": 0.03}, relative=True)
-    (planned,) = platform.planned([Waypoint(goal.position[0], goal.rotation[0])])
-    low, high = ROBOT.tension
+    (planned,) = platform.planner.plan(
+        [Waypoint(goal.position[0], goal.rotation[0])], platform.pose
+    )
+    low, high = platform.planner.wiring.tension
     assert planned.force.min() >= low - 1e-6
     assert planned.force.max() <= high + 1e-6
     structure, mass = platform.robot.structure(planned.pose), platform.robot.platform.mass

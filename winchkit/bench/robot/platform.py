@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -13,32 +13,22 @@ from winchkit.bench.common_move import wait_together
 from winchkit.bench.control.motion import StartGate
 from winchkit.bench.control.snapshot import Direction
 from winchkit.bench.host import WinchHost
-from winchkit.bench.robot.checks import require_within_limits
 from winchkit.bench.robot.motion import CableMotion, PathTime
-from winchkit.bench.robot.path import Waypoint, paths_through
-from winchkit.bench.robot.trajectory import PlatformTrajectory, plan_along
+from winchkit.bench.robot.path import Waypoint
+from winchkit.bench.robot.planner import Planner, coordinates_of, moved
+from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.errors import NotPermitted
-from winchkit.model.robot import ForceLimits, Pose, Robot, angles_of, rotation_of
+from winchkit.model.robot import Pose, Robot, quadratic
 from winchkit.schema.robot_bench import RobotWiring
 
 if TYPE_CHECKING:
     from winchkit.bench.winch import Winch
 
-__all__ = ["Platform", "moved"]
+__all__ = ["Platform"]
 
 _AGREE = 0.02
 """Largest difference between a cable length by its drum and by the geometry at the pose that fits
 all cables best, m: a larger one is a wrong reference, a slipped or a slack cable."""
-_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
-
-
-def moved(pose: Pose, change: Mapping[str, float], *, relative: bool) -> Pose:
-    """A pose with some coordinates replaced or changed, as :meth:`Platform.moved`."""
-    new = _six(pose)
-    for name, value in change.items():
-        index = _COORDINATES.index(name)
-        new[index] = value + (new[index] if relative else 0.0)
-    return Pose(new[None, :3], rotation_of(*new[3:])[None])
 
 
 class Platform:
@@ -53,12 +43,12 @@ class Platform:
     ) -> None:
         """Take the winches of the robot's lines by name."""
         self.robot = robot
-        self.wiring = wiring
         self._bench = bench
         self._winches = [winches[name] for name in robot.names]
-        self._limits = {one.name: one.wiring.limits for one in self._winches}
-        self.tension = ForceLimits(*wiring.tension)
-        """Limits of the force distribution, N."""
+        self.planner = Planner(
+            robot, wiring, {one.name: one.wiring.limits for one in self._winches}
+        )
+        """Plans its motions within the limits."""
 
     @property
     def pose(self) -> Pose:
@@ -85,9 +75,7 @@ class Platform:
 
     def coordinates(self) -> dict[str, float]:
         """The pose as x, y, z (m), roll, pitch and yaw (rad)."""
-        return {
-            name: float(value) for name, value in zip(_COORDINATES, _six(self.pose), strict=True)
-        }
+        return coordinates_of(self.pose)
 
     def moved(self, change: Mapping[str, float], *, relative: bool) -> Pose:
         """The present pose with some of its coordinates replaced or changed.
@@ -110,53 +98,6 @@ class Platform:
     def moving(self) -> bool:
         """Whether a motion is under way."""
         return any(winch.moving for winch in self._winches)
-
-    def planned(
-        self,
-        waypoints: Sequence[Waypoint],
-        speed: float | None = None,
-        acceleration: float | None = None,
-        start: Pose | None = None,
-    ) -> list[PlatformTrajectory]:
-        """Plan motions through waypoints and compare them with all limits; nothing moves.
-
-        Parameters
-        ----------
-        waypoints : sequence of Waypoint
-            Poses to go to; the platform stops at each that is not blended.
-        speed, acceleration : float, optional
-            Of the platform, m/s and m/s²; by default the limits of ``[robot]``.
-        start : Pose, optional
-            Pose at which it begins; by default the present one.
-
-        Returns
-        -------
-        list of PlatformTrajectory
-            One from each stop to the next.
-
-        Raises
-        ------
-        NotPermitted
-            For a limit that would be exceeded on the way, or by a stop.
-        """
-        if len(self.robot.names) < 6:
-            raise NotPermitted(
-                f"robot '{self.robot.profile.name}' has {len(self.robot.names)} cables, which do "
-                "not determine the rotation of its platform; moves along a path need at least 6"
-            )
-        wiring = self.wiring
-        fast = _within("speed", speed, wiring.speed, "m/s")
-        ramp = _within("acceleration", acceleration, wiring.acceleration, "m/s^2")
-        scale = wiring.speed / wiring.rotation_speed
-        # Rotation counts as ρ times its angle: its acceleration is limited with that of the path.
-        ramp = min(ramp, wiring.rotation_acceleration * scale)
-        paths = paths_through(start or self.pose, waypoints, scale)
-        out = []
-        for path in paths:
-            one = plan_along(self.robot, path, self.tension, fast, ramp)
-            require_within_limits(self.robot, one, self._limits, self.tension, wiring.acceleration)
-            out.append(one)
-        return out
 
     def move(
         self,
@@ -181,12 +122,18 @@ class Platform:
             Keep the drives enabled at the end.
         """
         waypoint = Waypoint(goal.position[0], goal.rotation[0])
-        for planned in self.planned([waypoint], speed, acceleration):
+        for planned in self.planner.plan([waypoint], self.pose, speed, acceleration):
             self.begin(planned, hold=hold)
             if wait:
                 self.wait()
 
-    def begin(self, planned: PlatformTrajectory, *, hold: bool = False) -> None:
+    def begin(
+        self,
+        planned: PlatformTrajectory,
+        *,
+        hold: bool = False,
+        preload: Array | None = None,
+    ) -> Array:
         """Begin a planned motion; all winches start in one cycle.
 
         Parameters
@@ -195,13 +142,30 @@ class Platform:
             A motion that begins at the present pose.
         hold : bool
             Keep the drives enabled at the end.
+        preload : (n,) array, optional
+            Motor angles at its end less those of the plan, rad; by default those at its beginning.
+            What differs at the beginning is removed in proportion to the travelled path.
+
+        Returns
+        -------
+        (n,) array
+            That difference, for the next motion of a series: it is the preload of the cables that
+            the plan does not describe, and is to stay.
+
+        Raises
+        ------
+        NotPermitted
+            For a winch that may not move.
         """
         from scipy.interpolate import CubicSpline
 
-        angles = planned.motor_angle - planned.motor_angle[0] + self._angles()[0]
+        present = self._angles()[0] - planned.motor_angle[0]
+        kept = present if preload is None else preload
+        share = planned.distance[:, None] / planned.path.length
+        angles = planned.motor_angle + present + share * (kept - present)
         self._permit(planned, angles)
         curve = CubicSpline(planned.time, angles, bc_type="clamped")
-        clock = PathTime(planned, self.wiring.acceleration)
+        clock = PathTime(planned, self.planner.wiring.acceleration)
         step = float(planned.time[1])
         sources = {
             winch: CableMotion(clock, curve.c[:, :, i], step, winch.cable, holds=hold)
@@ -211,6 +175,7 @@ class Platform:
         with self._bench.loop.ordering:
             for winch, source in sources.items():
                 winch.begin(source, gate)
+        return kept
 
     def wait(self) -> None:
         """Return at the end of the motion; raises what ended it before."""
@@ -235,26 +200,9 @@ class Platform:
 
     def _forces(self, pose: Pose) -> Array:
         """Cable forces of the plan at a pose at rest, (1, n); zero where there are none."""
-        from winchkit.model.robot import quadratic
-
         if len(self.robot.names) < 6:
             return np.zeros((1, len(self.robot.names)))
-        found = quadratic(self.robot.structure(pose)[0], self.robot.weight(pose)[0], self.tension)
-        return (found.value if found.feasible else np.zeros_like(found.value))[None]
-
-
-def _six(pose: Pose) -> Array:
-    """Coordinates of one pose."""
-    return np.concatenate([pose.position[0], angles_of(pose.rotation)[0]])
-
-
-def _within(name: str, asked: float | None, limit: float, unit: str) -> float:
-    """The asked value, or the limit; raises NotPermitted beyond it."""
-    if asked is None:
-        return limit
-    if not 0 < asked <= limit:
-        raise NotPermitted(
-            f"{name} {asked:g} {unit} of the platform is not within the limit {limit:g} {unit} of "
-            "[robot]"
+        found = quadratic(
+            self.robot.structure(pose)[0], self.robot.weight(pose)[0], self.planner.tension
         )
-    return asked
+        return (found.value if found.feasible else np.zeros_like(found.value))[None]

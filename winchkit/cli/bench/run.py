@@ -36,6 +36,7 @@ _POLL = 0.05
     examples=(
         "winchkit run short.toml -b bench.toml -o runs",
         "winchkit run short.toml -b bench.toml --dry-run",
+        "winchkit run rectangle.toml -b robot.toml -o runs",
     ),
 )
 @click.argument("programme", type=PROGRAMME)
@@ -75,12 +76,31 @@ def command(
 ) -> None:
     """Execute PROGRAMME (a file, or a shipped name) on a bench, one log per load and repeat.
 
+    A robot programme moves the platform of the bench's robot; its whole path is compared with all
+    limits before anything moves, with --dry-run only that.
+
     Ctrl-C, a trip or a fault stops the winches; what was logged until then is kept.
     """
-    from winchkit.schema.read import read_bench, read_programme
+    from winchkit.schema.read import load, read_bench, read_programme
+    from winchkit.schema.robot_programme import RobotProgramme
     from winchkit.sim.bench import programme_path
 
-    declared = read_programme(programme_path(programme))
+    path = programme_path(programme)
+    if isinstance(poses := load(path).value, RobotProgramme):
+        from winchkit.cli.bench.run_robot import run_robot
+
+        run_robot(
+            poses,
+            bench,
+            effects,
+            output,
+            f".{suffix}",
+            replace=replace,
+            dry_run=dry_run,
+            as_json=as_json,
+        )
+        return
+    declared = read_programme(path)
     if is_standard_input(programme) and not yes and any(step.ask for step in declared.step):
         raise UsageError(
             "PROGRAMME -: it asks an operator, whose answers would come from standard input as "

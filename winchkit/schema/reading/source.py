@@ -22,6 +22,7 @@ KINDS = (
     "robot",
     "bench",
     "programme",
+    "robot-programme",
     "sim-bench",
     "device",
     "size",
