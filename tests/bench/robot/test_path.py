@@ -78,3 +78,11 @@ def test_a_blended_corner_is_smooth_and_near_the_corner(
     assert places[-1] == pytest.approx(end)
     nearest = np.linalg.norm(places - first, axis=1).min()
     assert nearest <= blend, "the corner is cut by less than the blend"
+
+
+def test_a_right_angle_is_cut_by_the_distance_of_the_middle_of_its_curve() -> None:
+    (path,) = paths_through(HOME, [to(0.1, 0, 0, blend=0.02), to(0.1, 0.1, 0)], SCALE)
+    places = path.pose(np.linspace(0.0, path.length, 2001)).position
+    # Bernstein weights at 1/2 of the four control points beside the corner: (1, 5, 5, 1)/32.
+    middle = 0.02 * (1 + 5 / 2) / 32 * np.sqrt(2)
+    assert np.linalg.norm(places - [0.1, 0, 0], axis=1).min() == pytest.approx(middle, rel=1e-3)

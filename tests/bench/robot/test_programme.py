@@ -81,8 +81,6 @@ def test_a_programme_is_played_and_logged_once_per_repeat(bench: Bench, tmp_path
         place = robot.poses_at(angles[::5]).pose.position - robot.home.position
         assert place[:, 0].max() == pytest.approx(0.03, abs=FOLLOWING)
         assert place[:, 1].max() == pytest.approx(0.03, abs=FOLLOWING)
-        corner = np.linalg.norm(place - [0.03, 0.0, 0.0], axis=1).min()
-        assert 1e-3 < corner < 0.01, "the corner is cut by less than the blend"
         ends.append(angles[-1])
     assert ends[0] == pytest.approx(ends[1], abs=2e-3), "repeats do not drift"
     assert bench.snapshot.at_rest
