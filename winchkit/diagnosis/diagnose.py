@@ -76,6 +76,7 @@ _UNSEARCHED = (
     "with --as-recorded"
 )
 _LOCATED = ("unknown", "partly")
+_IMITATES = "a part of the residual is unexplained: it may imitate the cause"
 
 
 ProgressCallback = Callable[[str, float], None]
@@ -311,7 +312,8 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
     reported = judgement.reported
     added = range(engine.n_initial_terms, len(reported.final.hypothesis.terms))
     sets = [equivalence_set(engine, reported.final, reported.noise, index) for index in added]
-    pairs = pairs_of(sets or _closest(engine, result, judgement))
+    withheld_sets = () if sets else _closest(engine, result, judgement)
+    pairs = pairs_of(sets or withheld_sets)
     if sets:
         judgement = reweighted_judgement(engine, judgement)
         reported = judgement.reported
@@ -321,6 +323,8 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
         names = ", ".join(dict.fromkeys(f"{each.effect}: {each.reason}" for each in closest))
         judgement = withheld(engine, result, 1.0, f"closest, but not named: {names}")
         reported, pairs = judgement.reported, []
+    elif withheld_sets:
+        closest = _imitations(engine, result, withheld_sets)
     spread = spread if reported is found else _spread(engine, reported)
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
@@ -405,6 +409,16 @@ def _plausible(
     if all(a.effects == b.effects for a, b in zip(found, kept, strict=True)):
         return found, steps, ()
     return kept, steps_of(engine, result, kept, dataset, spread), ()
+
+
+def _imitations(
+    engine: TimeSeriesSelection, result: SelectionResult, sets: Sequence[EquivalenceSet]
+) -> tuple[Closest, ...]:
+    """First effects of the sets that explain a part, with their values."""
+    steps = steps_of(engine, result, sets, engine.regression.dataset)
+    return tuple(
+        Closest(step.effects[0], step.parameters[step.effects[0]], _IMITATES) for step in steps
+    )
 
 
 def _closest(

@@ -142,7 +142,7 @@ class Combination:
 
 @dataclass(frozen=True)
 class Closest:
-    """An effect that would explain the residual with values that cannot be."""
+    """An effect that explains the residual or a part of it, and the reason why it is not named."""
 
     effect: str
     parameters: Mapping[str, Estimate]

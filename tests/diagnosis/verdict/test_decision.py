@@ -12,6 +12,7 @@ from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.term import Term
+from winchkit.report.words.sentence import sentence
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import EffectTable
 
@@ -78,6 +79,14 @@ def test_partly() -> None:
     assert found.steps == ()
     (note,) = (note for note in found.notes if note.startswith("closest"))
     assert "motor-coulomb" in note
+    nearest = {each.effect: each for each in found.closest}
+    assert "motor-coulomb" in nearest
+    torque = nearest["motor-coulomb"].parameters["torque"]
+    assert torque.value == pytest.approx(0.02, abs=5 * torque.std)
+    assert "imitate" in nearest["motor-coulomb"].reason
+    text = sentence(found)
+    assert "a part is explained by these effects" in text.lower()
+    assert "the motor side has Coulomb friction" in text
     assert 0 < found.unexplained_share <= 0.5
 
 

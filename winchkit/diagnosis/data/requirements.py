@@ -24,7 +24,7 @@ _NEEDED = {
     "rope_force": "a load, load_mass or tension",
     "gearing": "a gearbox",
     "robot": "a robot's profile",
-    "axis": "a profile of kind 'axis'",
+    "axis": "a profile of kind 'axis', or runs without any force in a cable",
     "whole_turns": "a run in which the drum turns once at least",
     "torque": "a motor_torque channel",
 }
@@ -41,6 +41,10 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         return [] if measured else ["a measured " + " or ".join(effect.outputs)]
     cable = profile.cable
     roped = cable.diameter or cable.dead_length or profile.pulley
+    turns_whole = not is_axis and _turns(dataset) >= 1
+    rope_force = any(bool(r.raw.at.tension.any()) for r in recordings)
+    # Without a cable force a winch's drum that never turns once is what a joint is.
+    is_joint = set(dataset.outputs) == {"motor_torque"} and not rope_force and not turns_whole
     have = {
         "cable": bool(roped) or profile.reference.cable_length is not None,
         "layers": profile.drum.kind in {"spiral", "archimedean"},
@@ -48,11 +52,11 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "pulley": bool(profile.pulley),
         "temperature": all(r.signals.temperature is not None for r in recordings),
         "load": any(r.raw.load is not None for r in recordings),
-        "rope_force": any(bool(r.raw.at.tension.any()) for r in recordings),
+        "rope_force": rope_force,
         "gearing": True,
         "robot": False,
-        "axis": is_axis,
-        "whole_turns": not is_axis and _turns(dataset) >= 1,
+        "axis": is_axis or is_joint,
+        "whole_turns": turns_whole,
         "torque": "motor_torque" in dataset.outputs,
     }
     lacking = [_NEEDED[need] for need in effect.needs if not have[need]]

@@ -103,7 +103,7 @@ def cause_and_error(diagnosis: Diagnosis) -> tuple[str, str]:
         return _named(steps, diagnosis.data), " ".join(part for part in parts if part)
     if diagnosis.verdict == "partly":
         opening = "Partly explained by known effects, none of which is named"
-        return _unexplained(diagnosis, opening), ""
+        return f"{_unexplained(diagnosis, opening)} {_nearest(diagnosis)}".strip(), ""
     opening = "Nothing is named" if diagnosis.closest else "Unexplained by any known effect"
     return _closest(diagnosis) + _unexplained(diagnosis, opening), ""
 
@@ -329,6 +329,17 @@ def _closest(diagnosis: Diagnosis) -> str:
         return ""
     parts = [f"{clause(each.effect)}, but {each.reason}" for each in diagnosis.closest]
     return f"Closest: {'; '.join(parts)}. "
+
+
+def _nearest(diagnosis: Diagnosis) -> str:
+    """The effects that explain a part and may imitate its cause; or nothing."""
+    if not diagnosis.closest:
+        return ""
+    parts = []
+    for each in diagnosis.closest:
+        values = values_text(each.parameters)
+        parts.append(clause(each.effect) + (f" ({values})" if values else ""))
+    return f"A part is explained by these effects, or they imitate its cause: {'; '.join(parts)}."
 
 
 def _unexplained(diagnosis: Diagnosis, opening: str) -> str:
