@@ -1,4 +1,4 @@
-"""Which effects runs admit: a joint declared as a winch has gravity, a winch with a load has not."""
+"""Effects that runs admit: a joint declared as a winch has gravity, a loaded winch has none."""
 
 from __future__ import annotations
 
