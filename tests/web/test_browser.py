@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
@@ -135,6 +136,93 @@ def test_drop_see_add_the_ladder_falls_save_and_reload(
     page.locator("main input[type=checkbox]").first.check()
     until(page, lambda: page.locator("#overlay canvas").count() == 1)
     assert complaints == []
+
+
+def saved_as(page: Any, name: str, kind: str, folder: Path) -> Path:
+    """A file that a plot's button saves."""
+    with page.expect_download() as waiting:
+        page.click(f"[aria-label='Save {name} as {kind}']")
+    path = folder / f"{name}.{kind.lower()}"
+    waiting.value.save_as(path)
+    return path
+
+
+def rail(page: Any) -> float:
+    """Place of the rail of today's error in the focused column, per cent of its drawing."""
+    place = page.locator(".ladder .cell.focus line.rail").first.get_attribute("x1")
+    return float(str(place).rstrip("%"))
+
+
+@pytest.fixture(scope="module")
+def example() -> Iterator[Served]:
+    found = Served("--mystery", "1")
+    yield found
+    found.end()
+
+
+@pytest.mark.parametrize("motion", ["no-preference", "reduce"])
+def test_the_rail_slides_to_the_new_error_or_its_earlier_place_stays_dotted(
+    browser: Any, example: Served, motion: str
+) -> None:
+    page, complaints = opened(browser, example.url, reduced_motion=motion)
+    until(page, lambda: page.locator("#card .primary").count() == 1)
+    before = rail(page)
+    page.evaluate(
+        """() => { window.places = []; const look = () => {
+        const node = document.querySelector(".ladder .cell.focus line.rail");
+        if (node) window.places.push(parseFloat(node.getAttribute("x1")));
+        requestAnimationFrame(look); }; look(); }"""
+    )
+    page.keyboard.press("a")
+    until(page, lambda: page.locator(".name.history").count() == 1 and rail(page) < before - 5)
+    if motion == "reduce":
+        until(page, lambda: page.locator("line.earlier").count() > 0, 2.0)
+        until(page, lambda: page.locator("line.earlier").count() == 0, 6.0)
+    page.wait_for_timeout(1000)
+    places, after = page.evaluate("window.places"), rail(page)
+    between = {at for at in places if after + 1 < at < before - 1}
+    assert (len(between) > 3) == (motion == "no-preference")
+    assert ", was " in page.inner_text("#live")
+    page.keyboard.press("u")
+    until(page, lambda: page.locator(".name.history").count() == 0)
+    page.wait_for_timeout(1000)
+    assert rail(page) == pytest.approx(before, abs=0.5)
+    assert complaints == []
+    page.context.close()
+
+
+def test_every_plot_is_saved_with_its_title_its_runs_its_profile_and_the_version(
+    browser: Any, example: Served, tmp_path: Path
+) -> None:
+    page, complaints = opened(browser, example.url, accept_downloads=True, color_scheme="dark")
+    until(page, lambda: page.locator("#card .exports").count() == 1)
+    until(page, lambda: page.locator("#over .exports").count() == 1)
+    until(page, lambda: page.locator("#time .exports").count() == 1)
+    runs = page.evaluate("fetch('/api/view' + location.search).then((r) => r.json())")
+    names = [run["name"] for run in runs["runs"]]
+    labels = [
+        str(node.get_attribute("aria-label")).removeprefix("Save ").removesuffix(" as SVG")
+        for node in page.locator("[aria-label$='as SVG']").all()
+    ]
+    assert len(labels) == 4
+    for name in labels:
+        drawn = saved_as(page, name, "SVG", tmp_path).read_text()
+        root = ElementTree.fromstring(drawn)
+        words = " ".join(root.itertext())
+        assert "var(" not in drawn
+        assert "NaN" not in drawn
+        assert f"profile {runs['profile']['name']}" in words
+        assert f"winchkit {runs['version']}" in words
+        assert all(run in words for run in names)
+        table = saved_as(page, name, "CSV", tmp_path).read_text().splitlines()
+        assert table[0].startswith("# ")
+        assert len(table) > 4
+        picture = saved_as(page, name, "PNG", tmp_path).read_bytes()
+        assert picture[:8] == b"\x89PNG\r\n\x1a\n"
+        wide = int.from_bytes(picture[16:20], "big")
+        assert wide == 2 * float(root.get("width"))
+    assert complaints == []
+    page.context.close()
 
 
 @pytest.fixture(scope="module")

@@ -31,6 +31,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from winchkit.catalog import names
 from winchkit.errors import UsageError, WinchkitError
+from winchkit.version import __version__
 from winchkit.web.foreign import is_run, preview
 from winchkit.web.library import Library
 from winchkit.web.robot import RobotWork, is_robot
@@ -219,7 +220,11 @@ class _Work:
         ]
 
     def _shown(self) -> dict[str, Any]:
-        return self.workspace.view() | {"bench": self.has_bench, "robot": self.robot.summary()}
+        return self.workspace.view() | {
+            "bench": self.has_bench,
+            "robot": self.robot.summary(),
+            "version": __version__,
+        }
 
     async def _view(self, request: Request) -> Response:
         return JSONResponse(self._shown())

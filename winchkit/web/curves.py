@@ -100,6 +100,7 @@ class OutputCurves:
             "name": capital(OUTPUT_NAMES.get(self.output, self.output)),
             "unit": whole.label,
             "residual_unit": self.scale.label,
+            "residual_worth": self.scale.worth,
             "x": significant(x.tolist(), _TIME_DIGITS),
             "measured": significant(measured.tolist(), _DIGITS),
             "predicted": significant(predicted.tolist(), _DIGITS),

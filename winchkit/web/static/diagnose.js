@@ -1,15 +1,17 @@
 // The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
-import { alarm, ask, attempt, colour, dialog, download, el, fill, icon, number, order, say, svg } from "./page.js";
-import { dots, exporter, legend, line, plot } from "./plots.js";
+import { alarm, ask, attempt, colour, dialog, download, el, fill, icon, number, order, say, sourceOf, svg } from "./page.js";
+import { exporter } from "./figures.js";
+import { morph, slideRails } from "./motion.js";
+import { dots, legend, line, plot } from "./plots.js";
 
-let view = null, root = null, shown = { effect: null, output: null }, rails = {}, brushed = null, panels = [], cards = {}, span = null;
+let view = null, root = null, shown = { effect: null, output: null }, brushed = null, panels = [], cards = {}, span = null, earlier = null, drawnCurve = null;
 
 export function enter(main, state) { root = main; shown = { effect: null, output: null }; brushed = null; update(state); }
 
 export function update(state) {
-  const fresh = !view || view.diagnosis !== state.diagnosis;
   const signature = JSON.stringify([state.runs, state.profile, state.diagnosis]);
   const same = root.dataset.signature === signature && root.firstChild;
+  if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
   view = state;
   if (same) { busy(); return; }
   root.dataset.signature = signature;
@@ -17,6 +19,14 @@ export function update(state) {
   if (state.said) say(state.said);
   render();
 }
+
+// Whether two states differ in the profile's additions only, so that one becomes the other.
+function comparable(before, after) {
+  const own = (state) => JSON.stringify([state.profile && state.profile.name, state.runs]);
+  return before.diagnosis && after.diagnosis && own(before) === own(after);
+}
+
+const source = () => sourceOf(`profile ${[view.profile.name, ...view.profile.added].join(" + ")}`, view.runs.filter((run) => run.used).map((run) => run.name).join(", "));
 
 function render() {
   const d = view.diagnosis;
@@ -34,6 +44,7 @@ function render() {
       el("section", { class: "panel w5", id: "over", "aria-label": "Residual against each variable" }),
       el("section", { class: "panel w12", id: "data" })));
     drawLadder(); drawTime(); drawMultiples(); drawData();
+    if (earlier) slideRails(root.querySelector("#ladder"), earlierRails());
     if (shown.effect) drawCard();
   } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with.")));
   else if (!view.busy) root.append(el("div", { class: "panel" }, el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")));
@@ -122,53 +133,70 @@ function head(d) {
     d.sentence ? el("p", {}, d.sentence) : null);
 }
 
+// Places of the earlier profile's errors on the present axis, in percent.
+function earlierRails() {
+  const { columns, rows } = earlier.diagnosis.ladder, today = rows.find((row) => row.kind === "today"), most = reach(view.diagnosis.ladder);
+  return Object.fromEntries(columns.flatMap(({ output }) => today.cells[output] && today.cells[output].ratio ? [[output, X(today.cells[output].ratio, most)]] : []));
+}
+
+const reach = ({ columns, rows }) => Math.max(1.2, ...rows.flatMap((row) => columns.map((c) => row.cells[c.output] && row.cells[c.output].ratio ? LOG(row.cells[c.output].ratio) : 0)));
+
 const LOG = (ratio) => Math.log2(Math.max(ratio, 1));
 
 function drawLadder() {
   const box = root.querySelector("#ladder"), { columns, rows, candidates } = view.diagnosis.ladder;
   const narrow = matchMedia("(max-width: 699px)").matches;
   const seen = narrow ? columns.filter((c) => c.output === shown.output) : columns;
-  const most = Math.max(1.2, ...rows.flatMap((row) => columns.map((c) => row.cells[c.output] && row.cells[c.output].ratio ? LOG(row.cells[c.output].ratio) : 0)));
+  const most = reach(view.diagnosis.ladder);
   const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, 190px) ${seen.map((c) => c.output === shown.output && !narrow ? "2fr" : "1fr").join(" ")}` } });
   grid.append(el("span", {}));
   for (const c of seen) grid.append(el("button", { class: `head ${c.output === shown.output ? "focus" : ""}`, "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name, el("span", {}, c.unit)));
-  const today = rows.find((row) => row.kind === "today");
+  const today = rows.find((row) => row.kind === "today"), joined = rows.filter((row) => row.equal);
   for (const row of rows) {
     const chosen = row.kind === "candidate" && row.effect === shown.effect ? "chosen" : "";
     const name = row.kind === "candidate"
-      ? el("button", { class: `name ${chosen}`, "aria-pressed": String(Boolean(chosen)), title: row.effect, onclick: () => choose(row.effect) }, el("span", {}, row.label), row.equal ? el("b", { title: "cannot be distinguished", "aria-label": "cannot be distinguished" }, "=") : null)
+      ? el("button", { class: `name ${chosen}`, "aria-pressed": String(Boolean(chosen)), title: row.effect, onclick: () => choose(row.effect) }, el("span", {}, row.label), row.equal ? el("b", { class: `bracket ${row === joined[0] ? "first" : ""} ${row === joined.at(-1) ? "last" : ""}`, title: "cannot be distinguished with these runs" }, el("span", { class: "visually-hidden" }, "cannot be distinguished"), row === joined[Math.floor((joined.length - 1) / 2)] ? "=" : "") : null)
       : el("div", { class: `name ${row.kind}` }, el("span", {}, row.kind === "today" && view.profile && view.profile.added.length ? `+ ${view.profile.added.at(-1)}` : row.label), row.kind === "today" ? el("i", {}, "today") : null);
     grid.append(name);
     for (const c of seen) {
       const cell = row.cells[c.output], now = today.cells[c.output];
-      grid.append(el("div", { class: `cell ${row.kind} ${chosen} ${c.output === shown.output && !chosen ? "focus" : ""}` }, rung(row, cell, now, most), el("span", { class: "value" }, cell ? cell.text : "–")));
+      grid.append(el("div", { class: `cell ${row.kind} ${chosen} ${c.output === shown.output && !chosen ? "focus" : ""}` }, rung(row, cell, now, most, c.output), el("span", { class: "value" }, cell ? cell.text : "–")));
     }
   }
   grid.append(el("div", { class: "axis" }, "error ÷ noise floor"));
   for (const c of seen) grid.append(el("div", { class: `cell axis ${c.output === shown.output ? "focus" : ""}` }, scale(most), el("span", { class: "value" })));
-  fill(box, el("header", {}, el("h2", {}, "Held-out error of each candidate"), el("span", { class: "note" }, `${rows.filter((r) => r.kind === "candidate").length} of ${candidates} candidates shown; the others have less evidence`)),
+  fill(box, el("header", {}, el("h2", {}, "Held-out error of each candidate"), el("span", { class: "note" }, `${rows.filter((r) => r.kind === "candidate").length} of ${candidates} candidates shown; the others have less evidence`), exporter("ladder", ladderFigure)),
     narrow ? el("div", { class: "row", style: { marginBottom: "8px" } }, columns.map((c) => el("button", { "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name))) : null, grid);
 }
 
+function ladderFigure() {
+  const { columns, rows } = view.diagnosis.ladder, ratio = (row, c) => (row.cells[c.output] ? row.cells[c.output].ratio : null);
+  return { title: "Held-out error of each candidate over the noise floor", source: source(), across: columns.length, height: 60 + 24 * rows.length, legend: rows.map((row, i) => ({ name: `${rows.length - i} ${row.label}`, tone: toneOf(row) })).slice(0, 5),
+    panels: columns.map((c) => ({ title: `${c.name}, row by row`, xLabel: `${c.name}: error ÷ noise floor`, range: [0.5, rows.length + 0.5], x: rows.map((row) => ratio(row, c)), marks: [1],
+      series: rows.map((row, i) => ({ name: `${row.label} [row]`, x: [ratio(row, c), ratio(row, c) && ratio(rows.find((r) => r.kind === "today"), c)], y: [rows.length - i, rows.length - i], tone: toneOf(row), width: 4 })) })) };
+}
+const toneOf = (row) => ({ history: "muted", today: "today", candidate: "with", floor: "edge" })[row.kind];
+
 const X = (ratio, most) => 10 + (LOG(ratio) / most) * 84;
 
-function rung(row, cell, now, most) {
+function rung(row, cell, now, most, output) {
   const parts = [svg("rect", { x: "0%", y: 0, width: "10%", height: 27, fill: "var(--band)" }), svg("line", { x1: "10%", x2: "10%", y1: 0, y2: 27, stroke: "var(--edge)", "stroke-width": 1.5 })];
   const right = now && now.ratio ? `${X(now.ratio, most)}%` : null;
-  if (right && row.kind !== "history" && row.kind !== "floor") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? 13 : 0, y2: 27, stroke: "var(--today)", "stroke-width": 2, class: "rail" }));
+  const moving = (names) => ({ "data-rail": right, "data-moves": names });
+  if (right && row.kind !== "history" && row.kind !== "floor") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? 13 : 0, y2: 27, stroke: "var(--today)", "stroke-width": 2, class: "rail", ...moving("x1 x2") }));
   const picked = row.effect === shown.effect && row.kind === "candidate";
   if (cell && cell.ratio) {
     const at = `${X(cell.ratio, most)}%`;
     if (row.kind === "candidate") {
-      if (right) parts.push(svg("line", { x1: at, x2: right, y1: 13.5, y2: 13.5, stroke: "var(--with)", "stroke-width": picked ? 3.5 : 1.5, class: "rung" }));
+      if (right) parts.push(svg("line", { x1: at, x2: right, y1: 13.5, y2: 13.5, stroke: "var(--with)", "stroke-width": picked ? 3.5 : 1.5, class: "rung", ...moving("x2") }));
       parts.push(svg("circle", { cx: at, cy: 13.5, r: picked ? 5.5 : 4, fill: picked ? "var(--with)" : "var(--surface)", stroke: "var(--with)", "stroke-width": 2, class: "dot" }));
-    } else if (row.kind === "today") parts.push(svg("circle", { cx: at, cy: 13.5, r: 5, fill: "var(--today)", class: "dot" }));
+    } else if (row.kind === "today") parts.push(svg("circle", { cx: at, cy: 13.5, r: 5, fill: "var(--today)", class: "dot", ...moving("cx") }));
     else if (row.kind === "history") {
       parts.push(svg("circle", { cx: at, cy: 13.5, r: 4, fill: "var(--surface)", stroke: "var(--muted)", "stroke-width": 1.5 }));
       parts.push(svg("line", { x1: at, x2: at, y1: 18, y2: 27, stroke: "var(--muted)", "stroke-dasharray": "2 2" }));
     }
   }
-  return svg("svg", { "aria-hidden": "true" }, parts);
+  return svg("svg", { "aria-hidden": "true", "data-output": output }, parts);
 }
 
 function scale(most) {
@@ -191,7 +219,7 @@ async function drawCard() {
     if (effect !== shown.effect || !box.isConnected) return;
     const host = el("div", { class: "plot" });
     const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}.`) : el("p", { class: "note" }, "✓ Distinguishable from every other candidate with these runs.");
-    fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
+    fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect), card.signature ? exporter(`signature-${card.effect}`, () => signatureFigure(card)) : null),
       host, card.signature ? legend(["today", "residual, mean"], ["with", "signature"], ["band", "noise floor ±1σ", true]) : null,
       el("p", { class: "note" }, card.what), el("div", { class: "formula" }, card.formula),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
@@ -219,6 +247,12 @@ function drawSignature(host, s) {
     traces: [{ x: s.bins, y: s.means, tone: "today", width: 2 }, { x: s.bins, y: s.signature, tone: "with", width: 3 }], label: `Residual and signature over ${s.label}` });
 }
 
+function signatureFigure({ name, signature: s }) {
+  return { title: `${name}: its signature over the residual`, source: source(), legend: [{ name: "residual, mean", tone: "today" }, { name: "signature", tone: "with" }, { name: "noise floor ±1σ", tone: "edge" }],
+    panels: [{ title: `Residual [${s.unit}]`, x: s.x, xLabel: s.label, noise: s.noise, range: sym(s.residual)(), logarithmic: s.logarithmic, series: [{ name: `residual [${s.unit}]`, y: s.residual, tone: "today", points: true, opacity: 0.28 },
+      { name: `mean [${s.unit}]`, x: s.bins, y: s.means, tone: "today", width: 2 }, { name: `signature [${s.unit}]`, x: s.bins, y: s.signature, tone: "with", width: 3 }] }] };
+}
+
 const unitOf = (label) => (/\[(.+)\]$/.exec(label) || ["", ""])[1];
 function sym(values) {
   const sizes = values.filter((v) => v !== null).map(Math.abs).sort((a, b) => a - b), top = 1.15 * (sizes[Math.floor(0.995 * (sizes.length - 1))] || 1);
@@ -242,15 +276,23 @@ async function drawTime() {
       if (span && span[1] - span[0] > 0.98 * (data.last - data.first)) span = null;
       clearTimeout(zoom.timer); zoom.timer = setTimeout(drawTime, 60);
     };
-    const figure = () => ({ title: `${data.name}: measured, predicted [${data.unit}], residual [${data.residual_unit}]; ${view.profile.name}`, xLabel: "time [s]", x: data.x,
-      series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink" }, { name: `predicted [${data.unit}]`, y: data.predicted, tone: "today" }, { name: `residual [${data.residual_unit}]`, y: data.residual, tone: "with" }] });
+    const marks = data.runs.slice(1).map((run) => run.at), xLabel = "time [s]";
+    const figure = () => ({ title: `${data.name}: measured and predicted, and the residual`, source: source(), legend: [{ name: "measured", tone: "ink" }, { name: "predicted, residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
+      panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel, marks, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone: "today" }] },
+        { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, marks, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }] }] });
     fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise floor ±1σ", true]),
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
     plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 130, top: 22, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
     const marked = brushed ? brushed.time : null;
     const low = marked ? mixed(data.x, data.residual, marked, brushed.residual) : [data.x, data.residual];
-    plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
+    const drawn = plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
       { height: 150, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
+    if (earlier && earlier.curve && earlier.curve.output === output && !span && !marked) {
+      const { x, y, worth } = earlier.curve;
+      morph(drawn, { x, y: y.map((value) => (value === null ? null : (value * worth) / data.residual_worth)) }, low);
+    }
+    earlier = null;
+    drawnCurve = { output, x: data.x, y: data.residual, worth: data.residual_worth };
   });
 }
 
@@ -261,7 +303,7 @@ async function drawMultiples() {
     const found = await ask(`/api/multiples?output=${output}`);
     if (output !== shown.output || !box.isConnected) return;
     const grid = el("div", { class: "multiples" });
-    fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance explained; drag to mark samples")), grid);
+    fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance explained; drag to mark samples"), exporter(`${output}-residual`, () => multiplesFigure(found))), grid);
     const range = sym(found.residual);
     panels = found.panels.map((panel) => {
       const host = el("div", { class: "plot" });
@@ -272,6 +314,13 @@ async function drawMultiples() {
       return { drawn, index, data };
     });
   });
+}
+
+function multiplesFigure(found) {
+  const name = view.diagnosis.ladder.columns.find((c) => c.output === shown.output).name, range = sym(found.residual)();
+  return { title: `Residual of the ${name.toLowerCase()} against each variable`, source: source(), across: 3, legend: [{ name: "residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
+    panels: found.panels.map((panel) => ({ title: `${panel.name}, ${Math.round(100 * panel.share)} % [${found.unit}]`, x: panel.x, xLabel: panel.label, noise: found.noise, range, logarithmic: panel.logarithmic,
+      series: [{ name: `residual [${found.unit}]`, y: found.residual, tone: "today", points: true, opacity: 0.28 }, { name: `mean [${found.unit}]`, x: panel.bins, y: panel.means, tone: "today", width: 2 }] })) };
 }
 
 function brush(found, panel, low, high) {

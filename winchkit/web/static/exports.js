@@ -5,13 +5,14 @@ export const LIGHT = { surface: "#FFFFFF", ink: "#12161C", ink2: "#414B58", mute
 
 // `columns` are pairs of a name and its values; `source` says profile and runs when it is asked.
 export function drawingExporter(name, title, node, source, columns) {
-  const button = (kind) => el("button", { class: "plain", onclick: () => save(kind, name, title, node, source(), columns), "aria-label": `Save ${name} as ${kind}` }, kind);
+  const button = (kind) => el("button", { class: "plain", onclick: () => saved(kind, name, title, () => node, source(), columns), "aria-label": `Save ${name} as ${kind}` }, kind);
   return el("span", { class: "exports" }, button("PNG"), button("SVG"), button("CSV"));
 }
 
-function save(kind, name, title, node, source, columns) {
+// Keeps a drawing, which `draw` makes, or its values.
+export function saved(kind, name, title, draw, source, columns) {
   if (kind === "CSV") { keep(new Blob([table(title, source, columns)], { type: "text/csv" }), `${name}.csv`); return; }
-  const { text, width, height } = standalone(title, node, source);
+  const { text, width, height } = standalone(title, draw(), source);
   if (kind === "SVG") { keep(new Blob([text], { type: "image/svg+xml" }), `${name}.svg`); return; }
   const image = new Image();
   image.onload = () => {

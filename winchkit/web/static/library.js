@@ -1,5 +1,6 @@
 // The Library view: runs of the folder, overlaid, and opened in the Diagnose view.
-import { ask, attempt, el, fill, number, order } from "./page.js";
+import { ask, attempt, el, fill, number, order, sourceOf } from "./page.js";
+import { exporter } from "./figures.js";
 import { line, plot } from "./plots.js";
 
 let root, found = { runs: [] }, chosen = new Set(), channel = "tension", filter = "";
@@ -43,8 +44,10 @@ async function overlay() {
     const query = [...chosen].map((name) => `name=${encodeURIComponent(name)}`).join("&");
     const { lines } = await ask(`/api/overlay?channel=${encodeURIComponent(channel)}&${query}`);
     if (!lines.length) { fill(box, el("p", { class: "note" }, `None of these runs has ${channel}.`)); return; }
-    const host = el("div", { class: "plot" });
-    fill(box, el("div", { class: "legend" }, lines.map((own, i) => el("span", {}, el("i", { style: { background: `var(--${TONES[i % TONES.length]})` } }), own.name))), host, el("p", { class: "note" }, `${channel} [${lines[0].unit}] over time [s]`));
+    const host = el("div", { class: "plot" }), toned = lines.map((own, i) => ({ name: own.name, tone: TONES[i % TONES.length] }));
+    const figure = () => ({ title: `${channel}, each run from its own start`, source: sourceOf(`folder ${found.folder}`), legend: toned, height: 320,
+      panels: [{ title: `${channel} [${lines[0].unit}]`, xLabel: "time [s]", series: lines.map((own, i) => ({ ...toned[i], name: `${own.name} [${own.unit}]`, x: own.x, y: own.y })) }] });
+    fill(box, el("div", { class: "row" }, el("div", { class: "legend" }, lines.map((own, i) => el("span", {}, el("i", { style: { background: `var(--${TONES[i % TONES.length]})` } }), own.name))), el("span", { class: "end" }, exporter(`overlay-${channel}`, figure))), host, el("p", { class: "note" }, `${channel} [${lines[0].unit}] over time [s]`));
     const data = uPlot.join(lines.map((own) => [own.x, own.y]));
     const style = (i) => line(TONES[i % TONES.length], 1.4, 1, { spanGaps: true, ...(i >= TONES.length / 2 ? { dash: [6, 3] } : {}) });
     plot(host, data, lines.map((_, i) => style(i)), { height: 320, xLabel: "s", label: `${channel} of ${lines.length} runs over time` });

@@ -3,7 +3,7 @@ import * as bench from "./bench.js";
 import * as diagnose from "./diagnose.js";
 import * as library from "./library.js";
 import * as robot from "./robot.js";
-import { alarm, dialog, el, socket } from "./page.js";
+import { alarm, dialog, el, socket, version } from "./page.js";
 
 const views = { diagnose, bench, robot, library };
 const main = document.getElementById("main");
@@ -27,6 +27,7 @@ socket("/live", (fresh) => {
   const first = !state;
   if (first) alarm("");
   state = fresh;
+  version.text = fresh.version;
   if (first) bench.station(state).finally(route); else if (name) views[name].update(state);
 }, () => alarm("The server does not answer. Trying again; if it was ended, start 'winchkit serve' anew."));
 

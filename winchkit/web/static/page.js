@@ -82,6 +82,10 @@ export function icon(kind) {
 export const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 export const number = (value, digits = 4) => value === null || !Number.isFinite(value) ? "–" : String(Number(value.toPrecision(digits))).replace("-", "−");
 
+// Profile, runs and version, as every export names them.
+export const sourceOf = (...parts) => [...parts.filter(Boolean), `winchkit ${version.text}`].join("; ");
+export const version = { text: "" };
+
 export function say(text) { document.getElementById("live").textContent = text; }
 
 export function alarm(text, kind = "") {

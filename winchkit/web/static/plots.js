@@ -1,5 +1,5 @@
 // Curves by uPlot with the page's colours: axis at the bottom, hairlines, zoom, pan, brush, export.
-import { colour, el, keep, number } from "./page.js";
+import { colour, el, number } from "./page.js";
 
 const FONT = "12px Inter, system-ui, sans-serif";
 
@@ -161,53 +161,4 @@ export const line = (tone, width, alpha = 1, more = {}) => ({ stroke: () => colo
 
 export function legend(...items) {
   return el("div", { class: "legend" }, items.map(([tone, words, box]) => el("span", {}, el("i", { class: box ? "box" : "", style: { background: `var(--${tone})` } }), words)));
-}
-
-// Exports: CSV and SVG from the data, PNG from the SVG at twice the size; always the light theme.
-export function exporter(name, describe) {
-  const button = (kind) => el("button", { class: "plain", onclick: () => save(kind, name, describe()), "aria-label": `Save ${name} as ${kind}` }, kind);
-  return el("span", {}, button("PNG"), button("SVG"), button("CSV"));
-}
-
-function save(kind, name, figure) {
-  if (kind === "CSV") return keep(new Blob([csv(figure)], { type: "text/csv" }), `${name}.csv`);
-  const text = drawing(figure);
-  if (kind === "SVG") return keep(new Blob([text], { type: "image/svg+xml" }), `${name}.svg`);
-  const image = new Image();
-  image.onload = () => {
-    const canvas = el("canvas", { width: 1600, height: 2 * image.height });
-    canvas.getContext("2d").drawImage(image, 0, 0, 1600, 2 * image.height);
-    canvas.toBlob((blob) => keep(blob, `${name}.png`));
-  };
-  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(text)}`;
-}
-
-function csv(figure) {
-  const quoted = (text) => /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
-  const rows = figure.x.map((x, i) => [x, ...figure.series.map((s) => s.y[i] ?? "")].join(","));
-  return `# ${figure.title}\n${[figure.xLabel, ...figure.series.map((s) => s.name)].map(quoted).join(",")}\n${rows.join("\n")}\n`;
-}
-
-const LIGHT = { ink: "#12161C", today: "#C2500F", with: "#0B4A8A", muted: "#5F6B79", line: "#DDE2E8" };
-const escaped = (text) => String(text).replace(/[&<>"]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c]);
-
-function drawing(figure) {
-  const [w, h, left, top, right, bottom] = [800, 360, 60, 56, 16, 44];
-  const finite = (values) => values.filter((v) => v !== null && Number.isFinite(v));
-  const xs = finite(figure.x), ys = figure.series.flatMap((s) => finite(s.y));
-  const [x0, x1, y0, y1] = [xs.reduce((a, b) => Math.min(a, b)), xs.reduce((a, b) => Math.max(a, b)), ys.reduce((a, b) => Math.min(a, b)), ys.reduce((a, b) => Math.max(a, b))];
-  const px = (x) => left + ((x - x0) / (x1 - x0 || 1)) * (w - left - right), py = (y) => h - bottom - ((y - y0) / (y1 - y0 || 1)) * (h - top - bottom);
-  const ticks = (a, b) => { const raw = (b - a || 1) / 4, p = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].map((k) => k * p).find((k) => k >= raw); return Array.from({ length: 12 }, (_, i) => (Math.ceil(a / step) + i) * step).filter((v) => v <= b + step * 1e-9); };
-  const parts = [`<svg xmlns="http://www.w3.org/2000/svg" width="${w}" height="${h}" viewBox="0 0 ${w} ${h}" font-family="Inter, system-ui, sans-serif" font-size="12"><rect width="${w}" height="${h}" fill="#fff"/>`,
-    `<text x="${left}" y="20" font-size="14" font-weight="600" fill="${LIGHT.ink}">${escaped(figure.title)}</text>`];
-  for (const v of ticks(y0, y1)) parts.push(`<path d="M${left} ${py(v).toFixed(1)}H${w - right}" stroke="${LIGHT.line}"/><text x="${left - 6}" y="${(py(v) + 4).toFixed(1)}" text-anchor="end" fill="${LIGHT.muted}">${number(v)}</text>`);
-  for (const v of ticks(x0, x1)) parts.push(`<text x="${px(v).toFixed(1)}" y="${h - bottom + 18}" text-anchor="middle" fill="${LIGHT.muted}">${number(v)}</text>`);
-  parts.push(`<text x="${(w + left) / 2}" y="${h - 6}" text-anchor="middle" fill="${LIGHT.muted}">${escaped(figure.xLabel)}</text>`);
-  figure.series.forEach((s, k) => {
-    const tone = LIGHT[s.tone] || LIGHT.ink;
-    let path = "", pen = false;
-    figure.x.forEach((x, i) => { const y = s.y[i]; if (y === null || y === undefined || x === null) { pen = false; return; } path += `${pen ? "L" : "M"}${px(x).toFixed(1)} ${py(y).toFixed(1)}`; pen = true; });
-    parts.push(`<path d="${path}" fill="none" stroke="${tone}" stroke-width="1.3"/><text x="${left + k * 200}" y="42" fill="${tone}">${escaped(s.name)}</text>`);
-  });
-  return `${parts.join("")}</svg>`;
 }

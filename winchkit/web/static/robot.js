@@ -1,5 +1,5 @@
 // The Robot view: cables and platform, feasible poses, errors before and after the calibration.
-import { alarm, ask, attempt, dialog, download, el, fill, icon, number, order, svg } from "./page.js";
+import { alarm, ask, attempt, dialog, download, el, fill, icon, number, order, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
 
 let root = null, view = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
@@ -124,7 +124,7 @@ function error(found) {
   return el("section", { class: "panel", "aria-label": "Pose error, held out" }, el("header", {}, el("h2", {}, "Pose error, held out"), legend(`before ${mm(found.before)}`, `after ${mm(found.after)}`), drawingExporter("pose-error", "Pose error, held out", drawn, source, [["before [m]", [found.before]], ["after [m]", [found.after]], ["instrument [m]", [found.instrument]]])), drawn);
 }
 
-const source = () => `robot ${view.name}; ${view.files.join(", ")}`;
+const source = () => sourceOf(`robot ${view.name}`, view.files.join(", "));
 
 function drawDetails(found) {
   const box = root.querySelector("#details"), arrows = vectors(found.arrows), rows = view.lines.map((name, i) => [name, found.cables.before[i], found.cables.after[i]]);
