@@ -19,7 +19,7 @@ def test_the_tables_are_what_the_code_declares() -> None:
 def test_every_trip_of_the_control_loop_stands_in_the_table() -> None:
     source = "".join(
         (ROOT / "winchkit/bench" / name).read_text(encoding="utf-8")
-        for name in ("control/loop.py", "hardware.py", "control/latch.py")
+        for name in ("control/loop.py", "hardware.py", "control/latch.py", "winch.py")
     )
     raised = set(re.findall(r'Trip\(\s*"([a-z ]+)"', source))
     assert raised == {row.kind for row in BENCH_CONDITIONS}

@@ -111,7 +111,7 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> W
     _commission(axes)
     tell_hardware(spec)
     _tell_notes(spec, axes, buses)
-    winches = _winches(spec, axes, cables, sensors)
+    winches = _winches(spec, axes, cables, sensors, profiles)
     stale = max(_STALE_BEATS * spec.bus[name].heartbeat for name in buses)
     supervisor = _supervisor(spec, stale, axes, cables, profiles)
     hosts = [(bus, spec.bus[name].node, spec.bus[name].heartbeat) for name, bus in buses.items()]
@@ -156,6 +156,7 @@ def _winches(
     axes: Mapping[str, Cia402Axis],
     cables: Mapping[str, CableMap],
     sensors: Mapping[str, Mapping[str, Sensor]],
+    profiles: Mapping[str, WinchProfile],
 ) -> dict[str, WinchParts]:
     """Each winch as the loop sees it."""
     return {
@@ -166,6 +167,7 @@ def _winches(
             sensors[name],
             _frozen_cell(spec, winch),
             HangingLoad(math.nan if winch.load_mass is None else winch.load_mass),
+            cable_spec=profiles[name].cable,
         )
         for name, winch in spec.winch.items()
     }

@@ -9,14 +9,21 @@ from winchkit.bench.cells.tares import host_tare
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.motion import DEAD_MAN, Jog, MotionSource, Move, StartGate, Trim
-from winchkit.bench.control.snapshot import Phase, WinchSnapshot
+from winchkit.bench.control.snapshot import Phase, Trip, WinchSnapshot
 from winchkit.bench.control.supervisor import direction_of
+from winchkit.bench.control.tension_control import (
+    TensionControl,
+    TensionReading,
+    TensionSetting,
+    greatest_stiffness,
+)
 from winchkit.bench.control.winch_state import WinchParts
 from winchkit.bench.direction import no_positional, paid_out
 from winchkit.bench.host import WinchHost
 from winchkit.drivers.reading import Sensor
 from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
 from winchkit.schema.bench import WinchWiring
+from winchkit.units import parse
 
 __all__ = ["Winch"]
 
@@ -42,6 +49,7 @@ class Winch:
         self._bench, self._parts = bench, parts
         self._controller = parts.controller
         self._jog: Jog | None = None
+        self._tension: TensionControl | None = None
 
     @property
     def snapshot(self) -> WinchSnapshot:
@@ -105,7 +113,7 @@ class Winch:
     @property
     def goes_on(self) -> bool:
         """Whether a motion is under way that does not end by itself without a new command."""
-        return self.moving and self._jog is None
+        return self.moving and self._jog is None and self._tension is None
 
     @property
     def commanded_here(self) -> bool:
@@ -238,6 +246,118 @@ class Winch:
         change = paid_out("move_by", pay_out, wind_in)
         self.move_to(self.cable_length + change, speed, wait=wait, hold=hold)
 
+    def hold_tension(
+        self,
+        tension: float | str,
+        *,
+        duration: float | None = None,
+        travel: float = 0.1,
+        speed: float = 0.02,
+        stiffness: float | None = None,
+        hold: float = DEAD_MAN,
+    ) -> None:
+        """Keep the tension at the platform end, for ``hold`` seconds.
+
+        Call it again within that time to go on; without another call the winch ramps to rest and
+        disables. With ``duration`` it does so itself for that many seconds and returns at rest.
+        Where the travel is used up for 0.5 s the bench trips. Without a valid reading it rests.
+
+        Parameters
+        ----------
+        tension : float or str
+            N, or with its unit, ``"200 N"``.
+        duration : float, optional
+            s.
+        travel : float
+            Of cable from its place at the start, either way, m.
+        speed : float
+            Largest, m/s.
+        stiffness : float, optional
+            Upper bound of the stiffness of cable and structure, N/m; by default that of the
+            profile's cable.
+        hold : float
+            Time without another call, s, at most 1.
+
+        Raises
+        ------
+        UsageError
+            For numbers that cannot be meant.
+        NotPermitted
+            Without a load cell, or beyond its limits.
+        """
+        wanted = tension if isinstance(tension, float | int) else parse(tension, "force")
+        clock = self._bench.clock
+        self._keep_tension(wanted, travel, speed, stiffness, hold)
+        if duration is None:
+            return
+        mine, end = self._tension, clock.now() + duration
+        while self._tension is mine and self.moving and (left := end - clock.now()) > 0:
+            self.raise_trouble()
+            if mine is not None:
+                mine.refresh(clock.now() + min(hold, left))
+            clock.sleep(min(hold / 4, left))
+        self.wait()
+
+    def _keep_tension(
+        self, tension: float, travel: float, speed: float, stiffness: float | None, hold: float
+    ) -> None:
+        """Begin the control of the tension, or refresh it."""
+        numbers = (tension, travel, speed, 1.0 if stiffness is None else stiffness)
+        if not all(0 < number < math.inf for number in numbers) or not 0 < hold <= 1:
+            raise UsageError(
+                f"winch {self.name}: a tension of {tension} N with {travel} m of travel at {speed} "
+                f"m/s held for {hold} s cannot be meant; all are above zero"
+            )
+        cell = self.sensors.get("load") or self.sensors.get("cell")
+        if cell is None:
+            raise NotPermitted(f"winch {self.name} has no load cell, by which to hold a tension")
+        limits = self.wiring.limits
+        low, high = limits.tension_slack or 0.0, limits.tension_high or math.inf
+        if not low < tension < high:
+            raise NotPermitted(
+                f"winch {self.name}: {tension:g} N is not between tension_slack, {low:g} N, and "
+                f"tension_high, {high:g} N"
+            )
+        here = self.snapshot
+        self._bench.permit(self.name, direction_of(tension - here.rope_tension), held=True)
+        self.require_length()
+        expires = self._bench.clock.now() + hold
+        with self._bench.commanders.claimed(self.name):
+            control = self._tension
+            known = self._controller.source in (control, None) and self.moving
+            if control is None or not known or control.setting.tension != tension:
+                bound = greatest_stiffness(self._parts.cable_spec, here.cable_length, stiffness)
+                setting = TensionSetting(
+                    tension,
+                    travel,
+                    min(speed, limits.speed),
+                    bound,
+                    cell.max_age + limits.response_time,
+                    cell.max_age,
+                )
+                control = TensionControl(
+                    self._parts.cable, limits, setting, self._tension_reading, self._trip_tension
+                )
+                self._jog, self._tension = None, control
+                control.refresh(expires)
+                self._controller.begin(control)
+            else:
+                control.refresh(expires)
+
+    def _tension_reading(self, now: float) -> TensionReading:
+        """Tension at the platform end: the load's instrument, else the cell with its correction."""
+        load, cell = self.sensors.get("load"), self.sensors.get("cell")
+        sensor = load or cell
+        newest = None if sensor is None else sensor.latest
+        if newest is None:
+            return TensionReading(math.nan, math.inf)
+        correction = 0.0 if load is not None else self._parts.cable.correction
+        return TensionReading(newest.value + correction, now - newest.t_receive)
+
+    def _trip_tension(self, words: str) -> None:
+        trip = Trip("tension control", self.name, words, latches=True)
+        self._bench.loop.supervisor.latch(trip)
+
     def home(
         self, method: int | None = None, *, at: float | None = None, speed: float | None = None
     ) -> None:
@@ -335,7 +455,7 @@ class Winch:
             Common start with other winches.
         """
         with self._bench.commanders.claimed(self.name):
-            self._jog = None
+            self._jog = self._tension = None
             self._controller.begin(source, gate)
 
     def ready_for(self, move: MotionSource) -> bool:
@@ -355,7 +475,7 @@ class Winch:
 
     def run_down(self) -> None:
         """Order the ramp to rest, of this winch alone."""
-        self._jog = None
+        self._jog = self._tension = None
         self._controller.run_down()
 
     def raise_trouble(self) -> None:
@@ -420,6 +540,7 @@ class Winch:
             jog = self._jog
             if jog is None or not self.moving or self._controller.source not in (jog, None):
                 jog = self._jog = Jog(self._parts.cable, self.wiring.limits)
+                self._tension = None
                 jog.refresh(winding_speed, expires)
                 if winding_speed != 0:
                     self._controller.begin(jog)

@@ -59,6 +59,9 @@ SECTIONS: dict[str, dict[str, At]] = {
         ),
         "jog": At("winchkit.cli.bench.jog", "Move a winch by hand."),
         "move": At("winchkit.cli.bench.move", "Move a winch, or all as one, to a cable length."),
+        "hold-tension": At(
+            "winchkit.cli.bench.hold_tension", "Keep the tension of a cable by the winch's speed."
+        ),
         "home": At(
             "winchkit.cli.bench.home", "Find the drive's zero, or define the present length."
         ),

@@ -462,6 +462,11 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
         "none",
         "silence (see Ways to stop a drive)",
     ),
+    BenchCondition(
+        "tension control",
+        "cable that a held tension has moved, while the tension asks for more",
+        "the declared travel, 100 mm by default, for 0.5 s",
+    ),
     BenchCondition("latch file", "reading and writing of the latch file", "possible"),
     BenchCondition(
         "sync", "SYNC frames that were not sent here", "none", "a warning", latches=False

@@ -17,6 +17,7 @@ from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.drivers.reading import Reading
 from winchkit.errors import ConnectionLost
 from winchkit.estimation.cable_state import Sample
+from winchkit.schema.profiles.winch import CableSpec
 
 __all__ = ["Captured", "SensorPort", "WinchParts", "captured", "known", "pictures"]
 
@@ -58,6 +59,8 @@ class WinchParts:
     """Predicts the tension for that test."""
     commander: str = ""
     """Name of the client that commands it."""
+    cable_spec: CableSpec = field(default_factory=CableSpec)
+    """The cable as the profile declares it."""
 
 
 def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) -> WinchInput:

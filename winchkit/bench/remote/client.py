@@ -197,6 +197,25 @@ class RemoteStation:
         """Pose of the platform by the motor angles: x, y, z (m), roll, pitch, yaw (rad)."""
         return dict(self._call("pose"))
 
+    def hold_tension(
+        self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
+    ) -> None:
+        """Keep the tension of a winch for ``hold`` seconds.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch; None for the only one.
+        tension : float
+            At the platform end, N.
+        hold : float
+            Time without another call, s.
+        bounds : mapping of str to float
+            ``travel`` of cable either way, m, largest ``speed``, m/s, and upper bound of the
+            ``stiffness``, N/m, as of ``Winch.hold_tension``; each may be left out.
+        """
+        self._call("hold_tension", winch, tension, hold, dict(bounds))
+
     def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
         """Bytes of an object of a drive.
 

@@ -28,6 +28,7 @@ OPERATIONS = (
     "move",
     "move_pose",
     "pose",
+    "hold_tension",
     "take_over",
     "moving",
     "home",

@@ -69,6 +69,14 @@ class Station(Protocol):
     def pose(self) -> dict[str, float]:
         """Pose of the platform by the motor angles: x, y, z (m), roll, pitch, yaw (rad)."""
 
+    def hold_tension(
+        self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
+    ) -> None:
+        """Keep the tension (N) of a winch for ``hold`` seconds.
+
+        ``bounds`` may have ``travel`` (m), ``speed`` (m/s) and ``stiffness`` (N/m).
+        """
+
     def take_over(self, winch: str | None) -> None:
         """Command a winch, or "all", that another client commands; its motion ends by a ramp."""
 
@@ -192,6 +200,13 @@ class LocalStation:
     def pose(self) -> dict[str, float]:
         """Pose of the platform by the motor angles."""
         return self._bench.robot.coordinates()
+
+    def hold_tension(
+        self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
+    ) -> None:
+        """Keep the tension of a winch for ``hold`` seconds."""
+        with self._acting():
+            self._bench.named(winch).hold_tension(tension, hold=hold, **bounds)
 
     def take_over(self, winch: str | None) -> None:
         """Command a winch that another client commands."""

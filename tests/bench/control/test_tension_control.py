@@ -1,0 +1,154 @@
+"""Tension control on a simulated cable: convergence, and bounds whatever the load cell reads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fake_axis import CYCLE, Rig
+from winchkit.bench.control.snapshot import Phase, Trip
+from winchkit.bench.control.tension_control import (
+    TensionControl,
+    TensionReading,
+    TensionSetting,
+    greatest_stiffness,
+)
+from winchkit.errors import UsageError
+from winchkit.schema.bench import LimitSpec
+from winchkit.schema.profiles.winch import CableSpec
+
+LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0), response_time=0.06)
+ARM = 0.005
+"""Of the fake drum, m/rad."""
+
+
+class Held:
+    """A winch whose cable is fixed at its far end, an elastic spring, read with a delay."""
+
+    def __init__(self, setting: TensionSetting, stiffness: float, present: float) -> None:
+        self.rig = Rig(LIMITS)
+        self.rig.axes["A"].lag = 0.02
+        self.stiffness, self.present = stiffness, present
+        self.read: Callable[[float], TensionReading] = self._true
+        self.control = TensionControl(self.rig.cable(), LIMITS, setting, self._reading, self._trip)
+        self._past: list[float] = []
+
+    @property
+    def wound(self) -> float:
+        """Cable wound in since the beginning, m."""
+        return self.rig.axes["A"].angle * ARM
+
+    @property
+    def tension(self) -> float:
+        return max(0.0, self.present + self.stiffness * self.wound)
+
+    def _true(self, _now: float) -> TensionReading:
+        self._past.append(self.tension)
+        late = max(0, len(self._past) - 1 - round(0.04 / CYCLE))
+        return TensionReading(self._past[late], 0.04)
+
+    def _reading(self, now: float) -> TensionReading:
+        return self.read(now)
+
+    def _trip(self, words: str) -> None:
+        self.rig.supervisor.latch(Trip("tension control", "A", words, latches=True))
+
+    def run(self, duration: float) -> list[float]:
+        """Hold it for so long; returns the tension of every cycle, N."""
+        self.control.refresh(self.rig.now + duration)
+        self.rig.controller().begin(self.control)
+        seen = []
+        for _ in range(round(duration / CYCLE)):
+            self.rig.step()
+            seen.append(self.tension)
+        return seen
+
+
+def setting(tension: float = 200.0, stiffness: float = 2e4, travel: float = 0.05) -> TensionSetting:
+    return TensionSetting(tension, travel, 0.02, stiffness, 0.12, 0.25)
+
+
+@settings(max_examples=4, deadline=None)
+@given(stiffness=st.floats(5e3, 2e4), present=st.floats(50.0, 400.0), wanted=st.floats(60.0, 400.0))
+def test_the_tension_converges_without_overshoot_up_to_the_declared_stiffness(
+    stiffness: float, present: float, wanted: float
+) -> None:
+    held = Held(setting(wanted), stiffness, present)
+    seen = held.run(12.0)
+    assert seen[-1] == pytest.approx(wanted, abs=2.0)
+    low, high = sorted((present, wanted))
+    margin = 0.05 * (high - low) + 0.5
+    assert low - margin <= min(seen)
+    assert max(seen) <= high + margin
+
+
+def test_it_starts_without_a_step() -> None:
+    held = Held(setting(), 2e4, 100.0)
+    held.run(1.0)
+    steps = [abs(b - a) for a, b in zip(held.rig.speeds, held.rig.speeds[1:], strict=False)]
+    assert max(steps) <= LIMITS.acceleration * CYCLE + 1e-9
+
+
+@settings(max_examples=6, deadline=None)
+@given(
+    values=st.lists(
+        st.one_of(st.floats(-1e4, 1e4), st.just(math.nan), st.just(0.0)), min_size=1, max_size=6
+    ),
+    age=st.floats(0.0, 0.4),
+    travel=st.floats(0.01, 0.1),
+)
+def test_whatever_the_cell_reads_the_winch_stays_within_the_travel(
+    values: list[float], age: float, travel: float
+) -> None:
+    held = Held(setting(travel=travel), 2e4, 100.0)
+    begin = held.rig.now
+
+    def read(now: float) -> TensionReading:
+        return TensionReading(values[min(int(now - begin), len(values) - 1)], age)
+
+    held.read = read
+    farthest = 0.0
+    held.control.refresh(held.rig.now + 6)
+    held.rig.controller().begin(held.control)
+    for _ in range(round(6 / CYCLE)):
+        held.rig.step()
+        farthest = max(farthest, abs(held.wound))
+    assert farthest <= travel
+    if age > 0.25:
+        assert farthest == 0.0, "too old a reading moves nothing"
+
+
+@pytest.mark.parametrize(("reads", "stiffness"), [(0.0, 0.0), (30.0, 2e4)])
+def test_a_broken_cable_and_a_cell_that_stands_still_trip_at_the_travel(
+    reads: float, stiffness: float
+) -> None:
+    held = Held(setting(travel=0.02), stiffness, reads)
+    held.read = lambda _now: TensionReading(reads, 0.0)
+    held.run(4.0)
+    assert [trip.kind for trip in held.rig.supervisor.tripped] == ["tension control"]
+    assert "20 mm of cable" in held.rig.supervisor.tripped[0].message
+    assert held.rig.controller().phase is Phase.DISABLED
+    assert 0.01 < abs(held.wound) <= 0.02
+
+
+def test_silence_of_the_commander_ends_it_at_rest() -> None:
+    held = Held(setting(400.0), 2e4, 100.0)
+    held.control.refresh(held.rig.now + 0.2)
+    held.rig.controller().begin(held.control)
+    held.rig.run(1.0)
+    assert held.rig.controller().phase is Phase.DISABLED
+    assert held.rig.axes["A"].velocity == 0.0
+
+
+def test_the_stiffness_is_bounded_by_what_is_known_of_the_cable() -> None:
+    steel = greatest_stiffness(CableSpec(diameter=4e-3), 2.0, None)
+    assert steel == pytest.approx(210e9 * math.pi * 4e-6 / 2.0)
+    known = CableSpec(axial_stiffness=1e5, dead_length=1.0)
+    assert greatest_stiffness(known, 1.0, None) == pytest.approx(5e4)
+    assert greatest_stiffness(known, 1.0, 7.0) == 7.0
+    with pytest.raises(UsageError, match="neither axial_stiffness nor diameter"):
+        greatest_stiffness(CableSpec(), 2.0, None)

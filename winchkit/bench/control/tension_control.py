@@ -1,0 +1,180 @@
+"""Control of the cable tension of one winch by its speed, evaluated once a cycle.
+
+The winding speed is proportional to the tension error. A cable under load integrates it, with a
+tension rate of stiffness times speed, so that the loop has no steady error at a fixed load and
+needs no integrator that could wind up. It starts from rest at the present tension.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from winchkit.bench.control.cable import CableMap
+from winchkit.bench.control.motion import Ramp, Target
+from winchkit.errors import UsageError
+from winchkit.schema.bench import LimitSpec
+from winchkit.schema.profiles.winch import CableSpec
+
+__all__ = ["TensionControl", "TensionReading", "TensionSetting", "greatest_stiffness"]
+
+_LOOP = 0.25
+"""Gain times stiffness times delay: of 0.37, the limit of a response without overshoot, and 1.57,
+the limit of stability, of an integrator with a delay."""
+_MARGIN = 2e-3
+"""Of cable, kept to the declared travel, m."""
+_STUCK = 0.5
+"""Time for which the travel may be used up before the winch trips, s."""
+_STEEL = 210e9
+"""Modulus of elasticity of steel, Pa: no cable is stiffer than a steel bar of its diameter."""
+
+
+class TensionReading(NamedTuple):
+    """The controlled tension in a cycle."""
+
+    value: float
+    """At the platform end, N; NaN without a valid reading."""
+    age: float
+    """s."""
+
+
+@dataclass(frozen=True)
+class TensionSetting:
+    """What the control is to keep, SI."""
+
+    tension: float
+    """N."""
+    travel: float
+    """Of cable from its place at the start, either way, m."""
+    speed: float
+    """m/s."""
+    stiffness: float
+    """Upper bound of the stiffness of cable and structure, N/m."""
+    delay: float
+    """Of reading and drive together, s."""
+    max_age: float
+    """Older readings are not used, s."""
+
+    @property
+    def gain(self) -> float:
+        """Winding speed per tension error, m/s/N."""
+        return _LOOP / (self.stiffness * self.delay)
+
+
+def greatest_stiffness(cable: CableSpec, length: float, declared: float | None) -> float:
+    """Upper bound of the stiffness of a cable, N/m.
+
+    Parameters
+    ----------
+    cable : CableSpec
+        Of the winch's profile.
+    length : float
+        Free length, m.
+    declared : float or None
+        Declared by the caller, N/m.
+
+    Returns
+    -------
+    float
+        Declared value, else axial stiffness of the profile, else that of a steel bar of the
+        cable's diameter, divided by the length.
+
+    Raises
+    ------
+    UsageError
+        Where nothing is known of the cable.
+    """
+    if declared is not None:
+        return declared
+    axial = cable.axial_stiffness
+    if axial is None and cable.diameter is not None:
+        axial = _STEEL * math.pi * cable.diameter**2 / 4
+    span = length + cable.dead_length
+    if axial is None or not span > 0:
+        raise UsageError(
+            "the profile has neither axial_stiffness nor diameter of the cable, from which the "
+            'gain is computed; give the stiffness, such as "20 kN/m"'
+        )
+    return axial / span
+
+
+class TensionControl:
+    """Keeps the tension while someone keeps saying so; silence brings the winch to rest."""
+
+    holds = False
+    joins = False
+
+    def __init__(
+        self,
+        cable: CableMap,
+        limits: LimitSpec,
+        setting: TensionSetting,
+        reading: Callable[[float], TensionReading],
+        trip: Callable[[str], None],
+    ) -> None:
+        """``reading`` gives the tension at a time (s), ``trip`` latches a reason in words."""
+        self.setting = setting
+        self._cable, self._limits = cable, limits
+        self._reading, self._trip = reading, trip
+        self._ramp = Ramp(limits.acceleration)
+        self._expires = -math.inf
+        self._begin = self._angle = self._last = 0.0
+        self._stuck: float | None = None
+
+    def refresh(self, expires: float) -> None:
+        """Go on until ``expires`` (s on the bench's clock)."""
+        self._expires = expires
+
+    def start(self, time: float, angle: float, _winding_speed: float) -> None:
+        """Begin at rest."""
+        self._ramp = Ramp(self._limits.acceleration)
+        self._begin = self._angle = angle
+        self._last = time
+
+    def target(self, time: float, angle: float, now: float) -> Target:
+        """Speed by the tension error, within speed and travel; rest without a valid reading."""
+        live = now < self._expires
+        arm = self._cable.at(angle)[1]
+        travelled = (angle - self._begin) * arm
+        wish = self._wish(now, travelled) if live else 0.0
+        speed = self._ramp.follow(wish, time)
+        velocity = speed / arm
+        self._angle += velocity * (time - self._last)
+        self._last = time
+        return Target(velocity, self._angle, speed, done=not live and speed == 0.0)
+
+    def _wish(self, now: float, travelled: float) -> float:
+        setting = self.setting
+        reading = self._reading(now)
+        if not math.isfinite(reading.value) or reading.age > setting.max_age:
+            return 0.0
+        wish = setting.gain * (setting.tension - reading.value)
+        fastest = min(setting.speed, self._limits.speed)
+        wish = max(-fastest, min(fastest, wish))
+        allowed = self._allowed(setting.travel - math.copysign(1.0, wish) * travelled)
+        used_up = allowed == 0.0 and wish != 0.0
+        self._watch_travel(now, reading.value, used_up=used_up)
+        return math.copysign(min(abs(wish), allowed), wish)
+
+    def _allowed(self, room: float) -> float:
+        """Largest speed from which the drive, with its lag, stops within the room (m)."""
+        acceleration = self._limits.acceleration
+        lag = acceleration * self._limits.response_time
+        room = max(0.0, room - _MARGIN)
+        return math.sqrt(lag * lag + 2 * acceleration * room) - lag
+
+    def _watch_travel(self, now: float, tension: float, *, used_up: bool) -> None:
+        """Trip where the tension asks for more travel for some time."""
+        if not used_up:
+            self._stuck = None
+            return
+        if self._stuck is None:
+            self._stuck = now
+        if now - self._stuck >= _STUCK:
+            self._trip(
+                f"the tension is {tension:.1f} N after {self.setting.travel * 1e3:.0f} mm of cable "
+                f"(the declared travel), set is {self.setting.tension:.1f} N; look for a broken or "
+                "jammed cable and a wrong load cell, then reset"
+            )

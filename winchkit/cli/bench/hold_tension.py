@@ -1,0 +1,99 @@
+"""``winchkit hold-tension``: keeps the tension of a cable while the command runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import click
+
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.options import (
+    bench_option,
+    dry_run_option,
+    effects_option,
+    take_over_option,
+)
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import status_line
+
+__all__ = ["command"]
+
+_REFRESH = 0.05
+_HOLD = 0.2
+
+
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit hold-tension A 120N --for 5s",
+        "winchkit hold-tension A 120N --travel 20mm --stiffness '40 kN/m' -b bench.toml",
+    ),
+)
+@click.argument("winch", metavar="WINCH")
+@click.argument("tension", metavar="TENSION")
+@bench_option
+@click.option("--for", "duration", metavar="TIME", help="Then stop.  [default: until Ctrl-C]")
+@click.option(
+    "--travel",
+    metavar="LENGTH",
+    default="0.1 m",
+    show_default=True,
+    help="Cable either way from its place at the start; the winch trips where it is used up.",
+)
+@click.option(
+    "--speed", metavar="SPEED", default="20 mm/s", show_default=True, help="Fastest; no direction."
+)
+@click.option(
+    "--stiffness",
+    metavar="STIFFNESS",
+    help="Upper bound of cable and structure.  [default: by the profile's cable]",
+)
+@take_over_option
+@effects_option
+@dry_run_option
+@click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
+def command(
+    winch: str,
+    tension: str,
+    *,
+    bench: str,
+    duration: str | None,
+    travel: str,
+    speed: str,
+    stiffness: str | None,
+    take_over: bool,
+    effects: Sequence[str],
+    dry_run: bool,
+    as_json: bool,
+) -> None:
+    """Keep the tension of WINCH's cable at TENSION (at its platform end, by the load cell).
+
+    The winch moves with a speed proportional to the tension error. It comes to rest within 0.2 s
+    of the end of this command, without a fresh reading, and at the declared travel.
+    """
+    from winchkit.cli.core.dry_run import station_for
+    from winchkit.cli.core.quantities import optional, quantity, seconds
+
+    limit = seconds(duration)
+    wanted = quantity(tension, "force")
+    bounds = {"travel": quantity(travel, "length"), "speed": quantity(speed, "speed")}
+    if (bound := optional(stiffness, "stiffness")) is not None:
+        bounds["stiffness"] = bound
+    with station_for(
+        bench, client="hold-tension", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
+    ) as station:
+        if take_over:
+            station.take_over(winch)
+        clock = station.clock
+        end = math.inf if limit is None else clock.now() + limit
+        while (left := end - clock.now()) > 0:
+            station.hold_tension(winch, wanted, _HOLD, bounds)
+            clock.sleep(min(_REFRESH, left))
+        while station.moving(winch):
+            clock.sleep(_REFRESH)
+        status = station.status()
+    if as_json and not dry_run:
+        echo_json(status)
+    elif not dry_run:
+        click.echo(status_line(status))
