@@ -12,7 +12,7 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.placement import at_line
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot, approximate_forces, robot_of, rotation_of
-from winchkit.model.robot.tracker import reading_of
+from winchkit.model.robot.identification.tracker import reading_of
 from winchkit.schema.profiles.robot import HomeSpec, LineSpec, PlatformSpec, RobotProfile
 from winchkit.schema.profiles.winch import (
     CableSpec,

@@ -19,9 +19,9 @@ from winchkit.calibration.robot.selection import with_instruments
 from winchkit.effects import load_catalogue
 from winchkit.model.drum import drum_of
 from winchkit.model.robot import Pose, rotation_of
-from winchkit.model.robot.bundle_adjustment import State, moved
 from winchkit.model.robot.constraints import winding_of
 from winchkit.model.robot.elongation import strain_of
+from winchkit.model.robot.identification.bundle_adjustment import State, moved
 from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
 
 FEW = 6

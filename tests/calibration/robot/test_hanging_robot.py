@@ -20,7 +20,7 @@ from winchkit.calibration.robot.prediction import rms
 from winchkit.errors import UsageError
 from winchkit.model.robot import Pose, Robot, lengths, robot_of, rotation_of
 from winchkit.model.robot.balance import hanging_balance
-from winchkit.model.robot.pose_estimation import moved_pose
+from winchkit.model.robot.identification.pose_estimation import moved_pose
 from winchkit.runs.poses import Measured
 from winchkit.schema.profiles.winch import WinchProfile
 

@@ -18,21 +18,21 @@ from winchkit.diagnosis.robot.equations import Equations, start_pose
 from winchkit.model.robot import Pose, Robot, robot_of, rotation_of, structure_matrix
 from winchkit.model.robot.balance import balance, force_basis
 from winchkit.model.robot.constraints import mean_offset
-from winchkit.model.robot.pose_design import (
+from winchkit.model.robot.identification.pose_design import (
     chosen_in_turn,
     determinant_gain,
     noncentrality,
     pose_information,
 )
-from winchkit.model.robot.pose_estimation import (
+from winchkit.model.robot.identification.pose_estimation import (
     Iteration,
     estimated_pose,
     moved_pose,
 )
-from winchkit.model.robot.pose_estimation import (
+from winchkit.model.robot.identification.pose_estimation import (
     start_pose as completed,
 )
-from winchkit.model.robot.variance_components import re_estimated
+from winchkit.model.robot.identification.variance_components import re_estimated
 from winchkit.runs import read_run
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.schema.read import read_robot

@@ -22,7 +22,7 @@ from winchkit.model.robot import (
     swivel_sensitivities,
     wrap_angle,
 )
-from winchkit.model.robot.hessian import length_hessian
+from winchkit.model.robot.identification.hessian import length_hessian
 from winchkit.model.robot.rotation import rotation_by
 
 Array = np.ndarray

@@ -10,8 +10,8 @@ here the pose is an unknown beside the parameters, so that all cable equations c
 
 The cost is ½ Σ ρ(r/σ) + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
 deviations σ by kind of measurement are variance components
-(:mod:`winchkit.model.robot.variance_components`): fit and estimate alternate until σ changes by
-less than 3 %, at most eight times. A robust loss ρ is used after the first fit.
+(:mod:`winchkit.model.robot.identification.variance_components`): fit and estimate alternate until σ
+changes by less than 3 %, at most eight times. A robust loss ρ is used after the first fit.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ from winchkit.calibration.robot.statistics import calibration_statistics
 from winchkit.errors import UsageError
 from winchkit.fit_statistics import FitStatistics
 from winchkit.model.robot import Robot
-from winchkit.model.robot.bundle_adjustment import Solution, Weights
+from winchkit.model.robot.identification.bundle_adjustment import Solution, Weights
 from winchkit.rendering import Plotted
 from winchkit.runs.poses import Measured
 from winchkit.tabular import Columns, Tabular

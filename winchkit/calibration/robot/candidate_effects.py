@@ -17,7 +17,12 @@ from numpy.typing import NDArray
 from winchkit.calibration.robot.elongation import LAWS
 from winchkit.calibration.robot.equations import Equations
 from winchkit.calibration.robot.parameters import EFFECTS, Parameters, parameters_of
-from winchkit.model.robot.bundle_adjustment import Solution, State, Weights, linearise
+from winchkit.model.robot.identification.bundle_adjustment import (
+    Solution,
+    State,
+    Weights,
+    linearise,
+)
 
 __all__ = ["Candidate", "candidates"]
 

@@ -23,7 +23,6 @@ from winchkit.calibration.robot.instruments import Instruments
 from winchkit.calibration.robot.parameters import Parameters
 from winchkit.model.robot import Geometry, Pose, Robot, lengths
 from winchkit.model.robot.balance import balance, hanging_balance
-from winchkit.model.robot.bundle_adjustment import Rows, State
 from winchkit.model.robot.constraints import (
     Constraint,
     Strain,
@@ -37,7 +36,8 @@ from winchkit.model.robot.constraints import (
     winding_of,
 )
 from winchkit.model.robot.elongation import strain_of
-from winchkit.model.robot.tracker import Tracker, tracked_position, tracked_rotation
+from winchkit.model.robot.identification.bundle_adjustment import Rows, State
+from winchkit.model.robot.identification.tracker import Tracker, tracked_position, tracked_rotation
 from winchkit.runs.poses import Measured
 from winchkit.schema.profiles.robot import PlatformSpec
 

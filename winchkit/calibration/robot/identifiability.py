@@ -17,7 +17,13 @@ from winchkit.calibration.robot.equations import Equations
 from winchkit.calibration.robot.parameters import Parameters
 from winchkit.errors import UsageError
 from winchkit.model.robot import Pose
-from winchkit.model.robot.bundle_adjustment import Linear, Solution, State, Weights, linearise
+from winchkit.model.robot.identification.bundle_adjustment import (
+    Linear,
+    Solution,
+    State,
+    Weights,
+    linearise,
+)
 from winchkit.model.robot.rotation import rotation_by, rotation_vector, skew
 
 __all__ = [

@@ -4,9 +4,9 @@ Load cells have a gain per line and length counters a scale per line beside thei
 
 A tracker that was set up anew has another frame, a reflector sits elsewhere on the platform, a
 scale is off by some ppm, a target or an IMU is mounted at an angle. These numbers are parameters
-beside those of the robot (:mod:`winchkit.model.robot.tracker`), one frame per session. Each starts
-from the closed-form registration of the measured poses on those that the starting values predict
-from the motor angles alone.
+beside those of the robot (:mod:`winchkit.model.robot.identification.tracker`), one frame per
+session. Each starts from the closed-form registration of the measured poses on those that the
+starting values predict from the motor angles alone.
 """
 
 from __future__ import annotations
@@ -19,7 +19,12 @@ from numpy.typing import NDArray
 
 from winchkit.model.robot import Pose, Robot
 from winchkit.model.robot.constraints import rotation_residual
-from winchkit.model.robot.tracker import Tracker, declared_tracker, reading_of, registered
+from winchkit.model.robot.identification.tracker import (
+    Tracker,
+    declared_tracker,
+    reading_of,
+    registered,
+)
 from winchkit.runs.poses import Measured
 
 __all__ = [

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from winchkit.model.robot.bundle_adjustment import Loss
+from winchkit.model.robot.identification.bundle_adjustment import Loss
 
 __all__ = ["Options", "ProgressCallback"]
 

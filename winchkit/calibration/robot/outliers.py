@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
-from winchkit.model.robot.bundle_adjustment import Solution
+from winchkit.model.robot.identification.bundle_adjustment import Solution
 
 __all__ = ["gross_errors"]
 

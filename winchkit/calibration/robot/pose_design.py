@@ -9,9 +9,9 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Calibrated
 from winchkit.model.robot import Pose, Robot, angles_of, lengths, robot_of
-from winchkit.model.robot.bundle_adjustment import State, linearise
 from winchkit.model.robot.forward import forward
-from winchkit.model.robot.pose_design import (
+from winchkit.model.robot.identification.bundle_adjustment import State, linearise
+from winchkit.model.robot.identification.pose_design import (
     FREEDOMS,
     chosen_in_turn,
     determinant_gain,

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
 from winchkit.model.robot import Pose, forward, rotation_of
-from winchkit.model.robot.bundle_adjustment import State, Weights, place
-from winchkit.model.robot.pose_estimation import start_pose
+from winchkit.model.robot.identification.bundle_adjustment import State, Weights, place
+from winchkit.model.robot.identification.pose_estimation import start_pose
+from winchkit.model.robot.identification.tracker import pose_behind, reading_of, registered
 from winchkit.model.robot.rotation import rotation_vector
-from winchkit.model.robot.tracker import pose_behind, reading_of, registered
 
 __all__ = ["PoseErrors", "cable_errors", "errors_at", "predicted_poses", "rms", "start_of"]
 

@@ -29,7 +29,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
-from winchkit.model.robot.bundle_adjustment import Solution
+from winchkit.model.robot.identification.bundle_adjustment import Solution
 
 __all__ = ["Ratio", "Ratios", "ratios_of"]
 

@@ -46,7 +46,7 @@ from winchkit.calibration.robot.prediction import (
 from winchkit.calibration.robot.ratios import ratios_of
 from winchkit.calibration.robot.variance_components import NOISE, re_estimated_weights
 from winchkit.model.robot import Pose
-from winchkit.model.robot.bundle_adjustment import (
+from winchkit.model.robot.identification.bundle_adjustment import (
     Solution,
     State,
     Weights,
@@ -54,7 +54,7 @@ from winchkit.model.robot.bundle_adjustment import (
     place,
     solve,
 )
-from winchkit.model.robot.tracker import Tracker
+from winchkit.model.robot.identification.tracker import Tracker
 
 __all__ = ["Fitted", "fitted_with_instruments"]
 

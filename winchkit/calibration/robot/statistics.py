@@ -14,7 +14,7 @@ import numpy as np
 from winchkit.calibration.robot.equations import Equations
 from winchkit.calibration.robot.parameters import Estimated
 from winchkit.fit_statistics import FitStatistics, FittedParameter, correlations_of
-from winchkit.model.robot.bundle_adjustment import Solution, Weights
+from winchkit.model.robot.identification.bundle_adjustment import Solution, Weights
 
 __all__ = ["calibration_statistics"]
 

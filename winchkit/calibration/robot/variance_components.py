@@ -1,7 +1,7 @@
 """Standard deviation of each kind of measurement of a calibration, from the fit's own residuals.
 
-The estimate is that of :mod:`winchkit.model.robot.variance_components`, with the leverages of
-poses and parameters together.
+The estimate is that of :mod:`winchkit.model.robot.identification.variance_components`, with the
+leverages of poses and parameters together.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from winchkit.model.robot.bundle_adjustment import Solution, Weights, leverage
-from winchkit.model.robot.variance_components import START, re_estimated
+from winchkit.model.robot.identification.bundle_adjustment import Solution, Weights, leverage
+from winchkit.model.robot.identification.variance_components import START, re_estimated
 
 __all__ = ["NOISE", "KindNoise", "re_estimated_weights"]
 

@@ -8,9 +8,10 @@ The observation equations of :mod:`winchkit.diagnosis.robot.equations` as functi
 * the zeros of swivel angles and the offsets of length instruments, with the priors of a
   calibration about their mean readings.
 
-:func:`winchkit.model.robot.bundle_adjustment.solve` eliminates the poses by a Schur complement. The
-regression problem (:mod:`winchkit.diagnosis.robot.regression`) eliminates them at the solution by
-an orthonormal basis, which gives the same normal equations and independent rows, as tests need.
+:func:`winchkit.model.robot.identification.bundle_adjustment.solve` eliminates the poses by a Schur
+complement. The regression problem (:mod:`winchkit.diagnosis.robot.regression`) eliminates them at
+the solution by an orthonormal basis, which gives the same normal equations and independent rows, as
+tests need.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ from winchkit.diagnosis.robot.prior import GeometryPrior, profile_with_geometry
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot
-from winchkit.model.robot.bundle_adjustment import Rows, State, Weights, place, solve
 from winchkit.model.robot.constraints import ZERO_STD, Constraint, mean_offset
+from winchkit.model.robot.identification.bundle_adjustment import Rows, State, Weights, place, solve
 
 __all__ = ["STD_OF_ZERO", "Adjusted", "adjusted", "instrument_zeros", "placed"]
 

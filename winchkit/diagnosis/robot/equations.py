@@ -58,9 +58,9 @@ from winchkit.model.robot.constraints import (
     swivel_residual,
     winding_of,
 )
-from winchkit.model.robot.pose_estimation import start_pose as completed
+from winchkit.model.robot.identification.pose_estimation import start_pose as completed
+from winchkit.model.robot.identification.tracker import tracked_position, tracked_rotation
 from winchkit.model.robot.robot import standing
-from winchkit.model.robot.tracker import tracked_position, tracked_rotation
 from winchkit.model.stages import At, Stage
 
 __all__ = ["POSED", "Equations", "start_pose"]

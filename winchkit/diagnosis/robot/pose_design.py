@@ -2,7 +2,7 @@
 
 Each kind differs from the poses so far in one respect (farther out, turned more, other forces,
 other temperatures). Of each, the poses are chosen greedily for the noncentrality that they add
-(:mod:`winchkit.model.robot.pose_design`) to every question.
+(:mod:`winchkit.model.robot.identification.pose_design`) to every question.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from winchkit.model.robot import (
     lengths,
     swivel_angle,
 )
-from winchkit.model.robot.pose_design import (
+from winchkit.model.robot.identification.pose_design import (
     chosen_in_turn,
     in_box,
     is_held,

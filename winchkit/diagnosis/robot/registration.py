@@ -2,10 +2,10 @@
 
 The selection compares effects in a linearised model, to which a frame that is turned by tens of
 degrees, or a reflector far from the origin, is no small change. Such readings are first registered
-in closed form on the poses by the motor angles (:mod:`winchkit.model.robot.tracker`); frame and
-offset are then effects of the initial model, fitted beside everything else, and reported as the
-first missing effects. Numbers that the robot's file declares unknown start in the same way, and are
-not reported.
+in closed form on the poses by the motor angles
+(:mod:`winchkit.model.robot.identification.tracker`); frame and offset are then effects of the
+initial model, fitted beside everything else, and reported as the first missing effects. Numbers
+that the robot's file declares unknown start in the same way, and are not reported.
 """
 
 from __future__ import annotations
@@ -20,9 +20,14 @@ from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot
 from winchkit.model.robot.constraints import rotation_residual
+from winchkit.model.robot.identification.tracker import (
+    Tracker,
+    declared_tracker,
+    reading_of,
+    registered,
+)
+from winchkit.model.robot.identification.variance_components import START
 from winchkit.model.robot.rotation import rotation_by, rotation_vector
-from winchkit.model.robot.tracker import Tracker, declared_tracker, reading_of, registered
-from winchkit.model.robot.variance_components import START
 from winchkit.schema.profiles.instruments import ImuSpec
 
 __all__ = ["Registration", "registration_of"]

@@ -29,7 +29,7 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.term import Term, robot_with_terms
 from winchkit.model.robot import Pose, Robot
 from winchkit.model.robot.constraints import mean_offset
-from winchkit.model.robot.tracker import Tracker
+from winchkit.model.robot.identification.tracker import Tracker
 from winchkit.model.stages import At, Stage
 from winchkit.schema.profiles.robot import RobotProfile
 

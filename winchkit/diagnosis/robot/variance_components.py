@@ -1,6 +1,6 @@
 """Noise of each kind of measurement of a robot before effects are selected.
 
-Variance components (:mod:`winchkit.model.robot.variance_components`) of
+Variance components (:mod:`winchkit.model.robot.identification.variance_components`) of
 
 * contrasts of repeated poses (pure error), where they have at least 24 degrees of freedom;
 * else residuals with the pose, the geometry and the strongest directions of all candidate effects
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.robot.equations import POSED
-from winchkit.model.robot.variance_components import START as COMMON
-from winchkit.model.robot.variance_components import re_estimated
+from winchkit.model.robot.identification.variance_components import START as COMMON
+from winchkit.model.robot.identification.variance_components import re_estimated
 
 __all__ = ["START", "PoseNoise", "Stack", "noise_of", "repeated_differences"]
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.model.robot.identification.tracker import Tracker
 from winchkit.model.robot.rotation import rotation_by, rotation_vector
-from winchkit.model.robot.tracker import Tracker
 from winchkit.model.stages import At, Stage
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.robot.tracker import Tracker
+from winchkit.model.robot.identification.tracker import Tracker
 from winchkit.model.stages import At, Stage
 
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.robot.tracker import Tracker
+from winchkit.model.robot.identification.tracker import Tracker
 from winchkit.model.stages import At, Stage
 
 

@@ -3,6 +3,9 @@
 robot = robot_of(read_robot(find("profiles", "cabtive")))
 angles = robot.motor_angles(Pose(position, rotation))
 found = robot.poses_at(angles)
+
+``identification`` holds what calibration and diagnosis share: bundle adjustment, estimated poses,
+tracker and variance components.
 """
 
 from winchkit.model.robot.cycle import RobotCycle, flat_pose

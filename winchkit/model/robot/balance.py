@@ -31,8 +31,8 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.model.robot.constraints import Constraint
+from winchkit.model.robot.identification.pose_estimation import moved_pose
 from winchkit.model.robot.kinematics import Geometry, Pose, structure_matrix
-from winchkit.model.robot.pose_estimation import moved_pose
 from winchkit.model.robot.wrench import gravity_wrench, weight_by_payload
 from winchkit.schema.profiles.robot import PlatformSpec
 

@@ -13,6 +13,7 @@ from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
 from winchkit.model.line import Line
 from winchkit.model.robot.forward import Found, forward
+from winchkit.model.robot.identification.tracker import Tracker, declared_tracker
 from winchkit.model.robot.kernels import CableLine
 from winchkit.model.robot.kinematics import (
     Geometry,
@@ -22,7 +23,6 @@ from winchkit.model.robot.kinematics import (
     lengths,
     structure_matrix,
 )
-from winchkit.model.robot.tracker import Tracker, declared_tracker
 from winchkit.model.robot.wrench import gravity_wrench
 from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
 from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile

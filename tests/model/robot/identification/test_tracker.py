@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from winchkit.arrays import Array
 from winchkit.model.robot import Pose
-from winchkit.model.robot.rotation import angles_of, rotation_by
-from winchkit.model.robot.tracker import (
+from winchkit.model.robot.identification.tracker import (
     Tracker,
     pose_behind,
     reading_of,
@@ -22,6 +21,7 @@ from winchkit.model.robot.tracker import (
     tracked_position,
     tracked_rotation,
 )
+from winchkit.model.robot.rotation import angles_of, rotation_by
 
 HOME = np.array([0.36, 0.55, 0.56])
 TRACKER = Tracker(

@@ -28,8 +28,12 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.robot.constraints import Constraint
+from winchkit.model.robot.identification.pose_estimation import (
+    Iteration,
+    estimated_pose,
+    moved_pose,
+)
 from winchkit.model.robot.kinematics import Pose
-from winchkit.model.robot.pose_estimation import Iteration, estimated_pose, moved_pose
 
 __all__ = [
     "Equations",
