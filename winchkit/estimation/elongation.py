@@ -121,7 +121,7 @@ class ElongationCorrection:
         self._forces = kernels.array([0.0] * count)
         self._at_reference = self._strains(robot, reference, kernels)
         self._array = kernels.array
-        there = self._stretch(kernels.array(flat_pose(reference)))
+        there = self._stretch(kernels.array(flat_pose(reference)), self._wrench)
         assert there is not None, "forces and strains were just found here"
         self._last = there
 
@@ -170,7 +170,7 @@ class ElongationCorrection:
         initial = approximate_forces(robot.structure(pose), robot.weight(pose), middle)[0]
         return cls(robot, laws, pose, initial, kernels=kernels)
 
-    def update(self, pose: Any) -> Stretch:
+    def update(self, pose: Any, wrench: Any = None) -> Stretch:
         """Elongation at a pose of twelve floats (position, rotation by rows).
 
         Where it cannot be computed, the last good one is returned, so that a command never jumps.
@@ -179,22 +179,23 @@ class ElongationCorrection:
         ----------
         pose : (12,) sequence of float
             Position, m, and rotation matrix by rows.
+        wrench : (6,) sequence of float, optional
+            On the platform, N and N m: that of a moving platform, with its inertial forces, as of
+            :meth:`winchkit.model.robot.DynamicsCycle.wrench`; None for the constant one.
 
         Returns
         -------
         Stretch
             Elongation of each line; ``good`` is false for a repeated one.
         """
-        found = self._stretch(pose)
+        found = self._stretch(pose, self._wrench if wrench is None else wrench)
         if found is None:
             return replace(self._last, good=False)
         self._last = found
         return found
 
-    def _stretch(self, pose: Any) -> Stretch | None:
-        if not self._estimate(
-            self._lines, pose, self._initial, self._wrench, self._room, self._forces
-        ):
+    def _stretch(self, pose: Any, wrench: Any) -> Stretch | None:
+        if not self._estimate(self._lines, pose, self._initial, wrench, self._room, self._forces):
             return None
         forces = [float(force) for force in self._forces]
         strains = [

@@ -9,6 +9,14 @@ tracker and variance components.
 """
 
 from winchkit.model.robot.cycle import RobotCycle, flat_pose
+from winchkit.model.robot.dynamics import (
+    InverseDynamics,
+    PlatformMotion,
+    dynamic_wrench,
+    inverse_dynamics,
+    motion_of,
+)
+from winchkit.model.robot.dynamics_cycle import DynamicsCycle, DynamicTarget
 from winchkit.model.robot.elastic import ElongationLaw, Exponential, Linear, Quartic
 from winchkit.model.robot.force_distribution import (
     Feasibility,
@@ -41,6 +49,8 @@ from winchkit.model.robot.wrench import gravity_wrench
 
 __all__ = [
     "PLAIN",
+    "DynamicTarget",
+    "DynamicsCycle",
     "ElongationLaw",
     "Exponential",
     "Feasibility",
@@ -48,7 +58,9 @@ __all__ = [
     "Forces",
     "Found",
     "Geometry",
+    "InverseDynamics",
     "Linear",
+    "PlatformMotion",
     "Pose",
     "Quartic",
     "Robot",
@@ -60,6 +72,7 @@ __all__ = [
     "cables_of",
     "closed_form",
     "compiled",
+    "dynamic_wrench",
     "fastest",
     "flat_pose",
     "forward",
@@ -67,7 +80,9 @@ __all__ = [
     "gravity_wrench",
     "home_of",
     "improved_closed_form",
+    "inverse_dynamics",
     "lengths",
+    "motion_of",
     "quadratic",
     "robot_of",
     "rotation_of",

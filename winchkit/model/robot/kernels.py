@@ -8,6 +8,7 @@ from typing import Any
 
 from winchkit.errors import UsageError
 from winchkit.model.robot.loops import CableLine, cables_loop, motors_loop, wound_angle
+from winchkit.model.robot.loops_dynamics import torques, wrench
 from winchkit.model.robot.loops_pose import (
     cholesky,
     find_loop,
@@ -36,6 +37,10 @@ class RobotKernels:
     """Lines, lengths, pose, work, tolerance, most steps → moves the pose; steps taken, or −1."""
     forces: Function
     """Lines, pose, initial forces, wrench, work → fills forces (n); false where singular."""
+    wrench: Function
+    """Body, pose, velocity, acceleration → fills weight and inertial forces (6)."""
+    torques: Function
+    """Lines, rows, forces, velocity, angles, inertias, period, rates → fills torques (n)."""
     array: Callable[[list[float]], Any]
     """Makes the sequence type of these loops."""
     lines: Callable[[list[CableLine]], Any]
@@ -60,6 +65,8 @@ def _build(
         jit(motors_loop(jit(cables_loop(False)), jit(wound_angle))),
         jit(find_loop(steep, squares, solve, jit(turn), jit(straighten))),
         jit(forces_loop(steep, squares, solve)),
+        jit(wrench),
+        jit(torques),
         array,
         lines,
     )
@@ -107,6 +114,8 @@ def _warm_up(kernels: RobotKernels) -> None:
     some, out = kernels.array([0.0] * 6), kernels.array([0.0] * 6)
     kernels.motors(lines, pose, some, kernels.array([0.0] * 6), out)
     kernels.forces(lines, pose, some, some, work, out)
+    kernels.wrench(kernels.array([0.0] * 10), pose, some, some, kernels.array([0.0] * 6))
+    kernels.torques(lines, work[0], some, some, out, some, 1.0, kernels.array([0.0] * 6), out)
     kernels.find(lines, out, pose, work, 1e-9, 1)
 
 

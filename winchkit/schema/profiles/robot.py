@@ -12,6 +12,7 @@ from winchkit.schema.profiles.instruments import InstrumentSpec
 from winchkit.schema.profiles.winch import EffectTable, LedgerEntry, WinchProfile
 from winchkit.schema.quantity import (
     Angle,
+    Inertia,
     Length,
     Mass,
     Number,
@@ -57,6 +58,14 @@ class PlatformSpec(Table):
 
     mass: Mass = 0.0
     center_of_mass: Point = (0.0, 0.0, 0.0)
+    inertia: tuple[Inertia, Inertia, Inertia] | None = None
+    """Principal moments about the centre of mass, in platform axes, kg m²; None where unknown."""
+
+    def rules(self) -> Iterator[Rule]:
+        """Principal moments satisfy the triangle inequality."""
+        a, b, c = sorted(self.inertia or (0.0, 0.0, 0.0))
+        if c > (a + b) * (1 + 1e-9):
+            yield "inertia", f"{c:g} kg m^2 is above the sum of the two others; no body has these"
 
 
 @dataclass(frozen=True)
