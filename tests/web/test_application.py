@@ -255,3 +255,18 @@ def test_the_library_lists_and_overlays(client: TestClient, recorded: Path) -> N
     )
     outside = client.get("/api/overlay?name=../../etc/passwd", headers=HEADERS)
     assert outside.status_code == 400
+
+
+@pytest.mark.slow
+def test_a_cancelled_addition_leaves_the_profile_as_it_was(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    workspace.example("demo-fat-drum").result(PATIENCE)
+    before = workspace.view()
+    effect = next(r["effect"] for r in before["diagnosis"]["ladder"]["rows"] if "effect" in r)
+    workspace.changed = workspace.cancel
+    workspace.add(effect).result(PATIENCE)
+    after = workspace.view()
+    assert "cancelled" in after["faults"][0]
+    for key in ("profile", "diagnosis", "commands", "can_undo"):
+        assert after[key] == before[key]
+    workspace.close()

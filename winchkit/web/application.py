@@ -285,7 +285,11 @@ class _Work:
         return _accepted()
 
     def _open_profile(self, name: str) -> None:
-        if is_robot(name):
+        try:
+            of_robot = is_robot(name)
+        except WinchkitError:  # the workspace meets the same fault, and shows it
+            of_robot = False
+        if of_robot:
             open_robot(self.workspace, self.robot, [], name)
         else:
             self.workspace.open([], name)

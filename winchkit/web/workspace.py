@@ -384,11 +384,14 @@ class Workspace:
         return read_profile(self._state.versions[-1].path)
 
     def _diagnose(self, faults: Sequence[str] = ()) -> None:
-        answer = diagnose(self._runs(), self._profile(), self.catalogue, progress=self._progress)
+        answer, curves = self._diagnosed(self._profile())
+        self._set(answer=answer, curves=curves, faults=tuple(faults))
+
+    def _diagnosed(self, profile: WinchProfile) -> tuple[WinchAnswer, Mapping[str, OutputCurves]]:
+        answer = diagnose(self._runs(), profile, self.catalogue, progress=self._progress)
         initial = answer.result.initial_model
         noise = {name: out.noise_rms for name, out in answer.diagnosis.outputs.items()}
-        curves = curves_of(answer.engine.regression, initial.residual, noise)
-        self._set(answer=answer, curves=curves, faults=tuple(faults))
+        return answer, curves_of(answer.engine.regression, initial.residual, noise)
 
     def _add(self, effect: str) -> None:
         state = self._state
@@ -413,24 +416,26 @@ class Workspace:
             f"{quantity(out.heldout_rms_after, out.unit)}, was "
             f"{quantity(out.heldout_rms_before, out.unit)}"
         )
+        answer, curves = self._diagnosed(read_profile(path))
         self._set(
             versions=(*state.versions, Version(path, effect)),
             rungs=(*state.rungs, Rung(label, before)),
             said=said,
+            answer=answer,
+            curves=curves,
+            before=(state.answer, state.curves),
         )
-        self._diagnose()
-        self._set(before=(state.answer, state.curves))
 
     def _undo(self) -> None:
         state = self._state
         if len(state.versions) < 2:
             raise UsageError("there is nothing to undo")
-        self._set(versions=state.versions[:-1], rungs=state.rungs[:-1], said="")
-        if state.before is None:
-            self._diagnose()
-        else:
-            answer, curves = state.before
-            self._set(answer=answer, curves=curves, before=None)
+        earlier = state.versions[-2].path
+        answer, curves = state.before or self._diagnosed(read_profile(earlier))
+        versions, rungs = state.versions[:-1], state.rungs[:-1]
+        self._set(
+            versions=versions, rungs=rungs, said="", answer=answer, curves=curves, before=None
+        )
 
     def _card(self, effect_id: str) -> dict[str, Any]:
         state = self._state

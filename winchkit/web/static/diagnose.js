@@ -170,10 +170,11 @@ function drawLadder() {
 }
 
 function ladderFigure() {
-  const { columns, rows } = view.diagnosis.ladder, ratio = (row, c) => (row.cells[c.output] ? row.cells[c.output].ratio : null);
-  return { title: "Held-out error of each candidate over the noise floor", source: source(), across: columns.length, height: 60 + 24 * rows.length, legend: rows.map((row, i) => ({ name: `${rows.length - i} ${row.label}`, tone: toneOf(row) })).slice(0, 5),
-    panels: columns.map((c) => ({ title: `${c.name}, row by row`, xLabel: `${c.name}: error ÷ noise floor`, range: [0.5, rows.length + 0.5], x: rows.map((row) => ratio(row, c)), marks: [1],
-      series: rows.map((row, i) => ({ name: `${row.label} [row]`, x: [ratio(row, c), ratio(row, c) && ratio(rows.find((r) => r.kind === "today"), c)], y: [rows.length - i, rows.length - i], tone: toneOf(row), width: 4 })) })) };
+  const { columns, rows } = view.diagnosis.ladder, today = rows.find((row) => row.kind === "today"), ratio = (row, c) => (row.cells[c.output] ? row.cells[c.output].ratio : null);
+  const end = (row, c) => (row.kind === "candidate" && ratio(row, c) ? ratio(today, c) : ratio(row, c));
+  return { title: "Held-out error of each candidate", source: source(), height: 80 + 22 * rows.length, legend: [{ name: "present profile", tone: "today" }, { name: "with the candidate", tone: "with" }, { name: "noise floor", tone: "edge" }],
+    panels: columns.map((c) => ({ title: c.name, xLabel: "error ÷ noise floor", range: [0.5, rows.length + 0.5], rows: rows.map((row) => row.label), marks: [1],
+      series: rows.map((row, i) => ({ name: `row of ${row.label}`, x: [end(row, c), ratio(row, c)], y: [rows.length - i, rows.length - i], tone: toneOf(row), width: row.kind === "candidate" ? 4 : 9 })) })) };
 }
 const toneOf = (row) => ({ history: "muted", today: "today", candidate: "with", floor: "edge" })[row.kind];
 
@@ -219,9 +220,9 @@ async function drawCard() {
     if (effect !== shown.effect || !box.isConnected) return;
     const host = el("div", { class: "plot" });
     const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}.`) : el("p", { class: "note" }, "✓ Distinguishable from every other candidate with these runs.");
-    fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect), card.signature ? exporter(`signature-${card.effect}`, () => signatureFigure(card)) : null),
-      host, card.signature ? legend(["today", "residual, mean"], ["with", "signature"], ["band", "noise floor ±1σ", true]) : null,
-      el("p", { class: "note" }, card.what), el("div", { class: "formula" }, card.formula),
+    fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
+      host, card.signature ? legend(["today", "residual, mean"], ["with", "signature"], ["band", "noise ±1σ", true]) : null,
+      el("div", { class: "row", style: { flexWrap: "nowrap", alignItems: "start" } }, el("p", { class: "note" }, card.what), card.signature ? exporter(`signature-${card.effect}`, () => signatureFigure(card)) : null), el("div", { class: "formula" }, card.formula),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
       equal, card.next ? el("p", { class: "note" }, card.next) : null,
       el("div", { class: "buttons" }, el("button", { class: "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
@@ -280,7 +281,7 @@ async function drawTime() {
     const figure = () => ({ title: `${data.name}: measured and predicted, and the residual`, source: source(), legend: [{ name: "measured", tone: "ink" }, { name: "predicted, residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
       panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel, marks, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone: "today" }] },
         { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, marks, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }] }] });
-    fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise floor ±1σ", true]),
+    fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise ±1σ", true]),
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
     plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 130, top: 22, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
     const marked = brushed ? brushed.time : null;
@@ -303,7 +304,7 @@ async function drawMultiples() {
     const found = await ask(`/api/multiples?output=${output}`);
     if (output !== shown.output || !box.isConnected) return;
     const grid = el("div", { class: "multiples" });
-    fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance explained; drag to mark samples"), exporter(`${output}-residual`, () => multiplesFigure(found))), grid);
+    fill(box, el("header", {}, el("h2", {}, "Residual against each variable"), el("span", { class: "note", id: "brush" }, "share of variance"), exporter(`${output}-residual`, () => multiplesFigure(found))), grid);
     const range = sym(found.residual);
     panels = found.panels.map((panel) => {
       const host = el("div", { class: "plot" });

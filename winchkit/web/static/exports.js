@@ -31,9 +31,16 @@ function table(title, source, columns) {
 
 // A copy of the drawing on a white ground with title and source, and colours as numbers.
 function standalone(title, node, source) {
-  const [, , w, h] = node.getAttribute("viewBox").split(" ").map(Number), [width, height] = [w + 32, h + 68];
+  const [, , w, h] = node.getAttribute("viewBox").split(" ").map(Number), said = lines(source), [width, height] = [w + 32, h + 52 + 16 * said.length];
   const inner = new XMLSerializer().serializeToString(node).replace(/<svg[^>]*>/, `<g transform="translate(16 44)" font-size="${node.getAttribute("font-size") || 12}">`).replace(/<\/svg>$/, "</g>").replace(/var\(--([\w-]+)\)/g, (all, token) => LIGHT[token] || LIGHT.ink);
   const words = (text) => String(text).replace(/[&<>"]/g, (c) => ({ "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;" })[c]);
-  const text = `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" font-family="Inter, system-ui, sans-serif"><rect width="${width}" height="${height}" fill="#fff"/><text x="16" y="26" font-size="14" font-weight="600" fill="${LIGHT.ink}">${words(title)}</text>${inner}<text x="16" y="${height - 8}" font-size="12" fill="${LIGHT.muted}">${words(source)}</text></svg>`;
+  const text = `<svg xmlns="http://www.w3.org/2000/svg" width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" font-family="Inter, system-ui, sans-serif"><rect width="${width}" height="${height}" fill="#fff"/><text x="16" y="26" font-size="14" font-weight="600" fill="${LIGHT.ink}">${words(title)}</text>${inner}${said.map((line, i) => `<text x="16" y="${height - 8 - 16 * (said.length - 1 - i)}" font-size="12" fill="${LIGHT.muted}">${words(line)}</text>`).join("")}</svg>`;
   return { text, width, height };
+}
+
+// A text in lines of at most 110 characters, broken between words.
+function lines(text) {
+  const out = [""];
+  for (const word of text.split(" ")) { if (out.at(-1) && out.at(-1).length + word.length > 109) out.push(word); else out[out.length - 1] += `${out.at(-1) ? " " : ""}${word}`; }
+  return out;
 }

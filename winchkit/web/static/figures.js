@@ -1,9 +1,10 @@
 // Exports of plots: panels of curves and points as CSV, SVG and PNG at twice the size, light theme.
-// A figure has a title, a source, columns of panels; a panel a title, labels, series, noise and marks.
+// A figure has a title, a source, columns of panels; a panel a title, labels, series, noise and
+// marks, or names of rows in place of a vertical axis.
 import { el, keep, number, svg } from "./page.js";
 import { saved } from "./exports.js";
 
-const LEFT = 56, GAP = 30, BOTTOM = 40, TOP = 26;
+const GAP = 30, BOTTOM = 40, TOP = 26;
 
 export function exporter(name, describe) {
   const button = (kind) => el("button", { class: "plain", onclick: () => save(kind, name, describe()), "aria-label": `Save ${name} as ${kind}` }, kind);
@@ -39,13 +40,15 @@ function drawing(figure) {
 }
 
 function drawnPanel(panel, w, h) {
+  const LEFT = panel.rows ? 150 : 56;
   const x = (value) => (panel.logarithmic ? Math.log10(value) : value);
   const [x0, x1] = ends(finite(panel.series.flatMap((own) => finite(own.x || panel.x)).map(x)));
   const [y0, y1] = panel.range || ends([...panel.series.flatMap((own) => finite(own.y)), ...(panel.noise ? [panel.noise, -panel.noise] : [])]);
   const px = (value) => LEFT + ((x(value) - x0) / (x1 - x0 || 1)) * (w - LEFT - GAP), py = (value) => h - BOTTOM - ((Math.max(y0, Math.min(y1, value)) - y0) / (y1 - y0 || 1)) * (h - TOP - BOTTOM);
-  const parts = [svg("text", { x: LEFT, y: 14, "font-weight": 600, fill: "var(--ink)" }, panel.title)];
+  const parts = [svg("text", { x: LEFT, y: 14, "font-weight": 600, fill: "var(--ink)" }, panel.title.length > 0.13 * (w - LEFT) ? `${panel.title.slice(0, Math.floor(0.13 * (w - LEFT)) - 1)}…` : panel.title)];
   if (panel.noise) parts.push(svg("rect", { x: LEFT, y: py(panel.noise), width: w - LEFT - GAP, height: Math.max(0, py(-panel.noise) - py(panel.noise)), fill: "var(--band)", stroke: "var(--edge)", "stroke-dasharray": "3 3" }));
-  for (const value of steps(y0, y1)) parts.push(svg("line", { x1: LEFT, x2: w - GAP, y1: py(value), y2: py(value), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: py(value) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(value)));
+  for (const [i, name] of (panel.rows || []).entries()) parts.push(svg("text", { x: LEFT - 10, y: py(panel.rows.length - i) + 4, "text-anchor": "end", fill: "var(--ink2)" }, name.length > 20 ? `${name.slice(0, 19)}…` : name));
+  for (const value of panel.rows ? [] : steps(y0, y1)) parts.push(svg("line", { x1: LEFT, x2: w - GAP, y1: py(value), y2: py(value), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: py(value) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(value)));
   for (const value of steps(x0, x1)) parts.push(svg("text", { x: LEFT + ((value - x0) / (x1 - x0 || 1)) * (w - LEFT - GAP), y: h - BOTTOM + 16, "text-anchor": "middle", fill: "var(--muted)" }, number(panel.logarithmic ? 10 ** value : value, 3)));
   parts.push(svg("text", { x: (w + LEFT - GAP) / 2, y: h - BOTTOM + 32, "text-anchor": "middle", fill: "var(--muted)" }, panel.xLabel));
   for (const mark of panel.marks || []) parts.push(svg("line", { x1: px(mark), x2: px(mark), y1: TOP, y2: h - BOTTOM, stroke: "var(--edge)", "stroke-dasharray": "2 3" }));
