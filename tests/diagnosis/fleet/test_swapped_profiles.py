@@ -1,0 +1,59 @@
+"""Exchanged profiles: enumeration of all permutations, and the null distribution by simulation."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from winchkit.diagnosis.fleet.swapped_profiles import swapped_profiles
+
+NAMES = "ABCDE"
+TRUE = np.random.default_rng(1).normal(0.0, 20.0, (5, 2))
+ONE = np.eye(2)
+
+
+def drawn(order: tuple[int, ...], seed: int, scale: float = 1.0) -> tuple[dict, dict, dict]:
+    random = np.random.default_rng(seed)
+    identified = {n: scale * TRUE[i] + random.normal(size=2) for i, n in enumerate(NAMES)}
+    return (
+        identified,
+        dict.fromkeys(NAMES, ONE),
+        {n: scale * TRUE[i] for n, i in zip(NAMES, order, strict=True)},
+    )
+
+
+def test_two_exchanged_profiles_are_found() -> None:
+    (swap,) = swapped_profiles(*drawn((0, 3, 2, 1, 4), 2))
+    assert swap.winches == ("B", "D")
+    assert swap.p_value < 1e-6
+
+
+def test_three_exchanged_profiles_are_one_cycle_and_the_best_permutation() -> None:
+    identified, covariances, profiles = drawn((1, 2, 0, 3, 4), 3)
+    (swap,) = swapped_profiles(identified, covariances, profiles)
+    assert set(swap.winches) == {"A", "B", "C"}
+
+    def square(order: tuple[int, ...]) -> float:
+        pairs = zip(NAMES, order, strict=True)
+        return float(sum(np.sum((identified[n] - profiles[NAMES[i]]) ** 2) for n, i in pairs))
+
+    best = min(permutations(range(5)), key=square)
+    assert swap.chi_square_decrease == pytest.approx(square((0, 1, 2, 3, 4)) - square(best))
+
+
+@pytest.mark.parametrize("scale", [0.2, 0.02])
+def test_right_profiles_are_called_swapped_in_at_most_one_of_100(scale: float) -> None:
+    found = [swapped_profiles(*drawn((0, 1, 2, 3, 4), seed, scale)) for seed in range(500)]
+    assert np.mean([bool(swaps) for swaps in found]) <= 0.01 + 3 * np.sqrt(0.01 / 500)
+
+
+def test_the_p_value_of_two_winches_is_the_closed_form() -> None:
+    identified = {"A": np.array([2.0]), "B": np.array([0.0])}
+    profiles = {"A": np.array([0.0]), "B": np.array([2.0])}
+    (swap,) = swapped_profiles(identified, dict.fromkeys("AB", np.array([[0.25]])), profiles)
+    # D = 32 and d² = 32 with two distances of 2 and a standard deviation of 1/2.
+    assert swap.chi_square_decrease == pytest.approx(32.0)
+    assert swap.p_value == pytest.approx(norm.cdf(-(32 + 32) / (2 * np.sqrt(32))))

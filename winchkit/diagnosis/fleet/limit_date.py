@@ -1,0 +1,67 @@
+"""Date at which a trend reaches a limit, with a confidence interval by Fieller's theorem.
+
+References
+----------
+Fieller, E. C. (1954). Some problems in interval estimation. J. R. Stat. Soc. B 16, 175-185.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import stdtrit
+
+from winchkit.diagnosis.fleet.changes import Series
+from winchkit.diagnosis.fleet.robust_variance import Variance
+
+__all__ = ["LimitDate", "limit_date"]
+
+
+@dataclass(frozen=True)
+class LimitDate:
+    """Date at which the line through the estimates crosses a limit, s since 1970."""
+
+    limit: float
+    """SI."""
+    date: float
+    """Before the last session where the line crossed the limit, or moves away from it."""
+    earliest: float
+    """End of the 95 % confidence set; minus infinity where the slope is not significant."""
+    latest: float
+    """Infinite where the slope is not significant."""
+
+
+def limit_date(series: Series, between: Variance, limit: float) -> LimitDate:
+    """Date at which the trend of a series reaches a limit.
+
+    Parameters
+    ----------
+    series
+        Estimates of one winch.
+    between
+        Variance of the session effect.
+    limit
+        Value of the parameter, SI.
+
+    Notes
+    -----
+    With the line a + b (t − t̄) the 95 % set of dates is that of all t at which
+    (a + b (t − t̄) − limit)² ≤ q² Var(a + b (t − t̄)): an interval where b differs from zero at
+    5 %, otherwise unbounded. q is the quantile of t with the degrees of freedom of τ².
+    """
+    weight = 1 / (series.stds**2 + between.value)
+    centre = float(np.average(series.times, weights=weight))
+    t = series.times - centre
+    var_a, var_b = 1 / weight.sum(), 1 / (weight @ t**2)
+    gap = limit - float(np.average(series.values, weights=weight))
+    slope = float(weight @ (t * series.values)) * var_b
+    square = float(stdtrit(between.dof, 0.975)) ** 2
+    # (b² − q² var_b) u² − 2 gap b u + gap² − q² var_a = 0, with u = t − t̄.
+    first, last = slope**2 - square * var_b, gap**2 - square * var_a
+    date = centre + gap / slope if slope else np.inf
+    if first <= 0:
+        return LimitDate(limit, float(date), -np.inf, np.inf)
+    root = np.sqrt(max(gap**2 * slope**2 - first * last, 0.0))
+    ends = (gap * slope - root) / first, (gap * slope + root) / first
+    return LimitDate(limit, float(date), centre + float(ends[0]), centre + float(ends[1]))
