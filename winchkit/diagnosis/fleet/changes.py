@@ -32,7 +32,7 @@ from winchkit.diagnosis.fleet.robust_variance import Variance, robust_variance
 __all__ = ["Change", "Series", "StepDate", "change_of", "session_variance", "step_date"]
 
 LEAST_SESSIONS = 4
-"""Sessions from which a change can be told from the noise of one session."""
+"""Sessions from which a change is tested."""
 _COMPARED = 0.05
 _DRAWS = 400
 _SEED = 1962
