@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.quantity import Duration, PositiveDuration, PositiveMass, Quantity, Temperature
+from winchkit.schema.sim_platform import PlatformTruth
 from winchkit.schema.table import Table
 
 __all__ = ["FaultSpec", "HiddenSpec", "NoiseSpec", "SimBench", "WinchTruth"]
@@ -63,7 +64,7 @@ class FaultSpec(Table):
 
 @dataclass(frozen=True)
 class SimBench(Table):
-    """A simulated bench: a bench, and the true values of each winch."""
+    """A simulated bench: a bench, and the true values of each winch and of a robot's platform."""
 
     name: str
     bench: BenchSpec
@@ -71,3 +72,5 @@ class SimBench(Table):
     noise: NoiseSpec = field(default_factory=NoiseSpec)
     fault: tuple[FaultSpec, ...] = ()
     description: str = ""
+    platform: PlatformTruth | None = None
+    """True platform of a robot; None for winches with a load each."""

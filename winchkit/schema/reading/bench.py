@@ -17,6 +17,7 @@ from winchkit.schema.reading.parts import Reading
 from winchkit.schema.reading.source import spelled
 from winchkit.schema.reading.tables import marker_at
 from winchkit.schema.robot_bench import RobotWiring
+from winchkit.schema.sim_platform import PlatformTruth
 from winchkit.schema.simbench import FaultSpec, HiddenSpec, NoiseSpec, SimBench, WinchTruth
 from winchkit.units import suggest
 
@@ -94,6 +95,11 @@ def sim_bench(
     tree = dict(tree)
     noise = reading.table(NoiseSpec, tree.pop("noise", {}), ("noise",))
     faults = tuple(_numbered(reading, FaultSpec, tree.pop("fault", []), ("fault",)))
+    platform = None
+    if "platform" in tree:
+        platform = reading.table(PlatformTruth, tree.pop("platform"), ("platform",))
+        if "robot" not in tree:
+            reading.fault(("platform",), "is that of a robot; a table [robot] is missing")
     truths = {}
     winches = tree.get("winch")
     if isinstance(winches, dict):
@@ -109,7 +115,7 @@ def sim_bench(
     known = {name: truth for name, truth in truths.items() if truth is not None}
     # A simulation ends with its process, and its trips too.
     wired = replace(wired, latch_file="")
-    return SimBench(wired.name, wired, known, noise, faults, wired.description)
+    return SimBench(wired.name, wired, known, noise, faults, wired.description, platform)
 
 
 def _truth(reading: Reading, name: str, raw: object, hidden: object) -> WinchTruth | None:

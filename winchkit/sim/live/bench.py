@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -12,7 +12,7 @@ from pathlib import Path
 from time import monotonic
 from types import TracebackType
 
-from winchkit.errors import UsageError
+from winchkit.errors import NotPermitted, UsageError
 from winchkit.schema.bench import BenchSpec, BusSpec
 from winchkit.schema.programme import ALL, Step
 from winchkit.schema.simbench import FaultSpec, SimBench
@@ -23,7 +23,9 @@ from winchkit.sim.live.bench_file import write_bench
 from winchkit.sim.live.buses import CanPort, Interface, Wire, wired
 from winchkit.sim.live.lines import Line, Placed, open_line
 from winchkit.sim.live.real_time import TICK, serve
+from winchkit.sim.live.robot import LiveRobot
 from winchkit.sim.live.winch import LiveWinch
+from winchkit.sim.plant.hanging_load import Load
 from winchkit.units import suggest
 
 __all__ = ["LiveBench"]
@@ -88,6 +90,8 @@ class LiveBench:
         self.wire: dict[str, Wire] = {}
         """Wires of the CAN buses, by bus."""
         self.winches: dict[str, LiveWinch] = {}
+        self.robot: LiveRobot | None = None
+        """Platform and tracker of a robot; None for winches with a load each."""
         self.bench_spec: BenchSpec = self.sim_bench.bench
         self.overruns = 0
         """Number of ticks that were more than 20 ms late."""
@@ -156,6 +160,11 @@ class LiveBench:
         mass : float
             kg.
         """
+        if self.robot is not None:
+            raise NotPermitted(
+                f"winch {winch} moves the platform of a robot with others and has no load of its "
+                "own; the platform's mass is declared in [platform] of the simulated bench"
+            )
         with self.up_to_date():
             self._winch(winch).hang(mass)
 
@@ -215,6 +224,8 @@ class LiveBench:
             now = self._now()
             for winch in self.winches.values():
                 winch.advance(now)
+            if self.robot is not None:
+                self.robot.advance()
             yield
 
     def _winch(self, name: str) -> LiveWinch:
@@ -268,7 +279,12 @@ class LiveBench:
 
     def _make_winches(self) -> None:
         sim, now = self.sim_bench, self._now()
-        profiles = profiles_of(sim)
+        loads: Mapping[str, Load] = {}
+        if sim.platform is None:
+            profiles = profiles_of(sim)
+        else:
+            self.robot = LiveRobot(sim, sim.platform, self.seed, sends=self._simulated is None)
+            profiles, loads = self.robot.profiles, self.robot.ends
         for name, wiring in sim.bench.winch.items():
             port = self._ports.get(wiring.servo.bus)
             if port is None:
@@ -286,6 +302,7 @@ class LiveBench:
                 beside=sim.bench.path,
                 now=now,
                 clocks_deviate=self._simulated is not None,
+                load=loads.get(name),
             )
 
     def _placed(self, bus: str) -> Iterator[Placed]:
@@ -303,6 +320,8 @@ class LiveBench:
             line.stop()
         if self._pool is not None:
             self._pool.shutdown()
+        if self.robot is not None:
+            self.robot.close()
         for port in self._ports.values():
             if isinstance(port, CanPort):
                 port.close()
@@ -357,6 +376,8 @@ class LiveBench:
             for winch in winches:
                 winch.advance(now)
                 winch.tick(now)
+            if self.robot is not None:
+                self.robot.advance()
 
     def _go_wrong(self, fault: FaultSpec) -> None:
         winch, _, role = fault.target.partition(".")

@@ -18,6 +18,7 @@ from winchkit.sim.drive.faults import known
 from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
 from winchkit.sim.instruments.process import ProcessInstrument
 from winchkit.sim.live.instruments import device_of, instruments_of
+from winchkit.sim.plant.hanging_load import Load
 from winchkit.sim.plant.plant import WinchPlant
 from winchkit.units import suggest
 
@@ -57,9 +58,10 @@ class LiveWinch:
         beside: str,
         now: float,
         clocks_deviate: bool = False,
+        load: Load | None = None,
     ) -> None:
         self.name = name
-        self.plant = WinchPlant(profile, truth, seed=f"{seed}/{name}", noise=noise)
+        self.plant = WinchPlant(profile, truth, seed=f"{seed}/{name}", noise=noise, load=load)
         servo, eds = _servo(wiring.servo, beside)
         if wiring.servo.node is None:
             raise UsageError(f"winch {name}: its servo has no node; give it one, e.g. node = 1")

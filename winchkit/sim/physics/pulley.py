@@ -11,10 +11,17 @@ from winchkit.sim.physics.base import Physics, Stiffness, Viscosity, winding_dir
 from winchkit.sim.physics.presliding import relax
 from winchkit.sim.physics.state import State
 
-__all__ = ["CreepPulleys", "HeavyPulleys", "PreslidingPulleys", "StickyPulleys", "ViscousPulleys"]
+__all__ = [
+    "CreepPulleys",
+    "HeavyPulleys",
+    "PreslidingPulleys",
+    "StickyPulleys",
+    "ViscousPulleys",
+    "pressure",
+]
 
 
-def _pressure(before: float, after: float, wrap: float) -> float:
+def pressure(before: float, after: float, wrap: float) -> float:
     """Force on the axle of a pulley between two tensions, N (Eq. 22)."""
     square = before * before - 2 * before * after * cos(wrap) + after * after
     return sqrt(max(0.0, square))
@@ -22,9 +29,9 @@ def _pressure(before: float, after: float, wrap: float) -> float:
 
 def _dragged(tension: float, wrap: float, friction: float) -> float:
     """Friction force of an axle whose load includes this friction (Eq. 23)."""
-    force = friction * _pressure(tension, tension, wrap)
+    force = friction * pressure(tension, tension, wrap)
     for _ in range(2):
-        force = friction * _pressure(tension, tension + force, wrap)
+        force = friction * pressure(tension, tension + force, wrap)
     return force
 
 
@@ -53,7 +60,7 @@ class PreslidingPulleys(Physics):
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
         """Dahl force with the sliding force of the present axle load."""
         force = self._force.get(index, 0.0)
-        limit = self.friction * _pressure(tension, tension + force, wrap)
+        limit = self.friction * pressure(tension, tension + force, wrap)
         force = relax(force, state.winding_speed * dt, limit, self.stiffness, self.shape)
         self._force[index] = force
         return force

@@ -4,15 +4,32 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import Protocol
 
 from winchkit.sim.physics.state import GRAVITY
 
-__all__ = ["HangingLoad"]
+__all__ = ["HangingLoad", "Load"]
 
 _DAMPING_RATIO = 0.4
 """Damping ratio of a fibre cable with its load; that of a steel cable is lower."""
 _STIFF = 1.0
 """Natural angular frequency, in 1/step, above which the oscillation is neglected."""
+
+
+class Load(Protocol):
+    """The load at the end of a cable, as :class:`HangingLoad`."""
+
+    mass: float
+    position: float
+    tension: float
+    wrap_change: float
+    """Wrap at the last pulley beyond that of the profile, rad."""
+
+    def rest(self, cable_end: float, compliance: float) -> None:
+        """Set the load to rest."""
+
+    def step(self, cable_end: float, end_speed: float, compliance: float, dt: float) -> None:
+        """Advance by ``dt`` s."""
 
 
 @dataclass(slots=True)
@@ -26,6 +43,8 @@ class HangingLoad:
     """Positive downwards, m/s."""
     tension: float = 0.0
     """At the platform, N."""
+    wrap_change: float = 0.0
+    """A load below the winch leaves the last pulley in one direction."""
 
     def rest(self, cable_end: float, compliance: float) -> None:
         """Set the load to rest on a cable whose unloaded end is at ``cable_end``."""

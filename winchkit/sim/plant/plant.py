@@ -15,7 +15,7 @@ from winchkit.sim.physics.parameters import overridden
 from winchkit.sim.physics.state import State
 from winchkit.sim.physics.table import build, declared
 from winchkit.sim.plant.drum import CLIMB
-from winchkit.sim.plant.hanging_load import HangingLoad
+from winchkit.sim.plant.hanging_load import HangingLoad, Load
 from winchkit.sim.plant.kinematics import Kinematics
 from winchkit.sim.plant.sensors import Instruments, Measurement
 from winchkit.sim.plant.servo import DriveCommand, Servo
@@ -44,6 +44,8 @@ class WinchPlant:
         Noise of the instruments.
     cable_length : float, optional
         Initial cable length, m; by default that of the reference.
+    load : Load, optional
+        Load at the end of the cable in place of a hanging one, such as a robot's platform.
 
     Raises
     ------
@@ -59,6 +61,7 @@ class WinchPlant:
         seed: int | str,
         noise: NoiseSpec | None = None,
         cable_length: float | None = None,
+        load: Load | None = None,
     ) -> None:
         nominal = Kinematics.of(profile)
         true, self._pieces = _true_winch(profile, truth)
@@ -76,7 +79,7 @@ class WinchPlant:
             dead_length=true.cable.dead_length,
             inclination=true.path.inclination,
         )
-        self._load = HangingLoad(truth.load_mass, 0.0)
+        self._load = load or HangingLoad(truth.load_mass, 0.0)
         self._powered = False
         self._settle()
         self._instruments = Instruments(noise if noise is not None else NoiseSpec(), seed)
@@ -272,10 +275,12 @@ class WinchPlant:
         for weigh in self._weight:
             tension += weigh(state)
         if self._pulley:
+            change = self._load.wrap_change
             for index in range(len(self._wraps) - 1, -1, -1):
                 before = tension
                 for rub in self._pulley:
-                    tension += rub(state, index, self._wraps[index], before, dt)
+                    tension += rub(state, index, self._wraps[index] + change, before, dt)
+                change = 0.0
         state.tension = max(0.0, tension)
         torque = state.tension * state.arm
         for mesh in self._gear:

@@ -1,0 +1,61 @@
+"""The robot of a live simulated bench: its platform, and its tracker's datagrams."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from urllib.parse import urlsplit
+
+from winchkit.schema.sim_platform import PlatformTruth
+from winchkit.schema.simbench import SimBench
+from winchkit.sim.robot.build import build_robot
+from winchkit.sim.robot.tracker import SimTracker
+
+__all__ = ["LiveRobot"]
+
+
+class LiveRobot:
+    """Platform, cable ends and tracker of a simulated bench; not thread-safe.
+
+    Parameters
+    ----------
+    bench : SimBench
+        A bench with ``[robot]``.
+    truth : PlatformTruth
+        Its platform.
+    seed : int
+        Seed of the noise.
+    sends : bool
+        Whether the tracker sends datagrams to the address at which the bench file listens.
+    """
+
+    def __init__(self, bench: SimBench, truth: PlatformTruth, seed: int, *, sends: bool) -> None:
+        self.platform, self.profiles, self.ends = build_robot(bench, truth)
+        self.on_pose: Callable[[bytes], None] | None = None
+        """Called with each datagram of the tracker, also in simulated time."""
+        self._socket: socket.socket | None = None
+        wiring = bench.bench.robot
+        if wiring is not None and wiring.tracker is not None and sends:
+            parts = urlsplit(wiring.tracker.listen)
+            self._address = (parts.hostname or "", parts.port or 0)
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._tracker = SimTracker(self.platform, truth.tracker, seed, self._send)
+
+    def advance(self) -> None:
+        """Let the tracker measure and send."""
+        self._tracker.advance()
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self._socket is not None:
+            self._socket.close()
+
+    def _send(self, datagram: bytes) -> None:
+        if self._socket is not None:
+            try:
+                self._socket.sendto(datagram, self._address)
+            except OSError:
+                # Nobody listens: a tracker sends whether it is received or not.
+                pass
+        if self.on_pose is not None:
+            self.on_pose(datagram)

@@ -1,0 +1,114 @@
+"""Coupling of the winches to a common platform."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.sim.robot.platform import CablePlatform
+
+__all__ = ["CableEnd", "Coupling"]
+
+
+class Coupling:
+    """Advances the platform as far as all winches are.
+
+    Each winch integrates its own motor up to the instants of its frames and instruments. Beyond the
+    platform's time, at most one tick, its cable continues with the last rate of its length.
+
+    Parameters
+    ----------
+    platform : CablePlatform
+        The platform at rest.
+    tension : (n,) array
+        Cable forces at the start, N.
+    axial_stiffness : float
+        EA of the cables, N.
+    dead_length : sequence of float
+        Cable between drums and exit points, (n,), m.
+    """
+
+    def __init__(
+        self,
+        platform: CablePlatform,
+        tension: Array,
+        axial_stiffness: float,
+        dead_length: Sequence[float],
+    ) -> None:
+        self.platform = platform
+        platform.tension = np.array(tension, dtype=float)
+        self.ends = [
+            CableEnd(self, index, axial_stiffness, dead) for index, dead in enumerate(dead_length)
+        ]
+
+    def advance(self) -> None:
+        """Advance the platform to the time of the winch that is furthest behind."""
+        platform, ends = self.platform, self.ends
+        to = min(end.time for end in ends)
+        passed = to - platform.time
+        if passed <= 0.0:
+            return
+        start = np.array([end.passed for end in ends])
+        ahead = np.array([passed / (end.time - platform.time) for end in ends])
+        goal = start + ahead * (np.array([end.unstrained for end in ends]) - start)
+        platform.advance(to, start, goal, 1 / np.array([end.flexibility for end in ends]))
+        if platform.time == to:
+            for end, value in zip(ends, goal.tolist(), strict=True):
+                end.passed = value
+
+
+class CableEnd:
+    """The platform as the load of one winch; takes the place of a hanging load."""
+
+    def __init__(
+        self, coupling: Coupling, index: int, axial_stiffness: float, dead_length: float
+    ) -> None:
+        platform = coupling.platform
+        self._coupling, self._index = coupling, index
+        self._axial_stiffness, self._dead_length = axial_stiffness, dead_length
+        self._home_wrap = float(platform.wrap[index])
+        self.mass = platform.body.mass / len(platform.tension)
+        """Share of the platform, kg, which the motor accelerates beside its own rotor."""
+        self.time = platform.time
+        self.tension = float(platform.tension[index])
+        self.position = float(platform.length[index])
+        self.wrap_change = 0.0
+        self.unstrained = self.passed = self.home_length
+        """Unstrained cable now, and at the platform's time, m."""
+        self.flexibility = self._flexibility(0.0)
+
+    @property
+    def home_length(self) -> float:
+        """Unstrained free length at the start, m, for the initial force."""
+        strained = self.position + self._dead_length
+        return strained / (1 + self.tension / self._axial_stiffness) - self._dead_length
+
+    def rest(self, cable_end: float, compliance: float) -> None:
+        """Take the unstrained cable of the winch; the platform does not move at once."""
+        self._take(cable_end, 0.0, compliance)
+        self.passed = cable_end
+
+    def step(self, cable_end: float, end_speed: float, compliance: float, dt: float) -> None:
+        """Advance by ``dt`` s; the unstrained length is then ``cable_end``."""
+        self.time += dt
+        self.unstrained = cable_end
+        self.flexibility = self._flexibility(compliance)
+        self._coupling.advance()
+        self._take(cable_end, end_speed, compliance)
+
+    def _take(self, cable_end: float, end_speed: float, compliance: float) -> None:
+        platform, index = self._coupling.platform, self._index
+        self.unstrained = cable_end
+        self.flexibility = self._flexibility(compliance)
+        speed = float(platform.speed[index])
+        self.position = float(platform.length[index]) + speed * (self.time - platform.time)
+        stretch = self.position - cable_end
+        pull = (stretch + platform.damping_time * (speed - end_speed)) / self.flexibility
+        self.tension = max(0.0, pull) if stretch > 0 else 0.0
+        self.wrap_change = float(platform.wrap[index]) - self._home_wrap
+
+    def _flexibility(self, compliance: float) -> float:
+        """Elongation per force, m/N."""
+        return compliance + (self.unstrained + self._dead_length) / self._axial_stiffness
