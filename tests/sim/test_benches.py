@@ -22,7 +22,8 @@ from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.schedule import schedule
 
 BENCHES = [row["name"] for row in listed_benches()]
-WIRED_OTHERWISE = ("spiral-bench", "grooved-bench", "serial-bench")
+ROBOTS = ("cabtive-robot", "hanging-robot", "winding-device-robot")
+WIRED_OTHERWISE = ("spiral-bench", "grooved-bench", "serial-bench", *ROBOTS)
 VARIANTS = [name for name in BENCHES if name not in WIRED_OTHERWISE]
 
 

@@ -70,10 +70,15 @@ def simulate(
     Raises
     ------
     UsageError
-        For an impossible rate.
+        For an impossible rate, and for a robot.
     FileError
         For a programme that does not match the bench.
     """
+    if bench.platform is not None:
+        raise UsageError(
+            f"{bench.name} is a robot, whose winches move one platform; 'sim record' moves each "
+            "winch alone: use 'winchkit sim serve' and move the platform"
+        )
     if not 0 < rate <= 1 / MAX_STEP:
         raise UsageError(f"rate {rate:g} Hz must be above 0 and at most {1 / MAX_STEP:g} Hz")
     wiring = bench.bench.winch

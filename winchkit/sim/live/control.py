@@ -71,6 +71,9 @@ def _status(live: LiveBench) -> str:
             f"{winch.plant.load_mass:g} kg, {winch.drive.state.name.lower().replace('_', ' ')}"
             for name, winch in live.winches.items()
         ]
+        if live.robot is not None:
+            x, y, z = live.robot.platform.position.tolist()
+            winches.append(f"platform: x {x:.4f} m, y {y:.4f} m, z {z:.4f} m")
     return "; ".join([*winches, f"{live.overruns} late ticks, worst {live.worst_lateness:.3f} s"])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from urllib.parse import urlsplit
 
 from winchkit.schema.sim_platform import PlatformTruth
@@ -52,10 +53,8 @@ class LiveRobot:
 
     def _send(self, datagram: bytes) -> None:
         if self._socket is not None:
-            try:
+            # A tracker sends whether its datagrams are received or not.
+            with suppress(OSError):
                 self._socket.sendto(datagram, self._address)
-            except OSError:
-                # Nobody listens: a tracker sends whether it is received or not.
-                pass
         if self.on_pose is not None:
             self.on_pose(datagram)

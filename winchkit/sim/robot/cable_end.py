@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.sim.robot.platform import CablePlatform
+from winchkit.sim.robot.platform import LEAST_STEP, CablePlatform
 
 __all__ = ["CableEnd", "Coupling"]
 
@@ -92,10 +92,13 @@ class CableEnd:
 
     def step(self, cable_end: float, end_speed: float, compliance: float, dt: float) -> None:
         """Advance by ``dt`` s; the unstrained length is then ``cable_end``."""
+        # Only the winch that is furthest behind keeps the platform from advancing.
+        furthest = self.time - self._coupling.platform.time < LEAST_STEP
         self.time += dt
         self.unstrained = cable_end
         self.flexibility = self._flexibility(compliance)
-        self._coupling.advance()
+        if furthest:
+            self._coupling.advance()
         self._take(cable_end, end_speed, compliance)
 
     def _take(self, cable_end: float, end_speed: float, compliance: float) -> None:

@@ -17,10 +17,11 @@ from winchkit.sim.physics.state import GRAVITY
 from winchkit.sim.robot.pulleys import Pulleys
 from winchkit.sim.robot.rotation import turned
 
-__all__ = ["Body", "CablePlatform"]
+__all__ = ["LEAST_STEP", "Body", "CablePlatform"]
 
 _STEP = 1e-3
-_LEAST_STEP = 5e-5
+LEAST_STEP = 5e-5
+"""Shorter times are left to the next call, s."""
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class CablePlatform:
             Of the cables, N/m.
         """
         duration = to - self.time
-        if duration < _LEAST_STEP:
+        if duration < LEAST_STEP:
             return
         count = ceil(duration / _STEP - 1e-6)
         rate, dt = (end - start) / duration, duration / count
@@ -123,10 +124,10 @@ class CablePlatform:
         taut = expected > 0
         expected = np.where(taut, expected, 0.0)
         change = np.where(taut, dt / 4 * stiffness + damping / 2, 0.0)
-        omega = velocity[3:]
         inertia = self._inertia
         load = self._weight + self.wrench - jacobian.T @ ((self.tension + expected) / 2)
-        load[3:] -= np.cross(omega, inertia[3:, 3:] @ omega)
+        spin = velocity[None, 3:]
+        load[3:] -= _cross(spin, spin @ inertia[3:, 3:])[0]
         matrix = inertia + dt * (jacobian.T * change) @ jacobian
         self.velocity = velocity + np.linalg.solve(matrix, dt * load)
         mean = (velocity + self.velocity) * (dt / 2)
@@ -142,5 +143,10 @@ class CablePlatform:
         """Cables and inertia at the present pose."""
         arms = self._arms @ self.rotation.T
         self.length, direction, self.wrap = self.pulleys.cables(self.center + arms)
-        self._jacobian = np.concatenate([direction, np.cross(arms, direction)], axis=1)
+        self._jacobian = np.concatenate([direction, _cross(arms, direction)], axis=1)
         self._inertia[3:, 3:] = self.rotation @ self.body.inertia @ self.rotation.T
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Cross products of rows; a third of the time of ``numpy.cross`` for few of them."""
+    return np.asarray(a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]])

@@ -1,8 +1,8 @@
 """Cables from swivelling pulleys to the platform: lengths, directions and wraps.
 
 A cable reaches its pulley at the exit point along the swivel axis s. With n the direction from the
-axis to the anchor, the pulley's centre at r n from the exit point, and the anchor at (X, Y) from the
-centre along n and s, the point at the wrap φ is r(−cos φ, sin φ), the cable leaves it along
+axis to the anchor, the pulley's centre at r n from the exit point, and the anchor at (X, Y) from
+the centre along n and s, the point at the wrap φ is r(−cos φ, sin φ), the cable leaves it along
 (sin φ, cos φ), and with the free length f = √(X² + Y² − r²)
 
     sin φ = (f X + r Y)/(X² + Y²),  cos φ = (f Y − r X)/(X² + Y²).
