@@ -11,7 +11,7 @@ from math import exp
 from typing import ClassVar
 
 from winchkit.schema.quantity import Number, PositiveSpeed
-from winchkit.sim.physics.base import Physics, Stiffness, Viscosity
+from winchkit.sim.physics.base import Physics, Stiffness
 from winchkit.sim.physics.pulley import pressure
 from winchkit.sim.physics.state import State
 
@@ -24,13 +24,14 @@ _SHARES = tuple((2 * n + 1) / _ELEMENTS**2 for n in range(_ELEMENTS))
 
 @dataclass
 class MaxwellPulleys(Physics):
-    """Maxwell-slip friction of the axles, higher at low speed, and viscous drag of the bearings."""
+    """Maxwell-slip friction of the axles, higher at low speed, and drag of the bearings."""
 
     friction: Number = 0.012
     stiffness: Stiffness = 20000.0
     static_excess: Number = 0.15
     stribeck_speed: PositiveSpeed = 0.01
-    viscosity: Viscosity = 2.0
+    drag_speed: PositiveSpeed = 5.0
+    """At which the bearing drag equals the sliding force, m/s."""
     size: ClassVar[str] = "friction"
     _forces: dict[int, list[float]] = field(default_factory=dict)
 
@@ -45,4 +46,4 @@ class MaxwellPulleys(Physics):
         for n, share in enumerate(_SHARES):
             bound = share * limit
             forces[n] = max(-bound, min(bound, forces[n] + move))
-        return sum(forces) + self.viscosity * speed
+        return sum(forces) + self.friction * load * speed / self.drag_speed
