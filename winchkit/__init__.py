@@ -82,6 +82,8 @@ if TYPE_CHECKING:
     from winchkit.estimation.dahl import DahlEstimator
     from winchkit.estimation.dahl_identification import identify_dahl
     from winchkit.estimation.elongation import ElongationCorrection
+    from winchkit.library.index import index_library
+    from winchkit.library.query import library_estimates, library_runs, query_library
     from winchkit.model.robot.cycle import RobotCycle
     from winchkit.model.robot.force_distribution import ForceLimits
     from winchkit.model.robot.kinematics import Pose
@@ -170,8 +172,11 @@ __all__ = [
     "find",
     "fit_cell",
     "identify_dahl",
+    "index_library",
     "info_of",
     "ladder",
+    "library_estimates",
+    "library_runs",
     "listed_benches",
     "load_catalogue",
     "lss_identify",
@@ -184,6 +189,7 @@ __all__ = [
     "open_writer",
     "plan",
     "plan_poses",
+    "query_library",
     "read_axis",
     "read_bench",
     "read_log",
@@ -297,6 +303,12 @@ _NAMES = {
     "winchkit.estimation.dahl": ("DahlEstimator",),
     "winchkit.estimation.dahl_identification": ("identify_dahl",),
     "winchkit.estimation.elongation": ("ElongationCorrection",),
+    "winchkit.library.index": ("index_library",),
+    "winchkit.library.query": (
+        "library_estimates",
+        "library_runs",
+        "query_library",
+    ),
     "winchkit.model.robot.cycle": ("RobotCycle",),
     "winchkit.model.robot.force_distribution": ("ForceLimits",),
     "winchkit.model.robot.kinematics": ("Pose",),

@@ -1,7 +1,7 @@
 """The command line: one file per command, in folders by subject.
 
-``bench``, ``cell``, ``drive``, ``files``, ``log``, ``model``, ``sim`` and ``web`` have the
-commands, ``core`` their common parts. The table below is all that ``--help`` needs: a command
+``bench``, ``cell``, ``drive``, ``files``, ``library``, ``log``, ``model``, ``sim`` and ``web`` have
+the commands, ``core`` their common parts. The table below is all that ``--help`` needs: a command
 imports other packages when it runs. :func:`~winchkit.cli.main` is the entry.
 """
 
@@ -93,6 +93,9 @@ SECTIONS: dict[str, dict[str, At]] = {
             "Import recordings of other programs: channels and units.",
         ),
         "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
+        "library": At(
+            "winchkit.cli.library.group", "Tables of the runs of a folder: index, list, query."
+        ),
         "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
         "completion": At(
             "winchkit.cli.files.completion", "Print the completion script of a shell."

@@ -32,7 +32,9 @@ RUNS: tuple[Column, ...] = (
     Column("prefix", "text", "prefix of its columns in the file; empty without"),
     Column("session", "text", "metadata `session`, else the UTC date of `time`"),
     Column("time", "time", "UTC of the first sample"),
-    Column("time_source", "text", "`metadata`, `clock` (of the log), `file` (date of change)"),
+    Column(
+        "time_source", "text", "`metadata`, `clock` (of the log), `path` (a date), `file` (change)"
+    ),
     Column("duration", "number", "from the first sample to the last", "s"),
     Column("samples", "integer", "rows of the run"),
     Column("programme", "text", "metadata `programme`; null without"),

@@ -21,7 +21,15 @@ from winchkit.errors import Fault, FileError, UsageError
 from winchkit.regular_file import regular
 from winchkit.runs.recording.rotation import parts_beside
 
-__all__ = ["begin_log", "create", "is_written", "refuse_written", "require_in_place"]
+__all__ = [
+    "Lock",
+    "begin_log",
+    "create",
+    "is_written",
+    "lock_file",
+    "refuse_written",
+    "require_in_place",
+]
 
 _BUFFER = 1 << 20
 _PATIENCE = 2.0
@@ -89,7 +97,7 @@ def is_written(path: Path) -> bool:
     except OSError:
         return False
     try:
-        return _lock(descriptor) is Lock.BUSY
+        return lock_file(descriptor) is Lock.BUSY
     finally:
         os.close(descriptor)
 
@@ -140,7 +148,7 @@ def _hold(item: Path, held: ExitStack, *, replace: bool) -> None:
 
 def _require_free(descriptor: int, path: Path, *, replace: bool, is_new: bool = False) -> None:
     """Lock an open file; raises UsageError where a log would be lost by writing to it."""
-    lock = _lock(descriptor)
+    lock = lock_file(descriptor)
     if lock is Lock.BUSY:
         raise _being_written(path)
     if os.fstat(descriptor).st_size and not replace:
@@ -172,7 +180,7 @@ def _remove(item: Path) -> None:
         raise FileError(Fault(f"cannot be replaced: {error.strerror}", str(item))) from None
 
 
-def _lock(descriptor: int) -> Lock:
+def lock_file(descriptor: int) -> Lock:
     """Lock a file exclusively if it is free; the system releases it with the last descriptor."""
     try:
         if sys.platform == "win32":
@@ -205,7 +213,7 @@ def _folder_locked(folder: Path) -> Iterator[None]:
         return
     try:
         deadline = time.monotonic() + _PATIENCE
-        while _lock(descriptor) is Lock.BUSY and time.monotonic() < deadline:
+        while lock_file(descriptor) is Lock.BUSY and time.monotonic() < deadline:
             time.sleep(0.005)
         yield
     finally:

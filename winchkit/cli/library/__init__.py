@@ -1,0 +1,1 @@
+"""Commands on a library of runs: index, list, query; and the diagnosis of a fleet."""

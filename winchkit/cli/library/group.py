@@ -1,0 +1,28 @@
+"""``winchkit library``: tables of the runs of a folder."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.core.command import Example
+from winchkit.cli.core.lazy import At, LazyGroup
+
+__all__ = ["command"]
+
+COMMANDS = {
+    "index": At("winchkit.cli.library.index", "Bring the tables to the state of the files."),
+    "list": At("winchkit.cli.library.list", "List runs by winch, programme, load, date, verdict."),
+    "query": At("winchkit.cli.library.query", "Answer a SELECT over the tables (DuckDB)."),
+}
+
+
+@click.group(
+    cls=LazyGroup,
+    table=COMMANDS,
+    examples=(
+        "winchkit library index .",
+        Example("winchkit library list . --winch A", "needs the index of the line before"),
+    ),
+)
+def command() -> None:
+    """Tables of the runs of a folder, kept beside them; the files stay the truth."""

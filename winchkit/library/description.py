@@ -1,0 +1,211 @@
+"""Rows of the table of runs for one file: what is known of a recording without a model."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import numpy as np
+
+from winchkit.errors import Fault, FileError, RunError
+from winchkit.library.files import RunFile
+from winchkit.library.partitions import Row
+from winchkit.runs.info import LogInfo, info_of
+from winchkit.runs.read import read_log, read_run
+from winchkit.runs.recording.log_file import is_written
+from winchkit.runs.run import Run
+from winchkit.runs.sanity.inspection import inspect_run
+
+__all__ = ["ProfileOfRuns", "described", "library_winch", "session_of"]
+
+_DATE = re.compile(r"\d{4}\D?\d{2}(\D?\d{2})?\b.*")
+"""Name of a folder that begins with a date: a session, and no winch."""
+_STARTS = ("start_time", "started", "begun", "date")
+"""Metadata with the time of the first sample, ISO 8601."""
+
+
+@dataclass(frozen=True)
+class ProfileOfRuns:
+    """Profile that the runs are compared with."""
+
+    hash: str
+    name: str
+
+
+def described(file: RunFile, profile: ProfileOfRuns | None = None) -> list[Row]:
+    """Rows of a file: one per winch, or one with its fault.
+
+    Parameters
+    ----------
+    file : RunFile
+        The file.
+    profile : ProfileOfRuns, optional
+        Profile of the runs.
+    """
+    own = {"path": file.path, "size": file.size, "mtime": file.mtime}
+    digest, run, mapping, info = "", None, None, None
+    try:
+        digest = _hash(file)
+        if any(is_written(part) for part in file.files):
+            raise RunError(Fault("is being recorded; index again when it ends"))
+        run, mapping = _read(file)
+        info = info_of(read_log(run.path)) if mapping is None and _is_mcap(file) else None
+    except FileError as error:
+        return [own | _faulty(file, digest, str(error.faults[0]))]
+    if sum(part.stat().st_size for part in file.files) != file.size:
+        return [own | _faulty(file, digest, "changed while it was read; index again")]
+    if mapping is not None:
+        digest = hashlib.sha256((digest + _content_hash(mapping)).encode()).hexdigest()
+    where = str(mapping) if mapping is not None else None
+    shared = own | {"hash": digest, "mapping": where} | _of_file(run, info, file, profile)
+    return [shared | _of_winch(run, prefix, file.path) for prefix in run.winches()]
+
+
+def library_winch(path: str, prefix: str, metadata: str = "") -> str:
+    """Name of a winch in the library.
+
+    Parameters
+    ----------
+    path : str
+        Path of the run below the library.
+    prefix : str
+        Prefix of the winch's columns.
+    metadata : str
+        Metadata ``winch`` of the run.
+
+    Returns
+    -------
+    str
+        The first folder of the path that does not begin with a date, followed by ``/`` and the
+        prefix where the run has prefixes; without such a folder the prefix or the metadata.
+    """
+    folders = PurePosixPath(path).parts[:-1]
+    named = next((name for name in folders if not _DATE.fullmatch(name)), "")
+    return "/".join(filter(None, (named, prefix))) or metadata
+
+
+def session_of(metadata: dict[str, str], time: datetime) -> str:
+    """Session of a run: its metadata ``session``, else the UTC date of its start."""
+    return metadata.get("session") or time.date().isoformat()
+
+
+def _read(file: RunFile) -> tuple[Run, Path | None]:
+    """Run of a file, and the mapping by which it was read; raises FileError."""
+    # Parts have a common name that no file has.
+    path = file.files[0] if len(file.files) == 1 else file.files[0].parent / Path(file.path).name
+    fault: FileError | None = None
+    if file.is_native:
+        try:
+            return read_run(path), None
+        except FileError as error:
+            fault = error
+    for mapping in file.mappings:
+        try:
+            return read_run(path, mapping), mapping
+        except FileError as error:
+            fault = fault or error
+    raise fault or RunError(Fault("no mapping has its columns", str(path)))
+
+
+def _of_file(
+    run: Run, info: LogInfo | None, file: RunFile, profile: ProfileOfRuns | None
+) -> dict[str, Any]:
+    texts = dict(run.metadata)
+    time, source = _time(texts, info, file)
+    return {
+        "session": session_of(texts, time),
+        "time": time,
+        "time_source": source,
+        "duration": float(np.ptp(run.time)) if len(run) else 0.0,
+        "samples": len(run),
+        "programme": texts.get("programme") or None,
+        "profile": profile.hash if profile else None,
+        "profile_name": profile.name if profile else texts.get("profile"),
+        "counters": json.dumps(info.counters) if info and info.counters else None,
+        "complete": info is None or info.closed is not False,
+        "fault": None,
+        "imported_from": texts.get("imported_from"),
+    }
+
+
+def _of_winch(run: Run, prefix: str, path: str) -> dict[str, Any]:
+    own = run.of_winch(prefix)
+    load = own.metadata.get(f"{prefix}.load_mass") if prefix else None
+    return {
+        "winch": library_winch(path, prefix, "" if prefix else own.metadata.get("winch", "")),
+        "prefix": prefix,
+        "load_mass": _mass(load) if load else own.load_mass,
+        "temperature": _mean(own, "temperature"),
+        "channels": sorted(own),
+        "sanity": sorted({finding.code for finding in inspect_run(own)}),
+    }
+
+
+def _mass(text: str) -> float:
+    from winchkit.units import parse
+
+    return parse(text, "mass")
+
+
+def _mean(run: Run, channel: str) -> float | None:
+    if channel not in run or not np.isfinite(run[channel]).any():
+        return None
+    return float(np.nanmean(run[channel]))
+
+
+def _time(texts: dict[str, str], info: LogInfo | None, file: RunFile) -> tuple[datetime, str]:
+    for key in _STARTS:
+        try:
+            found = datetime.fromisoformat(texts.get(key, ""))
+        except ValueError:
+            continue
+        return found.replace(tzinfo=found.tzinfo or UTC).astimezone(UTC), "metadata"
+    if info is not None and info.begun is not None:
+        return datetime.fromisoformat(info.begun), "clock"
+    for name in reversed(PurePosixPath(file.path).parts):
+        try:
+            return datetime.fromisoformat(name[:10]).replace(tzinfo=UTC), "path"
+        except ValueError:
+            continue
+    return _changed(file), "file"
+
+
+def _changed(file: RunFile) -> datetime:
+    """Date of change of the oldest part: a mapping may be newer."""
+    return datetime.fromtimestamp(min(part.stat().st_mtime for part in file.files), UTC)
+
+
+def _faulty(file: RunFile, digest: str, fault: str) -> dict[str, Any]:
+    time = datetime.fromtimestamp(file.mtime / 1e9, UTC)
+    return {
+        "winch": library_winch(file.path, ""),
+        "prefix": "",
+        "time": time,
+        "time_source": "file",
+        "hash": digest,
+        "fault": fault,
+    }
+
+
+def _is_mcap(file: RunFile) -> bool:
+    return file.path.endswith(".mcap")
+
+
+def _hash(file: RunFile) -> str:
+    """SHA-256 of the content of all parts; raises FileError."""
+    if len(file.files) == 1:
+        return _content_hash(file.files[0])
+    return hashlib.sha256("".join(map(_content_hash, file.files)).encode()).hexdigest()
+
+
+def _content_hash(path: Path) -> str:
+    try:
+        with path.open("rb") as content:
+            return hashlib.file_digest(content, "sha256").hexdigest()
+    except OSError as error:
+        raise RunError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
