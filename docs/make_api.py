@@ -30,7 +30,13 @@ SECTIONS = {
     ),
     "Runs": (
         *("read_run", "read_poses", "write_run", "open_writer", "Run", "run_of", "export"),
-        *("index_library", "library_runs", "library_estimates", "query_library"),
+        *(
+            "index_library",
+            "diagnose_library",
+            "library_runs",
+            "library_estimates",
+            "query_library",
+        ),
         *("read_log", "info_of", "recover", "open_replay"),
     ),
     "Diagnosis": (

@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from winchkit.estimation.dahl import DahlEstimator
     from winchkit.estimation.dahl_identification import identify_dahl
     from winchkit.estimation.elongation import ElongationCorrection
+    from winchkit.library.diagnose import diagnose_library
     from winchkit.library.index import index_library
     from winchkit.library.query import library_estimates, library_runs, query_library
     from winchkit.model.robot.cycle import RobotCycle
@@ -166,6 +167,7 @@ __all__ = [
     "config_store",
     "diagnose",
     "diagnose_each",
+    "diagnose_library",
     "diagnose_robot",
     "drive_info",
     "export",
@@ -303,6 +305,7 @@ _NAMES = {
     "winchkit.estimation.dahl": ("DahlEstimator",),
     "winchkit.estimation.dahl_identification": ("identify_dahl",),
     "winchkit.estimation.elongation": ("ElongationCorrection",),
+    "winchkit.library.diagnose": ("diagnose_library",),
     "winchkit.library.index": ("index_library",),
     "winchkit.library.query": (
         "library_estimates",

@@ -42,6 +42,7 @@ SECTIONS: dict[str, dict[str, At]] = {
         "serve": At(
             "winchkit.cli.web.serve", "Serve the page: look, learn, add, watch the error fall."
         ),
+        "fleet": At("winchkit.cli.library.fleet", "Many winches: diagnose a library of runs."),
         "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
         "effects": At(
             "winchkit.cli.model.effects", "List the physical effects, or show one's card."

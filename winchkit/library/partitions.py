@@ -53,11 +53,14 @@ class Partitions:
         """Partitions of a table, sorted."""
         return sorted((self.folder / table).glob("*/*.parquet"))
 
+    def of_winch(self, table: str, winch: str) -> list[Path]:
+        """Partitions of one winch, sorted."""
+        return sorted((self.folder / table / _encoded(winch)).glob("*.parquet"))
+
     def place(self, table: str, row: Mapping[str, Any]) -> Path:
         """Partition of a row, by its winch and the UTC month of its time."""
         moment: datetime = row["time"]
-        winch = quote(row["winch"], safe="").replace(".", "%2E") or _EMPTY
-        return self.folder / table / winch / f"{moment:%Y-%m}.parquet"
+        return self.folder / table / _encoded(row["winch"]) / f"{moment:%Y-%m}.parquet"
 
     def read(self, table: str, columns: Sequence[str] | None = None) -> pa.Table:
         """Rows of a table; raises FileError for a damaged partition."""
@@ -159,6 +162,11 @@ class Partitions:
         except (OSError, pa.ArrowException, KeyError) as error:
             message = f"is no partition of a library ({error}); delete it, and index again"
             raise FileError(Fault(message, str(path))) from None
+
+
+def _encoded(winch: str) -> str:
+    """Name of a winch as one folder."""
+    return quote(winch, safe="").replace(".", "%2E") or _EMPTY
 
 
 def _made(folder: Path) -> None:

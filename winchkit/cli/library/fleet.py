@@ -1,0 +1,26 @@
+"""``winchkit fleet``: many winches and sessions."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.core.command import Example
+from winchkit.cli.core.lazy import At, LazyGroup
+
+__all__ = ["command"]
+
+COMMANDS = {
+    "diagnose": At("winchkit.cli.library.diagnose", "Diagnose every winch and session."),
+}
+
+
+@click.group(
+    cls=LazyGroup,
+    table=COMMANDS,
+    examples=(
+        Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
+        Example("winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786", "a host"),
+    ),
+)
+def command() -> None:
+    """Many winches and sessions: the runs of an indexed folder."""

@@ -1,0 +1,133 @@
+"""Diagnoses by the workers of a Dask cluster: of this computer, or one by its address."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
+from itertools import islice
+from typing import Any
+
+from winchkit.errors import ConnectionLost, UsageError
+from winchkit.library.tasks import Outcome, Task, failed, outcome_of
+from winchkit.version import __version__
+
+__all__ = ["cluster_outcomes"]
+
+_WORKER_BYTES = 2 << 30
+"""Memory that a diagnosis of long runs needs, with reserve."""
+_AHEAD = 4
+"""Tasks per worker that the scheduler holds: its memory does not grow with the library."""
+_LOSSES = 3
+"""Lost workers after which a task counts as the cause and fails."""
+_PATIENCE = 30.0
+
+
+def cluster_outcomes(
+    due: Sequence[Task],
+    jobs: int | None = None,
+    scheduler: str | None = None,
+    work: Callable[[Task], Outcome] = outcome_of,
+) -> Iterator[Outcome]:
+    """Outcomes of tasks as they end, in any order.
+
+    Parameters
+    ----------
+    due : sequence of Task
+        The tasks.
+    jobs : int, optional
+        Processes of this computer, by default by its cores and memory.
+    scheduler : str, optional
+        Address of an existing scheduler, such as ``tcp://host:8786``.
+    work : callable
+        Function that makes an outcome of a task.
+
+    Yields
+    ------
+    Outcome
+        Of a lost worker the task is given to another one.
+
+    Raises
+    ------
+    UsageError
+        Without Dask; for workers with another version of winchkit.
+    ConnectionLost
+        For a scheduler that does not answer.
+    """
+    try:
+        dask: Any = import_module("dask")
+        distributed: Any = import_module("distributed")
+    except ImportError:
+        raise UsageError(
+            "several processes need Dask; install it with pip install 'winchkit[cluster]', or "
+            "use one process (--jobs 1)"
+        ) from None
+    with dask.config.set({"distributed.scheduler.allowed-failures": _LOSSES}):
+        if scheduler is None:
+            threads = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
+            local = distributed.LocalCluster(
+                n_workers=min(jobs or _processes(), len(due)),
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=None,
+                env=threads,
+            )
+            with local, distributed.Client(local) as client:
+                yield from _outcomes(client, due, work)
+            return
+        try:
+            client = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)
+        except (OSError, ValueError) as error:
+            raise ConnectionLost(f"{scheduler}: no Dask scheduler answers ({error})") from None
+        with client:
+            _require_version(client, scheduler)
+            yield from _outcomes(client, due, work)
+
+
+def _outcomes(
+    client: Any, due: Sequence[Task], work: Callable[[Task], Outcome]
+) -> Iterator[Outcome]:
+    """Results of a window of tasks; one that fails is tried once more."""
+    distributed: Any = import_module("distributed")
+    tasks = iter(due)
+    window = _AHEAD * max(len(client.scheduler_info(n_workers=-1)["workers"]), 1)
+    running: dict[Any, tuple[Task, int]] = {}
+
+    def submit(task: Task, attempt: int) -> Any:
+        future = client.submit(work, task, key=f"winchkit-{task.key}-{attempt}")
+        running[future.key] = (task, attempt)
+        return future
+
+    ended = distributed.as_completed([submit(task, 0) for task in islice(tasks, window)])
+    for future in ended:
+        task, attempt = running.pop(future.key)
+        error = future.exception()
+        outcome = failed(task, f"{type(error).__name__}: {error}") if error else future.result()
+        future.release()
+        if outcome.diagnosis.get("failure") is not None and attempt == 0:
+            ended.add(submit(task, 1))
+            continue
+        yield outcome
+        for task in islice(tasks, 1):
+            ended.add(submit(task, 0))
+
+
+def _processes() -> int:
+    """Processes for the cores and the memory of this computer."""
+    system: Any = import_module("distributed.system")
+    return max(1, min(int(system.CPU_COUNT), int(system.MEMORY_LIMIT // _WORKER_BYTES)))
+
+
+def _version_of_worker() -> str:
+    from winchkit.version import __version__ as own
+
+    return own
+
+
+def _require_version(client: Any, scheduler: str) -> None:
+    found = set(client.run(_version_of_worker).values())
+    if found - {__version__}:
+        others = ", ".join(sorted(found - {__version__}))
+        raise UsageError(
+            f"{scheduler}: its workers have winchkit {others}, this computer {__version__}; "
+            "install the same version there"
+        )
