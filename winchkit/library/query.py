@@ -79,7 +79,23 @@ def library_runs(
 
 
 def library_estimates(folder: str | Path) -> pa.Table:
-    """Estimates of a library; raises FileError for a folder without an index."""
+    """Estimates of a library.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the runs, which was indexed.
+
+    Returns
+    -------
+    pyarrow.Table
+        Columns of the table ``estimates``; docs/formats.md.
+
+    Raises
+    ------
+    FileError
+        For a folder without an index.
+    """
     return _indexed(folder).read("estimates")
 
 
