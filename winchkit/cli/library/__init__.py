@@ -1,1 +1,5 @@
-"""Commands on a library of runs: index, list, query; and the diagnosis of a fleet."""
+"""``winchkit library`` and ``winchkit fleet``: runs of many winches in a folder.
+
+``index``, ``list`` and ``query`` are commands on the tables of the runs; ``diagnose`` fills those of
+the diagnoses.
+"""
