@@ -2,10 +2,12 @@
 
 ``python benchmarks/robot_tick.py [--json] [--robot ipanema3]``: for one pose of eight cables the
 inverse kinematics with elongation and drums, the same with Eq. 8's forces and strains found anew,
-and the forward kinematics warm-started from a pose half a millimetre off, each in plain Python and
-compiled (where numba is installed, the ``fast`` extra); inverse and forward kinematics of many
-poses at once. Promised: 20 and 2 us for the first, 200 and 4 us for the forward kinematics, a
-million poses a second; 1 ms for Eq. 8. Exits with 1 when a promise is broken.
+the inverse dynamics (Newton-Euler, Eq. 8, drums, motor torques), the same with the elongation under
+the dynamic wrench, and the forward kinematics warm-started from a pose half a millimetre off, each
+in plain Python and compiled (where numba is installed, the ``fast`` extra); inverse and forward
+kinematics of many poses at once. Promised: 20 and 2 us for the first, 40 and 4 us for the inverse
+dynamics, 200 and 4 us for the forward kinematics, a million poses a second; 1 ms for Eq. 8. Exits
+with 1 when a promise is broken.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from winchkit.catalog import find
 from winchkit.estimation.elongation import ElongationCorrection
 from winchkit.model.robot import (
     PLAIN,
+    DynamicsCycle,
     Linear,
     Pose,
     Robot,
@@ -42,6 +45,10 @@ LIMITS = {
     "tick, compiled": 2e-6,
     "tick with Eq. 8, plain": 1e-3,
     "tick with Eq. 8, compiled": 1e-3,
+    "dynamics, plain": 40e-6,
+    "dynamics, compiled": 4e-6,
+    "dynamics with elongation, plain": 1e-3,
+    "dynamics with elongation, compiled": 1e-3,
     "forward, plain": 200e-6,
     "forward, compiled": 4e-6,
     "inverse, a pose of many": 1e-6,
@@ -49,12 +56,15 @@ LIMITS = {
 RATIOS = (
     ("tick, compiled", "tick, plain"),
     ("tick with Eq. 8, compiled", "tick with Eq. 8, plain"),
+    ("dynamics, compiled", "dynamics, plain"),
+    ("dynamics, plain", "tick with Eq. 8, plain"),
     ("forward, compiled", "forward, plain"),
     ("inverse, a pose of many", "inverse, numpy one by one"),
     ("forward, a pose of many", "forward, numpy one by one"),
 )
 ROUNDS = 7
 STEP = 0.5e-3
+PERIOD, ROTOR = 1e-3, 4e-4
 MIDDLE_FORCE, STIFFNESS = 500.0, 439.13e3
 MANY, BATCH = 500_000, 5_000
 
@@ -92,6 +102,8 @@ def one_by_one(robot: Robot, kernels: RobotKernels, name: str) -> dict[str, floa
     near = Pose(there.position + STEP / 3**0.5, there.rotation)
     lengths = [kernels.array(robot.lengths(at)[0].tolist()) for at in (there, near)]
     cycle.start_from(pose)
+    dynamics = DynamicsCycle(robot, initial, PERIOD, inertia=[ROTOR] * count, kernels=kernels)
+    rates, gains = kernels.array([0.3, -0.2, 0.1, 0.2, 0.1, 0.4]), kernels.array([1.0] * 6)
 
     def forth_and_back() -> None:
         cycle.pose_at(lengths[1])
@@ -101,6 +113,13 @@ def one_by_one(robot: Robot, kernels: RobotKernels, name: str) -> dict[str, floa
         f"tick, {name}": fastest_of(lambda: cycle.motor_angles(pose, strains), 3000),
         f"tick with Eq. 8, {name}": fastest_of(
             lambda: cycle.motor_angles(pose, stretch.update(pose).strain), 1000
+        ),
+        f"dynamics, {name}": fastest_of(lambda: dynamics.update(pose, rates, gains), 1000),
+        f"dynamics with elongation, {name}": fastest_of(
+            lambda: dynamics.update(
+                pose, rates, gains, stretch.update(pose, dynamics.wrench(pose, rates, gains)).strain
+            ),
+            1000,
         ),
         f"forward, {name}": fastest_of(forth_and_back, 500) / 2,
     }

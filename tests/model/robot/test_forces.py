@@ -18,6 +18,7 @@ from winchkit.model.robot import (
     gravity_wrench,
     improved_closed_form,
     quadratic,
+    steepest_force,
     structure_matrix,
     wrench_feasibility,
 )
@@ -179,3 +180,10 @@ def test_weight_acts_in_the_centre_of_mass() -> None:
     np.testing.assert_allclose(found[:3], [0, 0, -3 * GRAVITY])
     np.testing.assert_allclose(found[3:], np.cross(lever, found[:3]), atol=1e-12)
     assert found[4] == pytest.approx(-0.2 * 3 * GRAVITY)
+
+
+def test_the_steepest_force_is_told_per_length_of_path() -> None:
+    distance = np.array([0.0, 0.1, 0.3, 0.4])
+    force = np.array([[1.0, 5.0], [2.0, 5.0], [8.0, np.nan], [9.0, 4.0]])
+    assert steepest_force(force, distance) == pytest.approx(30.0)
+    assert np.isnan(steepest_force(force[:1], distance[:1]))

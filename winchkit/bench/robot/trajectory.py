@@ -10,7 +10,8 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.control.motion import JERK_TIME
 from winchkit.bench.robot.path import Path
-from winchkit.model.robot import ForceLimits, Pose, Robot, quadratic
+from winchkit.model.robot import ForceLimits, PlatformMotion, Pose, Robot, quadratic
+from winchkit.model.robot import dynamic_wrench as of_motion
 from winchkit.model.trajectory import Trajectory, plan
 
 __all__ = ["PlatformTrajectory", "dynamic_wrench", "plan_along"]
@@ -99,15 +100,25 @@ def plan_along(
 
 
 def dynamic_wrench(robot: Robot, pose: Pose, acceleration: Array) -> Array:
-    """Weight and inertial force of the platform's mass about its origin, (k, 6), N and N m.
+    """Weight and inertial force of a motion along a path, (k, 6), N and N m.
 
-    The moment of inertia is not part of a profile; rotation acts on the mass as if concentrated
-    in its centre.
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    pose : Pose
+        k poses.
+    acceleration : (k, 3) array
+        Of the platform's origin, m/s^2; angular velocity and acceleration are taken as zero.
+
+    Returns
+    -------
+    (k, 6) array
+        About the platform's origin.
     """
-    wrench = robot.weight(pose)
-    inertial = -robot.platform.mass * acceleration
-    lever = pose.rotation @ np.asarray(robot.platform.center_of_mass, dtype=float)
-    return np.asarray(wrench + np.concatenate([inertial, np.cross(lever, inertial)], axis=1))
+    still = np.zeros_like(acceleration)
+    motion = PlatformMotion(pose, np.hstack([still, still]), np.hstack([acceleration, still]))
+    return of_motion(robot.platform, motion)
 
 
 def _forces(robot: Robot, pose: Pose, acceleration: Array, limits: ForceLimits) -> Array:

@@ -26,6 +26,7 @@ from winchkit.model.robot.force_distribution import (
     closed_form,
     improved_closed_form,
     quadratic,
+    steepest_force,
     wrench_feasibility,
 )
 from winchkit.model.robot.forward import Found, forward
@@ -87,6 +88,7 @@ __all__ = [
     "robot_of",
     "rotation_of",
     "sensitivities",
+    "steepest_force",
     "structure_matrix",
     "swivel_angle",
     "swivel_sensitivities",

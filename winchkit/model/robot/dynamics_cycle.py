@@ -35,7 +35,7 @@ class DynamicTarget:
     motor_torque: Any
     """Feed-forward: cable force times arm, and the inertia of the winch, (n,), N m."""
     good: bool
-    """False where the pose determines no forces: force and torque are those of the last cycle."""
+    """False where the pose determines no forces: all values are those of the last cycle."""
 
 
 class DynamicsCycle:
@@ -69,7 +69,6 @@ class DynamicsCycle:
         "_inertia",
         "_initial",
         "_kernels",
-        "_lengths",
         "_lines",
         "_now",
         "_period",
@@ -110,8 +109,8 @@ class DynamicsCycle:
         self._initial = array(np.asarray(initial, dtype=float).tolist())
         self._inertia, self._period, self._now = array(given), period, 0.0
         self._work, self._wrench = kernels.work(count), array([0.0] * 6)
-        self._still, self._lengths, self._angles, self._forces, self._torques, self._rates = (
-            array([0.0] * count) for _ in range(6)
+        self._still, self._angles, self._forces, self._torques, self._rates = (
+            array([0.0] * count) for _ in range(5)
         )
 
     def wrench(self, pose: Any, velocity: Any, acceleration: Any) -> Any:
@@ -154,18 +153,18 @@ class DynamicsCycle:
         loops, lines = self._kernels, self._lines
         held = self._still if strains is None else strains
         loads = self.wrench(pose, velocity, acceleration)
-        loops.motors(lines, pose, held, self._lengths, self._angles)
         good = bool(loops.forces(lines, pose, self._initial, loads, self._work, self._forces))
         if good:
-            loops.torques(
+            loops.winches(
                 lines,
                 self._work[0],
+                held,
                 self._forces,
                 velocity,
-                self._angles,
                 self._inertia,
                 self._now,
                 self._rates,
+                self._angles,
                 self._torques,
             )
         # After a cycle without speeds the next has no difference of speeds.

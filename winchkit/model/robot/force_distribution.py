@@ -21,6 +21,7 @@ __all__ = [
     "closed_form",
     "improved_closed_form",
     "quadratic",
+    "steepest_force",
     "wrench_feasibility",
 ]
 
@@ -229,6 +230,27 @@ def wrench_feasibility(structure: Array, wrench: Array, limits: ForceLimits) -> 
     best = found.x
     margin = float("nan") if best is None else float(best[-1]) * scale
     return Feasibility(bool(margin >= -_WITHIN * scale), margin)
+
+
+def steepest_force(force: Array, distance: Array) -> float:
+    """Largest change of a cable force per length of a path, N/m.
+
+    Parameters
+    ----------
+    force : (k, n) array
+        Cable forces along the path, N; NaN where there are none.
+    distance : (k,) array
+        Along the path, increasing, m.
+
+    Returns
+    -------
+    float
+        NaN without two neighbouring samples. A distribution that jumps shows a value that grows in
+        proportion as the samples become denser; that of a continuous one has a limit.
+    """
+    slope = np.abs(np.diff(force, axis=0)) / np.diff(distance)[:, None]
+    known = slope[np.isfinite(slope)]
+    return float(known.max()) if len(known) else float("nan")
 
 
 def _nearest(structure: Array, wrench: Array, middle: Array) -> Array:

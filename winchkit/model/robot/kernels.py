@@ -8,7 +8,7 @@ from typing import Any
 
 from winchkit.errors import UsageError
 from winchkit.model.robot.loops import CableLine, cables_loop, motors_loop, wound_angle
-from winchkit.model.robot.loops_dynamics import torques, wrench
+from winchkit.model.robot.loops_dynamics import winches_loop, wrench
 from winchkit.model.robot.loops_pose import (
     cholesky,
     find_loop,
@@ -39,8 +39,8 @@ class RobotKernels:
     """Lines, pose, initial forces, wrench, work → fills forces (n); false where singular."""
     wrench: Function
     """Body, pose, velocity, acceleration → fills weight and inertial forces (6)."""
-    torques: Function
-    """Lines, rows, forces, velocity, angles, inertias, period, rates → fills torques (n)."""
+    winches: Function
+    """Lines, rows, strains, forces, velocity, inertias, period, rates → fills angles, torques."""
     array: Callable[[list[float]], Any]
     """Makes the sequence type of these loops."""
     lines: Callable[[list[CableLine]], Any]
@@ -66,7 +66,7 @@ def _build(
         jit(find_loop(steep, squares, solve, jit(turn), jit(straighten))),
         jit(forces_loop(steep, squares, solve)),
         jit(wrench),
-        jit(torques),
+        jit(winches_loop(jit(wound_angle))),
         array,
         lines,
     )
@@ -115,7 +115,8 @@ def _warm_up(kernels: RobotKernels) -> None:
     kernels.motors(lines, pose, some, kernels.array([0.0] * 6), out)
     kernels.forces(lines, pose, some, some, work, out)
     kernels.wrench(kernels.array([0.0] * 10), pose, some, some, kernels.array([0.0] * 6))
-    kernels.torques(lines, work[0], some, some, out, some, 1.0, kernels.array([0.0] * 6), out)
+    rates = kernels.array([0.0] * 6)
+    kernels.winches(lines, work[0], some, some, some, some, 1.0, rates, out, out)
     kernels.find(lines, out, pose, work, 1e-9, 1)
 
 

@@ -6,11 +6,13 @@ gravity (3) in base axes.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import floor, pi
 from typing import Any
 
-__all__ = ["torques", "wrench"]
+__all__ = ["winches_loop", "wrench"]
 
+Function = Callable[..., Any]
 _TURN = 2.0 * pi
 
 
@@ -44,32 +46,44 @@ def wrench(body: Any, pose: Any, velocity: Any, acceleration: Any, out: Any) -> 
     out[5] = cx * fy - cy * fx - (zx * mx + zy * my + zz * mz)
 
 
-def torques(  # noqa: PLR0917 - numba takes no keywords
-    lines: Any,
-    rows: Any,
-    forces: Any,
-    velocity: Any,
-    angles: Any,
-    inertia: Any,
-    period: float,
-    rates: Any,
-    out: Any,
-) -> None:
-    """Motor torques f r/i + J dφ'/dt; replaces the motor speeds ``rates`` of the last cycle.
+def winches_loop(wound_angle: Function) -> Function:
+    """Loop of motor angles and torques from the lengths and gradients of the cables."""
 
-    With a period of zero, as in the first cycle, the inertia is left out.
-    """
-    for i in range(len(lines)):
-        line = lines[i]
-        turns = ((angles[i] - line.motor_angle) / line.ratio + line.home_angle) / _TURN
-        if line.stepped != 0.0:
-            turns = float(floor(turns))
-        arm = (line.winding + line.growth * max(turns, 0.0)) / line.ratio
-        speed = 0.0
-        for k in range(6):
-            speed += rows[7 * i + 1 + k] * velocity[k]
-        rate = -speed / arm
-        out[i] = forces[i] * arm
-        if period > 0.0:
-            out[i] += inertia[i] * (rate - rates[i]) / period
-        rates[i] = rate
+    def winches(  # noqa: PLR0917 - numba takes no keywords
+        lines: Any,
+        rows: Any,
+        strains: Any,
+        forces: Any,
+        velocity: Any,
+        inertia: Any,
+        period: float,
+        rates: Any,
+        angles: Any,
+        out: Any,
+    ) -> None:
+        """Torques f r/i + J dφ'/dt; replaces the motor speeds ``rates`` of the last cycle.
+
+        With a period of zero, as in the first cycle, the inertia is left out.
+        """
+        vx, vy, vz = velocity[0], velocity[1], velocity[2]
+        ox, oy, oz = velocity[3], velocity[4], velocity[5]
+        for i in range(len(lines)):
+            line, g = lines[i], 7 * i
+            length = rows[g]
+            slack = length - strains[i] * (length + line.dead_length)
+            turned = wound_angle(line, line.home_wound + line.home_length - slack)
+            angles[i] = line.motor_angle + line.ratio * (turned - line.home_angle)
+            turns = turned / _TURN
+            if line.stepped != 0.0 and turns > 0.0:
+                turns = float(floor(turns))
+            arm = (line.winding + line.growth * max(turns, 0.0)) / line.ratio
+            speed = rows[g + 1] * vx + rows[g + 2] * vy + rows[g + 3] * vz
+            speed += rows[g + 4] * ox + rows[g + 5] * oy + rows[g + 6] * oz
+            rate = -speed / arm
+            torque = forces[i] * arm
+            if period > 0.0:
+                torque += inertia[i] * (rate - rates[i]) / period
+            out[i] = torque
+            rates[i] = rate
+
+    return winches
