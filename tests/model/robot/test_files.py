@@ -176,3 +176,13 @@ def test_without_mass_nothing_keeps_the_cables_of_a_suspended_robot_taut(check: 
     result = check(eight.replace('mass = "10 kg"', 'mass = "0 kg"'))
     assert result.exit_code == 0
     assert "without mass nothing keeps the cables taut; give mass (warning)" in result.stderr
+
+
+@pytest.mark.parametrize(("third", "code"), [("0.7 kg m^2", 0), ("0.8 kg m^2", 3)])
+def test_no_body_has_a_moment_above_the_sum_of_the_others(
+    check: object, third: str, code: int
+) -> None:
+    moments = f'inertia = ["0.3 kg m^2", "0.4 kg m^2", "{third}"]\n'
+    result = check(FOUR.replace("[home]", f"{moments}[home]"))  # type: ignore[operator]
+    assert result.exit_code == code, result.stderr
+    assert ("above the sum" in result.stderr) == (code == 3)
