@@ -182,7 +182,7 @@ def test_weight_acts_in_the_centre_of_mass() -> None:
     assert found[4] == pytest.approx(-0.2 * 3 * GRAVITY)
 
 
-def test_the_steepest_force_is_told_per_length_of_path() -> None:
+def test_the_steepest_force_is_per_length_of_path() -> None:
     distance = np.array([0.0, 0.1, 0.3, 0.4])
     force = np.array([[1.0, 5.0], [2.0, 5.0], [8.0, np.nan], [9.0, 4.0]])
     assert steepest_force(force, distance) == pytest.approx(30.0)
