@@ -20,7 +20,7 @@ from winchkit.calibration.robot.pose_design import next_poses
 from winchkit.calibration.robot.prediction import cable_errors, rms
 from winchkit.calibration.robot.profile import Provenance, write_calibrated
 from winchkit.catalog import find
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, WinchkitError
 from winchkit.model.robot import (
     ForceLimits,
     Pose,
@@ -50,14 +50,17 @@ _NO_MASS = (20.0, 150.0)
 
 
 def is_robot(name: str) -> bool:
-    """Whether a profile, by name or file, is that of a robot.
+    """Whether a profile, by name or file, is that of a robot; False where it cannot be read.
 
     Parameters
     ----------
     name : str
-        Name or path; raises FileError.
+        Name or path.
     """
-    return isinstance(read_any(find("profiles", name)), RobotProfile)
+    try:
+        return isinstance(read_any(find("profiles", name)), RobotProfile)
+    except WinchkitError:
+        return False  # the reader of winches says what is wrong with it
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,289 @@
+"""Calibration of a robot by its own bench: drive to poses, measure at rest, fit, validate.
+
+The procedure of the CABTIVE paper (Lessanibahri et al., section IV) in one call. Poses for the fit
+and for the validation are drawn at random in a box about home; each is planned, so that a pose that
+the cables cannot hold within the limits is drawn again. The platform stands still while the tracker
+and the load cells are averaged. Poses of the validation are never used in the fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.bench.robot.path import Waypoint
+from winchkit.bench.robot.planner import moved
+from winchkit.bench.robot.tracker import Tracker, mean_pose
+from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate
+from winchkit.calibration.robot.pose_design import next_poses
+from winchkit.calibration.robot.prediction import rms
+from winchkit.errors import NotPermitted, RunError, UsageError
+from winchkit.model.robot import Pose, angles_of, robot_of, rotation_of
+from winchkit.runs.poses import read_poses
+from winchkit.runs.run import Channel, Run
+
+if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench
+
+__all__ = ["PoseVolume", "SelfCalibration", "recorded_poses", "self_calibrated"]
+
+_TRIES = 40
+"""Draws of one pose, of which one is to be within the limits."""
+_AXES = ("x", "y", "z", "roll", "pitch", "yaw")
+_CHANNELS = tuple(f"platform_{axis}" for axis in _AXES)
+_UNITS = ("m", "m", "m", "rad", "rad", "rad")
+_POLL = 0.05
+_ROUNDS = 6
+"""Times that poses are added to reach a wanted accuracy."""
+
+
+@dataclass(frozen=True)
+class PoseVolume:
+    """Volume about home in which poses are drawn, and how each is measured."""
+
+    half_width: float = 0.075
+    """Along each axis, m; CABTIVE: 75 mm."""
+    half_turn: float = 0.131
+    """About each axis, rad; CABTIVE: 7.5°."""
+    settle: float = 0.5
+    """Time at rest before a measurement, s."""
+    dwell: float = 0.5
+    """Time over which it is averaged, s."""
+
+
+@dataclass(frozen=True)
+class SelfCalibration:
+    """Result of :func:`self_calibrated`."""
+
+    calibrated: Calibrated
+    fit: Run
+    """Poses that were fitted, a row each."""
+    validation: Run
+    """Poses of the validation."""
+
+    @property
+    def held_out(self) -> tuple[float, float]:
+        """Position error of the validation before and after, rms, m."""
+        found = self.calibrated
+        return rms(found.validation_before.distance), rms(found.validation_after.distance)
+
+
+def self_calibrated(
+    bench: Bench,
+    tracker: Tracker,
+    *,
+    poses: int = 60,
+    validation: int = 20,
+    volume: PoseVolume | None = None,
+    options: Options | None = None,
+    accuracy: float | None = None,
+    seed: int = 0,
+    progress: Callable[[str, float | None], None] = lambda _text, _share: None,
+) -> SelfCalibration:
+    """Calibrate the robot of an open bench.
+
+    Parameters
+    ----------
+    bench : Bench
+        With a robot at home or anywhere in its workspace; its operator watches.
+    tracker : Tracker
+        Receives poses of the platform.
+    poses, validation : int
+        Number of poses to fit, and of poses that are never fitted.
+    volume : PoseVolume, optional
+        Where, and how long each is measured.
+    options : Options, optional
+        Effects and noise, as of :func:`winchkit.calibrate`.
+    accuracy : float, optional
+        Held-out position error, m: poses of most information are added, a sixth of ``poses`` at a
+        time, until it is reached, six times at most.
+    seed : int
+        Of the drawn poses.
+    progress : callable, optional
+        Called with what is done and the share of the poses.
+
+    Returns
+    -------
+    SelfCalibration
+        The calibration and the measured poses.
+
+    Raises
+    ------
+    UsageError
+        For fewer than ten poses, or none to validate.
+    NotPermitted
+        Where no pose of the volume is within the limits.
+    MotionError, NoReply
+        Whatever stops a motion; a tracker that sends nothing.
+    """
+    if poses < 10 or validation < 1:
+        raise UsageError(
+            f"{poses} poses to fit and {validation} to validate: at least 10 and 1 are needed"
+        )
+    volume = volume or PoseVolume()
+    random = np.random.default_rng(seed)
+    driver = _Driver(bench, tracker, volume)
+    total = poses + validation
+    try:
+        fit = recorded_poses(
+            driver.drawn(random, poses), bench, "fit",
+            lambda done: progress("measuring poses", done / total),
+        )  # fmt: skip
+        held = recorded_poses(
+            driver.drawn(random, validation), bench, "validation",
+            lambda done: progress("measuring poses", (poses + done) / total),
+        )  # fmt: skip
+        found = _fitted(bench, fit, held, options)
+        for _ in range(_ROUNDS if accuracy else 0):
+            if rms(found.validation_after.distance) <= (accuracy or 0.0):
+                break
+            progress("adding poses", None)
+            more = driver.proposed(found, max(1, poses // 6))
+            extra = recorded_poses(more, bench, "fit", lambda _done: None)
+            fit = _joined(fit, extra)
+            found = _fitted(bench, fit, held, options)
+    finally:
+        bench.stop()
+    return SelfCalibration(found, fit, held)
+
+
+def recorded_poses(
+    rows: Iterator[Array], bench: Bench, name: str, done: Callable[[int], None]
+) -> Run:
+    """Measure poses, a row each.
+
+    Parameters
+    ----------
+    rows : iterator of (m,) arrays
+        Values of the channels; each is measured when it is asked for.
+    bench : Bench
+        Whose robot it is.
+    name : str
+        Of the run.
+    done : callable
+        Called with the number of measured poses.
+
+    Returns
+    -------
+    Run
+        Motor angles and tensions of the lines, and poses of the platform.
+    """
+    values: list[Array] = []
+    for row in rows:
+        values.append(row)
+        done(len(values))
+    lines = bench.robot.robot.names
+    table = np.array(values)
+    channels = {
+        **{f"{line}.motor_angle": Channel(table[:, i], "rad") for i, line in enumerate(lines)},
+        **{
+            f"{line}.tension": Channel(table[:, len(lines) + i], "N")
+            for i, line in enumerate(lines)
+        },
+        **{
+            channel: Channel(table[:, 2 * len(lines) + i], unit)
+            for i, (channel, unit) in enumerate(zip(_CHANNELS, _UNITS, strict=True))
+        },
+    }
+    return Run(name, np.arange(float(len(table))), channels)
+
+
+class _Driver:
+    """Moves the platform from pose to pose and measures each at rest."""
+
+    def __init__(self, bench: Bench, tracker: Tracker, volume: PoseVolume) -> None:
+        self.bench, self.tracker, self.volume = bench, tracker, volume
+        self._here = bench.robot.pose
+        self._preload: Array | None = None
+
+    def drawn(self, random: np.random.Generator, count: int) -> Iterator[Array]:
+        """Rows of random poses within the limits."""
+        reach = np.repeat([self.volume.half_width, self.volume.half_turn], 3)
+        home = self.bench.robot.robot.home
+        for _ in range(count):
+            for _ in range(_TRIES):
+                change = dict(zip(_AXES, random.uniform(-reach, reach).tolist(), strict=True))
+                if self._go(moved(home, change, relative=True)):
+                    break
+            else:
+                raise NotPermitted(
+                    f"none of {_TRIES} poses within {self.volume.half_width * 1e3:g} mm of home is "
+                    "within the limits of robot and winches; choose a smaller box, or wider limits"
+                )
+            yield self._measured()
+
+    def proposed(self, found: Calibrated, count: int) -> Iterator[Array]:
+        """Rows of the poses of most information that are within the limits."""
+        for pose in next_poses(found, count):
+            turned = rotation_of(*pose.angles)[None]
+            if self._go(Pose(np.array([pose.position]), turned)):
+                yield self._measured()
+
+    def _go(self, goal: Pose) -> bool:
+        """Move on a line; False where a limit forbids it."""
+        platform = self.bench.robot
+        waypoint = Waypoint(goal.position[0], goal.rotation[0])
+        try:
+            planned = platform.planner.plan([waypoint], self._here)
+        except (NotPermitted, UsageError):
+            return False
+        for motion in planned:
+            self._preload = platform.begin(motion, hold=True, preload=self._preload)
+            platform.wait()
+        self._here = goal
+        return True
+
+    def _measured(self) -> Array:
+        bench, volume = self.bench, self.volume
+        self._wait(volume.settle)
+        begin = bench.clock.now()
+        seen: list[tuple[list[float], list[float]]] = []
+        while bench.clock.now() < begin + volume.dwell:
+            self._wait(_POLL)
+            winches = bench.snapshot.winch
+            names = bench.robot.robot.names
+            seen.append(
+                ([winches[n].motor_angle for n in names], [winches[n].tension for n in names])
+            )
+        wiring = bench.robot.planner.wiring.tracker
+        poses = self.tracker.require(begin, wiring.listen if wiring else "the tracker's address")
+        pose = mean_pose(poses)
+        angles, tension = (np.mean([row[k] for row in seen], axis=0) for k in (0, 1))
+        return np.concatenate([angles, tension, pose.position, angles_of(pose.rotation)])
+
+    def _wait(self, duration: float) -> None:
+        bench = self.bench
+        end = bench.clock.now() + duration
+        while (left := end - bench.clock.now()) > 0:
+            bench.raise_trouble()
+            bench.clock.sleep(min(_POLL, left))
+
+
+def _fitted(bench: Bench, fit: Run, held: Run, options: Options | None) -> Calibrated:
+    """Fit with the tracker's frame unknown, unless the profile declares it."""
+    robot = bench.robot.robot
+    profile = robot.profile
+    tracker = profile.instrument.tracker
+    unknown = replace(tracker, frame="unknown")
+    profile = replace(profile, instrument=replace(profile.instrument, tracker=unknown))
+    # One set-up of the tracker: both runs are one session.
+    fit, held = (replace(run, metadata={"session": "bench"}) for run in (fit, held))
+    return calibrate(
+        robot_of(profile), read_poses([fit], profile), read_poses([held], profile), options
+    )
+
+
+def _joined(first: Run, second: Run) -> Run:
+    """Rows of both."""
+    if set(first.channels) != set(second.channels):
+        raise RunError(f"{second.name}: has other channels than {first.name}")
+    channels = {
+        name: replace(one, values=np.concatenate([one.values, second[name]]))
+        for name, one in first.channels.items()
+    }
+    count = len(first.time) + len(second.time)
+    return replace(first, time=np.arange(float(count)), channels=channels)
