@@ -83,6 +83,7 @@ def self_calibrated(
     accuracy: float | None = None,
     seed: int = 0,
     progress: Callable[[str, float | None], None] = lambda _text, _share: None,
+    keep: Callable[[Run], None] = lambda _run: None,
 ) -> SelfCalibration:
     """Calibrate the robot of an open bench.
 
@@ -105,6 +106,9 @@ def self_calibrated(
         Of the drawn poses.
     progress : callable, optional
         Called with what is done and the share of the poses.
+    keep : callable, optional
+        Called with the runs ``fit`` and ``validation`` as soon as they are measured, before the
+        fit; again with ``fit`` where poses are added.
 
     Returns
     -------
@@ -137,6 +141,8 @@ def self_calibrated(
             driver.drawn(random, validation), bench, "validation",
             lambda done: progress("measuring poses", (poses + done) / total),
         )  # fmt: skip
+        keep(fit)
+        keep(held)
         found = _fitted(bench, fit, held, options)
         for _ in range(_ROUNDS if accuracy else 0):
             if rms(found.validation_after.distance) <= (accuracy or 0.0):
@@ -145,6 +151,7 @@ def self_calibrated(
             more = driver.proposed(found, max(1, poses // 6))
             extra = recorded_poses(more, bench, "fit", lambda _done: None)
             fit = _joined(fit, extra)
+            keep(fit)
             found = _fitted(bench, fit, held, options)
     finally:
         bench.stop()

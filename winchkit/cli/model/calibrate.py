@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
-from winchkit.cli.core.completion import complete_effect
+from winchkit.cli.bench.calibrate_robot import pose_names
+from winchkit.cli.core.command import Example
+from winchkit.cli.core.completion import complete_bench, complete_effect
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE, RUN, output_option
 from winchkit.cli.core.output import echo_json
@@ -19,7 +22,6 @@ from winchkit.cli.model.options import (
     html_option,
     page_title,
     read_all,
-    runs_argument,
     write_figures,
     write_page,
 )
@@ -50,10 +52,34 @@ _NOISE_DIMENSIONS = {
     examples=(
         "winchkit calibrate cabtive poses.csv -o calibrated.toml",
         "winchkit calibrate cabtive poses.csv --validate more.csv --next 5 -o calibrated.toml",
+        Example(
+            "winchkit calibrate cabtive -b robot.toml --poses 60 -o calibrated.toml",
+            "needs a bench with a robot",
+        ),
     ),
 )
 @click.argument("robot", type=PROFILE)
-@runs_argument
+@click.argument("runs", nargs=-1, metavar="[RUN...]", type=RUN)
+@click.option(
+    "-b",
+    "--bench",
+    metavar="FILE",
+    shell_complete=complete_bench,
+    help="Let this bench drive to the poses and measure them.",
+)
+@click.option(
+    "--poses", type=click.IntRange(10), default=60, show_default=True, help="To drive to."
+)
+@click.option(
+    "--held-out", type=click.IntRange(1), default=20, show_default=True, help="Poses never fitted."
+)
+@click.option(
+    "--box", metavar="LENGTH", default="75 mm", show_default=True, help="Half width about home."
+)
+@click.option(
+    "--turn", metavar="ANGLE", default="7.5 deg", show_default=True, help="Half turn about home."
+)
+@click.option("--accuracy", metavar="LENGTH", help="Add poses until the error is below this.")
 @click.option(
     "--validate",
     "validate",
@@ -85,6 +111,12 @@ _NOISE_DIMENSIONS = {
 def command(
     robot: str,
     runs: Sequence[str],
+    bench: str | None,
+    poses: int,
+    held_out: int,
+    box: str,
+    turn: str,
+    accuracy: str | None,
     validate: Sequence[str],
     output: str,
     effects: Sequence[str],
@@ -103,15 +135,25 @@ def command(
     any mix: position, rotation or some of its angles, swivel angles, cable lengths. The poses
     themselves are always found beside the parameters. Exit status 1, and no file, where the
     held-out error is larger than that of ROBOT.
+
+    With --bench there are no RUNs: the bench moves its robot to random poses about home, waits for
+    rest, averages the tracker and the load cells, fits, and judges other poses. Ctrl-C stops it.
     """
     from winchkit.calibration.robot.pose_design import next_poses
     from winchkit.catalog import find
 
     source = find("profiles", robot)
+    options = _options(effects, noise, loss, middle_force)
+    if bool(runs) == bool(bench):
+        raise UsageError("give the RUNs to fit, or --bench to drive to poses and measure them")
     with progress_bar() as progress:
-        found = _calibrated(
-            source, runs, validate, _options(effects, noise, loss, middle_force), progress
-        )
+        if bench:
+            drive = _Drive(bench, poses, held_out, box, turn, accuracy)
+            found = drive.calibrated(robot, Path(output), options, progress)
+            files = pose_names(Path(output))
+            runs = [str(files["fit"])]
+        else:
+            found = _calibrated(source, runs, validate, options, progress)
         progress("proposing poses", None)
         ahead = next_poses(found, following) if following else []
     if len(ahead) < following:
@@ -134,6 +176,40 @@ def command(
         click.echo(f"winchkit: {found.refusal}", err=True)
         click.get_current_context().exit(1)
     suggest_next("diagnose", runs, "-p", output)
+
+
+@dataclass(frozen=True)
+class _Drive:
+    """Options of a calibration by a bench."""
+
+    bench: str
+    poses: int
+    held_out: int
+    box: str
+    turn: str
+    accuracy: str | None
+
+    def calibrated(
+        self, robot: str, output: Path, options: Options, progress: ProgressCallback
+    ) -> Calibrated:
+        """Drive, measure and fit."""
+        from winchkit.bench.robot.self_calibration import PoseVolume
+        from winchkit.cli.bench.calibrate_robot import calibrated_by_bench
+        from winchkit.units import parse
+
+        volume = PoseVolume(parse(self.box, "length"), parse(self.turn, "angle"))
+        accuracy = None if self.accuracy is None else parse(self.accuracy, "length")
+        return calibrated_by_bench(
+            self.bench,
+            robot,
+            output,
+            poses=self.poses,
+            validation=self.held_out,
+            volume=volume,
+            options=options,
+            accuracy=accuracy,
+            progress=progress,
+        ).calibrated
 
 
 def _source(robot: str, runs: Sequence[str]) -> str:

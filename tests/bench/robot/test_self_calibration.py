@@ -1,0 +1,33 @@
+"""A robot that calibrates itself: hidden geometry and a tracker in a frame of its own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import robot_rectangle
+import robot_self_calibrated
+from winchkit.bench.robot.self_calibration import self_calibrated
+from winchkit.bench.robot.tracker import Tracker
+from winchkit.errors import UsageError
+
+
+@pytest.mark.slow
+def test_the_benchmark_calibrates_a_hidden_geometry() -> None:
+    found = robot_self_calibrated.measure(5, poses=14, validation=4, cycle=0.02)
+    assert found["refused"] is None
+    assert found["held_out_before_mm"] > 0.2
+    assert found["held_out_after_mm"] < 0.25 * found["held_out_before_mm"]
+
+
+@pytest.mark.slow
+def test_the_rectangle_needs_an_estimate_of_the_friction() -> None:
+    found = robot_rectangle.measure(3, cycle=0.04)
+    assert found["dahl_N"] < 0.2 * found["none_N"]
+    assert found["dahl_N"] < found["coulomb_N"]
+    assert np.mean(found["friction"]) == pytest.approx(0.012, rel=0.15)
+
+
+def test_too_few_poses_are_refused_before_anything_moves() -> None:
+    with pytest.raises(UsageError, match="at least 10 and 1"):
+        self_calibrated(None, Tracker(lambda: 0.0), poses=9)  # type: ignore[arg-type]
