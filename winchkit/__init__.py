@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from winchkit.bench.programme import run_programme
     from winchkit.bench.recording.replay import open_replay
     from winchkit.bench.remote.session import attach
+    from winchkit.bench.robot.self_calibration import PoseVolume, SelfCalibration, self_calibrated
+    from winchkit.bench.robot.tracker import Tracker
     from winchkit.calibration.cell.files import read_points
     from winchkit.calibration.cell.fit import fit_cell
     from winchkit.calibration.cell.static_effects import static_effects
@@ -136,11 +138,14 @@ __all__ = [
     "NotPermitted",
     "Parameter",
     "Pose",
+    "PoseVolume",
     "Robot",
     "RobotCycle",
     "Run",
     "RunError",
+    "SelfCalibration",
     "SimulatedClock",
+    "Tracker",
     "UsageError",
     "WinchkitError",
     "__version__",
@@ -211,6 +216,7 @@ __all__ = [
     "run_of",
     "run_programme",
     "scan",
+    "self_calibrated",
     "serve",
     "simulate",
     "sized",
@@ -235,6 +241,8 @@ _NAMES = {
         "cell_zero",
     ),
     "winchkit.bench.commissioning.calls": ("commission",),
+    "winchkit.bench.robot.self_calibration": ("PoseVolume", "SelfCalibration", "self_calibrated"),
+    "winchkit.bench.robot.tracker": ("Tracker",),
     "winchkit.bench.control.snapshot": ("BenchSnapshot",),
     "winchkit.bench.drives.calls": (
         "bus_load",
