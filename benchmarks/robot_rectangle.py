@@ -6,7 +6,8 @@ through the control loop at 250 Hz: CiA 402 drives on CAN, load cells on Modbus 
 platform on elastic cables. The force at the platform is estimated from the cells at the drums
 without friction, with Coulomb friction, and with the Dahl estimator; the numbers of both are
 identified on another motion, with a second cell at the platform's end. The friction of the pulleys
-in the simulation follows another law: Maxwell-slip elements with a Stribeck curve and viscous bearings.
+in the simulation follows another law: Maxwell-slip elements with a Stribeck curve and drag of the
+bearings.
 
 The paper's experiment: 17.9 +- 20.5 N. Prints one JSON object: mean absolute error and standard
 deviation over all samples and cables, N. Exits with 1 above 4 N.
