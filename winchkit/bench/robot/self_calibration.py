@@ -60,6 +60,7 @@ class SelfCalibration:
     """Result of :func:`self_calibrated`."""
 
     calibrated: Calibrated
+    """Estimates, prediction errors before and after, warnings."""
     fit: Run
     """Poses that were fitted, a row each."""
     validation: Run

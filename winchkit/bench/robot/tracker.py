@@ -181,7 +181,13 @@ class Tracker:
         threading.Thread(target=self._run, args=(receiver,), name="tracker", daemon=True).start()
 
     def receive(self, datagram: bytes) -> None:
-        """Take a datagram; what is no pose is counted."""
+        """Take a datagram; what is no pose is counted.
+
+        Parameters
+        ----------
+        datagram : bytes
+            As of :func:`parse_pose`.
+        """
         try:
             pose = parse_pose(datagram, self._now())
         except ValueError as error:
@@ -194,12 +200,23 @@ class Tracker:
             self._poses.append(pose)
 
     def since(self, time: float) -> list[TrackedPose]:
-        """Poses that were received after a time of this computer, s."""
+        """Return the poses that were received after a time.
+
+        Parameters
+        ----------
+        time : float
+            Time of this computer, s.
+
+        Returns
+        -------
+        list of TrackedPose
+            Oldest first, 4096 at most.
+        """
         with self._lock:
             return [pose for pose in self._poses if pose.received > time]
 
     def require(self, since: float, address: str) -> list[TrackedPose]:
-        """Poses since a time; raises NoReply where none came.
+        """Return the poses since a time.
 
         Parameters
         ----------
@@ -207,6 +224,16 @@ class Tracker:
             Time of this computer, s.
         address : str
             Where they are expected, for the message.
+
+        Returns
+        -------
+        list of TrackedPose
+            One at least.
+
+        Raises
+        ------
+        NoReply
+            Where none came.
         """
         found = self.since(since)
         if not found:
