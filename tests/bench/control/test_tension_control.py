@@ -77,7 +77,7 @@ def setting(tension: float = 200.0, stiffness: float = 2e4, travel: float = 0.05
 def test_the_tension_converges_without_overshoot_up_to_the_declared_stiffness(
     stiffness: float, present: float, wanted: float
 ) -> None:
-    held = Held(setting(wanted), stiffness, present)
+    held = Held(setting(wanted, travel=0.1), stiffness, present)
     seen = held.run(12.0)
     assert seen[-1] == pytest.approx(wanted, abs=2.0)
     low, high = sorted((present, wanted))

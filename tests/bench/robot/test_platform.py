@@ -14,10 +14,10 @@ import pytest
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.loop import Callback
-from winchkit.bench.control.snapshot import BenchSnapshot
+from winchkit.bench.control.snapshot import BenchSnapshot, Phase
 from winchkit.bench.robot.path import Waypoint
 from winchkit.bench.robot.platform import Platform
-from winchkit.errors import DriveFault, MotionError, NotPermitted, UsageError
+from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.schema.bench import BenchSpec
 from winchkit.sim.live.bench import LiveBench
 
@@ -127,15 +127,29 @@ def test_forces_of_the_plan_are_within_limits_and_balance_the_platform(bench: Be
     assert np.abs(np.diff(planned.force, axis=0)).max() < 10.0, "forces are continuous"
 
 
-def test_a_fault_of_one_drive_stops_all(live: LiveBench, bench: Bench) -> None:
+@pytest.mark.parametrize("fault", ["over-current", "enable input open"])
+def test_a_lost_drive_makes_all_others_quick_stop_in_one_cycle(
+    live: LiveBench, bench: Bench, fault: str
+) -> None:
     platform = bench.robot
     platform.move(platform.moved({"x": 0.08}, relative=True), wait=False)
     bench.clock.sleep(0.6)
-    live.inject("4.servo", "over-current")
-    with pytest.raises(DriveFault, match="winch 4"):
+    phases: list[set[Phase]] = []
+    bench.loop.samplers.append(
+        lambda seen: phases.append({seen.winch[n].phase for n in NAMES if n != "4"})
+    )
+    live.inject("4.servo", fault)
+    with pytest.raises(MotionError, match="winch 4"):
         platform.wait()
+    bench.clock.sleep(0.3)
+    bench.loop.samplers.pop()
+    after = [seen for seen in phases if Phase.STOPPING in seen]
+    assert after, "a quick stop, no ramp"
+    assert Phase.MOVING not in after[0], "all of them in the cycle in which the first stops"
+    live.inject("4.servo", "recover")
     bench.wait_at_rest(NAMES)
-    assert bench.snapshot.at_rest
+    with pytest.raises(MotionError):
+        platform.move(platform.moved({"x": -0.02}, relative=True))
     bench.reset()
 
 
