@@ -33,6 +33,8 @@ SECTIONS = {
         *(
             "index_library",
             "diagnose_library",
+            "library_history",
+            "LibraryHistory",
             "library_runs",
             "library_estimates",
             "query_library",

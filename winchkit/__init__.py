@@ -85,6 +85,7 @@ if TYPE_CHECKING:
     from winchkit.estimation.dahl_identification import identify_dahl
     from winchkit.estimation.elongation import ElongationCorrection
     from winchkit.library.diagnose import diagnose_library
+    from winchkit.library.history import LibraryHistory, library_history
     from winchkit.library.index import index_library
     from winchkit.library.query import library_estimates, library_runs, query_library
     from winchkit.model.robot.cycle import RobotCycle
@@ -131,6 +132,7 @@ __all__ = [
     "Fault",
     "FileError",
     "ForceLimits",
+    "LibraryHistory",
     "LimitTripped",
     "LiveBench",
     "MotionError",
@@ -183,6 +185,7 @@ __all__ = [
     "info_of",
     "ladder",
     "library_estimates",
+    "library_history",
     "library_runs",
     "listed_benches",
     "load_catalogue",
@@ -313,6 +316,7 @@ _NAMES = {
     "winchkit.estimation.dahl": ("DahlEstimator",),
     "winchkit.estimation.dahl_identification": ("identify_dahl",),
     "winchkit.estimation.elongation": ("ElongationCorrection",),
+    "winchkit.library.history": ("LibraryHistory", "library_history"),
     "winchkit.library.diagnose": ("diagnose_library",),
     "winchkit.library.index": ("index_library",),
     "winchkit.library.query": (

@@ -61,7 +61,7 @@ def described(file: RunFile, profile: ProfileOfRuns | None = None) -> list[Row]:
         return [own | _faulty(file, digest, "changed while it was read; index again")]
     if mapping is not None:
         digest = hashlib.sha256((digest + _content_hash(mapping)).encode()).hexdigest()
-    where = str(mapping) if mapping is not None else None
+    where = None if mapping is None else mapping.relative_to(_library(file)).as_posix()
     shared = own | {"hash": digest, "mapping": where} | _of_file(run, info, file, profile)
     return [shared | _of_winch(run, prefix, file.path) for prefix in run.winches()]
 
@@ -92,6 +92,11 @@ def library_winch(path: str, prefix: str, metadata: str = "") -> str:
 def session_of(metadata: dict[str, str], time: datetime) -> str:
     """Session of a run: its metadata ``session``, else the UTC date of its start."""
     return metadata.get("session") or time.date().isoformat()
+
+
+def _library(file: RunFile) -> Path:
+    """Folder of the library, which the path of the file is below."""
+    return file.files[0].parents[len(PurePosixPath(file.path).parts) - 1]
 
 
 def _read(file: RunFile) -> tuple[Run, Path | None]:

@@ -13,7 +13,7 @@ from winchkit.library.description import ProfileOfRuns, described
 from winchkit.library.files import RunFile, run_files
 from winchkit.library.partitions import Partitions, Row
 
-__all__ = ["IndexReport", "index_library", "no_progress", "profile_of_runs"]
+__all__ = ["IndexReport", "index_library", "no_progress", "profile_of_runs", "profile_path"]
 
 _COMMIT = 5.0
 """Longest time between two writings of the table, s: a kill costs at most these runs."""
@@ -56,6 +56,23 @@ def profile_of_runs(profile: str | Path) -> ProfileOfRuns:
 
     path = find("profiles", str(profile))
     return ProfileOfRuns(hashlib.sha256(path.read_bytes()).hexdigest(), path.stem)
+
+
+def profile_path(profile: str | Path, winch: str) -> Path:
+    """File of a winch's profile; raises FileError.
+
+    Parameters
+    ----------
+    profile : str or Path
+        Profile, or a folder with ``WINCH.toml`` for each winch (``/`` as ``-``).
+    winch : str
+        Name of the winch in the library.
+    """
+    from winchkit.catalog import find
+
+    if Path(profile).is_dir():
+        profile = Path(profile) / f"{winch.replace('/', '-')}.toml"
+    return find("profiles", str(profile))
 
 
 def index_library(

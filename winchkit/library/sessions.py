@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from winchkit.library.partitions import Partitions, Row
+
+if TYPE_CHECKING:
+    from winchkit.runs.run import Run
 
 __all__ = ["SessionRun", "WinchSession", "winch_sessions"]
 
@@ -20,7 +25,20 @@ class SessionRun:
     prefix: str
     """Prefix of the winch's columns; empty without."""
     mapping: str | None
-    """Mapping by which it is read."""
+    """Mapping by which it is read, below the library."""
+
+    def read(self, library: Path) -> Run:
+        """Read it; raises FileError.
+
+        Parameters
+        ----------
+        library : Path
+            Folder of the library.
+        """
+        from winchkit.runs.read import read_run
+
+        mapping = None if self.mapping is None else library / self.mapping
+        return read_run(library / self.path, mapping).of_winch(self.prefix)
 
 
 @dataclass(frozen=True)

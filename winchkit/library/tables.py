@@ -48,7 +48,11 @@ RUNS: tuple[Column, ...] = (
     Column("complete", "flag", "false for a log without its end"),
     Column("fault", "text", "why the file is no run; null for a run"),
     Column("imported_from", "text", "file of another program that the run was made of; null else"),
-    Column("mapping", "text", "mapping by which the file is read; null for a file of winchkit"),
+    Column(
+        "mapping",
+        "text",
+        "mapping by which the file is read, below the library; null for a file of winchkit",
+    ),
     Column("size", "integer", "of the file, or of all parts", "B"),
     Column("mtime", "integer", "date of change since 1970, of the newest part", "ns"),
     Column("hash", "text", "SHA-256 of the content and of the mapping; equal for copies"),

@@ -14,7 +14,7 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from winchkit.library.index import profile_of_runs
+from winchkit.library.index import profile_of_runs, profile_path
 from winchkit.library.partitions import Partitions, Row
 from winchkit.library.sessions import WinchSession
 from winchkit.plain_json import without_nan
@@ -88,11 +88,8 @@ def task_of(
     band : float, optional
         Cut-off of the torque's low-pass, Hz.
     """
-    from winchkit.catalog import find
-
-    if Path(profile).is_dir():
-        profile = Path(profile) / f"{session.winch.replace('/', '-')}.toml"
-    path, known = find("profiles", str(profile)), profile_of_runs(profile)
+    path = profile_path(profile, session.winch)
+    known = profile_of_runs(path)
     basis = [session.winch, session.session, [[r.path, r.hash, r.prefix] for r in session.runs]]
     parts = [basis, known.hash, effects, band, __version__]
     key = hashlib.sha256(json.dumps(parts).encode()).hexdigest()
@@ -105,7 +102,6 @@ def outcome_of(task: Task) -> Outcome:
     """Diagnose the runs of a task; a failure becomes a row with its reason."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.effects.catalogue import load_catalogue
-    from winchkit.runs.read import read_run
     from winchkit.schema.read import read_profile
 
     library = Path(task.library)
@@ -118,10 +114,7 @@ def outcome_of(task: Task) -> Outcome:
             for file, (_, text) in zip(files, task.effects, strict=True):
                 file.write_text(text, encoding="utf-8")
             catalogue = load_catalogue(files)
-        runs = [
-            read_run(library / run.path, run.mapping).of_winch(run.prefix)
-            for run in task.session.runs
-        ]
+        runs = [run.read(library) for run in task.session.runs]
         answer = diagnose(runs, profile, catalogue, task.band)
     except Exception as error:  # noqa: BLE001 - kept with its reason: other sessions go on
         return failed(task, f"{type(error).__name__}: {error}")

@@ -17,6 +17,10 @@ from winchkit.cli.core.command import LETTERS
 from winchkit.cli.core.messages import suggest_next
 
 NOT_RUN = {
+    "needs a Dask scheduler",
+    "needs a bench with a robot",
+    "needs an index",
+    "needs an index: winchkit library index .",
     "asks somebody beside the winch",
     "asks somebody to hang weights",
     "needs a CAN adapter",

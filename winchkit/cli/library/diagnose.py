@@ -21,7 +21,7 @@ __all__ = ["command"]
     cls=Command,
     examples=(
         Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
-        Example("winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786", "a host"),
+        Example("winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786", "needs a Dask scheduler"),
     ),
 )
 @click.argument("folder", metavar="DIR")

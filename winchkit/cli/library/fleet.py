@@ -11,6 +11,7 @@ __all__ = ["command"]
 
 COMMANDS = {
     "diagnose": At("winchkit.cli.library.diagnose", "Diagnose every winch and session."),
+    "trend": At("winchkit.cli.library.trend", "What changed, since when, at what cost."),
 }
 
 
@@ -19,7 +20,7 @@ COMMANDS = {
     table=COMMANDS,
     examples=(
         Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
-        Example("winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786", "a host"),
+        Example("winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786", "needs a Dask scheduler"),
     ),
 )
 def command() -> None:

@@ -1,0 +1,130 @@
+"""``winchkit fleet trend``: what changed in the runs of a library, since when, at what cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.completion import complete_effect, complete_file
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import json_option
+from winchkit.errors import UsageError, suggest
+
+__all__ = ["command"]
+
+_NEEDS_INDEX = "needs an index: winchkit library index ."
+
+
+@click.command(
+    "trend",
+    cls=Command,
+    examples=(
+        Example("winchkit fleet trend . -p bench-spiral --effect cell-gain", _NEEDS_INDEX),
+        Example(
+            "winchkit fleet trend . -p bench-spiral --limit 'cell-gain.gain_error=2 %'",
+            _NEEDS_INDEX,
+        ),
+    ),
+)
+@click.argument("folder", metavar="DIR")
+@click.option(
+    "-p", "--profile", required=True, metavar="P", help="Profile, or folder of WINCH.toml."
+)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME",
+    shell_complete=complete_effect,
+    help="Follow this effect.  [default: those that 'fleet diagnose' named]",
+)
+@click.option(
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar="EFFECT.PARAMETER=VALUE",
+    help="Value that must not be reached; its date is estimated.",
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    multiple=True,
+    metavar="FILE",
+    shell_complete=complete_file,
+    help="Your own effects.",
+)
+@json_option
+def command(
+    *,
+    folder: str,
+    profile: str,
+    effects: Sequence[str],
+    limits: Sequence[str],
+    effect_files: Sequence[str],
+    as_json: bool,
+) -> int:
+    """Fit one set of effects to every session below DIR, and report what changed and since when.
+
+    The same effects are fitted to all winches and dates, so that names do not change from session
+    to session. Every series is tested for a step or a trend, and every winch against the others,
+    at a false discovery rate of 1 % over all of them. The report says date, size, cost and what to
+    do. Exit code 1: something changed, or a winch differs from the others.
+    """
+    from winchkit.library.history import library_history
+    from winchkit.report.fleet_text import history_text
+
+    known = dict(_limit(text, effect_files) for text in limits)
+    with progress_bar() as progress:
+        found = library_history(
+            folder,
+            profile,
+            effects=effects,
+            effect_files=effect_files,
+            limits=known,
+            progress=progress,
+        )
+    for session, reason in found.failures.items():
+        note(f"{session}: {reason}")
+    history = found.history
+    if as_json:
+        told: dict[str, Any] = history.to_json()
+        told |= {
+            "effects": list(found.effects),
+            "sessions": found.sessions,
+            "failures": dict(found.failures),
+        }
+        echo_json(told)
+    else:
+        click.echo(f"{found.sessions} sessions, effects {', '.join(found.effects)}\n")
+        click.echo(history_text(history))
+    return 1 if history.changed or history.odd else 0
+
+
+def _limit(text: str, effect_files: Sequence[str]) -> tuple[tuple[str, str], float]:
+    """``cell-gain.gain_error=2 %`` as effect, parameter and SI value; raises UsageError."""
+    from winchkit.effects.catalogue import load_catalogue
+    from winchkit.units import dimension_of, parse
+
+    left, equals, value = text.partition("=")
+    name, dot, parameter = left.strip().partition(".")
+    if not (equals and dot):
+        raise UsageError(f"--limit '{text}': write EFFECT.PARAMETER=VALUE")
+    catalogue = load_catalogue(effect_files)
+    if name not in catalogue:
+        known = [effect.id for effect in catalogue]
+        raise UsageError(f"--limit '{text}': there is no effect '{name}'{suggest(name, known)}")
+    names = [p.name for p in catalogue[name].parameters]
+    if parameter not in names:
+        raise UsageError(f"--limit '{text}': {name} has {', '.join(names)}")
+    declared = catalogue[name].parameter(parameter)
+    limit = parse(value.strip(), dimension_of(declared.unit) or "ratio")
+    if declared.reciprocal:
+        if not limit > 0:
+            raise UsageError(f"--limit '{text}': it is above 0")
+        return (name, f"1/{parameter}"), 1 / limit
+    return (name, parameter), limit

@@ -1,0 +1,158 @@
+"""History of a library: one set of effects fitted to every session, and what changed since when."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from winchkit.errors import FileError, RunError, UsageError, suggest
+from winchkit.library.index import no_progress, profile_path
+from winchkit.library.partitions import Partitions
+from winchkit.library.sessions import WinchSession, winch_sessions
+
+if TYPE_CHECKING:
+    from winchkit.diagnosis.fleet.history import FleetHistory
+    from winchkit.diagnosis.fleet.sessions import SessionEstimate
+    from winchkit.effects.catalogue import Catalogue
+    from winchkit.effects.term import Term
+
+__all__ = ["LibraryHistory", "common_effects", "library_history"]
+
+
+@dataclass(frozen=True)
+class LibraryHistory:
+    """What changed in the runs of a library."""
+
+    effects: tuple[str, ...]
+    """The set that was fitted to every session."""
+    sessions: int
+    """Number of sessions that were fitted."""
+    history: FleetHistory
+    """Every parameter over winches and time."""
+    failures: Mapping[str, str]
+    """``winch session`` to the reason why it was not fitted."""
+
+
+def common_effects(sets: Iterable[Sequence[str]]) -> tuple[str, ...]:
+    """Choose one effect for every set of effects that the sessions cannot distinguish.
+
+    Parameters
+    ----------
+    sets : iterable of sequence of str
+        Equivalence sets of all sessions.
+
+    Returns
+    -------
+    tuple of str
+        The effect that is in most sets, then that in most of the others, and so on: the name of a
+        cause is the same in all sessions.
+    """
+    left = [tuple(one) for one in sets if one]
+    chosen: list[str] = []
+    while left:
+        counts = Counter(effect for one in left for effect in set(one))
+        best = min(counts, key=lambda effect: (-counts[effect], effect))
+        chosen.append(best)
+        left = [one for one in left if best not in one]
+    return tuple(chosen)
+
+
+def library_history(
+    folder: str | Path,
+    profile: str | Path,
+    *,
+    effects: Sequence[str] = (),
+    effect_files: Sequence[str | Path] = (),
+    limits: Mapping[tuple[str, str], float] | None = None,
+    progress: Callable[[str, float | None], None] = no_progress,
+) -> LibraryHistory:
+    """Fit one set of effects to every session of a library, and test each for changes.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the runs, which was indexed.
+    profile : str or Path
+        Profile of all winches, or a folder with ``WINCH.toml`` for each (``/`` as ``-``).
+    effects : sequence of str, optional
+        Effects to follow; by default those that ``winchkit fleet diagnose`` named.
+    effect_files : sequence of str or Path, optional
+        Files of user effects.
+    limits : mapping, optional
+        (effect, parameter) to the value that must not be reached, SI.
+    progress : callable, optional
+        Called with a text and the share of the work done.
+
+    Returns
+    -------
+    LibraryHistory
+        Changes with dates, odd winches, costs and dates of limits.
+
+    Raises
+    ------
+    FileError
+        For a folder without an index, or a profile that is wrong.
+    UsageError
+        For an unknown effect, and where no effect was named yet.
+    """
+    from winchkit.diagnosis.fleet.history import fleet_history
+    from winchkit.diagnosis.fleet.sessions import null_term
+    from winchkit.effects.catalogue import load_catalogue
+
+    tables = Partitions(Path(folder))
+    if not tables.files("runs"):
+        raise FileError(f"{folder}: has no indexed runs; run 'winchkit library index' on it first")
+    catalogue = load_catalogue(effect_files)
+    chosen = tuple(effects) or common_effects(_named_sets(tables))
+    if not chosen:
+        raise UsageError(
+            f"{folder}: no effect is named in its diagnoses; run 'winchkit fleet diagnose' first, "
+            "or name the effects to follow (--effect)"
+        )
+    for name in chosen:
+        if name not in catalogue:
+            known = [effect.id for effect in catalogue]
+            raise UsageError(f"there is no effect '{name}'{suggest(name, known)}")
+    terms = [null_term(catalogue[name]) for name in chosen]
+    sessions = winch_sessions(tables)
+    estimates: list[SessionEstimate] = []
+    failures: dict[str, str] = {}
+    for number, session in enumerate(sessions):
+        progress(f"{session.winch} {session.session}", number / len(sessions))
+        try:
+            estimates += _fitted(tables, session, profile, terms, catalogue)
+        except (FileError, RunError) as error:
+            failures[f"{session.winch} {session.session}"] = str(error)
+    fitted = len(sessions) - len(failures)
+    return LibraryHistory(chosen, fitted, fleet_history(estimates, limits), failures)
+
+
+def _named_sets(tables: Partitions) -> list[Sequence[str]]:
+    """Equivalence sets of the named effects, one per step of every diagnosis."""
+    rows = tables.read("estimates", ("key", "kind", "effect", "set")).to_pylist()
+    steps = {(row["key"], row["effect"]): row["set"] for row in rows if row["kind"] == "model"}
+    return [steps[key] for key in sorted(steps)]
+
+
+def _fitted(
+    tables: Partitions,
+    session: WinchSession,
+    profile: str | Path,
+    terms: Sequence[Term],
+    catalogue: Catalogue,
+) -> tuple[SessionEstimate, ...]:
+    from winchkit.diagnosis.fleet.sessions import fit_session
+    from winchkit.schema.read import read_profile
+
+    library = tables.runs.resolve()
+    return fit_session(
+        [run.read(library) for run in session.runs],
+        read_profile(profile_path(profile, session.winch)),
+        terms,
+        winch=session.winch,
+        time=session.time.timestamp(),
+        catalogue=catalogue,
+    )

@@ -1,0 +1,121 @@
+"""Maintenance report of a fleet: what changed, since when, what it costs, what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from math import isfinite
+
+from winchkit.diagnosis.fleet.history import FleetHistory, FleetParameter, WinchHistory
+from winchkit.report.words.numbers import quantity
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
+
+__all__ = ["history_text"]
+
+_DO = {
+    "cell": "calibrate the load cell with known weights, look for damage and moisture of its cable",
+    "cable": "measure the cable with a known length and load, look for broken wires; shorten or "
+    "replace it",
+    "drum": "measure the drum, and look how the cable lies on it",
+    "layer": "measure the drum, and look how the cable lies on it",
+    "pulley": "turn the pulleys by hand, clean and lubricate or replace their bearings",
+    "motor": "look at lubricant, temperature and brake of motor and gearbox",
+    "gear": "measure the backlash at the drum, look at oil and teeth",
+    "torque": "compare the drive's torque with a known load; check its settings",
+    "length": "compare the length instrument with a known length",
+    "payload": "weigh the load",
+}
+"""What to do, by the first word of an effect."""
+_US = "%Y-%m-%d"
+_UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
+
+
+def history_text(history: FleetHistory) -> str:
+    """Report of a fleet's history for a terminal.
+
+    Parameters
+    ----------
+    history : FleetHistory
+        Changes and differences.
+
+    Returns
+    -------
+    str
+        Lines: changes, the most significant first, then winches that differ from the others.
+    """
+    lines = [line for pair in history.changed for line in _changed(*pair)]
+    lines += [line for pair in history.odd for line in _odd(*pair)]
+    if not lines:
+        lines = ["No change over time, and no winch that differs from the others."]
+    tested = sum(len(parameter.winches) for parameter in history.parameters)
+    lines += ["", f"{tested} series of estimates; false discovery rate 1 % ({history.procedure})."]
+    if history.undetermined:
+        lines.append(f"{history.undetermined} estimates left out: their runs leave the value open.")
+    return "\n".join(lines)
+
+
+def _changed(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
+    change = winch.change
+    assert change is not None, "a change that was tested is there"
+    name = f"{parameter.effect} {parameter.parameter}"
+    size = _value(change.size, change.size_std, parameter.unit)
+    since = "over the sessions"
+    if change.date is not None and winch.kind != "trend":
+        date = change.date
+        since = f"since {_day(date.date)} (95 %: {_day(date.earliest)} to {_day(date.latest)})"
+    yield f"winch {winch.winch}: {clause(parameter.effect)}: {name} changed by {size} {since}"
+    yield (
+        f"  {winch.kind}; q = {winch.change_q_value:.1g}; now "
+        f"{_value(winch.value, winch.std, parameter.unit)}, all winches "
+        f"{_value(parameter.common, parameter.common_std, parameter.unit)}"
+    )
+    costs = [
+        f"{quantity(size, _UNITS.get(output, ''))} in the {OUTPUT_NAMES.get(output, output)}"
+        for output, size in winch.cost.items()
+        if size > 0
+    ]
+    if costs:
+        yield f"  costs {', '.join(costs)} (rms over the runs)"
+    if winch.limit is not None:
+        yield f"  {_limit(winch, parameter.unit)}"
+    yield f"  do: {_do(parameter.effect)}"
+
+
+def _odd(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
+    own = _value(winch.value, winch.std, parameter.unit)
+    others = _value(parameter.common, parameter.common_std, parameter.unit)
+    name = f"{parameter.effect} {parameter.parameter}"
+    yield f"winch {winch.winch} differs from the others: {name} {own}, the others {others}"
+    yield (
+        f"  q = {winch.odd_q_value:.1g}; pooled "
+        f"{_value(winch.pooled, winch.pooled_std, parameter.unit)}; do: "
+        f"{_do(parameter.effect)}; or is it another winch's profile?"
+    )
+
+
+def _limit(winch: WinchHistory, unit: str) -> str:
+    limit = winch.limit
+    assert limit is not None, "asked for where there is one"
+    ends = f"95 %: {_day(limit.earliest)} to {_day(limit.latest)}"
+    return f"reaches the limit of {quantity(limit.limit, unit)} on {_day(limit.date)} ({ends})"
+
+
+def _value(value: float, std: float, unit: str) -> str:
+    if unit == "1":
+        return f"{100 * value:.4g} ± {100 * std:.2g} %"
+    return f"{value:.4g} ± {std:.2g} {unit}"
+
+
+def _day(time: float) -> str:
+    """Date of a time in s since 1970; in words where there is none."""
+    if not isfinite(time):
+        return "no earlier bound" if time < 0 else "no later bound"
+    try:
+        return datetime.fromtimestamp(time, UTC).strftime(_US)
+    except (OverflowError, ValueError, OSError):
+        return "beyond the calendar"
+
+
+def _do(effect: str) -> str:
+    first = effect.partition("-")[0]
+    return _DO.get(first, "measure it again on the winch")
