@@ -20,6 +20,7 @@ NOT_RUN = {
     "needs a Dask scheduler",
     "needs a bench with a robot",
     "needs an index",
+    "needs the index of the line before",
     "needs an index: winchkit library index .",
     "asks somebody beside the winch",
     "asks somebody to hang weights",

@@ -21,7 +21,10 @@ __all__ = ["command"]
     cls=Command,
     examples=(
         Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
-        Example("winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786", "needs a Dask scheduler"),
+        Example(
+            "winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786",
+            "needs a Dask scheduler",
+        ),
     ),
 )
 @click.argument("folder", metavar="DIR")

@@ -20,7 +20,10 @@ COMMANDS = {
     table=COMMANDS,
     examples=(
         Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
-        Example("winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786", "needs a Dask scheduler"),
+        Example(
+            "winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786",
+            "needs a Dask scheduler",
+        ),
     ),
 )
 def command() -> None:
