@@ -1,4 +1,4 @@
-"""Takes docs/pictures/page-*.png from the page: ``python docs/make_screenshots.py``.
+"""Takes docs/pictures/page-*.png from the page: ``python docs/make_screenshots.py [VIEW …]``.
 
 It needs Chromium, the package ``playwright`` and the extra ``web``. The bench is simulated in real
 time, so it wants a quiet computer.
@@ -19,6 +19,9 @@ from playwright.sync_api import sync_playwright
 
 from winchkit import write_run
 from winchkit.web.examples import example_runs
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from robot_poses.truth import Truth, csv, poses
 
 PICTURES = Path(__file__).with_name("pictures")
 SIZE = {"width": 1280, "height": 900}
@@ -62,6 +65,13 @@ def bench(page: Any, url: str) -> None:
     page.wait_for_timeout(8000)
 
 
+def robot(page: Any, url: str) -> None:
+    """Robot view with calibrated poses and a slice of the feasible ones."""
+    page.goto(url)
+    page.wait_for_selector("#details svg", timeout=120_000)
+    page.wait_for_timeout(10_000)
+
+
 def library(page: Any, url: str) -> None:
     """Library view with two runs laid over each other."""
     page.goto(f"{url}#library")
@@ -77,15 +87,21 @@ def main() -> None:
     if chromium is None:
         sys.exit("no Chromium: apt-get install chromium")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
+        runs = Path(folder) / "runs"
+        runs.mkdir()
         for run in example_runs("demo-eccentric-drum").runs:
-            write_run(run, Path(folder) / f"{run.name}.csv")
+            write_run(run, runs / f"{run.name}.csv")
+        recorded = Path(folder) / "poses.csv"
+        recorded.write_text(csv(poses(Truth(), 60, 7), angles=True))
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         views = {
             "diagnose": (diagnose, ["--mystery", "1"]),
             "bench": (bench, ["--sim", "demo-adequate", "--allow-motion"]),
-            "library": (library, ["--folder", folder]),
+            "robot": (robot, [str(recorded), "-p", "cabtive"]),
+            "library": (library, ["--folder", str(runs)]),
         }
-        for name, (show, arguments) in views.items():
+        for name in sys.argv[1:] or views:
+            show, arguments = views[name]
             with served(*arguments) as url:
                 page = browser.new_page(viewport=SIZE)
                 show(page, url)

@@ -344,6 +344,29 @@ def test_a_held_jog_ends(browser: Any, bench: Served, way: str) -> None:
 
 
 @pytest.mark.realtime
+def test_a_log_counts_its_rows_and_the_cycle_time_has_a_histogram(
+    browser: Any, bench: Served, tmp_path: Path
+) -> None:
+    page = commanding(browser, bench.url)
+    name = f"{tmp_path.name}.csv"
+    page.fill("[aria-label='Name of the log']", name)
+    page.click("#record")
+    until(page, lambda: " rows" in page.inner_text("#recording"))
+    page.click("text=Cycle time")
+    until(page, lambda: page.locator("#cycles rect").count() > 0)
+    cycles = int(page.inner_text("#cycles p").split()[0])
+    until(page, lambda: int(page.inner_text("#cycles p").split()[0]) > cycles + 100)
+    page.click("#record")
+    until(page, lambda: page.inner_text("#recording") == "")
+    page.click("text=Charts")
+    until(page, lambda: page.locator("#strips canvas").count() == 4)
+    page.context.close()
+    log = Path(name)
+    assert len(log.read_text(encoding="utf-8").splitlines()) > 20
+    log.unlink()
+
+
+@pytest.mark.realtime
 def test_a_page_that_vanishes_stops_its_winch_and_one_page_commands(
     browser: Any, bench: Served
 ) -> None:

@@ -46,6 +46,8 @@ _KEPT = 60.0
 """History of the strip charts, s."""
 _PREDICTED = 0.5
 """Period of the model's prediction over the history, s."""
+_COUNTED = 0.5
+"""Period in which the rows of a log are asked for, s."""
 _LATEST_PICTURE = 0.4
 """Age of the picture that a browser had when it ordered a jog, s: eight periods."""
 _LARGEST = 4_000
@@ -285,7 +287,8 @@ class BenchView:
         self._browsers += 1
         browser = _Browser(f"page {self._browsers}", self)
         listening = asyncio.ensure_future(_received(socket, browser))
-        working = asyncio.ensure_future(self._obeying(browser))
+        tasks = self._obeying(browser), _counting(browser)
+        working = [asyncio.ensure_future(task) for task in tasks]
         predicted: dict[str, Any] | None = None
         try:
             while not listening.done():
@@ -306,7 +309,8 @@ class BenchView:
             pass
         finally:
             listening.cancel()
-            working.cancel()
+            for task in working:
+                task.cancel()
             if self._commander is browser:
                 self._commander = None
             await asyncio.to_thread(browser.leave)
@@ -398,6 +402,13 @@ async def _received(socket: WebSocket, browser: _Browser) -> None:
                 browser.said = f"the message is no JSON object of at most {_LARGEST} characters"
 
 
+async def _counting(browser: _Browser) -> None:
+    """Ask for the rows of the log that a browser started, while there is one."""
+    while True:
+        await asyncio.sleep(_COUNTED)
+        await asyncio.to_thread(browser.count)
+
+
 class _Browser:
     """One open page; with a station of its own while it commands."""
 
@@ -409,6 +420,7 @@ class _Browser:
         self.inbox = _Inbox()
         self._station: RemoteStation | None = None
         self._log: tuple[str, float] | None = None
+        self._counted: dict[str, Any] = {}
 
     def take(self, station: RemoteStation) -> None:
         """Command by a station."""
@@ -418,15 +430,24 @@ class _Browser:
     def leave(self) -> None:
         """Close the station: the owner ends what was started by it."""
         station, self._station, self._log = self._station, None, None
+        self._counted = {}
         if station is not None:
             with suppress(WinchkitError):
                 station.close()
 
     def recording(self) -> dict[str, Any] | None:
-        """File and time of the log that this browser started."""
+        """File, time and counters of the log that this browser started."""
         if self._log is None:
             return None
-        return {"file": Path(self._log[0]).name, "seconds": time.monotonic() - self._log[1]}
+        file, began = self._log
+        return {"file": file, "seconds": time.monotonic() - began, **self._counted}
+
+    def count(self) -> None:
+        """Count the rows of the log, and those that it lost."""
+        if self._station is not None and self._log is not None:
+            with suppress(WinchkitError, KeyError):
+                log = self._station.counters()["log"]
+                self._counted = {"rows": log["rows"], "lost": log["drops"]}
 
     def do(self, name: str, asked: dict[str, Any]) -> None:
         """Carry out a message; raises what the station raises."""
@@ -459,7 +480,7 @@ class _Browser:
         if path.name != name or path.suffix not in {".csv", ".mcap"}:
             raise UsageError("a log's name has no folder and ends with .csv or .mcap")
         station.start_log(str(path.resolve()))
-        self._log = (name, time.monotonic())
+        self._log, self._counted = (name, time.monotonic()), {}
 
     def _end_record(self, station: RemoteStation) -> None:
         station.end_log()

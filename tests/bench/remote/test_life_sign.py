@@ -68,6 +68,18 @@ ORDERS: dict[str, Callable[[LocalStation], None]] = {
 }
 
 
+def test_cycles_are_counted_by_the_time_since_the_one_before(attached: Attached) -> None:
+    before = attached.station.status()
+    attached.rig.wait(1.0)
+    after = attached.station.status()
+    period = after["cycle_time"]["period"]
+    pairs = zip(before["cycle_time"]["counts"], after["cycle_time"]["counts"], strict=True)
+    new = [later - earlier for earlier, later in pairs]
+    assert sum(new) == after["cycle"] - before["cycle"]
+    assert sum(new) == pytest.approx(1.0 / period, abs=2)
+    assert new[9] + new[10] == sum(new), "simulated time has no late cycle"
+
+
 @pytest.mark.parametrize("order", ORDERS)
 def test_what_a_silent_client_ordered_ends_by_a_ramp(attached: Attached, order: str) -> None:
     ORDERS[order](attached.station)

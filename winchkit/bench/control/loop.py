@@ -35,6 +35,8 @@ _DRIVES_NOTICE = 1.25
 lost."""
 _LATE = 5
 """Cycles: after a longer gap the frames that wait are read within as many."""
+_TENTHS = 30
+"""Of a period, in which the times of the cycles are counted."""
 _ANEW = 0.1
 """A judgement is put off once in this time at most, s."""
 _HEARD_WITHIN = 0.1
@@ -88,6 +90,9 @@ class ControlLoop:
         self.thread_id = 0
         """Native id of the control thread, once it runs."""
         self.overruns = 0
+        self.cycle_counts = [0] * (_TENTHS + 1)
+        """Cycles by the time since the one before: each count is for a tenth of the period, the
+        last one for everything longer."""
         self.ordering = threading.Lock()
         """Hold it to order several winches: what is ordered under it takes effect in one cycle."""
         self.beating = True
@@ -178,6 +183,8 @@ class ControlLoop:
     def _watch_clock(self, now: float) -> None:
         """Recognise a standstill of this computer by its own clock, before anything is blamed."""
         gap, self._before = now - self._before, now
+        if gap >= 0:
+            self.cycle_counts[min(int(10 * gap / self.cycle), _TENTHS)] += 1
         late = gap > _LATE * self.cycle
         if late and now > self._catching_up + _ANEW:
             # Frames that came meanwhile are read first: until then no silence is judged.

@@ -148,6 +148,10 @@ class LocalStation:
             item["state"] = item["state"].value
         return {
             **to_dict(self._bench.snapshot),
+            "cycle_time": {
+                "period": self._bench.loop.cycle,
+                "counts": list(self._bench.loop.cycle_counts),
+            },
             "bus": buses,
             "realtime": [asdict(item) for item in self._bench.realtime.items],
             "not_commissioned": self._bench.not_commissioned,

@@ -1,9 +1,10 @@
 // The Bench view, and the Stop of all views. A jog lasts as long as its messages: one each 50 ms.
-import { alarm, ask, attempt, colour, el, fill, number, say, socket, svg } from "./page.js";
+import { alarm, ask, attempt, colour, el, fill, icon, number, say, socket, svg } from "./page.js";
+import { cycles } from "./cycle.js";
 import { legend, line, plot } from "./plots.js";
 
 const PERIOD = 50, MOVING = new Set(["moving", "running down"]);
-let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, charts = [], history = {}, paused = false, drawnAt = 0, alive = null;
+let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, charts = [], history = {}, paused = false, drawnAt = 0, tab = "Charts", alive = null;
 
 export async function station(state) {
   if (!state.bench) return;
@@ -64,7 +65,7 @@ function header() {
   const state = now();
   box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${number(state.cable_length)} m` : ""}`;
   const role = box.querySelector("#role"), kind = commands() ? "command" : "watch";
-  if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, commands() ? "➤ You command" : "👁 Watching")); }
+  if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, icon(kind), commands() ? "You command" : "Watching")); }
 }
 
 function words(state) {
@@ -89,7 +90,7 @@ function banner() {
   if (!text) { fill(box); return; }
   const margin = { margin: "12px 24px 0" };
   if (lost) fill(box, el("div", { class: "alert", style: margin }, el("div", {}, lost)));
-  else fill(box, el("div", { class: "alert trip", style: margin }, el("b", {}, "⯃ Tripped"), el("div", {}, trips.map((trip) => el("p", {}, trip)), el("p", { class: "note" }, "Everything stopped. After the reset nothing moves before a new command.")), el("button", { onclick: () => { if (confirm("Clear the trips and drive faults? Nothing moves before a new command.")) send("reset"); }, disabled: !commands() }, "Reset ", el("kbd", {}, "R"))));
+  else fill(box, el("div", { class: "alert trip", style: margin }, el("b", { class: "row" }, icon("trip"), "Tripped"), el("div", {}, trips.map((trip) => el("p", {}, trip)), el("p", { class: "note" }, "Everything stopped. After the reset nothing moves before a new command.")), el("button", { onclick: () => { if (confirm("Clear the trips and drive faults? Nothing moves before a new command.")) send("reset"); }, disabled: !commands() }, "Reset ", el("kbd", {}, "R"))));
 }
 
 function build() {
@@ -105,17 +106,18 @@ function build() {
     return button;
   };
   const step = (mm) => el("button", { onclick: () => { send("step", { winch, change: -mm / 1000, speed }); watchMotion(); } }, `${mm > 0 ? "+" : "−"}${Math.abs(mm)}`);
-  const target = el("input", { size: 7, value: now() ? number(now().cable_length, 4) : "", "aria-label": "Cable length, m" });
-  const file = el("input", { size: 16, value: "bench.csv", "aria-label": "Name of the log" });
+  const target = el("input", { value: now() ? number(now().cable_length, 4) : "", "aria-label": "Cable length, m" });
+  const file = el("input", { class: "file", value: "bench.csv", "aria-label": "Name of the log" });
   fill(root, el("h1", { class: "visually-hidden" }, `Bench ${declared.name}`),
     el("div", { class: "row context" }, el("span", { class: "label" }, "Winch"), el("span", { class: "segments" }, names.map((name) => el("button", { "aria-pressed": String(name === winch), onclick: () => { winch = name; send("show", { winch }); build(); } }, name))),
+      el("span", { class: "segments" }, ["Charts", "Cycle time"].map((name) => el("button", { "aria-pressed": String(name === tab), onclick: () => { tab = name; build(); } }, name))),
       el("span", { class: "row end" }, el("span", { id: "recording", class: "note" }), el("span", { id: "says", class: "note" }),
         declared.allow_motion ? el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command") : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),
     el("div", { class: "bench-grid" },
       el("section", { class: "panel", "aria-label": `Winch ${winch}` }, el("header", {}, el("h2", {}, `Winch ${winch}`), el("span", { class: "note" }, `profile ${declared.winch[winch].profile}${declared.winch[winch].effects.length ? ` + ${declared.winch[winch].effects.length} effect${declared.winch[winch].effects.length === 1 ? "" : "s"}` : ""}`)), el("div", { id: "drawing" })),
       el("div", { style: { display: "grid", gap: "16px", alignContent: "start", minWidth: 0 } },
         el("section", { class: "panel live", id: "values", "aria-label": "Live values" }),
-        el("section", { class: "panel", "aria-label": "Last 60 s" }, el("header", {}, el("h2", {}, "Last 60 s"), legend(["edge", "measured"], ["today", "predicted, residual"]), el("span", { class: "note" }, el("button", { id: "pause", onclick: () => { paused = !paused; document.getElementById("pause").firstChild.textContent = paused ? "Go on " : "Pause "; } }, "Pause ", el("kbd", {}, "P")))), el("div", { id: "strips" })))),
+        tab === "Cycle time" ? el("section", { class: "panel", "aria-label": tab }, el("header", {}, el("h2", {}, "Time between cycles of the control")), el("div", { id: "cycles" })) : el("section", { class: "panel", "aria-label": "Last 60 s" }, el("header", {}, el("h2", {}, "Last 60 s"), legend(["edge", "measured"], ["today", "predicted, residual"]), el("span", { class: "note" }, el("button", { id: "pause", onclick: () => { paused = !paused; document.getElementById("pause").firstChild.textContent = paused ? "Go on " : "Pause "; } }, "Pause ", el("kbd", {}, "P")))), el("div", { id: "strips" })))),
     el("section", { class: "panel controls", style: { marginTop: "16px" }, "aria-label": "Controls" },
       el("fieldset", { class: "jogs" }, el("legend", {}, "Jog"), el("div", { class: "row" }, jogButton(1), jogButton(-1))),
       el("fieldset", {}, el("legend", {}, "Jog speed, m/s"), el("div", { class: "segments", id: "speeds" }, speeds.map((v) => el("button", { "aria-pressed": String(v === speed), onclick: () => { speed = v; build(); } }, String(v))))),
@@ -168,7 +170,7 @@ export function keys(event) {
   if (event.key === "ArrowUp") hold(1);
   else if (event.key === "ArrowDown") hold(-1);
   else if (event.key === "t") send("tare", { winch });
-  else if (event.key === "p") document.getElementById("pause").click();
+  else if (event.key === "p") document.getElementById("pause")?.click();
   else if (event.key === "r" && tripped().length) document.querySelector("#banner button").click();
   else if (event.key === "[" || event.key === "]") { const all = [...document.querySelectorAll("#speeds button")], at = all.findIndex((b) => b.getAttribute("aria-pressed") === "true") + (event.key === "]" ? 1 : -1); if (all[at]) all[at].click(); }
   else return false;
@@ -204,7 +206,7 @@ function refresh() {
   if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
   document.getElementById("says").textContent = picture && picture.commander && !commands() ? `${picture.commander} commands` : "";
   const log = picture && picture.recording;
-  document.getElementById("recording").textContent = log ? `● Recording ${log.file} · ${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}` : "";
+  document.getElementById("recording").textContent = log ? `● Recording ${log.file} · ${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "";
   document.getElementById("record").textContent = log ? "End" : "Record";
   if (!state || at - drawnAt < 90) return;
   drawnAt = at;
@@ -215,6 +217,8 @@ function refresh() {
     cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
     el("div", {}, el("span", { class: "note" }, "State"), el("div", { class: `state ${kind}` }, words(state)), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
   drawing(state);
+  const host = document.getElementById("cycles");
+  if (host && picture.status.cycle_time) cycles(host, picture.status.cycle_time, picture.status.overruns);
   if (!paused) for (const chart of charts) chart();
 }
 
@@ -248,8 +252,8 @@ const gear = () => declared.winch[winch].ratio || 1;
 
 function strips() {
   const box = document.getElementById("strips");
-  fill(box);
   charts = [];
+  if (!box) return;
   const chart = (title, unit, height, read, more = {}) => {
     const last = el("span", { class: "note" }), host = el("div", { class: "plot" });
     box.append(el("div", { class: "strip" }, el("h3", {}, title, el("span", { class: "note" }, unit), last), host));
@@ -263,10 +267,11 @@ function strips() {
     const own = rows(), p = predictions[winch], found = p && p[output], at = new Map(found ? p.time.map((t, i) => [t, found[part][i]]) : []);
     return own.map((row) => at.get(row.time) ?? null);
   };
+  const top = declared.winch[winch].limits.speed;
   const times = () => rows().map((row) => row.time - end());
   const text = (values, digits, unit) => { const v = values.filter((x) => x !== null).at(-1); return v === undefined ? "" : `${v.toFixed(digits).replace("-", "−")} ${unit}`; };
   chart("Tension", "N", 110, () => { const m = measured("tension"); return { data: [times(), m, joined("tension", "tension", "predicted")], last: text(m, 1, "N") }; });
   chart("Motor torque residual", "N m, measured − predicted", 90, () => { const r = joined("motor_torque", "motor_torque", "residual"); return { data: [times(), r], last: text(r, 3, "N m") }; }, { series: [line("today", 1)] });
   chart("Cable length", "m", 90, () => { const m = measured("cable_length"); return { data: [times(), m], last: text(m, 3, "m") }; }, { series: [line("ink", 1.4)] });
-  chart("Speed", "m/s, winding in is positive", 90, () => { const m = measured("cable_speed", -1); return { data: [times(), m], last: text(m, 3, "m/s") }; }, { series: [line("ink", 1.4)], axis: true });
+  chart("Speed", "m/s, winding in is positive", 90, () => { const m = measured("cable_speed", -1); return { data: [times(), m], last: text(m, 3, "m/s") }; }, { series: [line("ink", 1.4)], axis: true, range: () => [-1.05 * top, 1.05 * top] });
 }

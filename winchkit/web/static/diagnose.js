@@ -181,20 +181,20 @@ const toneOf = (row) => ({ history: "muted", today: "today", candidate: "with", 
 const X = (ratio, most) => 10 + (LOG(ratio) / most) * 84;
 
 function rung(row, cell, now, most, output) {
-  const parts = [svg("rect", { x: "0%", y: 0, width: "10%", height: 27, fill: "var(--band)" }), svg("line", { x1: "10%", x2: "10%", y1: 0, y2: 27, stroke: "var(--edge)", "stroke-width": 1.5 })];
+  const parts = [svg("rect", { x: "0%", y: 0, width: "10%", height: "100%", fill: "var(--band)" }), svg("line", { x1: "10%", x2: "10%", y1: 0, y2: "100%", stroke: "var(--edge)", "stroke-width": 1.5 })];
   const right = now && now.ratio ? `${X(now.ratio, most)}%` : null;
   const moving = (names) => ({ "data-rail": right, "data-moves": names });
-  if (right && row.kind !== "history" && row.kind !== "floor") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? 13 : 0, y2: 27, stroke: "var(--today)", "stroke-width": 2, class: "rail", ...moving("x1 x2") }));
+  if (right && row.kind !== "history" && row.kind !== "floor") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? "50%" : 0, y2: "100%", stroke: "var(--today)", "stroke-width": 2, class: "rail", ...moving("x1 x2") }));
   const picked = row.effect === shown.effect && row.kind === "candidate";
   if (cell && cell.ratio) {
     const at = `${X(cell.ratio, most)}%`;
     if (row.kind === "candidate") {
-      if (right) parts.push(svg("line", { x1: at, x2: right, y1: 13.5, y2: 13.5, stroke: "var(--with)", "stroke-width": picked ? 3.5 : 1.5, class: "rung", ...moving("x2") }));
-      parts.push(svg("circle", { cx: at, cy: 13.5, r: picked ? 5.5 : 4, fill: picked ? "var(--with)" : "var(--surface)", stroke: "var(--with)", "stroke-width": 2, class: "dot" }));
-    } else if (row.kind === "today") parts.push(svg("circle", { cx: at, cy: 13.5, r: 5, fill: "var(--today)", class: "dot", ...moving("cx") }));
+      if (right) parts.push(svg("line", { x1: at, x2: right, y1: "50%", y2: "50%", stroke: "var(--with)", "stroke-width": picked ? 3.5 : 1.5, class: "rung", ...moving("x2") }));
+      parts.push(svg("circle", { cx: at, cy: "50%", r: picked ? 5.5 : 4, fill: picked ? "var(--with)" : "var(--surface)", stroke: "var(--with)", "stroke-width": 2, class: "dot" }));
+    } else if (row.kind === "today") parts.push(svg("circle", { cx: at, cy: "50%", r: 5, fill: "var(--today)", class: "dot", ...moving("cx") }));
     else if (row.kind === "history") {
-      parts.push(svg("circle", { cx: at, cy: 13.5, r: 4, fill: "var(--surface)", stroke: "var(--muted)", "stroke-width": 1.5 }));
-      parts.push(svg("line", { x1: at, x2: at, y1: 18, y2: 27, stroke: "var(--muted)", "stroke-dasharray": "2 2" }));
+      parts.push(svg("circle", { cx: at, cy: "50%", r: 4, fill: "var(--surface)", stroke: "var(--muted)", "stroke-width": 1.5 }));
+      parts.push(svg("line", { x1: at, x2: at, y1: "66%", y2: "100%", stroke: "var(--muted)", "stroke-dasharray": "2 2" }));
     }
   }
   return svg("svg", { "aria-hidden": "true", "data-output": output }, parts);
@@ -219,10 +219,10 @@ async function drawCard() {
     const card = cards[effect] || (cards[effect] = await ask(`/api/card?effect=${encodeURIComponent(effect)}`));
     if (effect !== shown.effect || !box.isConnected) return;
     const host = el("div", { class: "plot" });
-    const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}.`) : el("p", { class: "note" }, "✓ Distinguishable from every other candidate with these runs.");
+    const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}.`) : el("p", { class: "note" }, "✓ Distinguishable from every other candidate.");
     fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
-      host, card.signature ? legend(["today", "residual, mean"], ["with", "signature"], ["band", "noise ±1σ", true]) : null,
-      el("div", { class: "row", style: { flexWrap: "nowrap", alignItems: "start" } }, el("p", { class: "note" }, card.what), card.signature ? exporter(`signature-${card.effect}`, () => signatureFigure(card)) : null), el("div", { class: "formula" }, card.formula),
+      host, card.signature ? el("div", { class: "row" }, legend(["today", "residual, mean"], ["with", "signature"], ["band", "±1σ", true]), exporter(`signature-${card.effect}`, () => signatureFigure(card))) : null,
+      el("p", { class: "note" }, card.what), el("div", { class: "formula" }, card.formula),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
       equal, card.next ? el("p", { class: "note" }, card.next) : null,
       el("div", { class: "buttons" }, el("button", { class: "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
@@ -283,11 +283,11 @@ async function drawTime() {
         { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, marks, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }] }] });
     fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise ±1σ", true]),
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
-    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 130, top: 22, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
+    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 140, top: 22, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
     const marked = brushed ? brushed.time : null;
     const low = marked ? mixed(data.x, data.residual, marked, brushed.residual) : [data.x, data.residual];
     const drawn = plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
-      { height: 150, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
+      { height: 180, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
     if (earlier && earlier.curve && earlier.curve.output === output && !span && !marked) {
       const { x, y, worth } = earlier.curve;
       morph(drawn, { x, y: y.map((value) => (value === null ? null : (value * worth) / data.residual_worth)) }, low);
@@ -308,7 +308,7 @@ async function drawMultiples() {
     const range = sym(found.residual);
     panels = found.panels.map((panel) => {
       const host = el("div", { class: "plot" });
-      grid.append(el("div", {}, el("h3", {}, el("span", {}, panel.name, el("span", { class: "note" }, ` ${unitOf(panel.label)}`)), el("span", {}, `${Math.round(100 * panel.share)} %`)), host));
+      grid.append(el("div", {}, el("h3", {}, el("span", {}, panel.name, el("span", { class: "note" }, ` ${unitOf(panel.label)}`)), el("span", { class: "share" }, `${Math.round(100 * panel.share)} %`)), host));
       const { index, columns: data } = sorted(panel.x, found.residual, Array(panel.x.length).fill(null));
       const drawn = plot(host, data, [{ paths: dots("today", 0.28, 2), points: { show: false } }, { paths: dots("brush", 0.9, 3), points: { show: false } }],
         { height: 120, traces: [{ x: panel.bins, y: panel.means, tone: "today", width: 2 }], noise: found.noise, range, logarithmic: panel.logarithmic, label: `Residual over ${panel.label}`, select: (low, high) => brush(found, panel, low, high) });

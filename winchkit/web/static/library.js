@@ -23,7 +23,7 @@ function render() {
   const body = el("tbody", {}, rows());
   fill(root, el("h1", { class: "visually-hidden" }, "Library"), el("div", { class: "row context" }, el("span", { class: "label" }, `Folder ${found.folder}: ${found.runs.length} file${found.runs.length === 1 ? "" : "s"}`), search,
     el("span", { class: "row end" }, el("label", { class: "row" }, "Overlay", pick), el("button", { class: "primary", id: "open", disabled: !chosen.size, onclick: () => attempt(async () => { await order("library", { names: [...chosen] }); location.hash = "#diagnose"; }) }, "Compare in Diagnose"))),
-  el("div", { class: "grid" }, el("section", { class: "panel w7 scroll", "aria-label": "Runs" }, el("table", { class: "rows" }, el("thead", {}, el("tr", {}, ["", "Run", "Programme", "Load", "Winch", "Length", "Date"].map((text, i) => el("th", { class: i === 5 ? "number" : "" }, text || el("span", { class: "visually-hidden" }, "Choose"))))), body)),
+  el("div", { class: "grid" }, el("section", { class: "panel w7 scroll", "aria-label": "Runs" }, el("table", { class: "rows" }, el("thead", {}, el("tr", {}, ["", "Run", "Programme", "Load", "Winch", "Length", "Date, UTC"].map((text, i) => el("th", { class: i === 5 ? "number" : "" }, text || el("span", { class: "visually-hidden" }, "Choose"))))), body)),
     el("section", { class: "panel w5", "aria-label": "Overlay" }, el("header", {}, el("h2", {}, "Overlay"), el("span", { class: "note" }, "each from its own start")), el("div", { id: "overlay" }, el("p", { class: "note" }, "Choose runs on the left.")))));
   overlay();
 }
@@ -34,7 +34,7 @@ function rows() {
   if (!seen.length) return [el("tr", {}, el("td", { colspan: 7 }, found.runs.length ? "No run has these words." : "There are no runs in this folder; start with --folder DIR."))];
   return seen.map((run) => run.fault ? el("tr", {}, el("td", {}), el("td", {}, run.name), el("td", { colspan: 5, class: "note" }, run.fault))
     : el("tr", {}, el("td", {}, el("input", { type: "checkbox", style: { minHeight: "auto" }, checked: chosen.has(run.name), "aria-label": `Choose ${run.name}`, onchange: (event) => { if (event.target.checked) chosen.add(run.name); else chosen.delete(run.name); document.getElementById("open").disabled = !chosen.size; overlay(); } })),
-      el("td", {}, run.name), el("td", {}, run.programme || "–"), el("td", {}, run.load || "–"), el("td", {}, run.winches.filter(Boolean).join(", ") || "–"), el("td", { class: "number" }, `${number(run.seconds, 3)} s`), el("td", { class: "note" }, run.date)));
+      el("td", {}, run.name), el("td", {}, run.programme || "–"), el("td", { class: "tight" }, run.load || "–"), el("td", {}, run.winches.filter(Boolean).join(", ") || "–"), el("td", { class: "tight number" }, `${number(run.seconds, 3)} s`), el("td", { class: "tight note" }, run.date.slice(0, 16).replace("T", " "))));
 }
 
 async function overlay() {

@@ -27,7 +27,7 @@ export function slideRails(box, before) {
   if (!moved.length) return;
   if (still()) {
     for (const { node, drawn, from } of moved) if (node.tagName === "line" && node.getAttribute("class") === "rail") {
-      const earlier = svg("line", { x1: `${from}%`, x2: `${from}%`, y1: node.getAttribute("y1"), y2: 27, stroke: "var(--today)", "stroke-width": 2, "stroke-dasharray": "2 4", class: "earlier" });
+      const earlier = svg("line", { x1: `${from}%`, x2: `${from}%`, y1: node.getAttribute("y1"), y2: "100%", stroke: "var(--today)", "stroke-width": 2, "stroke-dasharray": "2 4", class: "earlier" });
       drawn.append(earlier);
       setTimeout(() => earlier.remove(), STAYS);
     }

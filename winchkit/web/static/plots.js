@@ -3,18 +3,25 @@ import { colour, el, number } from "./page.js";
 
 const FONT = "12px Inter, system-ui, sans-serif";
 
-// Ticks as text, the unit beside the last one; of a logarithmic axis only whole powers of ten.
-function label(ticks, unit) {
-  const shown = ticks.map((tick) => (tick === null ? "" : number(tick)));
+// Ticks as text, the unit beside the last one.
+function label(ticks, unit, words) {
+  const shown = ticks.map((tick) => (tick === null ? "" : words(tick)));
   const last = shown.findLastIndex((text) => text !== "");
   return shown.map((text, index) => (index === last && unit ? `${text} ${unit}` : text));
 }
+
+// Of a logarithmic axis whole powers of ten, at most four.
+function powers(low, high) {
+  const first = Math.ceil(Math.log10(low) - 1e-9), last = Math.floor(Math.log10(high) + 1e-9), step = Math.max(1, Math.ceil((last - first + 1) / 4));
+  return Array.from({ length: Math.max(0, Math.floor((last - first) / step) + 1) }, (_, i) => 10 ** (first + i * step));
+}
+const power = (tick) => tick >= 0.01 && tick <= 1000 ? number(tick) : `10${String(Math.round(Math.log10(tick))).replace(/./g, (c) => ({ "-": "⁻" })[c] || "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])}`;
 
 function axes(xLabel, logarithmic, flat) {
   const ink = () => colour("muted");
   return [
     { stroke: ink, font: FONT, size: 26, space: flat ? 44 : 64, grid: { show: false }, ticks: { stroke: () => colour("line"), size: 4 }, gap: 4,
-      values: (u, ticks) => label(ticks, xLabel) },
+      ...(logarithmic ? { splits: (u, axis, low, high) => powers(low, high), filter: (u, ticks) => ticks } : {}), values: (u, ticks) => label(ticks, xLabel, logarithmic ? power : number) },
     { stroke: ink, font: FONT, size: flat ? 34 : 44, space: flat ? 24 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
       values: (u, ticks) => ticks.map((tick) => tick === null ? "" : number(tick)) },
   ];

@@ -2,11 +2,12 @@
 import { alarm, ask, attempt, dialog, download, el, fill, icon, number, order, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
 
-let root = null, view = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
+let root = null, view = null, newest = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
 
 export function enter(main, state) { root = main; signature = null; update(state); }
 
 export function update(state) {
+  newest = state;
   const now = JSON.stringify([state.robot, state.busy, state.faults]);
   if (now === signature && root.firstChild) return;
   const fresh = !signature || !state.robot || JSON.parse(signature)[0]?.number !== state.robot.number;
@@ -19,7 +20,7 @@ export function update(state) {
     view = next;
     shown.row = Math.min(shown.row, view.poses);
     await fetchPicture();
-    render(state);
+    render(newest);
     fetchSlice();
   });
 }
