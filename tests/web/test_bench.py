@@ -12,7 +12,11 @@ pytest.importorskip("starlette")
 from hypothesis import given
 from hypothesis import strategies as st
 
+from winchkit.catalog import find
+from winchkit.errors import UsageError
+from winchkit.schema.read import read_simbench
 from winchkit.web.bench import _Inbox
+from winchkit.web.drive_objects import drive_objects
 
 
 def taken(inbox: _Inbox) -> list[dict[str, Any]]:
@@ -39,3 +43,13 @@ def test_of_jogs_that_wait_only_the_newest_is_left_and_every_other_message_ends_
     assert [item["number"] for item in left if item["do"] != "jog"] == others
     jogs = [item["number"] for item in left if item["do"] == "jog"]
     assert jogs == ([len(names) - 1] if names and names[-1] == "jog" else [])
+
+
+@pytest.mark.parametrize("phase", ["moving", "running down", "enabling", None])
+def test_objects_are_not_read_where_a_winch_is_not_disabled(phase: str | None) -> None:
+    spec = read_simbench(find("sim", "demo-adequate")).bench
+    status = {} if phase is None else {"winch": {"A": {"phase": phase}}}
+    with pytest.raises(UsageError, match="read where it is disabled"):
+        drive_objects(spec, status, "A")
+    with pytest.raises(UsageError, match="there is no winch 'B'"):
+        drive_objects(spec, status, "B")

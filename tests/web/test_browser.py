@@ -344,7 +344,7 @@ def test_a_held_jog_ends(browser: Any, bench: Served, way: str) -> None:
 
 
 @pytest.mark.realtime
-def test_a_log_counts_its_rows_and_the_cycle_time_has_a_histogram(
+def test_a_log_counts_its_rows_and_cycles_and_objects_are_shown(
     browser: Any, bench: Served, tmp_path: Path
 ) -> None:
     page = commanding(browser, bench.url)
@@ -358,6 +358,8 @@ def test_a_log_counts_its_rows_and_the_cycle_time_has_a_histogram(
     until(page, lambda: int(page.inner_text("#cycles p").split()[0]) > cycles + 100)
     page.click("#record")
     until(page, lambda: page.inner_text("#recording") == "")
+    page.click("text=Drive objects")
+    until(page, lambda: "6041h" in page.inner_text("#objects"))
     page.click("text=Charts")
     until(page, lambda: page.locator("#strips canvas").count() == 4)
     page.context.close()

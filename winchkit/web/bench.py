@@ -37,6 +37,7 @@ from winchkit.errors import ConnectionLost, UsageError, WinchkitError
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.schema.read import read_bench, read_profile
+from winchkit.web.drive_objects import drive_objects
 
 __all__ = ["BenchView", "simulated_bench"]
 
@@ -162,6 +163,7 @@ class BenchView:
         return [
             Route("/api/bench", self._declared),
             Route("/api/bench/history", self._past),
+            Route("/api/bench/objects", self._objects),
             Route("/api/bench/stop", self._stop, methods=["POST"]),
             WebSocketRoute("/live/bench", self._live),
         ]
@@ -199,6 +201,10 @@ class BenchView:
 
     async def _past(self, request: Request) -> Response:
         return JSONResponse({name: list(rows) for name, rows in self._history.items()})
+
+    async def _objects(self, request: Request) -> Response:
+        winch = request.query_params.get("winch", "")
+        return JSONResponse(await asyncio.to_thread(drive_objects, self.spec, self._newest, winch))
 
     async def _stop(self, request: Request) -> Response:
         await asyncio.to_thread(self._stop_now)

@@ -1,6 +1,7 @@
 // The Bench view, and the Stop of all views. A jog lasts as long as its messages: one each 50 ms.
 import { alarm, ask, attempt, colour, el, fill, icon, number, say, socket, svg } from "./page.js";
 import { cycles } from "./cycle.js";
+import { objects } from "./objects.js";
 import { legend, line, plot } from "./plots.js";
 
 const PERIOD = 50, MOVING = new Set(["moving", "running down"]);
@@ -110,13 +111,14 @@ function build() {
   const file = el("input", { class: "file", value: "bench.csv", "aria-label": "Name of the log" });
   fill(root, el("h1", { class: "visually-hidden" }, `Bench ${declared.name}`),
     el("div", { class: "row context" }, el("span", { class: "label" }, "Winch"), el("span", { class: "segments" }, names.map((name) => el("button", { "aria-pressed": String(name === winch), onclick: () => { winch = name; send("show", { winch }); build(); } }, name))),
-      el("span", { class: "segments" }, ["Charts", "Cycle time"].map((name) => el("button", { "aria-pressed": String(name === tab), onclick: () => { tab = name; build(); } }, name))),
+      el("span", { class: "segments" }, ["Charts", "Drive objects", "Cycle time"].map((name) => el("button", { "aria-pressed": String(name === tab), onclick: () => { tab = name; build(); } }, name))),
       el("span", { class: "row end" }, el("span", { id: "recording", class: "note" }), el("span", { id: "says", class: "note" }),
         declared.allow_motion ? el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command") : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),
     el("div", { class: "bench-grid" },
       el("section", { class: "panel", "aria-label": `Winch ${winch}` }, el("header", {}, el("h2", {}, `Winch ${winch}`), el("span", { class: "note" }, `profile ${declared.winch[winch].profile}${declared.winch[winch].effects.length ? ` + ${declared.winch[winch].effects.length} effect${declared.winch[winch].effects.length === 1 ? "" : "s"}` : ""}`)), el("div", { id: "drawing" })),
       el("div", { style: { display: "grid", gap: "16px", alignContent: "start", minWidth: 0 } },
         el("section", { class: "panel live", id: "values", "aria-label": "Live values" }),
+        tab === "Drive objects" ? el("section", { class: "panel", "aria-label": tab }, el("header", {}, el("h2", {}, `Objects of the drive of winch ${winch}`)), el("div", { id: "objects" })) :
         tab === "Cycle time" ? el("section", { class: "panel", "aria-label": tab }, el("header", {}, el("h2", {}, "Time between cycles of the control")), el("div", { id: "cycles" })) : el("section", { class: "panel", "aria-label": "Last 60 s" }, el("header", {}, el("h2", {}, "Last 60 s"), legend(["edge", "measured"], ["today", "predicted, residual"]), el("span", { class: "note" }, el("button", { id: "pause", onclick: () => { paused = !paused; document.getElementById("pause").firstChild.textContent = paused ? "Go on " : "Pause "; } }, "Pause ", el("kbd", {}, "P")))), el("div", { id: "strips" })))),
     el("section", { class: "panel controls", style: { marginTop: "16px" }, "aria-label": "Controls" },
       el("fieldset", { class: "jogs" }, el("legend", {}, "Jog"), el("div", { class: "row" }, jogButton(1), jogButton(-1))),
@@ -127,6 +129,7 @@ function build() {
       el("fieldset", {}, el("legend", {}, "Log"), el("div", { class: "row" }, file, el("button", { id: "record", onclick: () => (picture && picture.recording ? send("end_record") : send("record", { file: file.value })) }, "Record")))),
     el("div", { class: "stopbar" }, jogButton(1), stopButton(), jogButton(-1)));
   strips();
+  if (tab === "Drive objects") objects(document.getElementById("objects"), winch);
   refresh();
 }
 
