@@ -52,7 +52,7 @@ SEEN = """() => { const at = performance.now(), old = document.querySelector("#t
     if (now && now !== old) window.drawn = performance.now() - at;
     else requestAnimationFrame(look); };
   requestAnimationFrame(look); }"""
-"""Time until the curves are drawn anew, ms."""
+"""Time until the curves are drawn again, ms."""
 PRESSED = """() => addEventListener("keydown",
   (event) => { window.pressed = performance.timeOrigin + event.timeStamp; }, true)"""
 
