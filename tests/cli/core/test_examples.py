@@ -77,6 +77,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
             "winchkit add motor-viscous --fit demo-*.csv -p better.toml -o both.toml",
             "winchkit export demo-10kg-1.csv -o lift.mcap",
             "winchkit import logger.csv -o imported -y --save-mapping mapping.toml",
+            "winchkit library index .",
         ):
             run(line)
         Path("cut.mcap").write_bytes(Path("lift.mcap").read_bytes()[:-200])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import click
 
-from winchkit.cli.core.command import Example
 from winchkit.cli.core.lazy import At, LazyGroup
 
 __all__ = ["command"]
@@ -21,7 +20,7 @@ COMMANDS = {
     table=COMMANDS,
     examples=(
         "winchkit library index .",
-        Example("winchkit library list . --winch A", "needs the index of the line before"),
+        "winchkit library list . --winch A",
     ),
 )
 def command() -> None:

@@ -6,21 +6,19 @@ from datetime import date, datetime
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.model.options import json_option
 
 __all__ = ["command"]
-
-_NEEDS_INDEX = "needs an index: winchkit library index ."
 
 
 @click.command(
     "list",
     cls=Command,
     examples=(
-        Example("winchkit library list . --winch A --since 2026-03-01", _NEEDS_INDEX),
-        Example("winchkit library list . --load '10 kg' --json", _NEEDS_INDEX),
+        "winchkit library list . --winch A --since 2026-03-01",
+        "winchkit library list . --load '10 kg' --json",
     ),
 )
 @click.argument("folder", metavar="DIR")

@@ -7,27 +7,19 @@ import sys
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.model.options import json_option
 
 __all__ = ["command"]
-
-_NEEDS_INDEX = "needs an index: winchkit library index ."
 
 
 @click.command(
     "query",
     cls=Command,
     examples=(
-        Example(
-            'winchkit library query . "SELECT winch, count(*) AS runs FROM runs GROUP BY winch"',
-            _NEEDS_INDEX,
-        ),
-        Example(
-            'winchkit library query . "SELECT time, value, std FROM estimates" --json',
-            _NEEDS_INDEX,
-        ),
+        'winchkit library query . "SELECT winch, count(*) AS runs FROM runs GROUP BY winch"',
+        'winchkit library query . "SELECT time, value, std FROM estimates" --json',
     ),
 )
 @click.argument("folder", metavar="DIR")

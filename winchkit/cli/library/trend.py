@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_effect, complete_file
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.output import echo_json
@@ -17,18 +17,13 @@ from winchkit.errors import UsageError, suggest
 
 __all__ = ["command"]
 
-_NEEDS_INDEX = "needs an index: winchkit library index ."
-
 
 @click.command(
     "trend",
     cls=Command,
     examples=(
-        Example("winchkit fleet trend . -p bench-spiral --effect cell-gain", _NEEDS_INDEX),
-        Example(
-            "winchkit fleet trend . -p bench-spiral --limit 'cell-gain.gain_error=2 %'",
-            _NEEDS_INDEX,
-        ),
+        "winchkit fleet trend . -p bench-spiral --effect cell-gain",
+        "winchkit fleet trend . -p bench-spiral --effect cell-gain --limit cell-gain.gain_error=2%",
     ),
 )
 @click.argument("folder", metavar="DIR")
