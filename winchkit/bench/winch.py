@@ -336,7 +336,7 @@ class Winch:
                     cell.max_age,
                 )
                 control = TensionControl(
-                    self._parts.cable, limits, setting, self._tension_reading, self._trip_tension
+                    self._parts.cable, limits, setting, self.tension_reading, self.trip_tension
                 )
                 self._jog, self._tension = None, control
                 control.refresh(expires)
@@ -344,8 +344,19 @@ class Winch:
             else:
                 control.refresh(expires)
 
-    def _tension_reading(self, now: float) -> TensionReading:
-        """Tension at the platform end: the load's instrument, else the cell with its correction."""
+    def tension_reading(self, now: float) -> TensionReading:
+        """Tension at the platform end: the load's instrument, else the cell with its correction.
+
+        Parameters
+        ----------
+        now : float
+            s.
+
+        Returns
+        -------
+        TensionReading
+            Newest value with its age.
+        """
         load, cell = self.sensors.get("load"), self.sensors.get("cell")
         sensor = load or cell
         newest = None if sensor is None else sensor.latest
@@ -354,7 +365,14 @@ class Winch:
         correction = 0.0 if load is not None else self._parts.cable.correction
         return TensionReading(newest.value + correction, now - newest.t_receive)
 
-    def _trip_tension(self, words: str) -> None:
+    def trip_tension(self, words: str) -> None:
+        """Latch a trip of the control of the tension.
+
+        Parameters
+        ----------
+        words : str
+            Why.
+        """
         trip = Trip("tension control", self.name, words, latches=True)
         self._bench.loop.supervisor.latch(trip)
 

@@ -59,6 +59,8 @@ class RobotWiring(Table):
     )
     """rad/s^2."""
     lost_winch: LostWinch = "stop-together"
+    tension_trim: bool = False
+    """Whether the cable forces are corrected at the end of each motion, by the load cells."""
     tracker: TrackerWiring | None = None
 
     def rules(self) -> Iterator[Rule]:

@@ -464,8 +464,8 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
     ),
     BenchCondition(
         "tension control",
-        "cable that a held tension has moved, while the tension asks for more",
-        "the declared travel, 100 mm by default, for 0.5 s",
+        "cable that a held tension, or a trim of a robot, has moved, while it asks for more",
+        "the declared travel, by default 100 mm (trim: 10 mm), for 0.5 s",
     ),
     BenchCondition("latch file", "reading and writing of the latch file", "possible"),
     BenchCondition(

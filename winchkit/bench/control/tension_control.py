@@ -18,14 +18,22 @@ from winchkit.errors import UsageError
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.profiles.winch import CableSpec
 
-__all__ = ["TensionControl", "TensionReading", "TensionSetting", "greatest_stiffness"]
+__all__ = [
+    "LOOP",
+    "STUCK",
+    "TensionControl",
+    "TensionReading",
+    "TensionSetting",
+    "fastest_within",
+    "greatest_stiffness",
+]
 
-_LOOP = 0.25
+LOOP = 0.25
 """Gain times stiffness times delay: of 0.37, the limit of a response without overshoot, and 1.57,
 the limit of stability, of an integrator with a delay."""
 _MARGIN = 2e-3
 """Of cable, kept to the declared travel, m."""
-_STUCK = 0.5
+STUCK = 0.5
 """Time for which the travel may be used up before the winch trips, s."""
 _STEEL = 210e9
 """Modulus of elasticity of steel, Pa: no cable is stiffer than a steel bar of its diameter."""
@@ -60,7 +68,7 @@ class TensionSetting:
     @property
     def gain(self) -> float:
         """Winding speed per tension error, m/s/N."""
-        return _LOOP / (self.stiffness * self.delay)
+        return LOOP / (self.stiffness * self.delay)
 
 
 def greatest_stiffness(cable: CableSpec, length: float, declared: float | None) -> float:
@@ -98,6 +106,12 @@ def greatest_stiffness(cable: CableSpec, length: float, declared: float | None) 
             'gain is computed; give the stiffness, such as "20 kN/m"'
         )
     return axial / span
+
+
+def fastest_within(room: float, limits: LimitSpec) -> float:
+    """Largest speed (m/s) from which the drive, with its lag, stops within the room (m)."""
+    lag = limits.acceleration * limits.response_time
+    return math.sqrt(lag * lag + 2 * limits.acceleration * max(0.0, room)) - lag
 
 
 class TensionControl:
@@ -153,17 +167,11 @@ class TensionControl:
         wish = setting.gain * (setting.tension - reading.value)
         fastest = min(setting.speed, self._limits.speed)
         wish = max(-fastest, min(fastest, wish))
-        allowed = self._allowed(setting.travel - math.copysign(1.0, wish) * travelled)
+        room = setting.travel - math.copysign(1.0, wish) * travelled - _MARGIN
+        allowed = fastest_within(room, self._limits)
         used_up = allowed == 0.0 and wish != 0.0
         self._watch_travel(now, reading.value, used_up=used_up)
         return math.copysign(min(abs(wish), allowed), wish)
-
-    def _allowed(self, room: float) -> float:
-        """Largest speed from which the drive, with its lag, stops within the room (m)."""
-        acceleration = self._limits.acceleration
-        lag = acceleration * self._limits.response_time
-        room = max(0.0, room - _MARGIN)
-        return math.sqrt(lag * lag + 2 * acceleration * room) - lag
 
     def _watch_travel(self, now: float, tension: float, *, used_up: bool) -> None:
         """Trip where the tension asks for more travel for some time."""
@@ -172,7 +180,7 @@ class TensionControl:
             return
         if self._stuck is None:
             self._stuck = now
-        if now - self._stuck >= _STUCK:
+        if now - self._stuck >= STUCK:
             self._trip(
                 f"the tension is {tension:.1f} N after {self.setting.travel * 1e3:.0f} mm of cable "
                 f"(the declared travel), set is {self.setting.tension:.1f} N; look for a broken or "

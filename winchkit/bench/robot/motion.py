@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from winchkit.arrays import Array
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import GAIN, SETTLE_TIME, SETTLED, Target
+from winchkit.bench.robot.tension_trim import CableTrim
 from winchkit.bench.robot.trajectory import PlatformTrajectory
 
 __all__ = ["CableMotion", "PathTime"]
@@ -81,10 +82,16 @@ class CableMotion:
         cable: CableMap,
         *,
         holds: bool,
+        trim: CableTrim | None = None,
     ) -> None:
-        """Take cubic polynomials (4, k) of the motor angle (rad), each for ``step`` (s)."""
+        """Take cubic polynomials (4, k) of the motor angle (rad), each for ``step`` (s).
+
+        ``trim`` corrects the cable forces at the end.
+        """
         self.holds = holds
         self.clock = clock
+        self.trim = trim
+        self._trimming = False
         self._pieces: Sequence[Sequence[float]] = coefficients.T.tolist()
         self._step = step
         self._cable = cable
@@ -94,14 +101,20 @@ class CableMotion:
         """Begin at rest at the first angle of the plan."""
         self.clock.at(time)
 
-    def target(self, time: float, angle: float, _now: float) -> Target:
+    def target(self, time: float, angle: float, now: float) -> Target:
         """Angle and velocity at the present time along the motion."""
+        if self._trimming and self.trim is not None:
+            return self.trim.target(time, angle, now)
         along, rate = self.clock.at(time)
         planned, velocity = self._planned(along)
         ended = self.clock.ended
         velocity = 0.0 if ended else velocity * rate
         arm = self._cable.at(angle)[1]
         done = ended and self._settled(time, (planned - angle) * arm)
+        if done and self.trim is not None and not self.clock.stopped:
+            self._trimming = True
+            self.trim.start(time, planned, 0.0)
+            done = False
         return Target(velocity + GAIN * (planned - angle), planned, velocity * arm, done=done)
 
     def _settled(self, time: float, missing: float) -> bool:
@@ -135,11 +148,14 @@ class CableRunDown:
     @property
     def duration(self) -> float:
         """s."""
-        return self._motion.clock.stop_time
+        trim = self._motion.trim
+        return max(self._motion.clock.stop_time, 0.0 if trim is None else trim.trim.duration)
 
     def start(self, _time: float, _angle: float, _winding_speed: float) -> None:
         """Order the stop for all winches of the robot."""
         self._motion.clock.slow_down()
+        if self._motion.trim is not None:
+            self._motion.trim.trim.end()
 
     def target(self, time: float, angle: float, now: float) -> Target:
         """As along the motion, until it rests."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -10,15 +10,18 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.bench.common_move import wait_together
-from winchkit.bench.control.motion import StartGate
+from winchkit.bench.control.motion import MotionSource, StartGate
 from winchkit.bench.control.snapshot import Direction
+from winchkit.bench.control.tension_control import greatest_stiffness
 from winchkit.bench.host import WinchHost
 from winchkit.bench.robot.motion import CableMotion, PathTime
 from winchkit.bench.robot.path import Waypoint
 from winchkit.bench.robot.planner import Planner, coordinates_of, moved
+from winchkit.bench.robot.tension_trim import CableTrim, ForceTrim, TrimSetting
 from winchkit.bench.robot.trajectory import PlatformTrajectory
-from winchkit.errors import NotPermitted
+from winchkit.errors import NotPermitted, UsageError
 from winchkit.model.robot import Pose, Robot, quadratic
+from winchkit.model.robot.force_distribution import null_space
 from winchkit.schema.robot_bench import RobotWiring
 
 if TYPE_CHECKING:
@@ -29,6 +32,10 @@ __all__ = ["Platform"]
 _AGREE = 0.02
 """Largest difference between a cable length by its drum and by the geometry at the pose that fits
 all cables best, m: a larger one is a wrong reference, a slipped or a slack cable."""
+_TRIM_TRAVEL = 0.01
+"""Of each cable in a correction of the forces, m: half of the difference above."""
+_TRIM_SPEED, _TRIM_TIME = 0.005, 5.0
+"""m/s and s."""
 
 
 class Platform:
@@ -167,15 +174,153 @@ class Platform:
         curve = CubicSpline(planned.time, angles, bc_type="clamped")
         clock = PathTime(planned, self.planner.wiring.acceleration)
         step = float(planned.time[1])
-        sources = {
-            winch: CableMotion(clock, curve.c[:, :, i], step, winch.cable, holds=hold)
-            for i, winch in enumerate(self._winches)
-        }
-        gate = StartGate([partial(winch.ready_for, source) for winch, source in sources.items()])
-        with self._bench.loop.ordering:
-            for winch, source in sources.items():
-                winch.begin(source, gate)
+        trims: list[CableTrim] | list[None] = [None] * len(self._winches)
+        if self.planner.wiring.tension_trim:
+            trims = self._trims(
+                Pose(planned.pose.position[-1:], planned.pose.rotation[-1:]),
+                planned.force[-1],
+                hold=hold,
+            )
+        self._start(
+            [
+                CableMotion(clock, curve.c[:, :, i], step, winch.cable, holds=hold, trim=trim)
+                for i, (winch, trim) in enumerate(zip(self._winches, trims, strict=True))
+            ]
+        )
         return kept
+
+    def trim(
+        self,
+        *,
+        duration: float = _TRIM_TIME,
+        travel: float = _TRIM_TRAVEL,
+        speed: float = _TRIM_SPEED,
+        axial_stiffness: float | None = None,
+        wait: bool = True,
+        hold: bool = False,
+    ) -> None:
+        """Correct the cable forces at rest toward the force distribution of the present pose.
+
+        The measured deviation is corrected as far as it is of forces that balance each other; the
+        pose stays. Without a valid reading of every cable nothing moves. Where the travel is used
+        up for 0.5 s the bench trips.
+
+        Parameters
+        ----------
+        duration : float
+            s.
+        travel : float
+            Of each cable, either way, m.
+        speed : float
+            Of each cable, m/s.
+        axial_stiffness : float, optional
+            Upper bound for the cables, N; by default that of the profile, else of a steel bar.
+        wait : bool
+            Return when all winches are at rest.
+        hold : bool
+            Keep the drives enabled at the end.
+
+        Raises
+        ------
+        UsageError
+            For numbers that cannot be meant.
+        NotPermitted
+            Where there is no force distribution within the limits, or a winch may not move or has
+            no load cell.
+        """
+        numbers = (duration, travel, speed, 1.0 if axial_stiffness is None else axial_stiffness)
+        if not all(0 < number < np.inf for number in numbers):
+            raise UsageError(
+                f"a trim for {duration} s with {travel} m of travel at {speed} m/s cannot be "
+                "meant; all are above zero"
+            )
+        pose = self.pose
+        force = self._forces(pose)[0]
+        if not force.any():
+            raise NotPermitted(
+                "no cable forces within the limits `tension` of [robot] hold the platform here; "
+                "move it, or change the limits"
+            )
+        for winch in self._winches:
+            self._bench.permit(winch.name, Direction.BOTH)
+        self._start(
+            self._trims(
+                pose,
+                force,
+                duration=duration,
+                travel=travel,
+                speed=speed,
+                axial_stiffness=axial_stiffness,
+                hold=hold,
+            )
+        )
+        if wait:
+            self.wait()
+
+    def _trims(
+        self,
+        pose: Pose,
+        force: Array,
+        *,
+        duration: float = _TRIM_TIME,
+        travel: float = _TRIM_TRAVEL,
+        speed: float = _TRIM_SPEED,
+        axial_stiffness: float | None = None,
+        hold: bool,
+    ) -> list[CableTrim]:
+        """A correction toward cable forces (n,) at a pose, of each winch."""
+        robot, winches = self.robot, self._winches
+        cells = [winch.sensors.get("load") or winch.sensors.get("cell") for winch in winches]
+        for winch, cell in zip(winches, cells, strict=True):
+            winch.require_length()
+            if cell is None:
+                raise NotPermitted(
+                    f"winch {winch.name} has no load cell; the cable forces of a platform are "
+                    "corrected by those of all its winches"
+                )
+        lengths = robot.lengths(pose)[0].tolist()
+        stiffness = []
+        for line, length in zip(robot.lines, lengths, strict=True):
+            cable = line.profile.cable
+            bound = (
+                None if axial_stiffness is None else axial_stiffness / (length + cable.dead_length)
+            )
+            stiffness.append(greatest_stiffness(cable, length, bound))
+        null = null_space(robot.structure(pose)[0])
+        limits = [winch.wiring.limits for winch in winches]
+        ages = [cell.max_age for cell in cells if cell is not None]
+        setting = TrimSetting(
+            robot.names,
+            force,
+            null @ null.T,
+            np.array(stiffness),
+            max(ages) + max(one.response_time for one in limits),
+            travel,
+            speed,
+            duration,
+        )
+
+        def readings(now: float) -> Array:
+            out = np.full(len(winches), np.nan)
+            for i, (winch, age) in enumerate(zip(winches, ages, strict=True)):
+                reading = winch.tension_reading(now)
+                if reading.age <= age:
+                    out[i] = reading.value
+            return out
+
+        def trip(index: int, words: str) -> None:
+            winches[index].trip_tension(words)
+
+        common = ForceTrim(setting, limits, readings, trip)
+        return [CableTrim(common, i, winch.cable, holds=hold) for i, winch in enumerate(winches)]
+
+    def _start(self, sources: Sequence[MotionSource]) -> None:
+        """Begin the motion of each winch, all in one cycle."""
+        pairs = list(zip(self._winches, sources, strict=True))
+        gate = StartGate([partial(winch.ready_for, source) for winch, source in pairs])
+        with self._bench.loop.ordering:
+            for winch, source in pairs:
+                winch.begin(source, gate)
 
     def wait(self) -> None:
         """Return at the end of the motion; raises what ended it before."""

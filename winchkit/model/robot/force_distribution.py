@@ -20,6 +20,7 @@ __all__ = [
     "approximate_forces",
     "closed_form",
     "improved_closed_form",
+    "null_space",
     "quadratic",
     "steepest_force",
     "wrench_feasibility",
@@ -192,7 +193,7 @@ def quadratic(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
     """
     low, high = limits.between(structure.shape[1])
     centre = _nearest(structure, wrench, (low + high) / 2)
-    null = _null_space(structure)
+    null = null_space(structure)
     step = _least_distance(
         np.concatenate([null, -null]), np.concatenate([low - centre, centre - high])
     )
@@ -253,17 +254,28 @@ def steepest_force(force: Array, distance: Array) -> float:
     return float(known.max()) if len(known) else float("nan")
 
 
+def null_space(structure: Array) -> Array:
+    """Orthonormal basis of the cable forces that balance each other.
+
+    Parameters
+    ----------
+    structure : (6, n) array
+        Structure matrix Aᵀ.
+
+    Returns
+    -------
+    (n, n − rank) array
+        Null space of Aᵀ.
+    """
+    _, values, right = np.linalg.svd(structure)
+    rank = int(np.sum(values > _RANK * values[0]))
+    return np.asarray(right[rank:].T)
+
+
 def _nearest(structure: Array, wrench: Array, middle: Array) -> Array:
     """Least-squares solution closest to ``middle``."""
     missing = wrench + structure @ middle
     return np.asarray(middle - np.linalg.pinv(structure, rcond=_RANK) @ missing)
-
-
-def _null_space(structure: Array) -> Array:
-    """Orthonormal basis of the null space of Aᵀ, (n, n − rank)."""
-    _, values, right = np.linalg.svd(structure)
-    rank = int(np.sum(values > _RANK * values[0]))
-    return np.asarray(right[rank:].T)
 
 
 def _least_distance(slope: Array, least: Array) -> Array | None:
