@@ -3,10 +3,10 @@
     python benchmarks/robot_trim.py --seed 1 --json
 
 The shipped ``winding-device-robot`` in simulated time. The platform moves to a random pose, one
-winch winds in 3 mm, then ``bench.robot.trim`` corrects. The result is the true deviation of the cable
-forces from the distribution, root mean square over the cables, of those forces that balance each
-other, and how far the platform moved. The profile has no pulley friction, the simulated robot has:
-the error that is left is that of the cells behind the pulleys.
+winch winds in 3 mm, then ``bench.robot.trim`` corrects. The result is the true deviation of the
+cable forces from the distribution, root mean square over the cables, of those forces that balance
+each other, and how far the platform moved. The profile has no pulley friction, the simulated robot
+has: the error that is left is that of the cells behind the pulleys.
 """
 
 from __future__ import annotations
