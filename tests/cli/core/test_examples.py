@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import chdir
 from glob import glob
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,7 @@ ON_DRIVE = ("scan", "info", "config", "lss")
 ON_CELL = ("cell",)
 BENCHES = (*ON_BENCH, *ON_DRIVE, *ON_CELL, "tare")
 WITHOUT_BENCH = ("log info", "log recover", "log replay", "log export", "cell calibrate")
+HAS_LIBRARY = all(find_spec(name) for name in ("pyarrow", "duckdb"))
 INPUT = "quit\n"
 """What is typed: it ends ``sim serve``."""
 POINTS = "load [kg],indicated [N]\n0,0.1\n5,49.3\n10,98.4\n5,49.2\n0,0.2\n"
@@ -45,7 +47,16 @@ def chosen(*groups: str) -> list[Example]:
 
 
 def of() -> list[object]:
-    return [pytest.param(item, id=item.line.replace("/", "|")) for item in chosen()]
+    return [
+        pytest.param(item, id=item.line.replace("/", "|"), marks=_marks(item)) for item in chosen()
+    ]
+
+
+def _marks(example: Example) -> list[pytest.MarkDecorator]:
+    """Examples on a library's tables need the extra ``library``."""
+    if HAS_LIBRARY or not example.line.startswith(("winchkit library", "winchkit fleet")):
+        return []
+    return [pytest.mark.skip(reason="needs the extra 'library'")]
 
 
 def run(line: str, code: int = 0) -> None:
@@ -71,14 +82,15 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "poses.csv").write_text(csv(rows(50, 3)), encoding="utf-8")
     (folder / "more.csv").write_text(csv(rows(10, 99, noise=EXACT)), encoding="utf-8")
     with chdir(folder), served(folder, "A"):
-        for line in (
+        lines = [
             "winchkit sim record demo-elastic-rope programme-demo",
             "winchkit add cable-elongation-linear --fit demo-*.csv -p bench-spiral -o better.toml",
             "winchkit add motor-viscous --fit demo-*.csv -p better.toml -o both.toml",
             "winchkit export demo-10kg-1.csv -o lift.mcap",
             "winchkit import logger.csv -o imported -y --save-mapping mapping.toml",
-            "winchkit library index .",
-        ):
+            *(["winchkit library index ."] if HAS_LIBRARY else []),
+        ]
+        for line in lines:
             run(line)
         Path("cut.mcap").write_bytes(Path("lift.mcap").read_bytes()[:-200])
     return folder
