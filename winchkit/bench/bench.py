@@ -53,6 +53,7 @@ from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
     from winchkit.bench.robot.platform import Platform
+    from winchkit.bench.robot.tracker import Tracker
 
 __all__ = ["Bench", "Stations"]
 
@@ -120,6 +121,8 @@ class Bench:
         self.not_commissioned = ""
         """Why nothing may move before it is commissioned; empty where it is."""
         self._recorders: list[Recorder] = []
+        self._tracker: Tracker | None = None
+        self._tracker_lock = threading.Lock()
         self._release = ReleaseGuard()
         self._commissioner = threading.get_ident() if commissioning else None
         with ExitStack() as stack:
@@ -187,6 +190,24 @@ class Bench:
                 "profile, speed and tension (docs/formats.md)"
             )
         return self._platform
+
+    @property
+    def tracker(self) -> Tracker | None:
+        """The tracker of its robot, received from the first use on; None where none is declared.
+
+        Raises ConnectionLost where its address is in use.
+        """
+        wiring = None if self.spec.robot is None else self.spec.robot.tracker
+        if wiring is None:
+            return None
+        from winchkit.bench.robot.tracker import Tracker
+
+        with self._tracker_lock:
+            if self._tracker is None:
+                tracker = Tracker(self.clock.now)
+                tracker.listen(wiring.listen)
+                self._tracker = tracker
+            return self._tracker
 
     def __enter__(self) -> Self:
         return self
@@ -362,7 +383,8 @@ class Bench:
 
         With ``rotate`` (``"100MB"`` or ``"10min"``) it goes on in ``lift.002.csv`` and so on. An
         earlier log of that name is removed with ``replace`` only. Raises UsageError for one that is
-        there without ``replace``, or that is being written; FileError.
+        there without ``replace``, or that is being written; FileError; ConnectionLost where the
+        robot's tracker cannot be received.
 
         Parameters
         ----------
@@ -386,6 +408,7 @@ class Bench:
             self.clock,
             {**self._wired.metadata, **origin(self.spec), **(metadata or {})},
             self._stop_feeding,
+            tracker=self.tracker,
             rotation=None if rotate is None else Rotation.parse(rotate),
             replace=replace,
         )
@@ -404,6 +427,8 @@ class Bench:
                 self._wired.disarm()
             for recorder in tuple(self._recorders):
                 recorder.close()
+            if self._tracker is not None:
+                self._tracker.close()
         self._stack = ExitStack()
 
     def permit(self, winch: str, direction: Direction, *, held: bool = False) -> None:

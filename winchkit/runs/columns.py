@@ -16,6 +16,11 @@ POSE_DIMENSIONS: dict[str, str] = {
     **dict.fromkeys(("platform_roll", "platform_pitch", "platform_yaw"), "angle"),
 }
 """Dimension of every channel of a robot's platform."""
+_TRACKER_DIMENSIONS: dict[str, str] = {
+    **dict.fromkeys(("tracker_x", "tracker_y", "tracker_z"), "length"),
+    **dict.fromkeys(("tracker_qw", "tracker_qx", "tracker_qy", "tracker_qz"), "ratio"),
+}
+"""The same in the tracker's frame, as it was received."""
 
 _HEADER = re.compile(r"\s*([^\[\]]*?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
 
@@ -30,12 +35,13 @@ def column_dimension(name: str) -> str | None:
     """Dimension of a column, with or without a winch's prefix; None for an unknown one."""
     if name == "time":
         return "time"
-    return POSE_DIMENSIONS.get(name) or CHANNEL_DIMENSIONS.get(name.rpartition(".")[2])
+    pose = POSE_DIMENSIONS.get(name) or _TRACKER_DIMENSIONS.get(name)
+    return pose or CHANNEL_DIMENSIONS.get(name.rpartition(".")[2])
 
 
 def near_miss(name: str) -> str | None:
     """A known name that is similar to an unknown one."""
-    known = ["time", *CHANNEL_DIMENSIONS, *POSE_DIMENSIONS]
+    known = ["time", *CHANNEL_DIMENSIONS, *POSE_DIMENSIONS, *_TRACKER_DIMENSIONS]
     return next(iter(get_close_matches(name.rpartition(".")[2], known, n=1, cutoff=0.75)), None)
 
 

@@ -8,13 +8,16 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
+
+if TYPE_CHECKING:
+    from winchkit.bench.robot.tracker import TrackedPose, Tracker
 
 __all__ = ["CHANNELS", "TARED", "Feed"]
 
@@ -41,6 +44,16 @@ _of_reading = attrgetter("t_sample", "t_receive", *_NUMBERS)
 _FAST_GAP = 0.1
 _BARE_PERIOD = 0.0095
 """Rows of a bench without instruments: a hundredth of a second, less the jitter of a cycle."""
+_TRACKER = Source(
+    "/robot/tracker",
+    (
+        *(Signal(axis, "m", f"tracker_{axis}") for axis in "xyz"),
+        *(Signal(part, "1", f"tracker_{part}") for part in ("qw", "qx", "qy", "qz")),
+        Signal("tracker_time", "s"),
+    ),
+    _FAST_GAP,
+)
+"""Poses in the tracker's frame at the times of their arrival; its own times are not in a run."""
 _UNPOWERED = (Phase.DISABLED, Phase.ENABLING, Phase.RESETTING)
 _WAITING = 65_536
 """Cycles, and readings of an instrument, that may wait for a slow disk: a minute at 1 kHz."""
@@ -49,8 +62,13 @@ _WAITING = 65_536
 class Feed:
     """Collects snapshots and readings; one thread gives, another takes."""
 
-    def __init__(self, sensors: Mapping[str, Mapping[str, Sensor]], opened: float) -> None:
-        """Listen to winches with their sensors by role from ``opened`` (s) on."""
+    def __init__(
+        self,
+        sensors: Mapping[str, Mapping[str, Sensor]],
+        opened: float,
+        tracker: Tracker | None = None,
+    ) -> None:
+        """Listen to winches with their sensors by role, and a tracker, from ``opened`` (s) on."""
         prefix = {name: f"{name}." if len(sensors) > 1 else "" for name in sensors}
         self.lost = 0
         """Cycles and readings that were dropped because they were not taken in time."""
@@ -72,6 +90,9 @@ class Feed:
             if base is None
             else RowRule(topics[id(base)], opened)
         )
+        self._tracker, self._tracked = tracker, opened
+        if tracker is not None:
+            sources.append(_TRACKER)
         self.layout = Layout(tuple(sources), rule)
 
     def give(self, snapshot: BenchSnapshot) -> None:
@@ -89,6 +110,10 @@ class Feed:
             pieces[topic] = _drive_samples(rows)
         for topic, waiting in self._readings.items():
             pieces[topic] = _samples([waiting.popleft() for _ in range(len(waiting))])
+        poses = [] if self._tracker is None else self._tracker.since(self._tracked)
+        if poses:
+            self._tracked = poses[-1].received
+            pieces[_TRACKER.topic] = _tracked(poses)
         return {topic: samples for topic, samples in pieces.items() if len(samples)}, snapshots
 
     def close(self) -> None:
@@ -152,6 +177,12 @@ def _drive_samples(rows: list[tuple[Any, ...]]) -> Samples:
     known[1:] &= table[1:, 0] != table[:-1, 0]
     table = table[known]
     return Samples(table[:, 0], table[:, 0], table[:, 1:])
+
+
+def _tracked(poses: list[TrackedPose]) -> Samples:
+    received = np.array([pose.received for pose in poses])
+    values = np.array([(*pose.position, *pose.quaternion, pose.time) for pose in poses])
+    return Samples(received, received, values)
 
 
 def _samples(readings: list[Reading]) -> Samples:

@@ -19,7 +19,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.recording.feed import CHANNELS, TARED, Feed
@@ -30,6 +30,9 @@ from winchkit.errors import Fault, FileError
 from winchkit.runs.recording.open_log import open_log
 from winchkit.runs.recording.rotation import Rotation
 from winchkit.runs.recording.sync import Syncer
+
+if TYPE_CHECKING:
+    from winchkit.bench.robot.tracker import Tracker
 
 __all__ = ["CHANNELS", "Recorder", "counters_of", "tares_in_force"]
 
@@ -57,16 +60,18 @@ class Recorder:
         metadata: Mapping[str, str],
         detach: Callable[[Recorder], None] = lambda _recorder: None,
         *,
+        tracker: Tracker | None = None,
         rotation: Rotation | None = None,
         replace: bool = False,
     ) -> None:
-        """Log winches with their sensors by role; ``replace`` removes an earlier log of that name.
+        """Log winches with their sensors by role, and the robot's tracker.
 
+        ``replace`` removes an earlier log of that name.
         Raises FileError where it cannot write, UsageError where that would be another log's loss.
         """
         self._sensors, self._clock, self._detach = sensors, clock, detach
         self._offset = _utc_less(clock)
-        self._feed = Feed(sensors, clock.now())
+        self._feed = Feed(sensors, clock.now(), tracker)
         layout = dataclasses.replace(self._feed.layout, clock_offset=self._offset)
         self._about = {**metadata, "clock_offset": f"{self._offset / 1e9:.6f} s"}
         self._tares = tares_in_force(sensors)

@@ -38,7 +38,6 @@ def calibrated_by_bench(
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.identity import client_name
     from winchkit.bench.robot.self_calibration import self_calibrated
-    from winchkit.bench.robot.tracker import Tracker
     from winchkit.catalog import find
     from winchkit.runs.writer import write_run
     from winchkit.schema.read import read_bench
@@ -65,19 +64,16 @@ def calibrated_by_bench(
         note(f"written: {files[run.name]} ({len(run.time)} poses)")
 
     with open_bench(bench, name=client_name("calibrate"), realtime="try") as opened:
-        tracker = Tracker(opened.clock.now)
-        tracker.listen(spec.robot.tracker.listen)
-        try:
-            return self_calibrated(
-                opened,
-                tracker,
-                poses=poses,
-                validation=validation,
-                volume=volume,
-                options=options,
-                accuracy=accuracy,
-                progress=progress,
-                keep=keep,
-            )
-        finally:
-            tracker.close()
+        tracker = opened.tracker
+        assert tracker is not None, "the bench file declares it"
+        return self_calibrated(
+            opened,
+            tracker,
+            poses=poses,
+            validation=validation,
+            volume=volume,
+            options=options,
+            accuracy=accuracy,
+            progress=progress,
+            keep=keep,
+        )
