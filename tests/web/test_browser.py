@@ -362,6 +362,8 @@ def test_a_log_counts_its_rows_and_cycles_and_objects_are_shown(
     until(page, lambda: "6041h" in page.inner_text("#objects"))
     page.click("text=Charts")
     until(page, lambda: page.locator("#strips canvas").count() == 4)
+    residual = page.locator("#strips .strip").nth(1).locator("h3 span").last
+    until(page, lambda: str(residual.inner_text()).endswith("N m"))
     page.context.close()
     log = Path(name)
     assert len(log.read_text(encoding="utf-8").splitlines()) > 20

@@ -33,7 +33,7 @@ function receive(message) {
   const time = message.status.time;
   for (const [name, now] of Object.entries(message.status.winch || {})) {
     const rows = history[name] || (history[name] = []);
-    if (!rows.length || rows.at(-1).time < time) rows.push({ time, ...now });
+    if (!rows.length || rows.at(-1).time < time) rows.push({ ...now, time });
     while (rows.length && rows[0].time < time - 60) rows.shift();
   }
   if (message.said && (!before || before.said !== message.said)) { alarm(message.said); say(message.said); release(); }
