@@ -96,7 +96,7 @@ def test_a_pendulum_swings_with_its_frequency() -> None:
     crossings = np.flatnonzero(np.diff(signs)) * 1e-3
     period = 2 * np.mean(np.diff(crossings))
     assert period == pytest.approx(2 * pi * sqrt(1.5 / GRAVITY), rel=2e-3)
-    assert max(angles[-2500:]) == pytest.approx(start, rel=0.01)
+    assert max(angles[-2500:]) == pytest.approx(start, rel=1e-3)
 
 
 def test_work_of_the_drums_is_stored_or_dissipated() -> None:

@@ -3,7 +3,7 @@
 A cable is a Kelvin-Voigt spring between the length L0 that the winch has paid out and the length L
 that the pose needs, and carries no pressure:
 
-    f = max(0, EA/(L0 + d) (L − L0) + D dL/dt),      D = T EA/(L0 + d)
+    f = max(0, EA/(L0 + d) (L − L0) + D (dL/dt − dL0/dt)),      D = T EA/(L0 + d)
 
 with the dead length d and the damping time T. The rotation of a light platform on stiff cables is
 faster than its motion by orders of magnitude, so that the equations are stiff: they are integrated
@@ -55,7 +55,13 @@ class Simulated:
 
 
 def cable_forces(
-    geometry: Geometry, cables: ElasticCables, pose: Pose, velocity: Array, unstrained: Array
+    geometry: Geometry,
+    cables: ElasticCables,
+    pose: Pose,
+    velocity: Array,
+    unstrained: Array,
+    *,
+    rate: Array | float = 0.0,
 ) -> Array:
     """Forces of elastic cables, (p, n), N; zero where slack.
 
@@ -71,19 +77,21 @@ def cable_forces(
         Of the platform's origin, and angular, m/s and rad/s.
     unstrained : (n,) or (p, n) array
         Lengths L0 without force, m.
+    rate : (n,) or (p, n) array
+        Their derivatives by time, m/s; zero for winches at rest.
 
     Returns
     -------
     (p, n) array
-        N. The winches are taken as standing: the rate of L0 is left out of the damping.
+        N.
     """
     there = lengths(geometry, pose.position, pose.rotation)
     stiffness = cables.axial_stiffness / (unstrained + cables.dead_length)
     pull = stiffness * (there - unstrained)
     if cables.damping_time:
         structure = structure_matrix(geometry, pose.position, pose.rotation)
-        rate = -np.einsum("kij,ki->kj", structure, velocity)
-        pull = pull + np.where(there > unstrained, cables.damping_time * stiffness * rate, 0.0)
+        speed = -np.einsum("kij,ki->kj", structure, velocity) - rate
+        pull = pull + np.where(there > unstrained, cables.damping_time * stiffness * speed, 0.0)
     return np.maximum(pull, 0.0)
 
 
@@ -94,6 +102,7 @@ def integrate(
     start: tuple[Pose, Array],
     *,
     unstrained: Callable[[float], Array],
+    rate: Callable[[float], Array] | None = None,
     time: Array,
     tolerance: float = 1e-8,
 ) -> Simulated:
@@ -111,6 +120,8 @@ def integrate(
         One pose, and its velocity: of the origin, m/s, and angular, rad/s, base axes.
     unstrained : callable
         Lengths (n,) without force at a time, m: of a robot ``robot.lengths_at(angles)[0]``.
+    rate : callable, optional
+        Their derivatives (n,) by time, m/s, which the damping needs; None for winches at rest.
     time : (k,) array
         Instants to report, increasing from the start's, s.
     tolerance : float
@@ -130,13 +141,16 @@ def integrate(
 
     pose, velocity = start
 
+    def paid(now: float) -> Array:
+        return np.zeros(len(geometry.exit_point)) if rate is None else rate(now)
+
     def placed(state: Array) -> tuple[Pose, Array]:
         rows = np.atleast_2d(state)
         return Pose(rows[:, :3], rotation_from_quaternion(rows[:, 3:7])), rows[:, 7:]
 
     def slope(now: float, state: Array) -> Array:
         at, moving = placed(state)
-        force = cable_forces(geometry, cables, at, moving, unstrained(now))
+        force = cable_forces(geometry, cables, at, moving, unstrained(now), rate=paid(now))
         structure = structure_matrix(geometry, at.position, at.rotation)
         wrench = (structure @ force[..., None])[..., 0]
         gained = accelerations(platform, at.rotation, moving, wrench)[0]
@@ -158,6 +172,6 @@ def integrate(
     if not found.success:
         raise UsageError(f"the platform's motion could not be integrated: {found.message}")
     there, moving = placed(found.y.T)
-    rest = np.array([unstrained(float(now)) for now in time])
-    force = cable_forces(geometry, cables, there, moving, rest)
+    rest, rates = (np.array([given(float(now)) for now in time]) for given in (unstrained, paid))
+    force = cable_forces(geometry, cables, there, moving, rest, rate=rates)
     return Simulated(np.asarray(found.t), there, moving, force)
