@@ -12,8 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from winchkit.errors import FileError
-from winchkit.library.index import no_progress
+from winchkit.library.index import indexed, no_progress
 from winchkit.library.partitions import Partitions, Row
 from winchkit.library.sessions import winch_sessions
 from winchkit.library.tasks import Outcome, Task, outcome_of, task_of
@@ -92,9 +91,7 @@ def diagnose_library(
     A diagnosis that fails is tried once more. After an interruption the diagnoses that ended are
     in the tables, and the next call continues.
     """
-    tables = Partitions(Path(folder))
-    if not tables.files("runs"):
-        raise FileError(f"{folder}: has no indexed runs; run 'winchkit library index' on it first")
+    tables = indexed(folder)
     sources = tuple((Path(file).name, Path(file).read_text(encoding="utf-8")) for file in effects)
     tasks = [task_of(tables, session, profile, sources, band) for session in winch_sessions(tables)]
     rows = tables.read("diagnoses", ("key", "failure")).to_pylist()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from winchkit.errors import FileError, RunError, UsageError, suggest
-from winchkit.library.index import no_progress, profile_path
+from winchkit.library.index import indexed, no_progress, profile_path
 from winchkit.library.partitions import Partitions
 from winchkit.library.sessions import WinchSession, winch_sessions
 
@@ -102,9 +102,7 @@ def library_history(
     from winchkit.diagnosis.fleet.sessions import null_term
     from winchkit.effects.catalogue import load_catalogue
 
-    tables = Partitions(Path(folder))
-    if not tables.files("runs"):
-        raise FileError(f"{folder}: has no indexed runs; run 'winchkit library index' on it first")
+    tables = indexed(folder)
     catalogue = load_catalogue(effect_files)
     chosen = tuple(effects) or common_effects(_named_sets(tables))
     if not chosen:

@@ -13,7 +13,14 @@ from winchkit.library.description import ProfileOfRuns, described
 from winchkit.library.files import RunFile, run_files
 from winchkit.library.partitions import Partitions, Row
 
-__all__ = ["IndexReport", "index_library", "no_progress", "profile_of_runs", "profile_path"]
+__all__ = [
+    "IndexReport",
+    "index_library",
+    "indexed",
+    "no_progress",
+    "profile_of_runs",
+    "profile_path",
+]
 
 _COMMIT = 5.0
 """Longest time between two writings of the table, s: a kill costs at most these runs."""
@@ -56,6 +63,20 @@ def profile_of_runs(profile: str | Path) -> ProfileOfRuns:
 
     path = find("profiles", str(profile))
     return ProfileOfRuns(hashlib.sha256(path.read_bytes()).hexdigest(), path.stem)
+
+
+def indexed(folder: str | Path) -> Partitions:
+    """Tables of a folder; raises FileError where it has no index.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the runs.
+    """
+    tables = Partitions(Path(folder))
+    if not tables.files("runs"):
+        raise FileError(f"{folder}: has no indexed runs; run 'winchkit library index' on it first")
+    return tables
 
 
 def profile_path(profile: str | Path, winch: str) -> Path:
