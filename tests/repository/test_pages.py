@@ -66,6 +66,9 @@ NOT_RUN = {
     "the answer depends on the computer": "docs/realtime.md",
     "needs the drive": "docs/howto/drive.md",
     "tests/devices/test_makers_drives.py runs it with the maker's file": "docs/howto/drive.md",
+    "needs a bench with a robot": "docs/howto/robot-motion.md",
+    "moves a simulated robot for three minutes": "docs/howto/tracker.md",
+    "needs a folder of runs over months": "docs/howto/fleet.md",
     "the checks of .ci/run": "CONTRIBUTING.md",
     "changes the changelog": "docs/release.md",
     "tests/repository/test_wheel.py installs winchkit into a new environment": (
