@@ -36,6 +36,7 @@ def recorded(bench: str, programme: str | Path, **options: Any) -> list[Run]:
 def test_every_example_is_known_here() -> None:
     files = {path.name for path in EXAMPLES.iterdir() if path.is_file()}
     toml = {"ladder.toml", "short.toml", "stroke.toml", "winding-device.toml"}
+    toml |= {"robot-rectangle.toml", "robot-star.toml", "robot-poses.toml"}
     assert files == {"better_position.py", "heave.py", "my_effect.py"} | toml
 
 
