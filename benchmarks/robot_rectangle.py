@@ -86,19 +86,20 @@ def recorded(
     return recorder.values
 
 
-def learning(seed: int) -> list[tuple[dict[str, float], float]]:
+def learning(seed: int, moves: int = 8) -> list[tuple[dict[str, float], float]]:
     """Another motion: reversals of many sizes, at other places, heights and speeds."""
     random = np.random.default_rng(seed)
     out = []
-    for size in (0.12, 0.05, 0.02, 0.1, 0.01, 0.03, 0.08, 0.0):
+    for size in (0.12, 0.05, 0.02, 0.1, 0.01, 0.03, 0.08, 0.0)[-moves:]:
         x, y, z = (random.uniform(-1, 1, 3) * size).tolist()
         out.append(({"x": x, "y": y, "z": z}, float(random.uniform(0.02, 0.06))))
     return out
 
 
-def rectangle() -> list[tuple[dict[str, float], float]]:
+def rectangle(scale: float = 1.0) -> list[tuple[dict[str, float], float]]:
     """To the first corner and round."""
-    return [({"x": x, "y": y}, SPEED) for x, y in (*CORNERS, CORNERS[0], (0.0, 0.0))]
+    corners = (*CORNERS, CORNERS[0], (0.0, 0.0))
+    return [({"x": scale * x, "y": scale * y}, SPEED) for x, y in corners]
 
 
 def estimates(group: PulleyGroup, values: Array) -> dict[str, Array]:
@@ -117,8 +118,10 @@ def estimates(group: PulleyGroup, values: Array) -> dict[str, Array]:
     }
 
 
-def measure(seed: int, cycle: float = 0.004, cables: int = 8) -> dict[str, Any]:
-    """Errors of the three laws on the rectangle."""
+def measure(
+    seed: int, cycle: float = 0.004, cables: int = 8, scale: float = 1.0, moves: int = 8
+) -> dict[str, Any]:
+    """Errors of the three laws on the rectangle, and smaller for a test."""
     sim = read_simbench(find("sim", ROBOT))
     sim = replace(sim, bench=replace(sim.bench, cycle=cycle))
     winch = next(iter(sim.bench.winch.values())).profile
@@ -127,8 +130,8 @@ def measure(seed: int, cycle: float = 0.004, cables: int = 8) -> dict[str, Any]:
     with LiveBench(sim, seed=seed, simulated_time=clock) as live:
         with open_bench(live.bench_spec, clock) as bench:
             clock.sleep(0.5)
-            taught = recorded(bench, live, learning(seed))
-            judged = recorded(bench, live, rectangle())
+            taught = recorded(bench, live, learning(seed, moves))
+            judged = recorded(bench, live, rectangle(scale))
         assert live.robot is not None
     random = np.random.default_rng([seed, 1])
     errors: dict[str, list[Array]] = {"none": [], "coulomb": [], "dahl": []}
