@@ -130,7 +130,7 @@ def test_it_names_friction_what_the_directions_differ_in_and_a_record_of_command
     assert found[:2] == [("motor-viscous-asymmetry",), ("torque-lead",)]
     assert set(found[2]) <= {"motor-coulomb", "motor-stribeck"}
     position = {name for effects in found[3:] for name in effects}
-    assert position <= {"spring-balancer", "friction-at-place"}
+    assert position <= {"spring-balancer", "joint-gravity", "friction-at-place"}
     assert any("no run repeats another" in note for note in answer.notes)
     values = {name: of for step in answer.steps for name, of in step.parameters.items()}
     drag = values["motor-viscous-asymmetry"]["viscosity_difference"]

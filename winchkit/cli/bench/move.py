@@ -9,7 +9,7 @@ import click
 
 from winchkit.cli.bench.direction_option import direction_options, read_direction
 from winchkit.cli.bench.pose_option import pose_line, read_pose
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -35,8 +35,8 @@ _POLL = 0.05
     examples=(
         "winchkit move A --to '3.9 m' --speed '0.2 m/s'",
         "winchkit move all --pay-out 50mm -b bench.toml",
-        "winchkit move --pose x=0.1m,z=0.3m,yaw=2deg --speed 50mm/s -b robot.toml",
-        "winchkit move --pose-by z=20mm -b robot.toml",
+        Example("winchkit move --pose x=0.1m,yaw=2deg -b robot.toml", "needs a bench with a robot"),
+        Example("winchkit move --pose-by z=20mm -b robot.toml", "needs a bench with a robot"),
     ),
 )
 @winch_argument

@@ -84,6 +84,7 @@ def test_a_drive_that_only_says_that_it_watches_is_refused(rig: Rig) -> None:
     axis_on(bus, prove=False).commission()
 
 
+@pytest.mark.realtime  # a stall of the thread that beats is a lost heartbeat
 def test_the_proof_disturbs_no_other_node_on_the_bus() -> None:
     """Another drive, armed on the host whose heartbeat goes on meanwhile, notices nothing."""
     spec, over = bus_spec(), threading.Event()
