@@ -21,7 +21,7 @@ from winchkit.cli import main
 from winchkit.cli.core.command import Example
 
 ROOT = Path(__file__).parents[3]
-ON_BENCH = ("jog", "move", "hold-tension", "home", "run", "stop", "reset", "monitor", "log")
+ON_BENCH = ("jog", "move", "home", "run", "stop", "reset", "monitor", "log")
 ON_DRIVE = ("scan", "info", "config", "lss")
 ON_CELL = ("cell",)
 BENCHES = (*ON_BENCH, *ON_DRIVE, *ON_CELL, "tare")

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import click
 
-from winchkit.cli.core.command import Command
+from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -20,14 +20,18 @@ from winchkit.cli.core.terminal import status_line
 __all__ = ["command"]
 
 _REFRESH = 0.05
+_NEEDS_CELL = "needs a bench with a load cell"
 _HOLD = 0.2
 
 
 @click.command(
     cls=Command,
     examples=(
-        "winchkit hold-tension A 120N --for 5s",
-        "winchkit hold-tension A 120N --travel 20mm --stiffness '40 kN/m' -b bench.toml",
+        Example("winchkit hold-tension A 120N --for 5s", _NEEDS_CELL),
+        Example(
+            "winchkit hold-tension A 120N --travel 20mm --stiffness '40 kN/m' -b bench.toml",
+            _NEEDS_CELL,
+        ),
     ),
 )
 @click.argument("winch", metavar="WINCH")
