@@ -37,13 +37,12 @@ def measure(
     poses: int = 60,
     validation: int = 20,
     cycle: float = 0.004,
-    geometry: float | None = None,
+    volume: PoseVolume | None = None,
 ) -> dict[str, Any]:
     """Calibrate a robot whose hidden geometry the seed determines."""
     sim = read_simbench(find("sim", ROBOT))
     assert sim.platform is not None
-    hidden = sim.platform.geometry if geometry is None else geometry
-    truth = replace(sim.platform, geometry=hidden, geometry_seed=seed)
+    truth = replace(sim.platform, geometry_seed=seed)
     sim = replace(sim, platform=truth, bench=replace(sim.bench, cycle=cycle))
     clock, started = SimulatedClock(), process_time()
     with LiveBench(sim, seed=seed, simulated_time=clock) as live:
@@ -58,7 +57,7 @@ def measure(
                 tracker,
                 poses=poses,
                 validation=validation,
-                volume=PoseVolume(),
+                volume=volume,
                 options=Options(effects=EFFECTS),
                 seed=seed,
             )

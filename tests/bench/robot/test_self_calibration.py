@@ -7,14 +7,16 @@ import pytest
 
 import robot_rectangle
 import robot_self_calibrated
-from winchkit.bench.robot.self_calibration import self_calibrated
+from winchkit.bench.robot.self_calibration import PoseVolume, self_calibrated
 from winchkit.bench.robot.tracker import Tracker
 from winchkit.errors import UsageError
 
 
 @pytest.mark.slow
 def test_the_benchmark_calibrates_a_hidden_geometry() -> None:
-    found = robot_self_calibrated.measure(5, poses=10, validation=3, cycle=0.04)
+    found = robot_self_calibrated.measure(
+        5, poses=10, validation=3, cycle=0.04, volume=PoseVolume(0.04, 0.08, 0.15, 0.15)
+    )
     assert found["refused"] is None
     assert found["held_out_before_mm"] > 0.2
     assert found["held_out_after_mm"] < 0.25 * found["held_out_before_mm"]
@@ -22,7 +24,7 @@ def test_the_benchmark_calibrates_a_hidden_geometry() -> None:
 
 @pytest.mark.slow
 def test_the_rectangle_needs_an_estimate_of_the_friction() -> None:
-    found = robot_rectangle.measure(3, cycle=0.04, scale=0.1, moves=3)
+    found = robot_rectangle.measure(3, cycle=0.04, scale=0.06, moves=2)
     assert found["dahl_N"] < 0.2 * found["none_N"]
     assert found["dahl_N"] < found["coulomb_N"]
     assert np.mean(found["friction"]) == pytest.approx(0.012, rel=0.15)
