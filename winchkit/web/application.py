@@ -231,10 +231,12 @@ class _Work:
 
     async def _choices(self, request: Request) -> Response:
         effects = [effect.id for effect in self.workspace.catalogue]
+        known = names("profiles")
+        robots = [name for name in known if is_robot(name)]
         return JSONResponse(
             {
-                "profiles": [name for name in names("profiles") if not is_robot(name)],
-                "robots": [name for name in names("profiles") if is_robot(name)],
+                "profiles": [name for name in known if name not in robots],
+                "robots": robots,
                 "examples": names("sim"),
                 "effects": effects,
             }
@@ -285,11 +287,7 @@ class _Work:
         return _accepted()
 
     def _open_profile(self, name: str) -> None:
-        try:
-            of_robot = is_robot(name)
-        except WinchkitError:  # the workspace meets the same fault, and shows it
-            of_robot = False
-        if of_robot:
+        if is_robot(name):
             open_robot(self.workspace, self.robot, [], name)
         else:
             self.workspace.open([], name)
