@@ -35,6 +35,7 @@ from winchkit.bench.remote.commander import Commanders, NotCommander
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.life_sign import LifeSigns
+from winchkit.bench.robot.wiring import no_robot
 from winchkit.bench.winch import Winch
 from winchkit.drivers.can.bus.health import BusHealth
 from winchkit.drivers.can.cia402.axis import Cia402Axis
@@ -46,7 +47,6 @@ from winchkit.errors import (
     LimitTripped,
     MotionError,
     NotPermitted,
-    UsageError,
 )
 from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
@@ -185,10 +185,7 @@ class Bench:
     def robot(self) -> Platform:
         """The platform that the winches move; raises UsageError for a bench without ``[robot]``."""
         if self._platform is None:
-            raise UsageError(
-                f"bench '{self.spec.name}' declares no robot; write a table [robot] with its "
-                "profile, speed and tension (docs/formats.md)"
-            )
+            raise no_robot(self.spec)
         return self._platform
 
     @property

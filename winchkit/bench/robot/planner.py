@@ -11,7 +11,7 @@ from winchkit.arrays import Array
 from winchkit.bench.robot.checks import require_within_limits
 from winchkit.bench.robot.path import Waypoint, paths_through
 from winchkit.bench.robot.trajectory import PlatformTrajectory, plan_along
-from winchkit.bench.robot.wiring import robot_of_bench
+from winchkit.bench.robot.wiring import no_robot, robot_of_bench
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.model.robot import ForceLimits, Pose, Robot, angles_of, rotation_of
 from winchkit.schema.bench import BenchSpec, LimitSpec
@@ -36,10 +36,7 @@ class Planner:
         """The robot of a bench file; raises UsageError where it declares none."""
         robot = robot_of_bench(spec)
         if robot is None or spec.robot is None:
-            raise UsageError(
-                f"bench '{spec.name}' declares no robot; write a table [robot] with its profile, "
-                "speed and tension (docs/formats.md)"
-            )
+            raise no_robot(spec)
         return cls(robot, spec.robot, {name: spec.winch[name].limits for name in robot.names})
 
     @property

@@ -5,13 +5,22 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from winchkit import catalog
+from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
     from winchkit.model.robot import Robot
     from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["line_profiles", "robot_of_bench"]
+__all__ = ["line_profiles", "no_robot", "robot_of_bench"]
+
+
+def no_robot(spec: BenchSpec) -> UsageError:
+    """The refusal of what needs a robot on a bench that declares none."""
+    return UsageError(
+        f"bench '{spec.name}' declares no robot; write a table [robot] with its profile, speed and "
+        "tension (docs/formats.md)"
+    )
 
 
 def robot_of_bench(spec: BenchSpec) -> Robot | None:
