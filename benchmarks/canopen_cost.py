@@ -18,7 +18,7 @@ import os
 import sys
 from typing import Any
 
-from can_cost.cycle import cost_of_cycle, lateness_of_cycle
+from can_cost.cycle import HEARTBEAT, cost_of_cycle, lateness_of_cycle
 from can_cost.decoding import cost_of_decoding
 
 AIMS = {
@@ -39,7 +39,8 @@ def main() -> int:
         cost["cycle_over_pdo_map"] = cost["cycle_p10_us"] / decoding["pdo_map_us"]
         figures[f"cycle, {link}"] = cost
     link = given.link[-1]
-    load = {"link": link, "busy": given.busy, "realtime": given.realtime}
+    load: dict[str, Any] = {"link": link, "busy": given.busy, "realtime": given.realtime}
+    load["heartbeat"] = given.heartbeat
     figures["lateness"] = lateness_of_cycle(given.seconds, given.axes, **load)
     if given.fast:
         figures["two buses at 1 kHz"] = lateness_of_cycle(
@@ -60,6 +61,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--axes", type=int, default=8)
     parser.add_argument("--cycles", type=int, default=2000, help="in held time")
     parser.add_argument("--rounds", type=int, default=400, help="of decoding")
+    parser.add_argument("--heartbeat", type=float, default=HEARTBEAT, help="of drives and host, s")
     parser.add_argument("--busy", type=int, default=0, help="processes that compute beside it")
     parser.add_argument("--realtime", action="store_true", help="priority, locked memory")
     parser.add_argument("--link", nargs="+", choices=("virtual", "socket"), default=["virtual"])

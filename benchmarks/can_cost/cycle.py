@@ -197,19 +197,23 @@ class Bench:
 
 @contextmanager
 def bench(
-    axes: int, link: Link = "virtual", buses: int = 1, cycle: float = CYCLE
+    axes: int,
+    link: Link = "virtual",
+    buses: int = 1,
+    cycle: float = CYCLE,
+    heartbeat: float = HEARTBEAT,
 ) -> Iterator[Bench]:
     """A bench of jogging winches around ``ControlLoop``, not yet running."""
     clock = Clock()
     device = read_device(catalog.find("devices", "generic-cia402"))
     profile = read_profile(catalog.find("profiles", "bench-spiral"))
-    watch = WatchSpec(127, HEARTBEAT, cycle, True, prove=False)
+    watch = WatchSpec(127, heartbeat, cycle, True, prove=False)
     winches, opened, served = {}, [], []
     with ExitStack() as stack:
         for number in range(buses):
             nodes = range(1, axes // buses + 1)
             channel = f"cost{number}-{os.getpid()}"
-            spec = BusSpec("can", interface="virtual", channel=channel, heartbeat=HEARTBEAT)
+            spec = BusSpec("can", interface="virtual", channel=channel, heartbeat=heartbeat)
             drives: DriveBus = (
                 NearDrives(channel, nodes, cycle, device)
                 if link == "virtual"
@@ -230,9 +234,9 @@ def bench(
             _quiet(bus)
             opened.append(bus)
             served.append(drives)
-        supervisor = Supervisor(dict.fromkeys(winches, Supervised(LIMITS, 2 * HEARTBEAT, cycle)))
-        hosts = [(bus, 127, HEARTBEAT) for bus in opened]
-        loop = ControlLoop(hosts, winches, supervisor, clock, cycle, longest_gap=2 * HEARTBEAT)
+        supervisor = Supervisor(dict.fromkeys(winches, Supervised(LIMITS, 2 * heartbeat, cycle)))
+        hosts = [(bus, 127, heartbeat) for bus in opened]
+        loop = ControlLoop(hosts, winches, supervisor, clock, cycle, longest_gap=2 * heartbeat)
         stack.callback(loop.close)
         for parts in winches.values():
             # No heartbeat comes between the commissioning and the first cycle.
@@ -286,11 +290,12 @@ def lateness_of_cycle(
     link: Link = "virtual",
     buses: int = 1,
     cycle: float = CYCLE,
+    heartbeat: float = HEARTBEAT,
     busy: int = 0,
     realtime: bool = False,
 ) -> dict[str, Any]:
     """How late the cycles begin in real time, ms, what they cost, and the frames lost."""
-    with bench(axes, link, buses, cycle) as it, ExitStack() as stack:
+    with bench(axes, link, buses, cycle, heartbeat) as it, ExitStack() as stack:
         over = threading.Event()
         for drives in it.drives:
             server = threading.Thread(target=_serve, args=(drives, over))

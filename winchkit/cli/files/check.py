@@ -12,6 +12,7 @@ import click
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import TABLE, effects_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.check_computer import about_computer, refusals
 from winchkit.errors import Fault, FileError, one_line
 
@@ -76,7 +77,11 @@ def command(
     """
     if not files and not computer:
         raise click.UsageError("Missing argument 'FILE...'; or --computer.", ctx)
-    verdicts = [check(file, effects) for file in files]
+    verdicts = []
+    with progress_bar() as progress:
+        for index, file in enumerate(files):
+            progress(f"checking {file}", index / len(files))
+            verdicts.append(check(file, effects))
     lines = about_computer() if computer else ()
     for verdict in verdicts:
         for warning in verdict.warnings:

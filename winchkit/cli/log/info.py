@@ -10,6 +10,7 @@ import click
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import RUN
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
 from winchkit.errors import one_line
 
 if TYPE_CHECKING:
@@ -37,7 +38,9 @@ def command(files: tuple[str, ...], as_json: bool) -> None:
     from winchkit.runs.info import info_of
     from winchkit.runs.read import read_log
 
-    info = info_of(read_log(files))
+    with progress_bar() as progress:
+        progress(f"reading {files[0]}", None)
+        info = info_of(read_log(files))
     if as_json:
         echo_json({"schema": 1, **vars(info)})
         return
