@@ -23,9 +23,9 @@ from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.robot.path import Waypoint
-from winchkit.bench.robot.trajectory import PlatformTrajectory, dynamic_wrench
+from winchkit.bench.robot.trajectory import PlatformTrajectory, motion_at
 from winchkit.errors import NotPermitted
-from winchkit.model.robot import Pose, wrench_feasibility
+from winchkit.model.robot import dynamic_wrench, wrench_feasibility
 from winchkit.schema.robot_bench import RobotWiring
 from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
@@ -61,10 +61,8 @@ def forces_margin(bench: Bench, planned: PlatformTrajectory, random: np.random.G
     robot = bench.robot.robot
     time = random.uniform(0.0, planned.duration, PLACES)
     distance, rate, change = planned.profile.at(time)
-    pose: Pose = planned.path.pose(distance)
-    first, second = planned.path.derivatives(distance)
-    linear = second * rate[:, None] ** 2 + first * change[:, None]
-    structure, wrench = robot.structure(pose), dynamic_wrench(robot, pose, linear)
+    motion = motion_at(planned.path, distance, rate, change)
+    structure, wrench = robot.structure(motion.pose), dynamic_wrench(robot.platform, motion)
     limits = bench.robot.planner.tension
     return min(
         wrench_feasibility(matrix, load, limits).margin

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from winchkit.arrays import Array
 from winchkit.bench.robot.path import Waypoint, paths_through
@@ -86,3 +87,17 @@ def test_a_right_angle_is_cut_by_the_distance_of_the_middle_of_its_curve() -> No
     # Bernstein weights at 1/2 of the four control points beside the corner: (1, 5, 5, 1)/32.
     middle = 0.02 * (1 + 5 / 2) / 32 * np.sqrt(2)
     assert np.linalg.norm(places - [0.1, 0, 0], axis=1).min() == pytest.approx(middle, rel=1e-3)
+
+
+def test_angular_derivatives_are_those_of_the_rotation() -> None:
+    first = Waypoint(np.array([0.1, 0.0, 0.0]), rotation_of(0.4, 0.0, 0.9), None, 0.04)
+    second = Waypoint(np.array([0.1, 0.1, 0.0]), rotation_of(-0.5, 0.6, 0.2))
+    (path,) = paths_through(HOME, [first, second], SCALE)
+    distance = np.linspace(0.01, path.length - 0.01, 40)
+    step, small = 1e-4, 1e-6
+    found = [path.derivatives(distance + by)[0][:, 3:] for by in (-small, 0.0, small)]
+    turned = [Rotation.from_matrix(path.pose(distance + by).rotation) for by in (-step, step)]
+    rate = (turned[1] * turned[0].inv()).as_rotvec() / (2 * step)
+    assert found[1] == pytest.approx(rate, abs=1e-4)
+    change = (found[2] - found[0]) / (2 * small)
+    assert path.derivatives(distance)[1][:, 3:] == pytest.approx(change, abs=0.02)

@@ -122,7 +122,7 @@ def test_forces_of_the_plan_are_within_limits_and_balance_the_platform(bench: Be
     assert planned.force.max() <= high + 1e-6
     structure, mass = platform.robot.structure(planned.pose), platform.robot.platform.mass
     force = np.einsum("kij,kj->ki", structure, planned.force)[:, :3]
-    expected = mass * (planned.acceleration + np.array([0.0, 0.0, 9.80665]))
+    expected = mass * (planned.motion.acceleration[:, :3] + np.array([0.0, 0.0, 9.80665]))
     assert force == pytest.approx(expected, abs=1e-3)
     assert np.abs(np.diff(planned.force, axis=0)).max() < 10.0, "forces are continuous"
 

@@ -13,6 +13,7 @@ from winchkit.model.robot.rotation import (
     quaternion_of,
     rotation_by,
     rotation_from_quaternion,
+    rotation_rates,
     rotation_vector,
 )
 
@@ -80,3 +81,24 @@ def test_batches_are_their_members() -> None:
         np.testing.assert_allclose(back(found(rotation)), rotation, atol=1e-12)
     np.testing.assert_allclose(rotation_from_quaternion(quaternion_of(rotation)), rotation)
     np.testing.assert_allclose(rotation[3, 2], rotation_by(vectors[3, 2]))
+
+
+@settings(deadline=None, max_examples=50)
+@given(vectors, vectors, vectors, st.sampled_from([1.0, 0.05, 0.0]))
+def test_rates_of_a_rotation_vector(
+    vector: np.ndarray, first: np.ndarray, second: np.ndarray, size: float
+) -> None:
+    vector = size * vector / 2
+    step = 1e-4
+
+    def there(t: float) -> Rotation:
+        return Rotation.from_rotvec(vector + t * first + t * t / 2 * second)
+
+    def velocity(t: float) -> np.ndarray:
+        turn = there(t + step) * there(t - step).inv()
+        return np.asarray(turn.as_rotvec() / (2 * step))
+
+    found, change = rotation_rates(vector, first, second)
+    np.testing.assert_allclose(found, velocity(0.0), atol=1e-5)
+    expected = (velocity(step) - velocity(-step)) / (2 * step)
+    np.testing.assert_allclose(change, expected, atol=2e-4 * (1 + np.linalg.norm(first)) ** 3)

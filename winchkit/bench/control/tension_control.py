@@ -20,10 +20,10 @@ from winchkit.schema.profiles.winch import CableSpec
 
 __all__ = [
     "LOOP",
-    "STUCK",
     "TensionControl",
     "TensionReading",
     "TensionSetting",
+    "UsedUp",
     "fastest_within",
     "greatest_stiffness",
 ]
@@ -33,7 +33,7 @@ LOOP = 0.25
 the limit of stability, of an integrator with a delay."""
 _MARGIN = 2e-3
 """Of cable, kept to the declared travel, m."""
-STUCK = 0.5
+_STUCK = 0.5
 """Time for which the travel may be used up before the winch trips, s."""
 _STEEL = 210e9
 """Modulus of elasticity of steel, Pa: no cable is stiffer than a steel bar of its diameter."""
@@ -114,6 +114,18 @@ def fastest_within(room: float, limits: LimitSpec) -> float:
     return math.sqrt(lag * lag + 2 * limits.acceleration * max(0.0, room)) - lag
 
 
+class UsedUp:
+    """Whether the travel of a control has been used up for 0.5 s, while it asks for more."""
+
+    def __init__(self) -> None:
+        self._since = math.inf
+
+    def at(self, now: float, *, used_up: bool) -> bool:
+        """Take whether it is used up at ``now`` (s), once a cycle."""
+        self._since = min(self._since, now) if used_up else math.inf
+        return now - self._since >= _STUCK
+
+
 class TensionControl:
     """Keeps the tension while someone keeps saying so; silence brings the winch to rest."""
 
@@ -135,7 +147,7 @@ class TensionControl:
         self._ramp = Ramp(limits.acceleration)
         self._expires = -math.inf
         self._begin = self._angle = self._last = 0.0
-        self._stuck: float | None = None
+        self._used_up = UsedUp()
 
     def refresh(self, expires: float) -> None:
         """Go on until ``expires`` (s on the bench's clock)."""
@@ -169,20 +181,10 @@ class TensionControl:
         wish = max(-fastest, min(fastest, wish))
         room = setting.travel - math.copysign(1.0, wish) * travelled - _MARGIN
         allowed = fastest_within(room, self._limits)
-        used_up = allowed == 0.0 and wish != 0.0
-        self._watch_travel(now, reading.value, used_up=used_up)
-        return math.copysign(min(abs(wish), allowed), wish)
-
-    def _watch_travel(self, now: float, tension: float, *, used_up: bool) -> None:
-        """Trip where the tension asks for more travel for some time."""
-        if not used_up:
-            self._stuck = None
-            return
-        if self._stuck is None:
-            self._stuck = now
-        if now - self._stuck >= STUCK:
+        if self._used_up.at(now, used_up=allowed == 0.0 and wish != 0.0):
             self._trip(
-                f"the tension is {tension:.1f} N after {self.setting.travel * 1e3:.0f} mm of cable "
-                f"(the declared travel), set is {self.setting.tension:.1f} N; look for a broken or "
-                "jammed cable and a wrong load cell, then reset"
+                f"the tension is {reading.value:.1f} N after {setting.travel * 1e3:.0f} mm of "
+                f"cable (the declared travel), set is {setting.tension:.1f} N; look for a broken "
+                "or jammed cable and a wrong load cell, then reset"
             )
+        return math.copysign(min(abs(wish), allowed), wish)

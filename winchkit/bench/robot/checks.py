@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.bench.robot.trajectory import PlatformTrajectory, dynamic_wrench
+from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.errors import NotPermitted
-from winchkit.model.robot import ForceLimits, Pose, Robot, closed_form, quadratic
+from winchkit.model.robot import (
+    ForceLimits,
+    Pose,
+    Robot,
+    closed_form,
+    dynamic_wrench,
+    quadratic,
+)
 from winchkit.schema.bench import LimitSpec
 
 __all__ = ["require_within_limits"]
@@ -130,12 +137,13 @@ def _force_faults(
     out = []
     without = np.flatnonzero(~np.isfinite(planned.force).all(axis=1))
     if len(without):
-        wrench = dynamic_wrench(robot, planned.pose, planned.acceleration)
+        wrench = dynamic_wrench(robot.platform, planned.motion)
         out.append(_without_forces(robot, planned, tension, wrench, int(without[0])))
     first, _ = planned.path.derivatives(planned.distance)
     moving = np.where(planned.speed[:, None] > 0, 1.0, 0.0)
-    braked = planned.acceleration - deceleration * moving * first
-    structure, wrench = robot.structure(planned.pose), dynamic_wrench(robot, planned.pose, braked)
+    braked = planned.motion.acceleration - deceleration * moving * first
+    structure = robot.structure(planned.pose)
+    wrench = dynamic_wrench(robot.platform, replace(planned.motion, acceleration=braked))
     count = len(planned.time)
     for k in np.unique(np.linspace(0, count - 1, min(count, _STATIONS)).astype(int)):
         if not quadratic(structure[k], wrench[k], tension).feasible:

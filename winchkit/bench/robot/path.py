@@ -16,7 +16,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.robot import Pose
-from winchkit.model.robot.rotation import rotation_by, rotation_vector
+from winchkit.model.robot.rotation import rotation_by, rotation_rates, rotation_vector
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -69,8 +69,13 @@ class Path:
         return Pose(point[:, :3], rotation_by(point[:, 3:] / self.scale) @ self.start)
 
     def derivatives(self, distance: Array) -> tuple[Array, Array]:
-        """First and second derivative of the position by s, (k, 3) each, 1 and 1/m."""
-        return self.curve(distance, 1)[:, :3], self.curve(distance, 2)[:, :3]
+        """First and second derivative of the pose by s, (k, 6) each.
+
+        Of the position, 1 and 1/m, then angular in base axes, rad/m and rad/m².
+        """
+        point, first, second = (self.curve(distance, order) for order in range(3))
+        turning = rotation_rates(*(one[:, 3:] / self.scale for one in (point, first, second)))
+        return np.hstack([first[:, :3], turning[0]]), np.hstack([second[:, :3], turning[1]])
 
 
 def paths_through(start: Pose, waypoints: Sequence[Waypoint], scale: float) -> list[Path]:

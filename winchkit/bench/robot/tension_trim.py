@@ -19,7 +19,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import GAIN, Target
-from winchkit.bench.control.tension_control import LOOP, STUCK, fastest_within
+from winchkit.bench.control.tension_control import LOOP, UsedUp, fastest_within
 from winchkit.schema.bench import LimitSpec
 
 __all__ = ["CableTrim", "ForceTrim", "TrimSetting"]
@@ -70,7 +70,7 @@ class ForceTrim:
         self._joined: set[int] = set()
         self._cycle = self._begun = math.nan
         self._stopped = False
-        self._stuck: float | None = None
+        self._used_up = UsedUp()
 
     def join(self, index: int) -> None:
         """A winch has come to rest at its place; the correction begins with the last of them."""
@@ -124,23 +124,14 @@ class ForceTrim:
             fastest = min(setting.speed, limits.speed, fastest_within(room, limits))
             if abs(wish[i]) * scale > fastest:
                 scale, tightest = fastest / abs(float(wish[i])), i
-        self._watch_travel(now, tightest, float(error[tightest]), used_up=scale < 1e-3)
-        return np.asarray(wish * scale)
-
-    def _watch_travel(self, now: float, index: int, missing: float, *, used_up: bool) -> None:
-        """Trip where the forces ask for more travel for some time."""
-        if not used_up:
-            self._stuck = None
-            return
-        if self._stuck is None:
-            self._stuck = now
-        if now - self._stuck >= STUCK:
+        if self._used_up.at(now, used_up=scale < 1e-3):
             self._trip(
-                index,
-                f"{missing:+.1f} N are missing in cable {self.setting.names[index]} after "
-                f"{self.setting.travel * 1e3:g} mm of cable (travel of the trim); look for a "
-                "broken or jammed cable and a wrong load cell, home the winches, then reset",
+                tightest,
+                f"{error[tightest]:+.1f} N are missing in cable {setting.names[tightest]} after "
+                f"{setting.travel * 1e3:g} mm of cable (travel of the trim); look for a broken or "
+                "jammed cable and a wrong load cell, home the winches, then reset",
             )
+        return np.asarray(wish * scale)
 
 
 class CableTrim:

@@ -10,11 +10,10 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.control.motion import JERK_TIME
 from winchkit.bench.robot.path import Path
-from winchkit.model.robot import ForceLimits, PlatformMotion, Pose, Robot, quadratic
-from winchkit.model.robot import dynamic_wrench as of_motion
+from winchkit.model.robot import ForceLimits, PlatformMotion, Pose, Robot, dynamic_wrench, quadratic
 from winchkit.model.trajectory import Trajectory, plan
 
-__all__ = ["PlatformTrajectory", "dynamic_wrench", "plan_along"]
+__all__ = ["PlatformTrajectory", "motion_at", "plan_along"]
 
 _STEP = 0.02
 """Of the samples between which motor angles are interpolated, s."""
@@ -35,15 +34,19 @@ class PlatformTrajectory:
     """Along the path, (k,), m."""
     speed: Array
     """Along the path, (k,), m/s."""
-    pose: Pose
-    acceleration: Array
-    """Of the platform's origin, (k, 3), m/s^2."""
+    motion: PlatformMotion
+    """Poses with velocities and accelerations, (k, 6)."""
     length: Array
     """Of the cables, (k, n), m."""
     force: Array
     """Cable forces nearest to the middle of the limits, (k, n), N; NaN where there are none."""
     motor_angle: Array
     """(k, n), rad."""
+
+    @property
+    def pose(self) -> Pose:
+        """Poses, k."""
+        return self.motion.pose
 
     @property
     def duration(self) -> float:
@@ -87,42 +90,37 @@ def plan_along(
     count = min(_MOST, max(_FEWEST, ceil(profile.duration / _STEP) + 1))
     time = np.linspace(0.0, profile.duration, count)
     distance, rate, change = profile.at(time)
-    pose = path.pose(distance)
-    first, second = path.derivatives(distance)
-    linear = second * rate[:, None] ** 2 + first * change[:, None]
-    force = _forces(robot, pose, linear, limits)
+    motion = motion_at(path, distance, rate, change)
+    force = _forces(robot, motion, limits)
     tension = np.where(np.isfinite(force), force, 0.0)
-    angle = robot.motor_angles(pose, tension=tension)
-    length = robot.lengths(pose)
-    return PlatformTrajectory(
-        path, profile, time, distance, rate, pose, linear, length, force, angle
-    )
+    angle = robot.motor_angles(motion.pose, tension=tension)
+    length = robot.lengths(motion.pose)
+    return PlatformTrajectory(path, profile, time, distance, rate, motion, length, force, angle)
 
 
-def dynamic_wrench(robot: Robot, pose: Pose, acceleration: Array) -> Array:
-    """Weight and inertial force of a motion along a path, (k, 6), N and N m.
+def motion_at(path: Path, distance: Array, rate: Array, change: Array) -> PlatformMotion:
+    """Motion of the platform at places of a path.
 
     Parameters
     ----------
-    robot : Robot
-        The robot.
-    pose : Pose
-        k poses.
-    acceleration : (k, 3) array
-        Of the platform's origin, m/s^2; angular velocity and acceleration are taken as zero.
+    path : Path
+        The path.
+    distance, rate, change : (k,) array
+        Along it, with first and second derivative by time, m, m/s and m/s².
 
     Returns
     -------
-    (k, 6) array
-        About the platform's origin.
+    PlatformMotion
+        k samples.
     """
-    still = np.zeros_like(acceleration)
-    motion = PlatformMotion(pose, np.hstack([still, still]), np.hstack([acceleration, still]))
-    return of_motion(robot.platform, motion)
+    first, second = path.derivatives(distance)
+    velocity = first * rate[:, None]
+    acceleration = second * rate[:, None] ** 2 + first * change[:, None]
+    return PlatformMotion(path.pose(distance), velocity, acceleration)
 
 
-def _forces(robot: Robot, pose: Pose, acceleration: Array, limits: ForceLimits) -> Array:
-    structure, wrench = robot.structure(pose), dynamic_wrench(robot, pose, acceleration)
+def _forces(robot: Robot, motion: PlatformMotion, limits: ForceLimits) -> Array:
+    structure, wrench = robot.structure(motion.pose), dynamic_wrench(robot.platform, motion)
     out = np.full(structure.shape[::2], np.nan)
     for k, (matrix, load) in enumerate(zip(structure, wrench, strict=True)):
         found = quadratic(matrix, load, limits)

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 
 from winchkit.arrays import Array
 
+_SERIES = 0.1
+"""Angle below which coefficients come from their power series, rad: error below 1e-10."""
+
 __all__ = [
     "angle_rates",
     "angles_of",
@@ -18,6 +21,7 @@ __all__ = [
     "rotation_by",
     "rotation_from_quaternion",
     "rotation_of",
+    "rotation_rates",
     "rotation_vector",
     "skew",
 ]
@@ -135,6 +139,50 @@ def rotation_vector(rotation: ArrayLike) -> Array:
     tiny = sine < 1e-12
     scale = np.where(tiny, 2.0, angle / np.where(tiny, 1.0, sine))
     return np.asarray(q[..., 1:] * scale[..., None])
+
+
+def rotation_rates(vector: Array, first: Array, second: Array) -> tuple[Array, Array]:
+    """Angular velocity and acceleration of R = exp([φ]×) R0 with a changing rotation vector φ.
+
+    Parameters
+    ----------
+    vector, first, second : (..., 3) array
+        φ, rad, and its derivatives by any parameter.
+
+    Returns
+    -------
+    velocity, acceleration : (..., 3) array
+        ω with dR = [ω]× R, base axes, and its derivative.
+
+    Notes
+    -----
+    ω = φ' + b φ × φ' + c φ × (φ × φ'), with b = (1 − cos θ)/θ², c = (θ − sin θ)/θ³ and θ = ‖φ‖.
+    """
+    square = np.sum(vector * vector, axis=-1, keepdims=True)
+    angle = np.sqrt(square)
+    large = angle > _SERIES
+    t = np.where(large, angle, 1.0)
+    sine, cosine = np.sin(t), np.cos(t)
+
+    def either(closed: Array, one: float, two: float, three: float) -> Array:
+        return np.where(large, closed, one + square * (two + square * three))
+
+    b = either((1 - cosine) / t**2, 1 / 2, -1 / 24, 1 / 720)
+    c = either((t - sine) / t**3, 1 / 6, -1 / 120, 1 / 5040)
+    # b' and c' by θ, over θ; θ θ' is φ · φ'.
+    b_rate = either((t * sine - 2 * (1 - cosine)) / t**4, -1 / 12, 1 / 180, -1 / 6720)
+    c_rate = either((3 * sine - t * cosine - 2 * t) / t**5, -1 / 60, 1 / 1260, -1 / 60480)
+    along = np.sum(vector * first, axis=-1, keepdims=True)
+    across, bent = np.cross(vector, first), np.cross(vector, second)
+    twice = np.cross(vector, across)
+    velocity = first + b * across + c * twice
+    acceleration = (
+        second
+        + b * bent
+        + c * (np.cross(first, across) + np.cross(vector, bent))
+        + along * (b_rate * across + c_rate * twice)
+    )
+    return velocity, acceleration
 
 
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
