@@ -41,7 +41,8 @@ _SAMPLED = 5.0
 _WARM_UP = 0.2
 """Share of the time, at least 30 s."""
 _MISSED = 2.05
-"""A longer gap, in cycles, holds a cycle that was left out."""
+"""A longer gap, in cycles, holds a whole period without a cycle, which the loop has to report in
+the cycle that ends the gap."""
 _ROTATE = "60 s"
 """A part has an index in memory, 0.3 kB a chunk, until it is closed: parts shorter than the samples
 of the memory keep it out of the growth."""
@@ -53,9 +54,10 @@ class Watch:
     """Counts gaps between cycles by itself, and moves every winch up and down."""
 
     def __init__(self) -> None:
-        self.cycles = self.gaps = 0
+        self.cycles = self.gaps = self.unreported = 0
         self.longest = 0.0
         self._before = math.nan
+        self._overruns = 0
         self._began = math.nan
 
     def __call__(self, snapshot: BenchSnapshot) -> dict[str, float]:
@@ -64,10 +66,13 @@ class Watch:
         self._before = snapshot.time
         self.cycles += 1
         if math.isfinite(gap):
-            self.gaps += gap > _MISSED * _CYCLE
+            missed = gap > _MISSED * _CYCLE
+            self.gaps += missed
+            self.unreported += missed and snapshot.overruns == self._overruns
             self.longest = max(self.longest, gap)
         else:
             self._began = snapshot.time
+        self._overruns = snapshot.overruns
         phase = 2 * math.pi * (snapshot.time - self._began) / _PERIOD
         return dict.fromkeys(snapshot.winch, _SPEED * math.sin(phase))
 
@@ -162,13 +167,13 @@ def measured(bench: Bench, folder: Path, duration: float) -> dict[str, Any]:
     health = {name: axis.health for name, axis in bench.axes.items()}
     drops = recorder.counters()
     recorder.close()
-    reported = bench.loop.overruns - overruns
     slope = float(np.polyfit(times, memory, 1)[0]) * 3600 if len(times) > 2 else math.nan
     return {
         "minutes": round(duration / 60, 2),
         "cycles": watch.cycles,
         "missed_cycles": watch.gaps,
-        "missed_unreported": max(0, watch.gaps - reported),
+        "missed_unreported": watch.unreported,
+        "overruns": bench.loop.overruns - overruns,
         "longest_gap_s": round(watch.longest, 4),
         "memory_mb": round(memory[-1], 1) if memory else None,
         "growth_mb_h": round(slope, 2),

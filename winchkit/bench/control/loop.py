@@ -90,6 +90,7 @@ class ControlLoop:
         self.thread_id = 0
         """Native id of the control thread, once it runs."""
         self.overruns = 0
+        """Periods in which no cycle began."""
         self.cycle_counts = [0] * (_TENTHS + 1)
         """Cycles by the time since the one before: each count is for a tenth of the period, the
         last one for everything longer."""
@@ -267,6 +268,11 @@ class ControlLoop:
         due = self._clock.now()
         while not self._stopping.is_set():
             now = self._clock.now()
+            missed = int((now - due) / self.cycle)
+            if missed > 0:
+                # They are left out and not made up for: no period has two SYNCs.
+                self.overruns += missed
+                due += missed * self.cycle
             if self.broken is None:
                 try:
                     self.step(now)
@@ -275,10 +281,6 @@ class ControlLoop:
             else:
                 self.stop_step(now)
             due += self.cycle
-            late = self._clock.now() - due
-            if late > self.cycle:
-                self.overruns += 1
-                due += late
             self._clock.sleep(due - self._clock.now())
 
     def fail(self, error: BaseException, now: float) -> None:

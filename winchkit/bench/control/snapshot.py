@@ -139,7 +139,7 @@ class BenchSnapshot:
     blocked: tuple[Trip, ...] = ()
     """True now, and forbidding motion."""
     overruns: int = 0
-    """Cycles that ended late."""
+    """Periods of control in which no cycle began, since the bench was opened."""
     warnings: tuple[Trip, ...] = ()
     """What holds and forbids nothing."""
 

@@ -54,7 +54,8 @@ class HeartbeatWatch:
 
     def lost(self, now: float, since: float = -math.inf) -> bool:
         """Whether an armed watch has waited longer than its timeout, from ``since`` (s) on."""
-        return self.last is not None and now - max(self.last, since) > self.timeout
+        last = self.last  # read once: `forget` may run on another thread
+        return last is not None and now - (last if last > since else since) > self.timeout
 
 
 @dataclass

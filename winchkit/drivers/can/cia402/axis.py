@@ -181,7 +181,8 @@ class Cia402Axis:
     @property
     def alarms(self) -> tuple[int, ...]:
         """Emergency codes that it sent and has not taken back."""
-        return tuple(self.emergencies.in_force)
+        in_force = self.emergencies.in_force
+        return tuple(in_force) if in_force else ()
 
     @property
     def alarm_text(self) -> str:
@@ -257,7 +258,8 @@ class Cia402Axis:
     @property
     def operational(self) -> bool:
         """Whether its heartbeat says that its PDOs run."""
-        return self.heartbeat.state in (None, NmtState.OPERATIONAL)
+        state = self.heartbeat.state
+        return state is None or state == NmtState.OPERATIONAL
 
     @property
     def mapping_lost(self) -> bool:
