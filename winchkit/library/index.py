@@ -155,9 +155,23 @@ class _Indexing:
             known.setdefault(row["path"], []).append((place, row))
         due = [file for path, file in files.items() if self._is_due(file, known.get(path, []))]
         gone = [path for path in known if path not in files]
+        self._forget(gone, known)
         self._commit(gone, known, [])
         report = IndexReport((), len(files) - len(due), tuple(gone))
         return self._without_sources(self._read(due, known, report))
+
+    def _forget(self, paths: Sequence[str], known: dict[str, list[tuple[Path, Row]]]) -> None:
+        """Remove diagnoses and estimates of runs that are gone, before the rows of these runs.
+
+        After a kill in between the runs are still gone next time, and this is repeated.
+        """
+        if not paths:
+            return
+        gone, winches = set(paths), {row["winch"] for path in paths for _, row in known[path]}
+        with self.tables.locked("diagnoses"):
+            for table in ("estimates", "diagnoses"):
+                touched = [path for winch in winches for path in self.tables.of_winch(table, winch)]
+                self.tables.change(table, lambda row: not gone.isdisjoint(row["runs"]), touched, [])
 
     def _is_due(self, file: RunFile, rows: Sequence[tuple[Path, Row]]) -> bool:
         return not rows or any(

@@ -7,8 +7,8 @@ from datetime import date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from winchkit.errors import Fault, FileError, UsageError
-from winchkit.library.partitions import FOLDER, Partitions
+from winchkit.errors import UsageError
+from winchkit.library.index import indexed
 from winchkit.library.tables import TABLES, arrow_schema
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def library_runs(
     FileError
         For a folder without an index.
     """
-    tables = _indexed(folder)
+    tables = indexed(folder)
     found = tables.read("runs")
     judged: set[str] = set()
     if verdict is not None:
@@ -96,7 +96,7 @@ def library_estimates(folder: str | Path) -> pa.Table:
     FileError
         For a folder without an index.
     """
-    return _indexed(folder).read("estimates")
+    return indexed(folder).read("estimates")
 
 
 def query_library(folder: str | Path, sql: str) -> pa.Table:
@@ -122,7 +122,7 @@ def query_library(folder: str | Path, sql: str) -> pa.Table:
         For SQL that is wrong, that is more than one statement, or that does more than read; and
         without DuckDB.
     """
-    tables = _indexed(folder)
+    tables = indexed(folder)
     try:
         import duckdb
     except ImportError:
@@ -161,14 +161,6 @@ def _require_reading(statements: Sequence[Any], kinds: Any) -> None:
         raise UsageError(f"SQL: {len(statements)} statements; give one SELECT")
     if statements[0].type != kinds.SELECT:
         raise UsageError("SQL: a library is only read by it; give a SELECT")
-
-
-def _indexed(folder: str | Path) -> Partitions:
-    tables = Partitions(Path(folder))
-    if not tables.folder.is_dir():
-        message = f"has no index ({FOLDER}); run 'winchkit library index' on it first"
-        raise FileError(Fault(message, str(folder)))
-    return tables
 
 
 def _is_load(found: float | None, asked: float) -> bool:

@@ -71,7 +71,11 @@ DIAGNOSES: tuple[Column, ...] = (
     Column("profile", "text", "hash of the profile"),
     Column("profile_name", "text", "its name"),
     Column("version", "text", "version of winchkit"),
-    Column("result", "text", "JSON of `winchkit diagnose --json`, shortened; null after a failure"),
+    Column(
+        "result",
+        "text",
+        "JSON of `winchkit diagnose --json`, shortened to 20 kB; null after a failure",
+    ),
 )
 """One row per diagnosis: runs of one winch and one session."""
 

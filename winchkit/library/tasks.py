@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import tempfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.diagnose import WinchAnswer
     from winchkit.diagnosis.results import Estimate
 
-__all__ = ["Outcome", "Task", "failed", "outcome_of", "task_of"]
+__all__ = ["Outcome", "Task", "failed", "outcome_of", "stored_result", "task_of"]
 
 _CANDIDATES = 10
 """Candidates that a stored result keeps."""
@@ -39,6 +40,10 @@ _STORED = (
     "notes",
 )
 """Parts of a diagnosis that a stored result keeps."""
+_LARGEST = 20_000
+"""Length of a stored result, bytes."""
+_DISPENSABLE = ("candidates", "closest", "unexplained", "notes", "outputs", "steps", "caveats")
+"""Parts that a result above this length loses, in this order; the estimates have their table."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +131,27 @@ def failed(task: Task, reason: str) -> Outcome:
     return Outcome(_shared(task) | {"failure": reason}, ())
 
 
+def stored_result(found: Mapping[str, Any]) -> str:
+    """JSON of a diagnosis as a table keeps it, at most 20 kB; ``dropped`` names omitted parts.
+
+    Parameters
+    ----------
+    found : mapping
+        Dictionary that ``winchkit diagnose --json`` prints.
+    """
+    stored = {name: found[name] for name in _STORED}
+    stored["candidates"] = stored["candidates"][:_CANDIDATES]
+    dropped: list[str] = []
+    text = json.dumps(without_nan(stored))
+    for name in _DISPENSABLE:
+        if len(text) <= _LARGEST:
+            break
+        del stored[name]
+        dropped.append(name)
+        text = json.dumps(without_nan({**stored, "dropped": dropped}))
+    return text
+
+
 def _shared(task: Task) -> Row:
     session = task.session
     return {
@@ -143,13 +169,10 @@ def _shared(task: Task) -> Row:
 
 def _rows(task: Task, answer: WinchAnswer) -> Outcome:
     diagnosis = answer.diagnosis
-    found = diagnosis.to_json()
-    stored = {name: found[name] for name in _STORED}
-    stored["candidates"] = stored["candidates"][:_CANDIDATES]
     row = _shared(task) | {
         "verdict": diagnosis.verdict,
         "effects": [step.effects[0] for step in diagnosis.steps if step.effects],
-        "result": json.dumps(without_nan(stored)),
+        "result": stored_result(diagnosis.to_json()),
     }
     about = {
         name: value

@@ -57,3 +57,22 @@ def test_the_p_value_of_two_winches_is_the_closed_form() -> None:
     # D = 32 and d² = 32 with two distances of 2 and a standard deviation of 1/2.
     assert swap.chi_square_decrease == pytest.approx(32.0)
     assert swap.p_value == pytest.approx(norm.cdf(-(32 + 32) / (2 * np.sqrt(32))))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_pair_is_found_alone_in_a_fleet_whose_profiles_are_close(seed: int) -> None:
+    # A hundred winches whose neighbours in radius differ by less than they are known.
+    random = np.random.default_rng(seed)
+    true, std = random.normal(0.0, 3e-4, 100), 5e-6
+    names = [f"W{index:03}" for index in range(100)]
+    order = np.argsort(true)
+    pair = sorted((int(order[20 + seed]), int(order[70 + seed])))
+    declared = true.copy()
+    declared[pair] = true[pair[::-1]]
+    identified = {
+        n: np.array([x + random.normal(0.0, std)]) for n, x in zip(names, true, strict=True)
+    }
+    covariances = dict.fromkeys(names, np.array([[std**2]]))
+    profiles = {name: np.array([x]) for name, x in zip(names, declared, strict=True)}
+    found = swapped_profiles(identified, covariances, profiles)
+    assert [sorted(swap.winches) for swap in found] == [[names[index] for index in pair]]

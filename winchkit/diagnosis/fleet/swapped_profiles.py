@@ -3,6 +3,8 @@
 References
 ----------
 Kuhn, H. W. (1955). The Hungarian method for the assignment problem. Naval Res. Logist. Q. 2, 83-97.
+Foster, D. P., George, E. I. (1994). The risk inflation criterion for multiple regression. Ann.
+Stat. 22, 1947-1975.
 """
 
 from __future__ import annotations
@@ -51,9 +53,13 @@ def swapped_profiles(
 
     Notes
     -----
-    The assignment minimises Σ (x − p)ᵀ C⁻¹ (x − p). For a cycle, the decrease D of this sum against
-    the declared profiles is N(−d², 4 d²) if these are right, d² the sum of the squared distances
-    δᵀ C⁻¹ δ between each declared profile and the assigned one: p = Φ(−(D + d²)/(2 d)).
+    The assignment minimises Σ (x − p)ᵀ C⁻¹ (x − p) + 2 m ln n, with m the number of the n winches
+    that get another profile: the penalty of a search among n alternatives per winch (Foster and
+    George 1994). Without it winches whose profiles differ by less than C are exchanged by chance,
+    and join the cycles of those that were exchanged. For a cycle, the decrease D of the first sum
+    against the declared profiles is N(−d², 4 d²) if these are right, d² the sum of the squared
+    distances δᵀ C⁻¹ δ between each declared profile and the assigned one:
+    p = Φ(−(D + d²)/(2 d)).
     """
     names = list(identified)
     inverses = [np.asarray(np.linalg.inv(covariances[n]), dtype=np.float64) for n in names]
@@ -63,7 +69,8 @@ def swapped_profiles(
             for name, inverse in zip(names, inverses, strict=True)
         ]
     ).reshape(len(names), len(names))
-    _, assigned = linear_sum_assignment(cost)
+    penalty = 2 * np.log(max(len(names), 1)) * (1 - np.eye(len(names)))
+    _, assigned = linear_sum_assignment(cost + penalty)
     out, left = [], set(range(len(names)))
     while left:
         cycle = [min(left)]
