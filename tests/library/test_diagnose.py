@@ -53,7 +53,7 @@ def slow_outcome(task: Task) -> Outcome:
 
 @pytest.fixture
 def library(tmp_path: Path) -> Path:
-    ticks = np.arange(20) * 0.1
+    ticks = np.linspace(0.0, 1.9, 20)
     for seed, path in enumerate(("w1/2026-03-01/a.csv", "w1/2026-03-08/b.csv", "w2/c.csv")):
         angle = np.random.default_rng(seed).normal(size=20).cumsum()
         (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)

@@ -97,7 +97,8 @@ def _outcomes(
         running[future.key] = (task, attempt)
         return future
 
-    ended = distributed.as_completed([submit(task, 0) for task in islice(tasks, window)])
+    first = [submit(task, 0) for task in islice(tasks, window)]
+    ended = distributed.as_completed(first, loop=client.loop)
     for future in ended:
         task, attempt = running.pop(future.key)
         error = future.exception()
