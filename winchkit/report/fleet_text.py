@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import isfinite
 
@@ -10,7 +11,7 @@ from winchkit.diagnosis.fleet.history import FleetHistory, FleetParameter, Winch
 from winchkit.report.words.numbers import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
 
-__all__ = ["history_text"]
+__all__ = ["ChangeText", "change_text", "day_text", "history_text", "odd_texts"]
 
 _DO = {
     "cell": "calibrate the load cell with known weights, look for damage and moisture of its cable",
@@ -30,6 +31,21 @@ _US = "%Y-%m-%d"
 _UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 
 
+@dataclass(frozen=True)
+class ChangeText:
+    """Words of one change."""
+
+    cause: str
+    size: str
+    since: str
+    now: str
+    cost: str
+    """Empty where the change causes no error in the runs."""
+    limit: str
+    """Empty without a limit."""
+    advice: str
+
+
 def history_text(history: FleetHistory) -> str:
     """Report of a fleet's history for a terminal.
 
@@ -44,7 +60,7 @@ def history_text(history: FleetHistory) -> str:
         Lines: changes, the most significant first, then winches that differ from the others.
     """
     lines = [line for pair in history.changed for line in _changed(*pair)]
-    lines += [line for pair in history.odd for line in _odd(*pair)]
+    lines += [line for pair in history.odd for line in odd_texts(*pair)]
     if not lines:
         lines = ["No change over time, and no winch that differs from the others."]
     tested = sum(len(parameter.winches) for parameter in history.parameters)
@@ -54,34 +70,72 @@ def history_text(history: FleetHistory) -> str:
     return "\n".join(lines)
 
 
-def _changed(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
+def change_text(parameter: FleetParameter, winch: WinchHistory) -> ChangeText:
+    """Words of a change that was tested.
+
+    Parameters
+    ----------
+    parameter : FleetParameter
+        The parameter.
+    winch : WinchHistory
+        One of its winches, with a change.
+
+    Returns
+    -------
+    ChangeText
+    """
     change = winch.change
     assert change is not None, "a change that was tested is there"
-    name = f"{parameter.effect} {parameter.parameter}"
-    size = _value(change.size, change.size_std, parameter.unit)
     since = "over the sessions"
     if change.date is not None and winch.kind != "trend":
         date = change.date
-        since = f"since {_day(date.date)} (95 %: {_day(date.earliest)} to {_day(date.latest)})"
-    yield f"winch {winch.winch}: {clause(parameter.effect)}: {name} changed by {size} {since}"
-    yield (
-        f"  {winch.kind}; q = {winch.change_q_value:.1g}; now "
-        f"{_value(winch.value, winch.std, parameter.unit)}, all winches "
-        f"{_value(parameter.common, parameter.common_std, parameter.unit)}"
-    )
+        ends = f"95 %: {day_text(date.earliest)} to {day_text(date.latest)}"
+        since = f"since {day_text(date.date)} ({ends})"
     costs = [
         f"{quantity(size, _UNITS.get(output, ''))} in the {OUTPUT_NAMES.get(output, output)}"
         for output, size in winch.cost.items()
         if size > 0
     ]
-    if costs:
-        yield f"  costs {', '.join(costs)} (rms over the runs)"
-    if winch.limit is not None:
-        yield f"  {_limit(winch, parameter.unit)}"
-    yield f"  do: {_do(parameter.effect)}"
+    return ChangeText(
+        clause(parameter.effect),
+        _value(change.size, change.size_std, parameter.unit),
+        since,
+        _value(winch.value, winch.std, parameter.unit),
+        ", ".join(costs),
+        "" if winch.limit is None else _limit(winch, parameter.unit),
+        _do(parameter.effect),
+    )
 
 
-def _odd(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
+def _changed(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
+    text = change_text(parameter, winch)
+    name = f"{parameter.effect} {parameter.parameter}"
+    yield f"winch {winch.winch}: {text.cause}: {name} changed by {text.size} {text.since}"
+    yield (
+        f"  {winch.kind}; q = {winch.change_q_value:.1g}; now {text.now}, all winches "
+        f"{_value(parameter.common, parameter.common_std, parameter.unit)}"
+    )
+    if text.cost:
+        yield f"  costs {text.cost} (rms over the runs)"
+    if text.limit:
+        yield f"  {text.limit}"
+    yield f"  do: {text.advice}"
+
+
+def odd_texts(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
+    """Two lines of a winch that differs from the others.
+
+    Parameters
+    ----------
+    parameter : FleetParameter
+        The parameter.
+    winch : WinchHistory
+        The winch.
+
+    Yields
+    ------
+    str
+    """
     own = _value(winch.value, winch.std, parameter.unit)
     others = _value(parameter.common, parameter.common_std, parameter.unit)
     name = f"{parameter.effect} {parameter.parameter}"
@@ -96,8 +150,8 @@ def _odd(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
 def _limit(winch: WinchHistory, unit: str) -> str:
     limit = winch.limit
     assert limit is not None, "asked for where there is one"
-    ends = f"95 %: {_day(limit.earliest)} to {_day(limit.latest)}"
-    return f"reaches the limit of {quantity(limit.limit, unit)} on {_day(limit.date)} ({ends})"
+    ends = f"95 %: {day_text(limit.earliest)} to {day_text(limit.latest)}"
+    return f"reaches the limit of {quantity(limit.limit, unit)} on {day_text(limit.date)} ({ends})"
 
 
 def _value(value: float, std: float, unit: str) -> str:
@@ -106,8 +160,19 @@ def _value(value: float, std: float, unit: str) -> str:
     return f"{value:.4g} ± {std:.2g} {unit}"
 
 
-def _day(time: float) -> str:
-    """Date of a time in s since 1970; in words where there is none."""
+def day_text(time: float) -> str:
+    """Date of a time in s since 1970; in words where there is none.
+
+    Parameters
+    ----------
+    time : float
+        UTC, s.
+
+    Returns
+    -------
+    str
+        ``2026-03-01``.
+    """
     if not isfinite(time):
         return "no earlier bound" if time < 0 else "no later bound"
     try:

@@ -12,7 +12,7 @@ from winchkit.cli.core.completion import complete_effect, complete_file
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import progress_bar
-from winchkit.cli.model.options import json_option
+from winchkit.cli.model.options import html_option, json_option, write_page
 from winchkit.errors import UsageError, suggest
 
 __all__ = ["command"]
@@ -53,6 +53,7 @@ __all__ = ["command"]
     shell_complete=complete_file,
     help="Your own effects.",
 )
+@html_option
 @json_option
 def command(
     *,
@@ -61,6 +62,7 @@ def command(
     effects: Sequence[str],
     limits: Sequence[str],
     effect_files: Sequence[str],
+    html: str | None,
     as_json: bool,
 ) -> int:
     """Fit one set of effects to every session below DIR, and report what changed and since when.
@@ -97,6 +99,10 @@ def command(
     else:
         click.echo(f"{found.sessions} sessions, effects {', '.join(found.effects)}\n")
         click.echo(history_text(history))
+    if html:
+        from winchkit.report.pages.fleet_history import fleet_history_html
+
+        write_page(html, fleet_history_html(history, "Maintenance report of a fleet"))
     return 1 if history.changed or history.odd else 0
 
 

@@ -55,6 +55,8 @@ class WinchHistory:
     odd_q_value: float
     """Adjusted p-value of being one of the other winches; NaN with fewer than four winches."""
     rms_per_unit: Mapping[str, float]
+    series: Series
+    """Own estimates of the sessions."""
     limit: LimitDate | None = None
     """Date at which a trend reaches the limit of this parameter, where one is given."""
 
@@ -206,6 +208,7 @@ def fleet_history(
                 next(change_q),
                 next(odd_q),
                 own[-1].rms_per_unit,
+                each.series[index],
                 None
                 if limit is None or len(own) < 2
                 else limit_date(each.series[index], each.between, limit),
