@@ -28,6 +28,8 @@ def test_a_row_and_a_figure_for_each_change() -> None:
     page = Page(fleet_history_html(history(0.02, 1e-3), "fleet"))
     assert "2 changes in 2 winches" in page.text
     assert page.count("figure") == 2
+    drawn = [a for _, a in page.elements if "today-points" in str(a.get("class"))]
+    assert drawn, "a point per session"
     assert page.count("tr") == 3, "a head and two changes"
     assert "since 1970-02-" in page.text, "a step between sessions 7 and 8"
     assert "over the sessions" in page.text

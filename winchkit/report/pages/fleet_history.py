@@ -95,7 +95,7 @@ def _figure(parameter: FleetParameter, winch: WinchHistory) -> Figure:
     start = float(series.times[0])
     fit = Series("fitted", "with", *_fitted(winch, start, factor), "line")
     points = Series(
-        "sessions", "measured", (series.times - start) / _DAY, factor * series.values, "points"
+        "sessions", "today", (series.times - start) / _DAY, factor * series.values, "points"
     )
     std = factor * float(np.median(series.stds))
     return Figure(
