@@ -272,12 +272,14 @@ def _axis(
         raise FileError(Fault(f"servo '{ref.device}' needs its node number", spec.path))
     arm = abs(cable.arm(0.0))
     acceleration = _HEADROOM * winch.limits.acceleration / arm
+    quick = 0.0 if spec.robot is None else spec.robot.quick_stop or 0.0
     watch = WatchSpec(
         bus.node,
         bus.heartbeat,
         spec.cycle,
         winch.brake,
         acceleration,
+        quick_stop=quick / arm,
         limits=_at_shaft(cable, winch.limits),
         speed=_FASTEST * winch.limits.speed / arm,
         options=winch.options,

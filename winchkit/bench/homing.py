@@ -35,7 +35,7 @@ def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[No
     axis = bench.axes[winch.name]
     _check(winch, asked)
     _check_drive(axis, asked)
-    bench.permit(winch.name, Direction.BOTH)
+    winch.permit(Direction.BOTH)
     try:
         zero = 0.0
         if asked.method is not None:

@@ -9,7 +9,7 @@ from winchkit.bench.cells.tares import host_tare
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.motion import DEAD_MAN, Jog, MotionSource, Move, StartGate, Trim
-from winchkit.bench.control.snapshot import Phase, Trip, WinchSnapshot
+from winchkit.bench.control.snapshot import Direction, Phase, Trip, WinchSnapshot
 from winchkit.bench.control.supervisor import direction_of
 from winchkit.bench.control.tension_control import (
     TensionControl,
@@ -155,7 +155,7 @@ class Winch:
         self.keep_jogging(winding_speed, hold, held=False)
         mine = self._jog
         while mine is self._jog and self.moving and (left := end - clock.now()) > 0:
-            self._bench.permit(self.name, direction_of(winding_speed))
+            self.permit(direction_of(winding_speed))
             if mine is not None:
                 mine.refresh(winding_speed, clock.now() + min(hold, left))
             clock.sleep(min(hold / 4, left))
@@ -319,7 +319,7 @@ class Winch:
                 f"tension_high, {high:g} N"
             )
         here = self.snapshot
-        self._bench.permit(self.name, direction_of(tension - here.rope_tension), held=True)
+        self.permit(direction_of(tension - here.rope_tension), held=True)
         self.require_length()
         expires = self._bench.clock.now() + hold
         with self._bench.commanders.claimed(self.name):
@@ -458,7 +458,7 @@ class Winch:
         )
         here = self.snapshot
         self._bench.axes[self.name].permit_angle(cable.motor_angle(length))
-        self._bench.permit(self.name, direction_of(here.cable_length - length))
+        self.permit(direction_of(here.cable_length - length))
         move.prepare(here.motor_angle)
         return move
 
@@ -495,6 +495,19 @@ class Winch:
         """Order the ramp to rest, of this winch alone."""
         self._jog = self._tension = None
         self._controller.run_down()
+
+    def permit(self, direction: Direction, *, held: bool = False) -> None:
+        """Raise what forbids a motion of this winch alone; its quick stop gets the declared ramp.
+
+        Parameters
+        ----------
+        direction : Direction
+            Of the motion.
+        held : bool
+            Whether the command is one of a series that goes on while a key is held.
+        """
+        self._bench.permit(self.name, direction, held=held)
+        self._bench.axes[self.name].set_quick_stop()
 
     def raise_trouble(self) -> None:
         """Raise what has stopped the bench, or who has taken the winch over, if anybody has."""
@@ -550,7 +563,7 @@ class Winch:
             )
 
     def _refresh(self, winding_speed: float, hold: float, *, held: bool) -> None:
-        self._bench.permit(self.name, direction_of(winding_speed), held=held)
+        self.permit(direction_of(winding_speed), held=held)
         if winding_speed:
             self.require_length()
         expires = self._bench.clock.now() + hold

@@ -58,6 +58,9 @@ class RobotWiring(Table):
         60 * _DEG
     )
     """rad/s^2."""
+    quick_stop: PositiveAcceleration | None = None
+    """Deceleration of the fastest cable in a quick stop, m/s^2: 6085h of the drives, scaled at the
+    beginning of each motion so that all cables stop in the same time; None leaves 6085h."""
     lost_winch: LostWinch = "stop-together"
     tension_trim: bool = False
     """Whether the cable forces are corrected at the end of each motion, by the load cells."""

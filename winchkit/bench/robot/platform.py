@@ -17,6 +17,7 @@ from winchkit.bench.host import WinchHost
 from winchkit.bench.robot.motion import CableMotion, PathTime
 from winchkit.bench.robot.path import Waypoint
 from winchkit.bench.robot.planner import Planner, coordinates_of, moved
+from winchkit.bench.robot.quick_stop import quick_stop_ramps
 from winchkit.bench.robot.tension_trim import CableTrim, ForceTrim, TrimSetting
 from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.errors import NotPermitted, UsageError
@@ -171,6 +172,7 @@ class Platform:
         share = planned.distance[:, None] / planned.path.length
         angles = planned.motor_angle + present + share * (kept - present)
         self._permit(planned, angles)
+        self._scale_quick_stops(planned)
         curve = CubicSpline(planned.time, angles, bc_type="clamped")
         clock = PathTime(planned, self.planner.wiring.acceleration)
         step = float(planned.time[1])
@@ -325,6 +327,17 @@ class Platform:
     def wait(self) -> None:
         """Return at the end of the motion; raises what ended it before."""
         wait_together(self._bench.loop, self._winches, self._bench.clock)
+
+    def _scale_quick_stops(self, planned: PlatformTrajectory) -> None:
+        """Set the drives' 6085h for this motion, where [robot] declares `quick_stop`."""
+        deceleration = self.planner.wiring.quick_stop
+        if deceleration is None:
+            return
+        pairs = zip(self._winches, planned.motor_angle[0].tolist(), strict=True)
+        arms = np.array([abs(winch.cable.at(angle)[1]) for winch, angle in pairs])
+        ramps = quick_stop_ramps(planned, arms, deceleration).tolist()
+        for winch, ramp in zip(self._winches, ramps, strict=True):
+            self._bench.axes[winch.name].set_quick_stop(ramp)
 
     def _permit(self, planned: PlatformTrajectory, angles: Array) -> None:
         """Raise what forbids a motion of one of the winches."""

@@ -22,7 +22,12 @@ from winchkit.drivers.can.cia402.feedback import (
 from winchkit.drivers.can.cia402.mode_change import change_mode
 from winchkit.drivers.can.cia402.modes import MODES, Homing, Target, homing_state, status_words
 from winchkit.drivers.can.cia402.motor_position import MotorPosition
-from winchkit.drivers.can.cia402.profile_parameters import HomingSpec, set_homing, set_profile
+from winchkit.drivers.can.cia402.profile_parameters import (
+    HomingSpec,
+    set_homing,
+    set_profile,
+    set_quick_stop,
+)
 from winchkit.drivers.can.cia402.sdo_stop import SdoStop
 from winchkit.drivers.can.cia402.second_master import SecondMaster
 from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, Wish, control_word
@@ -73,6 +78,7 @@ class Cia402Axis:
         self._cycle = (0, -math.inf)
         self._boot_ups = self._beats = 0
         self._previous = 0
+        self._quick_stop = watch.quick_stop
         self._sdo_stop = SdoStop(bus, node)
         self._others = SecondMaster(
             bus, node, [pdo.number for pdo in device.servo.rpdo], watch.host
@@ -111,6 +117,7 @@ class Cia402Axis:
         commander = Commander(self.name, drive, self._node.node, drive.mode, counter)
         gathering = self._listen(drive)
         self.drive, self.mode = drive, drive.mode
+        self._quick_stop = self._watch.quick_stop
         self._commander, self._gathering = commander, gathering
         self._stop_frames = commander.stop_frames()
         self.emergencies.in_force.clear()
@@ -399,6 +406,18 @@ class Cia402Axis:
         """Set speed (rad/s) and ramps (rad/s^2) of the profile modes; raises NotPermitted."""
         drive = self._disabled_drive("set its profile")
         set_profile(self._node, self.servo, drive.scale, speed=speed, acceleration=acceleration)
+
+    def set_quick_stop(self, acceleration: float | None = None) -> None:
+        """Set the ramp of quick stops (rad/s^2), None for that of commissioning, before a motion.
+
+        Nothing is sent where the drive has it already. Raises NotPermitted, NoReply,
+        DeviceRefused.
+        """
+        wanted = self._watch.quick_stop if acceleration is None else acceleration
+        if self.drive is None or wanted == self._quick_stop:
+            return
+        set_quick_stop(self._node, self.servo, self.drive.scale, wanted)
+        self._quick_stop = wanted
 
     @property
     def _watched(self) -> bool:

@@ -15,7 +15,7 @@ from winchkit.drivers.can.cia402.limits import DriveLimits, LimitsAtShaft, set_l
 from winchkit.drivers.can.cia402.mode_change import change_mode, supported_modes
 from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.cia402.option_codes import OptionCode, merged, set_options
-from winchkit.drivers.can.cia402.profile_parameters import set_profile
+from winchkit.drivers.can.cia402.profile_parameters import set_profile, set_quick_stop
 from winchkit.drivers.can.cia402.standstill import PolledStandstill
 from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, state_of
 from winchkit.drivers.can.cia402.units import Scale, read_scale
@@ -48,6 +48,8 @@ class WatchSpec:
 
     acceleration: float = 0.0
     """Of the motor, that a profile mode may use, rad/s^2; 0 leaves the drive's own."""
+    quick_stop: float = 0.0
+    """Of the motor in a quick stop, rad/s^2 (6085h); 0 leaves the drive's own."""
     prove: bool = True
     """Whether every commissioning proves that the drive notices a withheld heartbeat."""
     limits: LimitsAtShaft = field(default_factory=LimitsAtShaft)
@@ -120,6 +122,8 @@ def commission(
     host.set_up()
     on_error = _set_error_behaviour(node)
     limits = set_limits(node, scale, watch.limits)
+    if watch.quick_stop:
+        set_quick_stop(node, servo, scale, watch.quick_stop)
     change_mode(node, mode, clock)
     if watch.acceleration and not MODES[mode].cyclic:
         # The drive's own ramps must not come in the way of those that the host makes.

@@ -11,7 +11,7 @@ from winchkit.drivers.can.cia402.units import Scale
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["HERE", "HomingSpec", "check_homing", "set_homing", "set_profile"]
+__all__ = ["HERE", "HomingSpec", "check_homing", "set_homing", "set_profile", "set_quick_stop"]
 
 _RAMP_SPEED = 3000 * 2 * pi / 60
 """Speed that a ramp declared as a time reaches from standstill, rad/s."""
@@ -19,6 +19,8 @@ _MS = 1e-3
 METHODS = range(-128, 128)
 HERE = (37, 35)
 """Methods that take the present position for the zero: the present number and the old one."""
+_BY_RAMP = (2, 6)
+"""Values of 605Ah with which a quick stop uses 6085h."""
 _INSTEAD = {
     0x6098: "it cannot home; set reference.motor_angle in the winch's profile",
     0x6099: "use method 37, or a method of the drive's own tools",
@@ -65,6 +67,20 @@ def set_profile(
         for index in (0x6083, 0x6084):
             if node.read_if_there(index) is not None:
                 node.write_verified(index, 0, counts)
+
+
+def set_quick_stop(node: SdoNode, servo: ServoSpec, scale: Scale, acceleration: float) -> None:
+    """Set the ramp of quick stops (6085h, rad/s^2) and read it back.
+
+    Raises NotPermitted where a quick stop does not use it (605Ah), NoReply, DeviceRefused.
+    """
+    option = node.read_if_there(0x605A)
+    if option not in _BY_RAMP or node.read_if_there(0x6085) is None:
+        raise NotPermitted(
+            f"{node.place(0x605A)} is {option}: quick stops use 6085h with 2 and 6 only, and the "
+            "drive must have it; set options.quick_stop = 2, or leave out quick_stop of [robot]"
+        )
+    node.write_verified(0x6085, 0, _ramp(servo, scale, acceleration))
 
 
 def check_homing(node: SdoNode, servo: ServoSpec, homing: HomingSpec, *, defines: bool) -> None:
