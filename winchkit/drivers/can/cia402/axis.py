@@ -416,6 +416,7 @@ class Cia402Axis:
         wanted = self._watch.quick_stop if acceleration is None else acceleration
         if self.drive is None or wanted == self._quick_stop:
             return
+        self._quick_stop = math.nan  # unknown where the transfer fails
         set_quick_stop(self._node, self.servo, self.drive.scale, wanted)
         self._quick_stop = wanted
 
