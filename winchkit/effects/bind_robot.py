@@ -49,10 +49,12 @@ def robot_with_effects(profile: RobotProfile, catalogue: Catalogue | None = None
     return robot_with_terms(profile, robot_terms(profile, catalogue))
 
 
-def robot_terms(profile: RobotProfile, catalogue: Catalogue | None = None) -> tuple[Term, ...]:
+def robot_terms(
+    profile: RobotProfile, catalogue: Catalogue | None = None, *, moving: bool = False
+) -> tuple[Term, ...]:
     """Terms of a robot and of its lines' winches. Raises FileError with every fault.
 
-    Effects of winches that need a motion, such as friction, are left out.
+    Effects that need a motion, such as friction, are left out of a robot at rest.
 
     Parameters
     ----------
@@ -60,6 +62,8 @@ def robot_terms(profile: RobotProfile, catalogue: Catalogue | None = None) -> tu
         The robot.
     catalogue : Catalogue, optional
         Effects; by default all.
+    moving : bool
+        Whether the robot moves.
 
     Returns
     -------
@@ -67,13 +71,14 @@ def robot_terms(profile: RobotProfile, catalogue: Catalogue | None = None) -> tu
         Terms of the robot and of its winches.
     """
     catalogue = catalogue or load_catalogue()
-    terms = declared_terms(profile, catalogue)
+    declared = declared_terms(profile, catalogue)
+    terms = [term for term in declared if term.effect.places(moving=moving)]
     for line in profile.line:
         if isinstance(line.winch, WinchProfile):
             terms += [
                 Term(at_line(term.effect, line.name), term.values)
                 for term in terms_of(line.winch, catalogue)
-                if term.effect.on_robot
+                if term.effect.places(moving=moving)
             ]
     return tuple(terms)
 
@@ -172,13 +177,14 @@ def _single(tables: Iterable[EffectTable]) -> Iterator[EffectTable]:
 def _misplaced(effect: Effect, line: object, names: list[str]) -> str:
     """Fault of the place at which a table declares an effect; empty without a fault."""
     known = ", ".join(names)
-    if not effect.on_robot:
+    places = effect.places(moving=True)
+    if not places:
         return (
             "acts in motion only, and a robot's poses are static; declare it for the line's winch"
         )
-    if line is None and not effect.on_robot & {"all", "platform"}:
+    if line is None and not places & {"all", "platform"}:
         return f'missing: this effect acts on one line, named as line = "{names[0]}"'
-    if line is not None and "one" not in effect.on_robot:
+    if line is not None and "one" not in places:
         return "this effect acts on the robot as a whole; leave the line out"
     if line is not None and str(line) not in names:
         return f"no line '{line}'; the lines are {known}{suggest(str(line), names)}"

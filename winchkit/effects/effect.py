@@ -145,6 +145,8 @@ class Effect:
     on_robot: frozenset[Placement] = frozenset()
     """Places on a robot at rest: ``one`` line, ``all`` lines alike, both, or the ``platform``;
     empty for an effect that needs a motion."""
+    in_motion: frozenset[Placement] = frozenset()
+    """Places on a robot that only its trajectories show, poses at rest do not."""
 
     @property
     def not_in_control(self) -> str:
@@ -207,6 +209,21 @@ class Effect:
             Whether the models are nested.
         """
         return other.id in self.contains or self.id in other.contains
+
+    def places(self, *, moving: bool) -> frozenset[Placement]:
+        """Places on a robot at rest, or on one in motion.
+
+        Parameters
+        ----------
+        moving : bool
+            Whether the robot moves.
+
+        Returns
+        -------
+        frozenset of str
+            Of ``one``, ``all`` and ``platform``; empty where the effect is not visible.
+        """
+        return self.on_robot | self.in_motion if moving else self.on_robot
 
     @property
     def of_robots(self) -> bool:

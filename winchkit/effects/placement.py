@@ -116,8 +116,8 @@ def line_of_effect(effect: Effect) -> str:
     return effect.line if isinstance(effect, LineEffect) else ""
 
 
-def placements(effect: Effect, lines: Sequence[str]) -> Iterator[Effect]:
-    """Every placement of an effect on a robot at rest.
+def placements(effect: Effect, lines: Sequence[str], *, moving: bool = False) -> Iterator[Effect]:
+    """Every placement of an effect on a robot.
 
     Parameters
     ----------
@@ -125,13 +125,16 @@ def placements(effect: Effect, lines: Sequence[str]) -> Iterator[Effect]:
         The effect.
     lines : sequence of str
         Names of all lines.
+    moving : bool
+        Whether the robot moves; else it is at rest at its poses.
 
     Yields
     ------
     Iterator[Effect]
         Placed effects.
     """
-    if effect.on_robot & {"all", "platform"}:
+    places = effect.places(moving=moving)
+    if places & {"all", "platform"}:
         yield effect
-    if "one" in effect.on_robot:
+    if "one" in places:
         yield from (at_line(effect, line) for line in lines)

@@ -26,6 +26,7 @@ __all__ = ["STANDARD_ROBOT", "robot_changes", "standard_poses"]
 
 _POSES = 120
 _MIDDLE = 40.0
+_DURATION = 60.0
 _WINCH = WinchProfile(
     name="standard",
     drum=DrumSpec(kind="spiral", winding_radius=0.06),
@@ -53,9 +54,9 @@ STANDARD_ROBOT = RobotProfile(
 """A cube of one metre to each side of its centre, with a cable from every corner."""
 
 
-def standard_poses() -> Pose:
-    """Poses along a closed path through the cube, with changing rotations."""
-    at = np.linspace(0.0, 2 * np.pi, _POSES)
+def standard_poses(delay: float = 0.0) -> Pose:
+    """Poses on a closed path of 60 s through the cube, with rotations, ``delay`` seconds before."""
+    at = np.linspace(0.0, 2 * np.pi, _POSES) - 2 * np.pi * delay / _DURATION
     place = 0.5 + 0.25 * np.stack([np.sin(at), np.sin(2 * at + 0.6), np.cos(3 * at)], axis=1)
     turned = rotation_of(0.15 * np.sin(2 * at), 0.15 * np.cos(at), 0.2 * np.sin(3 * at + 1.0))
     return Pose(place, turned)
@@ -86,5 +87,6 @@ def _shown(robot: Robot) -> dict[str, Array]:
         bare.structure(pose), robot.weight(pose), np.full(len(robot.names), _MIDDLE)
     )
     by_drum = robot.lengths_at(bare.motor_angles(pose), force)
-    seen = pose if robot.tracker is None else reading_of(robot.tracker, pose)
+    tracker = robot.tracker
+    seen = pose if tracker is None else reading_of(tracker, standard_poses(tracker.delay))
     return {"cable_length": (by_drum - robot.lengths(seen))[:, 0], "tension": force[:, 0]}

@@ -27,7 +27,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["averaged", "holds_of"]
+__all__ = ["averaged", "holds_of", "is_log"]
 
 _LEVEL = 0.01
 """Probability that noise alone ends a hold anywhere in the log."""
@@ -68,6 +68,17 @@ def holds_of(angle: Array) -> list[slice] | None:
         return None
     least = _LEAST_SHARE * float(np.median([s.stop - s.start for s in stretches]))
     return [s for s in stretches if s.stop - s.start >= least]
+
+
+def is_log(angle: Array) -> bool:
+    """Whether rows are samples of a motion, whose noise is far below its spread.
+
+    Parameters
+    ----------
+    angle : (p, n) array
+        Motor angles of n lines in the order of time, rad; NaN where missing.
+    """
+    return _tolerance(angle) is not None
 
 
 def _tolerance(angle: Array) -> Array | None:

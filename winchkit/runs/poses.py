@@ -4,14 +4,15 @@ Readings are those of instruments whose known numbers (``[instrument]`` of the r
 gains, scales of length counters, zeros of swivels) are corrected.
 
 A log, whose rows are samples in time, has a pose per hold (:mod:`winchkit.runs.holds`): the mean of
-what was measured there. Its rows in motion are left out.
+what was measured there. Its rows in motion are left out. :func:`read_trajectory` keeps all rows of
+logs with few holds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,17 +20,19 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.model.robot.rotation import angles_of, rotation_from_quaternion
-from winchkit.runs.holds import averaged, holds_of
+from winchkit.runs.holds import averaged, holds_of, is_log
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.units import suggest
 
-__all__ = ["Measured", "joined", "read_poses"]
+__all__ = ["Measured", "Samples", "joined", "read_poses", "read_trajectory"]
 
 _POSITION = ("platform_x", "platform_y", "platform_z")
 _QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
 _ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
+_TRACKED = ("tracker_x", "tracker_y", "tracker_z")
+_TRACKED_QUATERNION = ("tracker_qw", "tracker_qx", "tracker_qy", "tracker_qz")
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,20 @@ class Measured:
         return replace(self, **{name: getattr(self, name)[rows] for name in _ARRAYS})
 
 
+class Samples(NamedTuple):
+    """Rows of logs of a robot in motion."""
+
+    measured: Measured
+    """(p,) rows of all runs."""
+    time: Array
+    """Since each run's start, (p,), s."""
+
+
+_FEWEST_HOLDS = 10
+"""Holds of logs from which they are poses: fewer are no diagnosis of poses."""
+_REST = 0.25
+"""Share of the rows at rest from which holds are poses (rule of thumb): a motion through many
+points stops at each for less."""
 _LEAST_TURN = 2e-3
 """Turn of a drum below which poses are the same, rad: 0.1 mm of cable on a radius of 50 mm."""
 _SCALARS = {"length_zeroed", "session_of_run", "notes"}
@@ -123,6 +140,49 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
             )
         )
     return poses
+
+
+def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> Samples | None:
+    """Rows of logs of a robot in motion.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Runs of the robot.
+    profile : RobotProfile
+        The robot.
+
+    Returns
+    -------
+    Samples or None
+        None where the runs are poses: a row each, or logs with at least ten holds that have a
+        quarter of the rows.
+
+    Raises
+    ------
+    RunError
+        As :func:`read_poses`.
+    """
+    faults = [fault for run in runs for fault in _faults(run, profile)]
+    if faults:
+        raise RunError(faults)
+    parts, times, count, rest = [], [], 0, 0
+    for number, run in enumerate(runs):
+        rows, notes = _rows_of(run, profile, number)
+        if not is_log(rows.motor_angle) or run.metadata.get("time") == _NUMBERED:
+            return None
+        holds = holds_of(rows.motor_angle) or []
+        count, rest = count + len(holds), rest + sum(hold.stop - hold.start for hold in holds)
+        parts.append(replace(rows, notes=tuple(f"{run.path or run.name}: {n}" for n in notes)))
+        moved = np.any(np.isfinite(_motor_angles(run, profile)), axis=1)
+        times.append((run.time - run.time[0])[moved])
+    if count >= _FEWEST_HOLDS and rest >= _REST * sum(map(len, times)):
+        return None
+    return Samples(joined(parts), np.concatenate(times))
+
+
+_NUMBERED = "row number"
+"""Metadata ``time`` of a run whose file has none."""
 
 
 def _stands_still(measured: Measured, profile: RobotProfile) -> bool:
@@ -188,7 +248,7 @@ def _faults(run: Run, profile: RobotProfile) -> list[Fault]:
         for name in names
         if name in there and not np.any(np.isfinite(run[f"{name}.motor_angle"]))
     ]
-    given, lacking = _present(run, _QUATERNION)
+    given, lacking = _present(run, _quaternion_columns(run))
     if given and lacking:
         faults.append(Fault(f"has {', '.join(given)} but not {', '.join(lacking)}", place))
     return faults
@@ -201,6 +261,18 @@ def _present(run: Run, names: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
+    rows, messages = _rows_of(run, profile, number)
+    poses, of_log = _of_holds(rows, run)
+    notes = [f"{run.path or run.name}: {note}" for note in (*messages, *of_log)]
+    return replace(poses, notes=tuple(notes))
+
+
+def _motor_angles(run: Run, profile: RobotProfile) -> Array:
+    return np.stack([_column(run, f"{line.name}.motor_angle") for line in profile.line], axis=1)
+
+
+def _rows_of(run: Run, profile: RobotProfile, number: int) -> tuple[Measured, list[str]]:
+    """Rows with a motor angle, and notes on what is missing."""
     names = [line.name for line in profile.line]
 
     def per_line(kind: str) -> Array:
@@ -213,7 +285,7 @@ def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
 
     found = Measured(
         motor_angle=per_line("motor_angle"),
-        position=np.stack([_column(run, name) for name in _POSITION], axis=1),
+        position=np.stack([_column(run, name) for name in _position_columns(run)], axis=1),
         angles=_angles(run),
         swivel=per_line("swivel") - known(own.swivels.zero),
         cable_length=per_line("cable_length") / (1 + known(own.length_counters.scale)),
@@ -225,10 +297,18 @@ def _of_run(run: Run, profile: RobotProfile, number: int) -> Measured:
         session_of_run=(run.metadata.get("session", "").strip() or run.path or run.name,),
     )
     moved = np.any(np.isfinite(found.motor_angle), axis=1)
-    poses, of_log = _of_holds(found[moved], run)
-    messages = [*_partly(run), *_gaps(found, moved), *of_log]
-    notes = [f"{run.path or run.name}: {note}" for note in messages]
-    return replace(poses, notes=tuple(notes))
+    return found[moved], [*_partly(run), *_gaps(found, moved)]
+
+
+def _position_columns(run: Run) -> tuple[str, ...]:
+    """Columns of a position: of the platform, else a bench's log of its tracker."""
+    if any(name in run for name in (*_POSITION, *_QUATERNION, *_ANGLES)):
+        return _POSITION
+    return _TRACKED
+
+
+def _quaternion_columns(run: Run) -> tuple[str, ...]:
+    return _QUATERNION if _position_columns(run) is _POSITION else _TRACKED_QUATERNION
 
 
 def _of_holds(rows: Measured, run: Run) -> tuple[Measured, list[str]]:
@@ -258,7 +338,7 @@ def _of_holds(rows: Measured, run: Run) -> tuple[Measured, list[str]]:
 
 def _partly(run: Run) -> list[str]:
     """Notes on incomplete groups of columns, which are valid but often a misspelling."""
-    given, lacking = _present(run, _POSITION)
+    given, lacking = _present(run, _position_columns(run))
     if not given or not lacking:
         return []
     return [
@@ -293,7 +373,7 @@ def _column(run: Run, name: str) -> Array:
 
 def _angles(run: Run) -> Array:
     angles = np.stack([_column(run, name) for name in _ANGLES], axis=1)
-    quaternion = np.stack([_column(run, name) for name in _QUATERNION], axis=1)
+    quaternion = np.stack([_column(run, name) for name in _quaternion_columns(run)], axis=1)
     whole = np.linalg.norm(quaternion, axis=1) > 0.5
     angles[whole] = angles_of(rotation_from_quaternion(quaternion[whole]))
     return angles

@@ -15,7 +15,7 @@ from winchkit.schema.profiles.winch import DrumSpec, WinchProfile
 CATALOGUE = load_catalogue()
 EFFECTS = [effect for effect in CATALOGUE if not effect.of_robots]
 IDS = [effect.id for effect in EFFECTS]
-ROBOT_EFFECTS = [effect for effect in CATALOGUE if effect.of_robots]
+ROBOT_EFFECTS = [effect for effect in CATALOGUE if effect.of_robots and effect.on_robot]
 ALL_IDS = [effect.id for effect in CATALOGUE]
 
 DRUMS = {

@@ -107,16 +107,17 @@ def grow_robot(
 
 def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
     names = [known.name for known in profile.line]
-    if not effect.on_robot:
-        raise UsageError(f"effect '{effect.id}' shows in motion only; poses stand still")
+    places = effect.places(moving=True)
+    if not places:
+        raise UsageError(f"effect '{effect.id}' shows in the motion of a single winch only")
     if line is None:
-        if not effect.on_robot & {"all", "platform"}:
+        if not places & {"all", "platform"}:
             raise UsageError(
                 f"effect '{effect.id}' acts on one line: name it with --winch, one of "
                 f"{', '.join(names)}"
             )
         return effect
-    if "one" not in effect.on_robot:
+    if "one" not in places:
         raise UsageError(f"effect '{effect.id}' acts on the robot as a whole; leave --winch out")
     if line not in names:
         raise UsageError(f"no line '{line}'; the lines are {', '.join(names)}")

@@ -120,6 +120,9 @@ def variables_of_poses(regression: PoseRegression) -> dict[str, Array]:
         "motor_angle": angle,
         "drum_angle": drum,
     }
+    if dataset.trajectory is not None:
+        out["time"] = dataset.trajectory.time[:, None]
+        out["motor_velocity"] = dataset.trajectory.motor_rate
     if dataset.has_tension:
         out["tension"] = measured.tension
     if np.isfinite(measured.temperature).any():
@@ -159,7 +162,8 @@ def _constants(regression: PoseRegression, output: str, error: Array) -> list[At
     known, out = np.isfinite(error), []
     winch = np.broadcast_to(np.arange(error.shape[1]), error.shape)
     pose = np.broadcast_to(regression.dataset.pose[:, None], error.shape)
-    for name, values in (("winch", winch), ("pose", pose)):
+    kinds = {"winch": winch} if regression.dataset.moves else {"winch": winch, "pose": pose}
+    for name, values in kinds.items():
         taken = _category_share(values[known], error[known])
         if taken.share > max(_LEAST_SHARE, taken.chance_share):
             own = name == "winch" and taken.own_share

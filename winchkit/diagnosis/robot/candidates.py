@@ -25,6 +25,7 @@ from winchkit.schema.profiles.robot import PRIORS
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
 __all__ = [
+    "BALANCING",
     "GEOMETRY",
     "candidates_at",
     "lacking",
@@ -35,6 +36,11 @@ __all__ = [
 
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius", "drum-radius", "layer-thickness")
 """Effects that are the geometry which a calibration fits."""
+BALANCING = frozenset({"payload-mass", "payload-centre", "cell-offset", "cell-thermal"})
+"""Effects that may explain an imbalance of tensions while its noise is estimated.
+
+Gains are excluded: zero tension and a platform without weight would balance any data.
+"""
 _PARTS = {
     "swivel-radius": "a line with a swivel_radius",
     "layer-thickness": "a drum that winds in layers",
@@ -50,9 +56,9 @@ _OUTSIDE_LINES = {"tension": "LINE.tension [N] of the load cells", "temperature"
 def candidates_at(dataset: RobotDataset, catalogue: Catalogue) -> Iterator[Effect]:
     """Effects at each of their places, as far as the poses could show them."""
     for effect in catalogue:
-        if not effect.on_robot or lacking(effect, dataset):
+        if lacking(effect, dataset):
             continue
-        for placed in placements(effect, dataset.names):
+        for placed in placements(effect, dataset.names, moving=dataset.moves):
             if _has_part(placed, dataset):
                 yield with_needs_met(placed, dataset)
 
@@ -60,6 +66,8 @@ def candidates_at(dataset: RobotDataset, catalogue: Catalogue) -> Iterator[Effec
 def lacking(effect: Effect, dataset: RobotDataset) -> list[str]:
     """Channels that an effect needs on a robot and that are absent, in words."""
     out = []
+    if not effect.places(moving=dataset.moves):
+        return ["a motion: poses stand still" if effect.in_motion else "a place on a robot"]
     if "rope_force" in effect.needs and not dataset.has_tension:
         out.append(_OUTSIDE_LINES["tension"])
     if "tension" in effect.outputs and not dataset.has_balance:

@@ -17,6 +17,7 @@ from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.errors import UNITS, Errors, column_names, errors_of, rms, signals
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
+from winchkit.diagnosis.robot.trajectory_regression import regression_at
 from winchkit.diagnosis.robot.variance_components import START
 from winchkit.effects.bind_robot import robot_terms
 from winchkit.effects.catalogue import Catalogue
@@ -71,9 +72,9 @@ def compared_robot(
 ) -> RobotCompared:
     """As :func:`compare_robot`, with regression and errors."""
     dataset = prepare_poses(runs, profile)
-    terms = robot_terms(profile, catalogue)
+    terms = robot_terms(profile, catalogue, moving=dataset.moves)
     pose = placed(dataset, terms, START)
-    regression = PoseRegression(LinearizationPoint(dataset, pose, START))
+    regression = regression_at(LinearizationPoint(dataset, pose, START))
     errors = errors_of(regression, regression.residuals(terms))
     noise = _noise(errors, dataset)
     follows = pose_attributions(regression, errors)

@@ -1,9 +1,9 @@
-"""Data set of a robot's poses: measurements of all runs and which rows repeat a pose."""
+"""Data set of a robot: poses at rest and which rows repeat one, or samples of a trajectory."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
+from winchkit.diagnosis.data.trajectory import Trajectory, trajectory_of
 from winchkit.errors import Fault, RunError
-from winchkit.runs.poses import Measured, read_poses
+from winchkit.runs.poses import Measured, read_poses, read_trajectory
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
@@ -32,7 +33,7 @@ _LEAST_KNOWN_SHARE = 0.5
 
 @dataclass(frozen=True, kw_only=True)
 class RobotDataset(Dataset):
-    """Poses of one robot: a row is a pose at rest, and rows have no order in time."""
+    """Poses of one robot: a row is a pose at rest, without order in time, or a sample in motion."""
 
     robot: RobotProfile
     measured: Measured
@@ -40,6 +41,8 @@ class RobotDataset(Dataset):
     """Number of the distinct pose of each row, (p,)."""
     runs: tuple[str, ...]
     """Files."""
+    trajectory: Trajectory | None = None
+    """Motion along the rows where they are samples in time; None for poses at rest."""
     balanced: bool = True
     """Whether the measured tensions balance the platform's weight well enough to be used."""
 
@@ -55,6 +58,11 @@ class RobotDataset(Dataset):
     def shown_outputs(self) -> tuple[str, ...]:
         """Outputs on which an effect may act."""
         return ("cable_length", "tension") if self.has_balance else ("cable_length",)
+
+    @property
+    def moves(self) -> bool:
+        """Whether rows are samples of a trajectory."""
+        return self.trajectory is not None
 
     @property
     def hangs(self) -> bool:
@@ -79,7 +87,7 @@ class RobotDataset(Dataset):
 
 
 def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
-    """Read the poses of a robot's runs.
+    """Read the poses of a robot's runs, or the samples of its logs in motion.
 
     Raises
     ------
@@ -89,7 +97,14 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
     """
     if not runs:
         raise RunError("no run given")
-    measured = read_poses(runs, robot)
+    samples = read_trajectory(runs, robot)
+    if samples is None:
+        measured, trajectory = read_poses(runs, robot), None
+    else:
+        measured, trajectory = trajectory_of(samples, robot)
+        measured = replace(
+            measured, notes=(*measured.notes, _motion_note(measured, trajectory, robot))
+        )
     place = ", ".join(run.path or run.name for run in runs)
     if len(measured) < _LEAST_POSES:
         raise RunError(
@@ -120,8 +135,19 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
         notes=measured.notes,
         robot=robot,
         measured=measured,
-        pose=_distinct(measured),
+        pose=_distinct(measured) if trajectory is None else np.arange(len(measured)),
+        trajectory=trajectory,
         runs=tuple(run.path or run.name for run in runs),
+    )
+
+
+def _motion_note(measured: Measured, trajectory: Trajectory, robot: RobotProfile) -> str:
+    """How the rows of a trajectory are used, and the forces that its motion needs."""
+    inertial = trajectory.inertial_wrench(robot.platform)[:, :3]
+    force = float(np.sqrt(np.mean(np.sum(inertial**2, axis=1))))
+    return (
+        f"a trajectory of {len(measured)} samples; inertial force {force:.2g} N rms, its standard "
+        f"deviation {trajectory.force_std(robot.platform):.2g} N"
     )
 
 

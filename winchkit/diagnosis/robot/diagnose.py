@@ -12,7 +12,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
 from scipy.special import fdtri
 
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
@@ -26,6 +25,7 @@ from winchkit.diagnosis.diagnose import (
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.residuals.traces import PoseTrace, pose_traces
 from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, Where, plain_step
 from winchkit.diagnosis.robot.attribution import pose_attributions
@@ -45,13 +45,16 @@ from winchkit.diagnosis.robot.pose_design import next_pose_runs
 from winchkit.diagnosis.robot.preparation import Preparation, calibrated_on, prepare_selection
 from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.diagnosis.robot.regression import PoseRegression
+from winchkit.diagnosis.robot.trajectory_regression import regression_at
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.verdict.decision import Judgement, judge
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
+from winchkit.errors import Fault, RunError
 from winchkit.model.stages import Stage
+from winchkit.runs.poses import read_trajectory
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
@@ -322,6 +325,14 @@ def diagnose_robot(
     FileError
         For effects that do not bind.
     """
+    if read_trajectory(runs, profile) is not None:
+        raise RunError(
+            Fault(
+                "a log in motion with too few holds to be poses; 'winchkit compare' and 'winchkit "
+                "add' evaluate it, a diagnosis needs poses at rest: at least ten holds",
+                ", ".join(run.path or run.name for run in runs),
+            )
+        )
     progress("judging the noise", 0.0)
     preparation = prepare_selection(runs, profile, catalogue or load_catalogue())
     progress("searching", 0.4)
@@ -358,7 +369,7 @@ def _geometry_explains_far_more(preparation: Preparation, file_engine: PoseSelec
     of it beside the few that explain most in turn."""
     present, noise = file_engine.fit_with_noise(file_engine.initial_model)
     for _ in range(_FEW_EFFECTS):
-        gain = _gain_of_geometry(preparation, file_engine, present.hypothesis)
+        gain = _gain_of_geometry(preparation, file_engine, present.hypothesis, noise)
         if not _is_significant(preparation, gain):
             return False
         scores = file_engine.scores(present, noise)
@@ -367,22 +378,22 @@ def _geometry_explains_far_more(preparation: Preparation, file_engine: PoseSelec
             return True
         present = file_engine.trial(present, best, noise).fit
     return _is_significant(
-        preparation, _gain_of_geometry(preparation, file_engine, present.hypothesis)
+        preparation, _gain_of_geometry(preparation, file_engine, present.hypothesis, noise)
     )
 
 
 def _gain_of_geometry(
-    preparation: Preparation, file_engine: PoseSelection, model: Hypothesis
+    preparation: Preparation, file_engine: PoseSelection, model: Hypothesis, noise: Noise
 ) -> float:
     """Decrease of χ² by a free geometry, beyond its calibration's uncertainty."""
     point = file_engine.regression.point
-    free_regression = PoseRegression(
-        replace(point, geometry=_from(preparation.prior, point.geometry))
-    )
+    free = regression_at(replace(point, geometry=_from(preparation.prior, point.geometry)))
     hypothesis = replace(model, nuisances=())
-    before = file_engine.regression
-    chi_square = fit(before, hypothesis, np.ones(before.n_rows)).chi_square
-    return chi_square - fit(free_regression, hypothesis, np.ones(free_regression.n_rows)).chi_square
+    chi_square = [
+        fit(regression, hypothesis, noise.inverse_sigma(regression)).chi_square
+        for regression in (file_engine.regression, free)
+    ]
+    return chi_square[0] - chi_square[1]
 
 
 def _concluded(
@@ -400,7 +411,8 @@ def _geometry_is_off(
 ) -> bool:
     """Whether the whole geometry explains a significant part of the remaining residual."""
     return _is_significant(
-        preparation, _gain_of_geometry(preparation, file_engine, result.final.hypothesis)
+        preparation,
+        _gain_of_geometry(preparation, file_engine, result.final.hypothesis, result.noise),
     )
 
 

@@ -1,8 +1,9 @@
-"""Selection engine of a robot's poses: noise known from the instruments, folds of poses."""
+"""Selection engines of a robot: poses with the noise of the instruments, and trajectories."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import fdtrc
@@ -12,14 +13,17 @@ from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import Noise, noise_saturated
+from winchkit.diagnosis.robot.candidates import BALANCING
 from winchkit.diagnosis.robot.errors import FittedModel, held_out_rms
 from winchkit.diagnosis.robot.regression import PoseRegression
+from winchkit.diagnosis.robot.trajectory_regression import TrajectoryRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.effects.effect import Effect
+from winchkit.effects.placement import base_of
 
-__all__ = ["PoseSelection"]
+__all__ = ["PoseSelection", "TrajectorySelection"]
 
 
 class PoseSelection(SelectionEngine):
@@ -83,6 +87,24 @@ class PoseSelection(SelectionEngine):
         p = np.asarray(fdtrc(dof, noise.dof, total / dof))
         worst = float(min(1.0, p.min() * count))
         return LackOfFitTest(worst, total - dof, p * count < 0.05)
+
+
+class TrajectorySelection(PoseSelection):
+    """Selection among hypotheses on a robot's trajectory, whose noise has a spectrum."""
+
+    regression: TrajectoryRegression
+
+    def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
+        """Variance by frequency band beside all candidates; that of the prior's rows is one."""
+        columns = np.array(self.signatures.columns)
+        tension = self.regression.rows_of({"tension"})
+        for candidate in self.signatures.candidates:
+            if base_of(candidate.effect) not in BALANCING:
+                for rows in tension:
+                    columns[rows, candidate.columns] = 0.0
+        found = noise_saturated(self.regression, residual, jacobian, columns)
+        prior = self.regression.prior_band
+        return replace(found, power=np.where(prior, 1.0, found.power))
 
 
 def _independent(columns: Array) -> Array:

@@ -58,12 +58,17 @@ from winchkit.model.robot.constraints import (
     swivel_residual,
     winding_of,
 )
+from winchkit.model.robot.identification.pose_estimation import moved_pose
 from winchkit.model.robot.identification.pose_estimation import start_pose as completed
-from winchkit.model.robot.identification.tracker import tracked_position, tracked_rotation
+from winchkit.model.robot.identification.tracker import (
+    Tracker,
+    tracked_position,
+    tracked_rotation,
+)
 from winchkit.model.robot.robot import standing
 from winchkit.model.stages import At, Stage
 
-__all__ = ["POSED", "Equations", "start_pose"]
+__all__ = ["POSED", "Equations", "continuous", "start_pose"]
 
 POSED = ("rope", "position", "rotation", "swivel", "gauge", "statics")
 """Kinds that depend on the pose, in their order."""
@@ -92,11 +97,26 @@ class Equations:
             return np.zeros_like(shown)
         out = shown.copy()
         for i, line in enumerate(robot.lines):
-            if any(m.stage is Stage.CELL for m in line.modifiers):
-                angle = self.dataset.measured.motor_angle[:, i]
-                at = standing(line, angle, shown[:, i], self.temperature[:, i])
-                out[:, i] = _force_behind(line, at, shown[:, i])
+            if any(m.stage in (Stage.CELL, Stage.PULLEY) for m in line.modifiers):
+                for rows in self._stretches:
+                    own = shown[rows, i]
+                    out[rows, i] = _force_behind(line, self._at(line, i, own, rows), own)
         return out
+
+    @property
+    def _stretches(self) -> tuple[slice, ...]:
+        """Rows in time that follow one another: those of each run of a trajectory."""
+        trajectory = self.dataset.trajectory
+        return (slice(None),) if trajectory is None else trajectory.runs
+
+    def _at(self, line: Line, index: int, force: Array, rows: slice = slice(None)) -> At:
+        """Inputs of the modifiers of a line, at rest or in motion."""
+        angle = self.dataset.measured.motor_angle[rows, index]
+        temperature, trajectory = self.temperature[rows, index], self.dataset.trajectory
+        if trajectory is None:
+            return standing(line, angle, force, temperature)
+        rate = trajectory.motor_rate[rows, index]
+        return line.moments(trajectory.time[rows], angle, rate, force, temperature)
 
     def residuals(self, robot: Robot) -> dict[str, Array]:
         """Residuals by kind of a robot with its effects.
@@ -123,7 +143,9 @@ class Equations:
             "statics": np.full((len(measured), 6), np.nan),
         }
         if self.dataset.hangs:
-            out["statics"] = hanging_residual(robot.geometry, pose, force, robot.platform)
+            out["statics"] = hanging_residual(
+                robot.geometry, pose, force, robot.platform, self._inertial(robot)
+            )
         if self.dataset.has_balance:
             out["tension"] = self._balance(robot, force)
         return out
@@ -134,8 +156,7 @@ class Equations:
         out = np.empty_like(angle)
         for i, line in enumerate(robot.lines):
             if line.modifiers:
-                at = standing(line, angle[:, i], force[:, i], self.temperature[:, i])
-                out[:, i] = line.lengths(at)
+                out[:, i] = line.lengths(self._at(line, i, force[:, i]))
             else:
                 out[:, i] = robot.home_length[i] + self._paid_out(robot, i, line)
         return out
@@ -161,8 +182,9 @@ class Equations:
             place = position(pose, measured.position).by_pose
             turned = rotation_by_pose(pose.rotation, measured.angles)
         else:
-            place = tracked_position(robot.tracker, pose, measured.position).by_pose
-            turned = tracked_rotation(robot.tracker, pose, measured.angles).by_pose
+            seen = self._seen(robot.tracker)
+            place = tracked_position(robot.tracker, seen, measured.position).by_pose
+            turned = tracked_rotation(robot.tracker, seen, measured.angles).by_pose
         statics = np.zeros((len(measured), 6, 6))
         if self.dataset.hangs:
             statics = self._statics(robot).by_pose
@@ -176,7 +198,20 @@ class Equations:
         }
 
     def _statics(self, robot: Robot) -> Constraint:
-        return hanging_balance(robot.geometry, self.pose, self.forces(robot), robot.platform)
+        return hanging_balance(
+            robot.geometry, self.pose, self.forces(robot), robot.platform, self._inertial(robot)
+        )
+
+    def _inertial(self, robot: Robot) -> Array | float:
+        """Wrench of the platform's inertial forces, (p, 6), N and N m; zero at rest."""
+        trajectory = self.dataset.trajectory
+        return 0.0 if trajectory is None else trajectory.inertial_wrench(robot.platform)
+
+    def _seen(self, tracker: Tracker) -> Pose:
+        """Poses that a tracker shows, which are those of its delay before."""
+        if self.dataset.trajectory is None or not tracker.delay:
+            return self.pose
+        return moved_pose(self.pose, self.dataset.trajectory.earlier(tracker.delay))
 
     def by_geometry(self, robot: Robot, geometry: Sequence[GeometryPrior]) -> dict[str, Array]:
         """Derivatives of the residuals by numbers of the geometry, (p, k, g), by kind.
@@ -226,12 +261,13 @@ class Equations:
         measured = self.dataset.measured.position
         if robot.tracker is None:
             return np.asarray(self.pose.position - measured)
-        return tracked_position(robot.tracker, self.pose, measured).residual
+        return tracked_position(robot.tracker, self._seen(robot.tracker), measured).residual
 
     def _rotation(self, robot: Robot) -> Array:
         if robot.tracker is None:
             return self._own_rotation
-        return tracked_rotation(robot.tracker, self.pose, self.dataset.measured.angles).residual
+        angles = self.dataset.measured.angles
+        return tracked_rotation(robot.tracker, self._seen(robot.tracker), angles).residual
 
     @cached_property
     def _own_rotation(self) -> Array:
@@ -245,9 +281,12 @@ class Equations:
 
     @cached_property
     def _force_basis(self) -> tuple[Array, Array]:
-        return force_basis(
-            structure_matrix(self.basis.geometry, self.pose.position, self.pose.rotation)
-        )
+        structure = structure_matrix(self.basis.geometry, self.pose.position, self.pose.rotation)
+        to_forces, to_cables = force_basis(structure)
+        if self.dataset.moves:
+            turn = continuous(to_cables)
+            return np.swapaxes(turn, 1, 2) @ to_forces, to_cables @ turn
+        return to_forces, to_cables
 
     @property
     def to_cables(self) -> Array:
@@ -258,8 +297,18 @@ class Equations:
         """Whitened forces that should carry the weight less those that do, (p, k), N."""
         structure = structure_matrix(robot.geometry, self.pose.position, self.pose.rotation)
         weight = gravity_wrench(robot.platform, self.pose.rotation)
-        left = wrench_residual(structure, force, weight)
+        left = wrench_residual(structure, force, weight + self._inertial(robot))
         return np.asarray(-(self._force_basis[0] @ left[..., None])[..., 0])
+
+
+def continuous(basis: Array) -> Array:
+    """Rotations (p, k, k) of the columns of orthonormal bases that make them continuous in time.
+
+    Each basis (p, m, k) is turned within its subspace to be nearest to that of the middle sample
+    (orthogonal Procrustes problem), so that the rows of a trajectory have a spectrum.
+    """
+    left, _, right = np.linalg.svd(np.swapaxes(basis, 1, 2) @ basis[len(basis) // 2])
+    return np.asarray(left @ right)
 
 
 def start_pose(dataset: RobotDataset) -> Pose:
@@ -271,16 +320,16 @@ def start_pose(dataset: RobotDataset) -> Pose:
 def _force_behind(line: Line, at: At, shown: Array) -> Array:
     """Cable force at which a cell shows ``shown``, N, by Newton's method; exact for a gain.
 
-    A cell at rest shows every force independently of the others, so that one difference gives all
-    derivatives.
+    One difference gives all derivatives: a cell at rest shows every force independently of the
+    others, and friction that remembers others is a small part of the force.
     """
     force, size = shown.copy(), max(float(np.nanmax(np.abs(shown), initial=0.0)), 1.0)
     step = _FORCE_STEP * size
     for _ in range(_NEWTON_STEPS):
-        here = line.shown_tension(at, force)
+        here = line.readings(force, at)
         missing = shown - here
         if np.nanmax(np.abs(missing), initial=0.0) < _FORCE_TOLERANCE * size:
             break
-        slope = (line.shown_tension(at, force + step) - here) / step
+        slope = (line.readings(force + step, at) - here) / step
         force = force + missing / np.maximum(slope, _LEAST_SLOPE)
     return force

@@ -228,9 +228,7 @@ def _held_out(model: FittedModel) -> Errors:
     regression, found = model.regression, model.fit
     here = regression.at(found.hypothesis)
     steps = left_out_steps(regression, found, model.noise, model.folds)
-    row, fold = regression.pose_of_row, np.concatenate(model.folds.of)
-    of_pose = np.zeros(len(regression.dataset.measured), dtype=np.intp)
-    of_pose[row[row >= 0]] = fold[row >= 0]
+    of_pose = regression.fold_of_pose(model.folds)
     out = {kind: values.copy() for kind, values in here.items()}
     for index in range(len(found.vector)):
         step = 1e-3 * max(1.0, abs(found.vector[index]))

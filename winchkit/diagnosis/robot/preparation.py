@@ -16,12 +16,13 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.robot.adjustment import adjusted
-from winchkit.diagnosis.robot.candidates import candidates_at, priors_of_geometry
+from winchkit.diagnosis.robot.candidates import BALANCING, candidates_at, priors_of_geometry
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
-from winchkit.diagnosis.robot.engine import PoseSelection
+from winchkit.diagnosis.robot.engine import PoseSelection, TrajectorySelection
 from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.diagnosis.robot.registration import Registration, registration_of
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
+from winchkit.diagnosis.robot.trajectory_regression import TrajectoryRegression, regression_at
 from winchkit.diagnosis.robot.variance_components import (
     START,
     PoseNoise,
@@ -50,11 +51,6 @@ __all__ = [
 ]
 
 _MOST_IMBALANCE = 0.2
-_BALANCING = frozenset({"payload-mass", "payload-centre", "cell-offset", "cell-thermal"})
-"""Effects that may explain an imbalance of tensions while its noise is estimated.
-
-Gains are excluded: zero tension and a platform without weight would balance any data.
-"""
 
 
 def own_effects(terms: Sequence[Term]) -> Hypothesis:
@@ -115,7 +111,7 @@ def estimated_noise(
     found = PoseNoise(START, {}, from_repeats=False, unexplained=START)
     for _ in range(2):
         point, own = fitted_point(dataset, terms, found.sigma, geometry)
-        regression = PoseRegression(point)
+        regression = regression_at(point)
         here = regression.residuals(own)
         columns = _columns(regression, own, candidates, here)
         kinds = [k for k, values in here.items() if np.isfinite(values).any()]
@@ -158,7 +154,7 @@ def _columns(
         for usual_step in coordinates.usual_steps():
             term = Term(effect, {**effect.null, **shape, **usual_step})
             there = regression.residuals((*own, term))
-            if base_of(effect) not in _BALANCING and "tension" in there:
+            if base_of(effect) not in BALANCING and "tension" in there:
                 there["tension"] = here["tension"]
             moved.append(there)
     geometry = regression.change_by_geometry()
@@ -211,7 +207,8 @@ class Preparation:
     def own(self) -> tuple[Term, ...]:
         """The profile's own effects at their file values, and those of the registration."""
         terms = self.registration.terms if self.registration else ()
-        return (*robot_terms(self.dataset.robot, self.catalogue), *terms)
+        own = robot_terms(self.dataset.robot, self.catalogue, moving=self.dataset.moves)
+        return (*own, *terms)
 
     @property
     def found(self) -> range:
@@ -226,9 +223,11 @@ class Preparation:
         """Selection engine with the given geometry as nuisance parameters."""
         terms = (*self.own, *beside)
         point, terms = fitted_point(self.dataset, terms, self.noise.sigma, geometry)
-        regression = PoseRegression(point)
         initial_model = own_effects(terms[: len(self.own)])
-        return PoseSelection(regression, initial_model, self.candidates, self.noise)
+        if self.dataset.moves:
+            motion = TrajectoryRegression(point)
+            return TrajectorySelection(motion, initial_model, self.candidates, self.noise)
+        return PoseSelection(PoseRegression(point), initial_model, self.candidates, self.noise)
 
     def file_geometry(self, beside: tuple[Term, ...] = ()) -> PoseSelection:
         """Selection engine with the geometry of the file and its calibration's uncertainty."""
@@ -271,7 +270,7 @@ def prepare_selection(
         For effects that do not bind.
     """
     dataset = prepare_poses(runs, profile)
-    own = robot_terms(profile, catalogue)
+    own = robot_terms(profile, catalogue, moving=dataset.moves)
     registration = registration_of(dataset, own, catalogue)
     dataset, own = registration.dataset, (*own, *registration.terms)
     prior = tuple(priors_of_geometry(dataset, catalogue, fitted=False))

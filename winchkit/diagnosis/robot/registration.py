@@ -42,6 +42,7 @@ _AS_GOOD = 1.5
 _FITS_BETTER = 2.0
 """Ratio of the mean squared rotation errors above which angles are not in the tracker's frame."""
 _EFFECTS = {"frame": "tracker-frame", "reflector": "reflector-offset"}
+_DELAY = "tracker-delay"
 _SUBSETS: tuple[frozenset[str], ...] = (
     frozenset({"frame"}),
     frozenset({"reflector"}),
@@ -130,10 +131,15 @@ def registration_of(
     dataset = _with_imu(dataset, tracker, pose)
     base = robot.tracker or declared_tracker(dataset.robot)
     made = {name: _term(name, catalogue, base, tracker) for name in found | declared}
+    delay = catalogue[_DELAY]
+    late = dataset.moves and isinstance(spec.delay, str) and _DELAY not in names
     return Registration(
         dataset,
         tuple(made[name] for name in sorted(found)),
-        tuple(made[name] for name in sorted(declared)),
+        (
+            *(made[name] for name in sorted(declared)),
+            *((Term(delay, delay.null),) if late else ()),
+        ),
     )
 
 
@@ -172,6 +178,8 @@ def _with_imu(dataset: RobotDataset, tracker: Tracker, pose: Pose) -> RobotDatas
         )
     if profile.instrument.imu is not None or not np.isfinite(measured.angles).any():
         return dataset
+    if dataset.moves and not np.any(tracker.turn):
+        return dataset  # A delay shifts positions and rotations as a small frame does.
     squares = []
     for own in (turned, replace(turned, turns_rotation=False)):
         difference = rotation_residual(reading_of(own, pose).rotation, measured.angles)

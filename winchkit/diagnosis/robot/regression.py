@@ -33,9 +33,10 @@ from winchkit.model.robot.identification.tracker import Tracker
 from winchkit.model.stages import At, Stage
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["LinearizationPoint", "PoseRegression"]
+__all__ = ["COPIES", "LinearizationPoint", "PoseRegression"]
 
-_COPIES = 5
+COPIES = 5
+"""Rows per number with a prior, distributed over the folds."""
 _GROUPS = 5
 _BLOCKS = 24
 _LEAST_POSES_OF_RUN = 10
@@ -98,13 +99,17 @@ class PoseRegression(Regression):
         self._posed = [k for k in POSED if np.isfinite(self._start[k]).any()]
         self._project()
         prior = [-(b.value - b.at) / b.std for b in point.geometry]
-        self._prior = np.tile(np.array(prior) / np.sqrt(_COPIES), _COPIES)
-        counts = [int(np.count_nonzero(keep)) for keep in self._keep.values()]
-        super().__init__(self._segments(counts), n_runs=1)
-        self._n_observations = sum(counts)
+        self._prior = np.tile(np.array(prior) / np.sqrt(COPIES), COPIES)
+        self._number_rows()
         self._here = self._rows_of(self._start)
         self.nominal_residual = self._beside(self._here, self._prior)
         self.nuisance_columns = self._nuisances()
+
+    def _number_rows(self) -> None:
+        """Segments of the rows."""
+        counts = [int(np.count_nonzero(keep)) for keep in self._keep.values()]
+        Regression.__init__(self, self._segments(counts), n_runs=1)
+        self._n_observations = sum(counts)
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -165,7 +170,7 @@ class PoseRegression(Regression):
 
     def missing_needs(self, effect: Effect) -> list[str]:
         """Measurements and parts that an effect needs and that are absent, in words."""
-        if not effect.on_robot:
+        if not effect.places(moving=self.dataset.moves):
             return ["a motion: poses stand still"]
         missing = lacking(effect, self.dataset) or lacking_parts(effect, self.dataset)
         if not missing and not set(effect.outputs) & set(self.dataset.shown_outputs):
@@ -214,8 +219,15 @@ class PoseRegression(Regression):
     def pose_of_row(self) -> NDArray[np.intp]:
         """Row of the data set behind each row; −1 − copy for those of the prior, (n_rows,)."""
         own = [np.nonzero(keep)[0] for keep in self._keep.values()]
-        copies = -1 - np.repeat(np.arange(_COPIES), len(self.point.geometry))
+        copies = -1 - np.repeat(np.arange(COPIES), len(self.point.geometry))
         return np.concatenate([own[0], copies, *own[1:]])
+
+    def fold_of_pose(self, folds: Folds) -> NDArray[np.intp]:
+        """Fold of each row of the data set, (p,)."""
+        row, fold = self.pose_of_row, np.concatenate(folds.of)
+        out = np.zeros(len(self.dataset.measured), dtype=np.intp)
+        out[row[row >= 0]] = fold[row >= 0]
+        return out
 
     def n_samples(self, output: str) -> int:
         """Number of rows of an output without those of the prior, at least one."""
@@ -293,20 +305,29 @@ class PoseRegression(Regression):
         if "tension" in self.dataset.outputs:
             self._keep["tension"] = np.isfinite(self._start["tension"])
 
-    def _rows_of(self, residuals: Mapping[str, Array]) -> Array:
-        """Measured minus predicted, whitened and projected: closures, then tensions."""
+    def _projected(self, residuals: Mapping[str, Array]) -> dict[str, Array]:
+        """Measured minus predicted, whitened and projected, (p, k) by output."""
         sigma = self.point.sigma
         white = np.concatenate([residuals[k] / sigma[k] for k in self._posed], axis=1)
         white = np.where(np.isfinite(white), white, 0.0)
-        free = (np.swapaxes(self._basis, 1, 2) @ white[..., None])[..., 0]
-        parts = [-free[self._keep["cable_length"]]]
+        out = {"cable_length": -(np.swapaxes(self._basis, 1, 2) @ white[..., None])[..., 0]}
         if "tension" in self._keep:
-            parts.append(-residuals["tension"][self._keep["tension"]] / sigma["tension"])
-        return np.concatenate(parts)
+            out["tension"] = -residuals["tension"] / sigma["tension"]
+        return out
+
+    def _rows_of(self, residuals: Mapping[str, Array]) -> Array:
+        """Measured minus predicted, whitened and projected: closures, then tensions."""
+        found = self._projected(residuals)
+        return np.concatenate([found[output][keep] for output, keep in self._keep.items()])
 
     def _beside(self, rows: Array, prior: Array) -> Array:
-        first = int(np.count_nonzero(self._keep["cable_length"]))
+        first = self._first_prior
         return np.concatenate([rows[:first], prior, rows[first:]])
+
+    @property
+    def _first_prior(self) -> int:
+        """Number of rows before those of the prior."""
+        return int(np.count_nonzero(self._keep["cable_length"]))
 
     def _segments(self, counts: Sequence[int]) -> list[Segment]:
         counts = [counts[0] + len(self._prior), *counts[1:]]
@@ -331,8 +352,8 @@ class PoseRegression(Regression):
                     columns.append(self._beside(column, np.zeros_like(self._prior)))
         for index, change in enumerate(self.change_by_geometry()):
             column = -self._rows_of(change)
-            held = np.zeros((_COPIES, len(self.point.geometry)))
-            held[:, index] = 1 / np.sqrt(_COPIES)
+            held = np.zeros((COPIES, len(self.point.geometry)))
+            held[:, index] = 1 / np.sqrt(COPIES)
             columns.append(self._beside(column, held.ravel()))
         return np.array(columns).reshape(len(columns), self.n_rows).T
 

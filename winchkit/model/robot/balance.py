@@ -134,7 +134,11 @@ def force_basis(structure: Array) -> tuple[Array, Array]:
 
 
 def hanging_residual(
-    geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSpec
+    geometry: Geometry,
+    pose: Pose,
+    tension: Array,
+    platform: PlatformSpec,
+    inertial: Array | float = 0.0,
 ) -> Array:
     """Residuals of :func:`hanging_balance` without their derivatives, (p, 6), N.
 
@@ -148,9 +152,11 @@ def hanging_residual(
         Cable forces, N; NaN where missing.
     platform : PlatformSpec
         Mass and centre of mass.
+    inertial : (p, 6) array or float
+        Wrench of inertial forces, N and N m; zero at rest.
     """
     structure = structure_matrix(geometry, pose.position, pose.rotation)
-    weight = gravity_wrench(platform, pose.rotation)
+    weight = gravity_wrench(platform, pose.rotation) + inertial
     return _scale(geometry) * wrench_residual(structure, tension, weight)
 
 
@@ -161,7 +167,11 @@ def _scale(geometry: Geometry) -> Array:
 
 
 def hanging_balance(
-    geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSpec
+    geometry: Geometry,
+    pose: Pose,
+    tension: Array,
+    platform: PlatformSpec,
+    inertial: Array | float = 0.0,
 ) -> Constraint:
     """Wrench of measured cable forces and weight, (p, 6), N.
 
@@ -175,6 +185,8 @@ def hanging_balance(
         Measured cable forces, N; NaN where missing.
     platform : PlatformSpec
         Mass and centre of mass.
+    inertial : (p, 6) array or float
+        Wrench of inertial forces, N and N m; zero at rest.
 
     Returns
     -------
@@ -190,7 +202,7 @@ def hanging_balance(
         return np.asarray(scale[:, None] * structure * tension[:, None, :])
 
     def wrench(at: Pose) -> Array:
-        weight = scale * gravity_wrench(platform, at.rotation)
+        weight = scale * (gravity_wrench(platform, at.rotation) + inertial)
         return np.asarray(pulls(geometry, at).sum(axis=2) + weight)
 
     by_pose = np.empty((len(pose.position), 6, 6))

@@ -84,6 +84,7 @@ _CLAUSES = {
     "drum-radius": "the winding radius of the drum is wrong",
     "exit-point": "the exit point of the cable differs from the profile",
     "home-length": "the cable length at home differs from the profile",
+    "tracker-delay": "the tracker is delayed against the bench",
     "imu-mounting": "the axes of the target or IMU are turned on the platform",
     "payload-centre": "the centre of mass of the platform is wrong",
     "payload-mass": "the mass of the platform is wrong",

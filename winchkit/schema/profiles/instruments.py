@@ -136,6 +136,7 @@ Frame = Annotated[FrameSpec | Unknown, _Frame()]
 Place = Annotated[Vector | Unknown, _OrUnknown("length", 3)]
 Turn = Annotated[Vector | Unknown, _OrUnknown("angle", 3)]
 Ratio = Annotated[float | Unknown, _OrUnknown("ratio")]
+Time = Annotated[float | Unknown, _OrUnknown("time")]
 _NONE: Vector = (0.0, 0.0, 0.0)
 
 
@@ -151,6 +152,8 @@ class TrackerSpec(Table):
     """Relative error of measured distances."""
     mounting: Turn = _NONE
     """Roll, pitch and yaw of the target's axes in the platform's frame, rad."""
+    delay: Time = 0.0
+    """Time by which a reading is older than those of the winches at the same time stamp, s."""
     datum: Literal["robot", "tracker"] = "robot"
     """Frame in which a calibration writes exit points and home pose where the tracker's frame is
     unknown."""

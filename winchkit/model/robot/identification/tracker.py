@@ -83,6 +83,8 @@ class Tracker:
     """Rotation vector of M, (3,), rad."""
     turns_rotation: bool = True
     """Whether rotations are measured in the tracker's frame."""
+    delay: float = 0.0
+    """Time by which its readings are older than those of the winches at the same stamp, s."""
 
     @classmethod
     def at(cls, home: Array) -> Tracker:
@@ -92,7 +94,7 @@ class Tracker:
     @property
     def is_trivial(self) -> bool:
         """Whether it shows the platform's pose in the base frame."""
-        numbers = (self.shift, self.turn, self.offset, self.scale)
+        numbers = (self.shift, self.turn, self.offset, self.scale, self.delay)
         return self.mounting is None and not any(np.any(number) for number in numbers)
 
     @property
@@ -111,6 +113,8 @@ def declared_tracker(profile: RobotProfile) -> Tracker:
     tracker = replace(Tracker.at(home), turns_rotation=spec.imu is None)
     if not isinstance(spec.tracker.scale, str):
         tracker = replace(tracker, scale=spec.tracker.scale)
+    if not isinstance(spec.tracker.delay, str):
+        tracker = replace(tracker, delay=spec.tracker.delay)
     if isinstance(spec.tracker.frame, FrameSpec):
         turned = rotation_of(*spec.tracker.frame.rotation)
         shift = np.array(spec.tracker.frame.position) - home
