@@ -17,8 +17,12 @@ pytest.importorskip("httpx2")
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
+from winchkit.diagnosis.add import add
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.write import write_addition
 from winchkit.runs.read import read_run
 from winchkit.runs.writer import write_run
+from winchkit.schema.read import read_profile
 from winchkit.web.application import application
 from winchkit.web.examples import example_runs
 from winchkit.web.library import Library
@@ -167,7 +171,9 @@ def test_constants_are_read_as_on_the_command_line(client: TestClient) -> None:
 
 
 @pytest.mark.slow
-def test_look_learn_add_and_the_error_falls(client: TestClient, recorded: Path) -> None:
+def test_look_learn_add_and_the_error_falls(
+    client: TestClient, recorded: Path, tmp_path: Path
+) -> None:
     for path in sorted(recorded.glob("*.csv")):
         headers = {**HEADERS, "x-file-name": path.name}
         assert (
@@ -186,8 +192,17 @@ def test_look_learn_add_and_the_error_falls(client: TestClient, recorded: Path) 
     assert np.corrcoef(card["signature"]["means"], card["signature"]["signature"])[0, 1] > 0.9
 
     before = _today(first)
+    workspace = client.workspace  # type: ignore[attr-defined]
+    wake, shown = workspace.changed, []
+    workspace.changed = lambda: (shown.append(workspace.view()["diagnosis"]), wake())
     do(client, "add", effect=effect)
     view = settled(client)
+    workspace.changed = wake
+    refit = next(found for found in shown if found["verdict"] == "refitted")
+    kinds = [row["kind"] for row in refit["ladder"]["rows"]]
+    assert kinds == ["history", "today", "floor"], "shown before it is diagnosed"
+    assert _today(refit) == pytest.approx(_today(view["diagnosis"]), rel=0.05)
+    _is_that_of_the_command_line(workspace, effect, tmp_path / "better.toml")
     after = _today(view["diagnosis"])
     assert min(after[o] / before[o] for o in before) < 0.6
     assert view["diagnosis"]["verdict"] == "adequate"
@@ -202,6 +217,20 @@ def test_look_learn_add_and_the_error_falls(client: TestClient, recorded: Path) 
     view = settled(client)
     assert _today(view["diagnosis"]) == pytest.approx(before)
     assert effect not in client.get("/api/profile", headers=HEADERS).text
+
+
+def _is_that_of_the_command_line(workspace: Workspace, effect: str, path: Path) -> None:
+    """The refitted profile of the page, and its errors, are those of ``add`` and ``diagnose``."""
+    earlier, present = (version.path for version in workspace.state.versions)
+    runs = [item.run for item in workspace.state.runs]
+    names = [item.name for item in workspace.state.runs]
+    write_addition(earlier, add(effect, runs, read_profile(earlier)), names, path)
+    assert path.read_text() == present.read_text()
+    answer = workspace.state.answer
+    assert answer is not None
+    for output, found in diagnose(runs, read_profile(path)).diagnosis.outputs.items():
+        shown = answer.diagnosis.outputs[output].heldout_rms_before
+        assert shown == pytest.approx(found.heldout_rms_before, rel=1e-9)
 
 
 def _today(diagnosis: Any) -> dict[str, float]:
@@ -253,6 +282,14 @@ def test_the_library_lists_and_overlays(client: TestClient, recorded: Path) -> N
     assert np.nanmax(np.array(line["y"], dtype=float)) == pytest.approx(
         run["tension"].max(), rel=1e-4
     )
+    other = next(row["name"] for row in found["runs"] if "fault" not in row and row["name"] != name)
+    both = get(client, f"/api/overlay?channel=tension&name={name}&name={other}")["difference"]
+    assert both["name"] == f"{other} less {name}"
+    later, (t, y) = read_run(recorded / other), (run.time - run.time[0], run["tension"])
+    at = later.time - later.time[0]
+    change = (later["tension"] - np.interp(at, t, y))[at <= t[-1]]
+    assert max(both["y"]) == pytest.approx(change.max(), rel=1e-4)
+    assert min(both["y"]) == pytest.approx(change.min(), rel=1e-4)
     outside = client.get("/api/overlay?name=../../etc/passwd", headers=HEADERS)
     assert outside.status_code == 400
 

@@ -183,6 +183,7 @@ def test_the_rail_slides_to_the_new_error_or_its_earlier_place_stays_dotted(
     between = {at for at in places if after + 1 < at < before - 1}
     assert (len(between) > 3) == (motion == "no-preference")
     assert ", was " in page.inner_text("#live")
+    until(page, lambda: page.locator("#busy progress").count() == 0)
     page.keyboard.press("u")
     until(page, lambda: page.locator(".name.history").count() == 0)
     page.wait_for_timeout(1000)

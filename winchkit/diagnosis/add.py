@@ -15,6 +15,7 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.diagnosis.results import Estimate, OutputFit
+from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Score, score
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.selection.weighting import reweighted
@@ -35,6 +36,7 @@ __all__ = [
     "add",
     "fitted_json",
     "grow",
+    "grow_prepared",
     "remove",
 ]
 
@@ -162,12 +164,17 @@ def grow(
 ) -> Grown:
     """The same as :func:`add`, with the fits."""
     catalogue = catalogue or load_catalogue()
+    _require_absent(catalogue[effect_id], profile)
+    dataset = prepare(runs, profile, band, decimate=True, fast=True, catalogue=catalogue)
+    return grow_prepared(effect_id, dataset, catalogue)
+
+
+def grow_prepared(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> Grown:
+    """The same as :func:`grow` on a prepared data set, that of the diagnosis of these runs."""
     effect = catalogue[effect_id]
-    if not effect.repeatable and any(table.id == effect_id for table in profile.effect):
-        raise UsageError(f"profile '{profile.name}' has the effect '{effect_id}' already")
-    dataset = prepare(runs, profile, band, decimate=True, catalogue=catalogue)
+    _require_absent(effect, dataset.profile)
     candidates = Catalogue([*catalogue, _placed(effect, dataset)])
-    engine = selection_engine(dataset, candidates)
+    engine = _engine(dataset, candidates, effect)
     lacking = engine.regression.missing_needs(effect)
     if lacking:
         raise UsageError(
@@ -176,7 +183,7 @@ def grow(
     (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
     reduced = without_impacts(dataset, final.hypothesis)
     if reduced is not None:
-        engine = selection_engine(reduced, candidates)
+        engine = _engine(reduced, candidates, effect)
         (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
     best = reweighted(engine, final, final_noise)
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
@@ -184,6 +191,22 @@ def grow(
     terms = tuple(estimates(engine.regression, best.fit, spread))
     notes = (*engine.regression.dataset.notes, *best.notes)
     return Grown(engine.regression, initial_model, best.fit, Addition(outputs, terms, notes))
+
+
+def _require_absent(effect: Effect, profile: WinchProfile) -> None:
+    if not effect.repeatable and any(table.id == effect.id for table in profile.effect):
+        raise UsageError(f"profile '{profile.name}' has the effect '{effect.id}' already")
+
+
+def _engine(dataset: Dataset, catalogue: Catalogue, effect: Effect) -> TimeSeriesSelection:
+    """Selection engine with the candidates that the fit of one effect needs.
+
+    Without repeats the noise is that beside all candidates, and an order is added where no other
+    candidate explains more; else only the signatures of thermal effects enter the noise.
+    """
+    whole = not dataset.repeated or has_orders(effect)
+    needed = [e for e in catalogue if whole or e.id == effect.id or "temperature" in e.needs]
+    return selection_engine(dataset, catalogue, needed)
 
 
 def _fitted(

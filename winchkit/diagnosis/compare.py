@@ -24,7 +24,7 @@ from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Compared", "compare", "compared", "initial_hypothesis"]
+__all__ = ["Compared", "compare", "compared", "initial_hypothesis", "initial_residual"]
 
 
 @dataclass(frozen=True)
@@ -88,16 +88,7 @@ def compared(
     regression = TimeSeriesRegression(
         prepare(runs, profile, band, kept_cut_offs=WHOLE_TRANSITION, catalogue=catalogue)
     )
-    start = initial_hypothesis(profile, catalogue, regression)
-    residual = regression.residual(start)
-    offset = None
-    offsets = regression.n_run_offsets + int(regression.fits_offset)
-    if offsets:
-        columns = regression.nuisance_columns[:, :offsets]
-        fitted = np.linalg.lstsq(columns, residual, rcond=None)[0]
-        residual = residual - columns @ fitted
-        lengths = _of_length(regression, columns)
-        offset = float(np.mean(fitted[lengths])) if lengths.any() else None
+    residual, offset = _without_offsets(profile, catalogue, regression)
     shares, orders = attributions(regression, residual), harmonics(regression, residual)
     noise = replicate_rms(regression, residual)
     outputs = {}
@@ -129,6 +120,25 @@ def compared(
         traces=traces_of(regression, residual),
     )
     return Compared(regression, residual, comparison)
+
+
+def initial_residual(catalogue: Catalogue, regression: TimeSeriesRegression) -> Array:
+    """Measured minus predicted by a profile at its file values, only the length offset fitted."""
+    return _without_offsets(regression.dataset.profile, catalogue, regression)[0]
+
+
+def _without_offsets(
+    profile: WinchProfile, catalogue: Catalogue | None, regression: TimeSeriesRegression
+) -> tuple[Array, float | None]:
+    """Residual of a profile with the offsets of the length fitted, and their mean, m."""
+    residual = regression.residual(initial_hypothesis(profile, catalogue, regression))
+    offsets = regression.n_run_offsets + int(regression.fits_offset)
+    if not offsets:
+        return residual, None
+    columns = regression.nuisance_columns[:, :offsets]
+    fitted = np.linalg.lstsq(columns, residual, rcond=None)[0]
+    lengths = _of_length(regression, columns)
+    return residual - columns @ fitted, float(np.mean(fitted[lengths])) if lengths.any() else None
 
 
 def initial_hypothesis(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise, zip_longest
 
 import numpy as np
@@ -52,6 +52,7 @@ from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.plausibility import implausible
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.effect import Effect
 from winchkit.effects.location import located
 from winchkit.effects.term import Term
 from winchkit.rendering import Plotted
@@ -65,6 +66,7 @@ __all__ = [
     "WinchAnswer",
     "candidates_of",
     "diagnose",
+    "diagnose_prepared",
     "no_progress",
     "selection_engine",
     "steps_of",
@@ -207,6 +209,20 @@ def diagnose(
     catalogue = catalogue or load_catalogue()
     progress("reading the signals", 0.0)
     dataset = prepare(runs, profile, band, decimate=decimate, fast=True, catalogue=catalogue)
+    return diagnose_prepared(
+        dataset, catalogue, as_recorded=as_recorded, progress=progress, interrupted=interrupted
+    )
+
+
+def diagnose_prepared(
+    dataset: Dataset,
+    catalogue: Catalogue,
+    *,
+    as_recorded: bool = False,
+    progress: ProgressCallback = no_progress,
+    interrupted: Callable[[WinchAnswer], None] | None = None,
+) -> WinchAnswer:
+    """The same as :func:`diagnose` on a prepared data set."""
     progress("drawing the candidates", 0.1)
     engine = selection_engine(dataset, catalogue)
     if caveats(dataset.sanity) and not as_recorded:
@@ -435,12 +451,18 @@ def _closest(
     return [equivalence_set(engine, result.final, result.noise, index) for index in added]
 
 
-def selection_engine(dataset: Dataset, catalogue: Catalogue) -> TimeSeriesSelection:
-    """Selection engine whose initial model is the profile's own effects."""
+def selection_engine(
+    dataset: Dataset, catalogue: Catalogue, candidates: Iterable[Effect] | None = None
+) -> TimeSeriesSelection:
+    """Selection engine whose initial model is the profile's own effects.
+
+    Candidates are all effects of the catalogue, or those that are given.
+    """
     regression = TimeSeriesRegression(dataset)
     initial_model = initial_hypothesis(dataset.profile, catalogue, regression)
-    candidates = [located(effect, dataset.motions) for effect in catalogue]
-    return TimeSeriesSelection(regression, initial_model, candidates)
+    chosen = catalogue if candidates is None else candidates
+    absent = [located(effect, dataset.motions) for effect in chosen]
+    return TimeSeriesSelection(regression, initial_model, absent)
 
 
 def steps_of(

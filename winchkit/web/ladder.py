@@ -16,7 +16,7 @@ from winchkit.report.words.numbers import Scale, quantity, scale_for, significan
 from winchkit.report.words.sentence import capital, changes_text, sentence, where_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
 
-__all__ = ["Rung", "card", "ladder", "verdict"]
+__all__ = ["Rung", "card", "ladder", "refitted", "verdict"]
 
 _SHOWN = 8
 """Candidates in the ladder; the others have less evidence."""
@@ -53,6 +53,20 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
         "caveats": list(diagnosis.caveats),
         "sanity": [finding.to_json() for finding in diagnosis.sanity],
         "used_share": dict(diagnosis.used_share),
+    }
+
+
+def refitted(said: str) -> dict[str, Any]:
+    """What stands in place of a verdict while a refitted profile is diagnosed."""
+    lists = ("unexplained", "empirical", "notes", "caveats", "sanity")
+    return {
+        "verdict": "refitted",
+        "chip": "Refitted",
+        "headline": said,
+        "sentence": "The candidates beside this profile are being fitted.",
+        "changes": "",
+        "used_share": {},
+        **{name: [] for name in lists},
     }
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from winchkit.arrays import Array
 from winchkit.errors import FileError, UsageError
 from winchkit.plain_json import significant
 from winchkit.report.figures.reduction import decimated
@@ -65,7 +66,9 @@ class Library:
         return path
 
     def overlay(self, names: Sequence[str], channel: str) -> dict[str, Any]:
-        """A channel of several runs from their starts, reduced for drawing.
+        """A channel of several runs from their starts, reduced for drawing; of two, the difference.
+
+        The first run is interpolated at the instants of the second one as far as both last.
 
         Parameters
         ----------
@@ -74,23 +77,24 @@ class Library:
         channel : str
             Name of the channel.
         """
-        lines = []
+        curves: list[tuple[str, str, Array, Array]] = []
         for name in names:
             run = read_run(self.path(name))
             own = run.of_winch(run.winches()[0])
-            if channel not in own:
-                continue
-            shown = decimated([own[channel]], _POINTS // 2)
-            x, values = (own.time - own.time[0])[shown], own[channel][shown]
-            lines.append(
-                {
-                    "name": name,
-                    "unit": own.channels[channel].unit,
-                    "x": significant(x.tolist(), 6),
-                    "y": significant(values.tolist(), 5),
-                }
-            )
-        return {"channel": channel, "lines": lines}
+            if channel in own:
+                unit = own.channels[channel].unit
+                curves.append((name, unit, own.time - own.time[0], own[channel]))
+        difference = None
+        if len(curves) == 2:
+            (first, unit, x1, y1), (second, _, x2, y2) = curves
+            both = x2 <= x1[-1]
+            change = y2[both] - np.interp(x2[both], x1, y1)
+            difference = _line(f"{second} less {first}", unit, x2[both], change)
+        return {
+            "channel": channel,
+            "lines": [_line(*curve) for curve in curves],
+            "difference": difference,
+        }
 
     def _files(self) -> list[Path]:
         found = [
@@ -102,6 +106,17 @@ class Library:
             and not any(part.startswith(".") for part in path.relative_to(self.folder).parts)
         ]
         return found[:_MOST]
+
+
+def _line(name: str, unit: str, x: Array, y: Array) -> dict[str, Any]:
+    """A curve reduced to the extremes of every pixel."""
+    shown = decimated([y], _POINTS // 2)
+    return {
+        "name": name,
+        "unit": unit,
+        "x": significant(x[shown].tolist(), 6),
+        "y": significant(y[shown].tolist(), 5),
+    }
 
 
 def _row(name: str, path: Path, changed: float) -> dict[str, Any]:

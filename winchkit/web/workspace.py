@@ -18,9 +18,12 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.catalog import find
-from winchkit.diagnosis.add import grow
-from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
+from winchkit.diagnosis.add import Grown, grow_prepared
+from winchkit.diagnosis.compare import initial_residual
+from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.diagnose import WinchAnswer, diagnose_prepared
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.write import write_addition
@@ -37,7 +40,7 @@ from winchkit.schema.read import read_profile
 from winchkit.web.curves import OutputCurves, curves_of
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
 from winchkit.web.foreign import imported
-from winchkit.web.ladder import Rung, card, ladder, verdict
+from winchkit.web.ladder import Rung, card, ladder, refitted, verdict
 
 __all__ = ["Cancelled", "LoadedRun", "Workspace"]
 
@@ -85,6 +88,8 @@ class State:
     before: tuple[WinchAnswer, Mapping[str, OutputCurves]] | None = None
     """Answer and curves before the last addition, so that undoing it needs no fit; one only, for
     the memory that an answer holds."""
+    refitted: bool = False
+    """Whether an addition is fitted and shown, and its diagnosis under way."""
     rungs: tuple[Rung, ...] = ()
     """Errors of the profiles before the present one."""
     said: str = ""
@@ -126,6 +131,7 @@ class Workspace:
         self._work: _Work | None = None
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="workspace")
         self._cards: dict[str, dict[str, Any]] = {}
+        self._prepared: tuple[tuple[object, ...], Dataset] | None = None
 
     @property
     def state(self) -> State:
@@ -194,15 +200,16 @@ class Workspace:
             "faults": list(state.faults),
             "said": state.said,
             "diagnosis": None,
+            "outputs": list(state.curves),
             "can_undo": len(state.versions) > 1,
         }
         if state.versions:
             added = [version.added for version in state.versions[1:]]
             out["profile"] = {"name": state.source, "added": added}
         if state.answer is not None:
-            out["diagnosis"] = verdict(state.answer.diagnosis) | {
+            words = refitted(state.said) if state.refitted else verdict(state.answer.diagnosis)
+            out["diagnosis"] = words | {
                 "ladder": ladder(state.answer, state.rungs),
-                "outputs": list(state.curves),
                 "next": [
                     {"separates": list(run.separates), "programme": run.programme}
                     for run in state.answer.diagnosis.next_runs
@@ -245,7 +252,7 @@ class Workspace:
         """The report of the present diagnosis as one page."""
         from winchkit.report.pages.pages import report_html
 
-        if self._state.answer is None:
+        if self._state.answer is None or self._state.refitted:
             raise UsageError("nothing is diagnosed yet")
         return report_html(self._state.answer, self._state.source, profile=self._state.source)
 
@@ -384,11 +391,26 @@ class Workspace:
         return read_profile(self._state.versions[-1].path)
 
     def _diagnose(self, faults: Sequence[str] = ()) -> None:
-        answer, curves = self._diagnosed(self._profile())
+        profile = self._profile()
+        self._progress("reading the signals", 0.0)
+        regression = TimeSeriesRegression(self._dataset(profile))
+        residual = initial_residual(self.catalogue, regression)
+        self._set(answer=None, curves=curves_of(regression, residual, {}), faults=tuple(faults))
+        answer, curves = self._diagnosed(profile)
         self._set(answer=answer, curves=curves, faults=tuple(faults))
 
+    def _dataset(self, profile: WinchProfile) -> Dataset:
+        """Data set of the runs that are used; the last one is kept."""
+        runs = self._runs()
+        key = (profile, *(item.path for item in self._state.runs if item.used))
+        if self._prepared is None or self._prepared[0] != key:
+            found = prepare(runs, profile, decimate=True, fast=True, catalogue=self.catalogue)
+            self._prepared = key, found
+        return self._prepared[1]
+
     def _diagnosed(self, profile: WinchProfile) -> tuple[WinchAnswer, Mapping[str, OutputCurves]]:
-        answer = diagnose(self._runs(), profile, self.catalogue, progress=self._progress)
+        dataset = self._dataset(profile)
+        answer = diagnose_prepared(dataset, self.catalogue, progress=self._progress)
         initial = answer.result.initial_model
         noise = {name: out.noise_rms for name, out in answer.diagnosis.outputs.items()}
         return answer, curves_of(answer.engine.regression, initial.residual, noise)
@@ -399,11 +421,21 @@ class Workspace:
             raise UsageError("nothing is diagnosed yet")
         if effect not in self.catalogue:
             raise UsageError(f"there is no effect '{effect}'")
-        grown = grow(effect, self._runs(), self._profile(), self.catalogue)
+        grown = grow_prepared(effect, self._dataset(self._profile()), self.catalogue)
         path = self.folder / f"version-{len(state.versions)}.toml"
         names = [item.name for item in state.runs if item.used]
         write_addition(state.versions[-1].path, grown.addition, names, path)
-        outputs = grown.addition.outputs
+        self._show_refit(state.answer, grown, Version(path, effect))
+        try:
+            answer, curves = self._diagnosed(read_profile(path))
+        except BaseException:
+            self._cards, self._state = {}, state
+            raise
+        self._set(answer=answer, curves=curves, refitted=False)
+
+    def _show_refit(self, answer: WinchAnswer, grown: Grown, version: Version) -> None:
+        """Show the refitted profile, its errors and curves, before it is diagnosed."""
+        state, outputs = self._state, grown.addition.outputs
         before = {name: out.heldout_rms_before for name, out in outputs.items()}
         label = "Profile as loaded" if len(state.versions) == 1 else f"+ {state.versions[-1].added}"
         largest = max(
@@ -416,15 +448,22 @@ class Workspace:
             f"{quantity(out.heldout_rms_after, out.unit)}, was "
             f"{quantity(out.heldout_rms_before, out.unit)}"
         )
-        answer, curves = self._diagnosed(read_profile(path))
+        now = {
+            name: replace(out, heldout_rms_before=out.heldout_rms_after)
+            for name, out in outputs.items()
+        }
+        shown = replace(answer.diagnosis, outputs=now, steps=(), candidates=(), where=())
+        noise = {name: out.noise_rms for name, out in outputs.items()}
         self._set(
-            versions=(*state.versions, Version(path, effect)),
+            versions=(*state.versions, version),
             rungs=(*state.rungs, Rung(label, before)),
             said=said,
-            answer=answer,
-            curves=curves,
-            before=(state.answer, state.curves),
+            answer=WinchAnswer(answer.engine, answer.result, shown),
+            refitted=True,
+            curves=curves_of(grown.regression, grown.final.residual, noise),
+            before=(answer, state.curves),
         )
+        self.changed()
 
     def _undo(self) -> None:
         state = self._state

@@ -30,7 +30,7 @@ function render() {
 
 function rows() {
   const words = filter.toLowerCase();
-  const seen = found.runs.filter((run) => !words || [run.name, run.programme, run.load].join(" ").toLowerCase().includes(words));
+  const seen = found.runs.filter((run) => !words || [run.name, run.programme, run.load, ...(run.winches || [])].join(" ").toLowerCase().includes(words));
   if (!seen.length) return [el("tr", {}, el("td", { colspan: 7 }, found.runs.length ? "No run has these words." : "There are no runs in this folder; start with --folder DIR."))];
   return seen.map((run) => run.fault ? el("tr", {}, el("td", {}), el("td", {}, run.name), el("td", { colspan: 5, class: "note" }, run.fault))
     : el("tr", {}, el("td", {}, el("input", { type: "checkbox", style: { minHeight: "auto" }, checked: chosen.has(run.name), "aria-label": `Choose ${run.name}`, onchange: (event) => { if (event.target.checked) chosen.add(run.name); else chosen.delete(run.name); document.getElementById("open").disabled = !chosen.size; overlay(); } })),
@@ -42,15 +42,20 @@ async function overlay() {
   if (!box || !chosen.size) { if (box) fill(box, el("p", { class: "note" }, "Choose runs on the left.")); return; }
   await attempt(async () => {
     const query = [...chosen].map((name) => `name=${encodeURIComponent(name)}`).join("&");
-    const { lines } = await ask(`/api/overlay?channel=${encodeURIComponent(channel)}&${query}`);
+    const { lines, difference } = await ask(`/api/overlay?channel=${encodeURIComponent(channel)}&${query}`);
     if (!lines.length) { fill(box, el("p", { class: "note" }, `None of these runs has ${channel}.`)); return; }
     const host = el("div", { class: "plot" }), toned = lines.map((own, i) => ({ name: own.name, tone: TONES[i % TONES.length] }));
     const figure = () => ({ title: `${channel}, each run from its own start`, source: sourceOf(`folder ${found.folder}`), legend: toned, height: 320,
-      panels: [{ title: `${channel} [${lines[0].unit}]`, xLabel: "time [s]", series: lines.map((own, i) => ({ ...toned[i], name: `${own.name} [${own.unit}]`, x: own.x, y: own.y })) }] });
+      panels: [{ title: `${channel} [${lines[0].unit}]`, xLabel: "time [s]", series: lines.map((own, i) => ({ ...toned[i], name: `${own.name} [${own.unit}]`, x: own.x, y: own.y })) },
+        ...(difference ? [{ title: `Difference [${difference.unit}]`, xLabel: "time [s]", series: [{ name: `${difference.name} [${difference.unit}]`, x: difference.x, y: difference.y, tone: "ink" }] }] : [])] });
     fill(box, el("div", { class: "row" }, el("div", { class: "legend" }, lines.map((own, i) => el("span", {}, el("i", { style: { background: `var(--${TONES[i % TONES.length]})` } }), own.name))), el("span", { class: "end" }, exporter(`overlay-${channel}`, figure))), host, el("p", { class: "note" }, `${channel} [${lines[0].unit}] over time [s]`));
     const data = uPlot.join(lines.map((own) => [own.x, own.y]));
     const style = (i) => line(TONES[i % TONES.length], 1.4, 1, { spanGaps: true, ...(i >= TONES.length / 2 ? { dash: [6, 3] } : {}) });
-    plot(host, data, lines.map((_, i) => style(i)), { height: 320, xLabel: "s", label: `${channel} of ${lines.length} runs over time` });
+    plot(host, data, lines.map((_, i) => style(i)), { height: difference ? 200 : 320, xLabel: "s", label: `${channel} of ${lines.length} runs over time` });
+    if (!difference) return;
+    const below = el("div", { class: "plot" });
+    box.append(el("h2", {}, "Difference", el("span", { class: "note" }, ` ${difference.unit}, ${difference.name}`)), below);
+    plot(below, [difference.x, difference.y], [line("ink", 1.4)], { height: 140, xLabel: "s", label: `Difference of the ${channel} over time` });
   });
 }
 
