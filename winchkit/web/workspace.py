@@ -131,7 +131,7 @@ class Workspace:
         self._work: _Work | None = None
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="workspace")
         self._cards: dict[str, dict[str, Any]] = {}
-        self._prepared: tuple[tuple[object, ...], Dataset] | None = None
+        self._prepared: Dataset | None = None
 
     @property
     def state(self) -> State:
@@ -328,6 +328,7 @@ class Workspace:
             self._cards = {}
         if changes.keys() & {"runs", "source"}:
             changes = {"before": None, **changes}
+            self._prepared = None
         self._state = replace(self._state, **{"faults": (), **changes})
 
     def _open(self, paths: Sequence[str | Path], profile: str | None) -> None:
@@ -400,13 +401,13 @@ class Workspace:
         self._set(answer=answer, curves=curves, faults=tuple(faults))
 
     def _dataset(self, profile: WinchProfile) -> Dataset:
-        """Data set of the runs that are used; the last one is kept."""
-        runs = self._runs()
-        key = (profile, *(item.path for item in self._state.runs if item.used))
-        if self._prepared is None or self._prepared[0] != key:
-            found = prepare(runs, profile, decimate=True, fast=True, catalogue=self.catalogue)
-            self._prepared = key, found
-        return self._prepared[1]
+        """Data set of the runs that are used; the last one is kept while these stay the same."""
+        if self._prepared is None or self._prepared.profile != profile:
+            runs = self._runs()
+            self._prepared = prepare(
+                runs, profile, decimate=True, fast=True, catalogue=self.catalogue
+            )
+        return self._prepared
 
     def _diagnosed(self, profile: WinchProfile) -> tuple[WinchAnswer, Mapping[str, OutputCurves]]:
         dataset = self._dataset(profile)
@@ -478,7 +479,7 @@ class Workspace:
 
     def _card(self, effect_id: str) -> dict[str, Any]:
         state = self._state
-        if state.answer is None:
+        if state.answer is None or state.refitted:
             raise UsageError("nothing is diagnosed yet")
         answer, engine, result = state.answer, state.answer.engine, state.answer.result
         item = next((s for s in result.scores if s.candidate.effect.id == effect_id), None)

@@ -9,7 +9,7 @@ let view = null, root = null, shown = { effect: null, output: null }, brushed = 
 export function enter(main, state) { root = main; shown = { effect: null, output: null }; brushed = null; update(state); }
 
 export function update(state) {
-  const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs]);
+  const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, !state.diagnosis && Boolean(state.busy)]);
   const same = root.dataset.signature === signature && root.firstChild;
   if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
   view = state;
@@ -49,7 +49,7 @@ function render() {
   } else if (view.outputs.length) {
     if (!view.outputs.includes(shown.output)) shown.output = view.outputs[0];
     const heads = view.outputs.map((output) => el("button", { "aria-pressed": String(output === shown.output), onclick: () => { shown.output = output; span = null; render(); } }, output.replaceAll("_", " ")));
-    root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, heads), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })));
+    root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, heads, view.busy ? null : el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })));
     drawTime();
   } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with.")));
   else if (!view.busy) root.append(el("div", { class: "panel" }, el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")));
