@@ -57,7 +57,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
 
 
 def refitted(said: str) -> dict[str, Any]:
-    """What stands in place of a verdict while a refitted profile is diagnosed."""
+    """Chip and headline in place of a verdict while a refitted profile is diagnosed."""
     lists = ("unexplained", "empirical", "notes", "caveats", "sanity")
     return {
         "verdict": "refitted",
