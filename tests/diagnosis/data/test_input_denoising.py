@@ -4,10 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.data.input_denoising import contrasts, shared_by_repeats, wiener_filtered
+from winchkit.diagnosis.data.input_denoising import (
+    contrasts,
+    shared_by_instruments,
+    shared_by_repeats,
+    wiener_filtered,
+)
 
 COUNT = 2000
 
@@ -46,6 +52,26 @@ def test_what_repeats_agree_on_stays_and_what_they_do_not_goes() -> None:
     noise = [random.standard_normal(COUNT) for _ in range(2)]
     for left in shared_by_repeats(noise, rows):
         assert rms(left) < 0.35
+
+
+def coloured(random: np.random.Generator, size: float) -> Array:
+    """Noise with a correlation time of 20 samples."""
+    return size * np.asarray(lfilter([np.sqrt(1 - 0.95**2)], [1, -0.95], random.normal(size=COUNT)))
+
+
+def test_coloured_noise_of_one_instrument_goes_and_what_both_show_stays() -> None:
+    """A white floor leaves coloured noise; its cross power with another instrument is chance."""
+    swing = 3 * np.sin(2 * np.pi * np.arange(COUNT) / 300)
+    alone, floor, both = [], [], []
+    for seed in range(8):
+        random = np.random.default_rng(seed)
+        noise, other = coloured(random, 1.0), coloured(random, 2.0)
+        alone.append(shared_by_instruments(noise, other))
+        floor.append(wiener_filtered(noise))
+        both.append(shared_by_instruments(swing + noise, 1.05 * swing + other))
+    assert rms(np.array(alone)) < rms(np.array(floor)) / 2
+    assert rms(np.array(both) - swing) < rms(np.array(floor))
+    assert all(x @ swing / (swing @ swing) > 0.8 for x in both)
 
 
 def test_what_has_no_partner_is_not_accepted() -> None:

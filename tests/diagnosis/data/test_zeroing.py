@@ -44,6 +44,23 @@ def test_a_wander_is_no_new_zero() -> None:
         assert zeroed_anew("cable_length", [wander, np.cumsum(random.normal(0, 1, 400))]) is None
 
 
+def test_a_new_zero_is_found_beside_what_the_temperature_does_and_not_instead() -> None:
+    """Six differences of repeats at other temperatures: elongation by these, then new zeros too."""
+    random = np.random.default_rng(7)
+    warmer = random.normal(0, 3, 6)
+    length = np.linspace(-1, 1, 400)
+    thermal = [np.stack([np.full(400, w), w * length]) for w in warmer]
+    noise = [random.normal(0, 0.1, 400) + 2.0 * w + 0.5 * w * length for w in warmer]
+    assert zeroed_anew("cable_length", noise) is not None
+    assert zeroed_anew("cable_length", noise, thermal) is None
+    moved = [x + random.normal(0, 1) for x in noise]
+    found = zeroed_anew("cable_length", moved, thermal)
+    assert found is not None
+    assert 0.3 < found.value < 2.0
+    # With as many temperatures as differences nothing is left to test.
+    assert zeroed_anew("cable_length", moved[:1], thermal[:1]) is None
+
+
 @pytest.mark.parametrize(("name", "size"), [("cable_length", 0.002), ("tension", 3.0)])
 def test_an_offset_per_run_does_not_hide_an_effect(name: str, size: float) -> None:
     """A larger drum is named with and without offsets, with the same radius."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
 from winchkit.runs.sanity.local_noise import local_noise
-from winchkit.runs.sanity.outliers import outlier_mask
+from winchkit.runs.sanity.outliers import outlier_mask, outlier_masks
 from winchkit.runs.sanity.quantisation import resolution
 from winchkit.runs.sanity.sampling import increasing_rows
 
@@ -128,6 +129,28 @@ def test_two_spikes_with_one_sample_between_them_are_outliers(
     values[first] += size
     values[first + 2] += sign * size
     assert np.flatnonzero(outlier_mask(values)).tolist() == [first, first + 2]
+
+
+@pytest.mark.parametrize("jerks", [False, True])
+def test_spikes_that_coincide_by_chance_are_outliers_and_jerks_are_not(jerks: bool) -> None:
+    """Spikes in 1 % of the samples of two channels; or peaks of the force, which both show."""
+    random = np.random.default_rng(11)
+    places = [5 + random.choice(COUNT // 5 - 2, 15, replace=False) * 5 for _ in range(2)]
+    places[1] = (
+        places[0] if jerks else np.append(places[1][places[1] != places[0][0]], places[0][0])
+    )
+    run = run_of(150 + random.normal(0, 0.8, COUNT))
+    torque = Channel(4 + random.normal(0, 0.02, COUNT), "N m")
+    run = replace(run, channels={**run.channels, "motor_torque": torque})
+    names = ("tension", "motor_torque")
+    for name, rows in zip(names, places, strict=True):
+        run[name][rows] += 300.0 * random.choice([-1, 1], len(rows))
+    masks = outlier_masks(run)
+    if jerks:
+        assert not masks
+    else:
+        for name, rows in zip(names, places, strict=True):
+            assert np.flatnonzero(masks[name]).tolist() == sorted(set(rows.tolist()))
 
 
 @given(SEEDS, st.floats(5.0, 24.0), st.integers(3, 20))

@@ -198,7 +198,7 @@ def prepare(
         left_out.append(outlying[1])
         runs = [run for index, run in enumerate(runs) if index != outlying[0]]
         dataset = assemble(runs, profile, filtering)
-    anew = [zeroed_anew(output, _repeat_differences(dataset, output)) for output in OUTPUTS]
+    anew = [zeroed_anew(output, *_repeat_differences(dataset, output)) for output in OUTPUTS]
     zeroed = [finding for finding in anew if finding is not None]
     factor = 1 if decimation is None else decimation.factor
     return replace(
@@ -220,7 +220,8 @@ def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Fin
     out = []
     for output in dataset.outputs:
         least = quantisation_noise(resolution.get(output, 0.0))
-        parts = _repeat_differences(dataset, output)
+        differences, thermal = _repeat_differences(dataset, output)
+        parts = [d for d, t in zip(differences, thermal, strict=True) if not t.any()]
         if not parts or not least:
             continue
         rms = float(np.sqrt(np.nanmean(np.concatenate(parts) ** 2)))
@@ -234,21 +235,33 @@ def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Fin
     return out
 
 
-def _repeat_differences(dataset: Dataset, output: str) -> list[Array]:
-    """Contrasts of the residuals of repeats; none of repeats at different temperatures."""
-    out: list[Array] = []
+def _repeat_differences(dataset: Dataset, output: str) -> tuple[list[Array], list[Array]]:
+    """Contrasts of the residuals of repeats, (n,) each, and of their temperatures, (2, n).
+
+    The latter are those of the temperature and of its product with the output; zero where the
+    temperatures are equal or not known.
+    """
+    differences: list[Array] = []
+    thermal: list[Array] = []
     for group in dataset.repeated:
         own = [dataset.recordings[run] for run in group.runs]
         if not all(output in r.measured for r in own):
             continue
         if output == "cable_length" and any(r.zeroed for r in own):
             continue
+        new = contrasts(_aligned_errors(dataset, group, output))[1]
         known = [r.signals.temperature for r in own]
-        warmth = [float(np.mean(values)) for values in known if values is not None]
-        if warmth and np.ptp(warmth) > _EQUAL_TEMPERATURE:
-            continue
-        out += list(contrasts(_aligned_errors(dataset, group, output))[1])
-    return out
+        warmth = np.array(
+            [x[rows] for x, rows in zip(known, group.rows, strict=True) if x is not None]
+        )
+        if len(warmth) == len(own) and np.ptp(warmth.mean(axis=1)) > _EQUAL_TEMPERATURE:
+            nominal = own[0].nominal[output][group.rows[0]]
+            warmer = contrasts(warmth - warmth.mean())[1]
+            thermal += [np.stack([w, w * (nominal - nominal.mean())]) for w in warmer]
+        else:
+            thermal += [np.zeros((2, new.shape[1]))] * len(new)
+        differences += list(new)
+    return differences, thermal
 
 
 def _aligned_errors(dataset: Dataset, group: Repeats, output: str) -> Array:

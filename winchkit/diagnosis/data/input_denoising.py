@@ -2,7 +2,8 @@
 
 A measured load or temperature carries noise of its own. What an effect changes is evaluated on the
 part of it that repeats share, by a Wiener filter per frequency band; without repeats on the part
-above the white noise floor. Otherwise that noise acts like a lag or a hysteresis.
+that another instrument shares (the tension with the torque, the load with the tension), or, where
+there is none, above the white noise floor. Otherwise that noise acts like a lag or a hysteresis.
 
 References
 ----------
@@ -28,6 +29,7 @@ from winchkit.model.stages import Signals
 __all__ = [
     "contrasts",
     "denoised_motions",
+    "shared_by_instruments",
     "shared_by_repeats",
     "wiener_filtered",
 ]
@@ -67,6 +69,24 @@ def wiener_filtered(signal: Array) -> Array:
     return _band_filtered(full, power, np.full_like(power, floor))
 
 
+def shared_by_instruments(signal: Array, other: Array) -> Array:
+    """Part of a signal that another instrument of the same quantity shows too.
+
+    Parameters
+    ----------
+    signal, other : (n,) array
+        Readings of the two, whose noise is independent, in one unit.
+
+    Returns
+    -------
+    (n,) array
+        The signal, each band scaled by the cross power of both over its own: the Wiener gain, since
+        only the quantity is in both (instrumental variable).
+    """
+    own, beside = (np.asarray(dct(x, type=2, norm="ortho")) for x in (signal, other))
+    return _band_filtered(own, own**2, own**2 - own * beside, beside**2)
+
+
 def shared_by_repeats(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
     """Part of each signal that its repeats share, on its own samples.
 
@@ -102,8 +122,11 @@ def shared_by_repeats(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]
     return out
 
 
-def _band_filtered(full: Array, power: Array, noise: Array) -> Array:
-    """Inverse transform with each band scaled by the share of its power that is not noise."""
+def _band_filtered(full: Array, power: Array, noise: Array, other: Array | None = None) -> Array:
+    """Inverse transform with each band scaled by the share of its power that is not noise.
+
+    ``other`` is the power of another instrument, where the share is that of a cross power.
+    """
     edges = band_edges(np.arange(len(full), dtype=float), 1)
     gain = np.ones_like(full)
     for low, high in pairwise(edges):
@@ -114,8 +137,11 @@ def _band_filtered(full: Array, power: Array, noise: Array) -> Array:
         total = float(np.sum(power[inside]))
         share = 1 - float(np.sum(noise[inside])) / total if total > 0 else 0.0
         # A ratio of two sums of n squares has a standard deviation of 2/√n: two of them are noise.
+        # A cross power of independent signals over the power of one: √(ratio of their powers/n).
         deviation = 2 / np.sqrt(inside.stop - inside.start)
-        gain[inside] = share if share > min(2 * deviation, 0.9) else 0.0
+        if other is not None and total > 0:
+            deviation *= float(np.sqrt(np.sum(other[inside]) / total)) / 2
+        gain[inside] = min(share, 1.0) if share > min(2 * deviation, 0.9) else 0.0
     gain[0] = 1.0
     return np.asarray(idct(full * gain, type=2, norm="ortho"))
 
@@ -137,10 +163,11 @@ def denoised_motions(
     Notes
     -----
     The acceleration of the cable is the part that repeats share. A measured force is its regression
-    on that acceleration plus the part of the remainder that repeats share; the force of a known
-    weight follows the acceleration alone; known weights on a winch at rest are used as they are,
-    since a filter would smooth their steps. The error of finite differences in the acceleration is
-    estimated from a measured force; with a known weight it is a nuisance parameter of the fit.
+    on that acceleration plus the part of the remainder that repeats, or two instruments, share; the
+    force of a known weight follows the acceleration alone; known weights on a winch at rest are
+    used as they are, since a filter would smooth their steps. The error of finite differences in
+    the acceleration is estimated from a measured force; with a known weight it is a nuisance
+    parameter of the fit.
     """
     out = list(motions)
     for group in repeats:
@@ -156,7 +183,7 @@ def denoised_motions(
             np.column_stack(pair) for pair in zip(unit_force, discretization, strict=True)
         ]
         for index, force, r in zip(
-            group.runs, _forces(own, regressors, group), discretization, strict=True
+            group.runs, _forces(line, own, regressors, group), discretization, strict=True
         ):
             out[index] = _with(out[index], force, r, signals[index].temperature)
     return out
@@ -192,11 +219,11 @@ def _denoised(values: Sequence[Array], group: Repeats) -> list[Array]:
 
 
 def _forces(
-    signals: Sequence[Signals], regressors: Sequence[Array], group: Repeats
+    line: Line, signals: Sequence[Signals], regressors: Sequence[Array], group: Repeats
 ) -> list[Array | None]:
     """Denoised cable force of every run of a group; None where it is not known.
 
-    ``moved`` (n, 2) holds the force of a unit weight and its correction for finite differences.
+    ``regressors`` (n, 2) hold the force of a unit weight and its correction for finite differences.
     """
     measured = [s.load if s.load is not None else s.tension for s in signals]
     known = [s.load_mass if s.load is None else None for s in signals]
@@ -207,10 +234,24 @@ def _forces(
     if len(values) < len(signals):
         return [None] * len(signals)
     regressed = [_regressed_force(v, f) for v, f in zip(values, regressors, strict=True)]
-    remainders = shared_by_repeats(
-        [v - f for v, f in zip(values, regressed, strict=True)], group.rows
-    )
-    return [f + r for f, r in zip(regressed, remainders, strict=True)]
+    remainders = [v - f for v, f in zip(values, regressed, strict=True)]
+    other = _other_force(line, signals[0]) if len(signals) == 1 else None
+    if other is not None:
+        beside = other - _regressed_force(other, regressors[0])
+        shared = [shared_by_instruments(remainders[0], beside)]
+    else:
+        shared = shared_by_repeats(remainders, group.rows)
+    return [f + r for f, r in zip(regressed, shared, strict=True)]
+
+
+def _other_force(line: Line, signals: Signals) -> Array | None:
+    """Cable force by another instrument than the one that is the load; None where there is none."""
+    if signals.load is not None and signals.tension is not None:
+        return signals.tension
+    if signals.motor_torque is None:
+        return None
+    motion = line.motion(signals)
+    return np.asarray(signals.motor_torque / line.way(motion.at).arm)
 
 
 def _regressed_force(force: Array, regressors: Array) -> Array:

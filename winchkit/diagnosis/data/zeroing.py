@@ -3,7 +3,9 @@
 Repeats have equal predictions, so that their difference is noise, and a constant where the
 instrument was zeroed in between. The mean of every difference is tested against its variation over
 blocks of time (batch means, one F test per output), and its first block against the change from
-block to block, so that a slow wander of the instrument is none.
+block to block, so that a slow wander of the instrument is none. Repeats at different temperatures
+may differ by what a temperature does: a straight line over it, and over its product with the
+output, is fitted beside.
 
 References
 ----------
@@ -34,7 +36,9 @@ _LEAST_SAMPLES = 64
 _LEVEL_OF_WANDER = 0.01
 
 
-def zeroed_anew(output: str, differences: Sequence[Array]) -> Finding | None:
+def zeroed_anew(
+    output: str, differences: Sequence[Array], thermal: Sequence[Array] | None = None
+) -> Finding | None:
     """Finding ``zeroed-anew``; value: standard deviation of the offset between repeats, SI.
 
     Parameters
@@ -44,32 +48,50 @@ def zeroed_anew(output: str, differences: Sequence[Array]) -> Finding | None:
     differences
         Contrasts of the residuals of repeats, each with the variance of one run's noise; NaN where
         a sample is not compared.
+    thermal
+        Per difference its known regressors, (k, n), such as the difference of temperatures; None
+        for none.
 
     Returns
     -------
     Finding or None
-        None where the means of the differences are within their variation over eight blocks of
-        time.
+        None where the means of the differences, beside the regressors, are within their variation
+        over eight blocks of time.
     """
-    known = [difference[np.isfinite(difference)] for difference in differences]
-    means = np.array(
-        [
-            [float(part.mean()) for part in np.array_split(own, BLOCKS)]
-            for own in known
-            if len(own) >= _LEAST_SAMPLES
-        ]
-    )
-    if len(means) == 0:
+    means, known = [], []
+    for index, difference in enumerate(differences):
+        rows = np.isfinite(difference)
+        if np.count_nonzero(rows) >= _LEAST_SAMPLES:
+            means.append(_block_means(difference[rows]))
+            beside = np.zeros((0, len(rows))) if thermal is None else thermal[index]
+            known.append(np.array([_block_means(x[rows]) for x in beside]).reshape(-1, BLOCKS).T)
+    if not means:
         return None
-    between = BLOCKS * float(np.mean(means.mean(axis=1) ** 2))
-    within = float(np.mean(means.var(axis=1, ddof=1)))
-    if within == 0:
+    observed, regressors = np.array(means), np.concatenate(known)
+    offsets = np.repeat(np.eye(len(means)), BLOCKS, axis=0)
+    without, rank = _left(observed.ravel(), regressors)
+    left, whole = _left(observed.ravel(), np.hstack([regressors, offsets]))
+    freedom = whole - rank, observed.size - whole
+    within = float(left @ left) / max(freedom[1], 1)
+    if freedom[0] == 0 or within == 0:
         return None
-    freedom = len(means), (BLOCKS - 1) * len(means)
+    between = float(without @ without - left @ left) / freedom[0]
     p_value = float(fdtrc(*freedom, between / within))
-    if p_value >= LEVEL or wanders(means):
+    if p_value >= LEVEL or wanders(without.reshape(observed.shape)):
         return None
     return anew(output, float(np.sqrt((between - within) / BLOCKS)), p_value, "repeats")
+
+
+def _block_means(values: Array) -> Array:
+    return np.array([float(part.mean()) for part in np.array_split(values, BLOCKS)])
+
+
+def _left(values: Array, columns: Array) -> tuple[Array, int]:
+    """Values without what columns explain, and the rank of these."""
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    unit = columns[:, size > 0] / size[size > 0]
+    amplitudes, _, rank, _ = np.linalg.lstsq(unit, values, rcond=1e-6)
+    return np.asarray(values - unit @ amplitudes), int(rank)
 
 
 def anew(output: str, spread: float, p_value: float, between: str) -> Finding:

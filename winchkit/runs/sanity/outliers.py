@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import bdtrc
 
 from winchkit.arrays import Array
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
@@ -18,8 +19,10 @@ _LIMIT = 12.0
 """Local standard deviations: beyond 8 in none of 10¹⁵ Gaussian samples, and room for tails."""
 _AGREEMENT = 0.25
 """Largest range of the four neighbours, in deviations of the sample."""
-_SAME_EVENT = 3.0
+_SAME_EVENT = 4.0
 """Local standard deviations of another channel at the same time, with which a peak is physical."""
+_LEVEL = 0.01
+"""Level of the test that spikes coincide with deviations of other channels by chance."""
 _WINDOW = 50
 _MAD = 0.6745
 
@@ -60,6 +63,12 @@ def outlier_masks(run: Run) -> dict[str, NDArray[np.bool_]]:
     dict of (n,) array of bool
         Channels with at least one spike. A peak of the force that lasts one sample, as at a jerk,
         appears in the angle, the tension, the load or the torque at the same time: it is none.
+
+    Notes
+    -----
+    Spikes of independent transmission errors coincide too, with the share of samples at which other
+    channels deviate. Coinciding peaks are physical where there are more of them than that
+    (binomial test, level 1 %).
     """
     names = [name for name in run if name.rpartition(".")[2] in CHANNEL_DIMENSIONS]
     found = {name: _spikes(run[name]) for name in names}
@@ -73,7 +82,7 @@ def outlier_masks(run: Run) -> dict[str, NDArray[np.bool_]]:
             for other, (_, shared) in found.items()
             if other != name and other.rpartition(".")[0] in {"", winch}
         ]
-        alone = spikes & ~_within_one(beside) if beside else spikes
+        alone = spikes & ~_physical(spikes, _within_one(beside)) if beside else spikes
         if alone.any():
             out[name] = alone
     return out
@@ -116,6 +125,15 @@ def _spikes(values: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     out[rows[2:-2][large & agree]] = True
     event[rows[2:-2][deviation > _SAME_EVENT * scale]] = True
     return out, event
+
+
+def _physical(spikes: NDArray[np.bool_], elsewhere: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Spikes at which other channels deviate; none where that is chance."""
+    together = spikes & elsewhere
+    count, chance = np.count_nonzero(together), float(np.mean(elsewhere))
+    # P(at least count of all spikes coincide).
+    by_chance = bdtrc(count - 1, np.count_nonzero(spikes), chance) if count else 1.0
+    return together if by_chance < _LEVEL else np.zeros_like(together)
 
 
 def _within_one(masks: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
