@@ -131,13 +131,13 @@ def test_two_spikes_with_one_sample_between_them_are_outliers(
     assert np.flatnonzero(outlier_mask(values)).tolist() == [first, first + 2]
 
 
-@pytest.mark.parametrize("jerks", [False, True])
-def test_spikes_that_coincide_by_chance_are_outliers_and_jerks_are_not(jerks: bool) -> None:
+@pytest.mark.parametrize("peaks", [False, True])
+def test_spikes_that_coincide_by_chance_are_outliers_and_peaks_are_not(peaks: bool) -> None:
     """Spikes in 1 % of the samples of two channels; or peaks of the force, which both show."""
     random = np.random.default_rng(11)
     places = [5 + random.choice(COUNT // 5 - 2, 15, replace=False) * 5 for _ in range(2)]
     places[1] = (
-        places[0] if jerks else np.append(places[1][places[1] != places[0][0]], places[0][0])
+        places[0] if peaks else np.append(places[1][places[1] != places[0][0]], places[0][0])
     )
     run = run_of(150 + random.normal(0, 0.8, COUNT))
     torque = Channel(4 + random.normal(0, 0.02, COUNT), "N m")
@@ -146,7 +146,7 @@ def test_spikes_that_coincide_by_chance_are_outliers_and_jerks_are_not(jerks: bo
     for name, rows in zip(names, places, strict=True):
         run[name][rows] += 300.0 * random.choice([-1, 1], len(rows))
     masks = outlier_masks(run)
-    if jerks:
+    if peaks:
         assert not masks
     else:
         for name, rows in zip(names, places, strict=True):
