@@ -149,6 +149,8 @@ class Bench:
             """Who commands each winch."""
             self.stopped_by = ""
             """Who gave the last quick stop."""
+            self.stops = 0
+            """Quick stops that were given."""
             self.cells = self._cell_desk()
             """Its instruments by name, for commands and whoever looks at them one by one."""
             self.loop.on_jog = self._jog_from_callback
@@ -304,6 +306,7 @@ class Bench:
         """
         self._release.close(set(self.winch))
         self.stopped_by = self.commanders.actor.name
+        self.stops += 1
         with self.loop.ordering:
             for parts in self.loop.winches.values():
                 parts.controller.stop()
@@ -490,6 +493,21 @@ class Bench:
                 f"{words} (latched: all winches were stopped; reset to go on, e.g. with "
                 "`winchkit reset`)"
             )
+
+    def raise_stop(self, stops: int) -> None:
+        """Raise what has stopped the bench, a quick stop after the first ``stops`` included.
+
+        A programme calls it before each motion and while it holds: a quick stop that comes while
+        nothing moves ends no motion.
+
+        Parameters
+        ----------
+        stops : int
+            Value of :attr:`stops` at the beginning of the programme.
+        """
+        self.raise_trouble()
+        if self.stops != stops:
+            raise MotionError(f"{self.stopped_by} stopped the bench between two motions")
 
     def wait_at_rest(self, names: Iterable[str]) -> None:
         """Return when these winches are disabled and stand still; raises MotionError if not.

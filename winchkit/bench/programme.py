@@ -129,7 +129,7 @@ class _Execution:
     ) -> None:
         self.folder = folder
         self.written: list[Path] = []
-        self._replace = replace
+        self._replace, self._stops = replace, bench.stops
         self._bench, self._programme, self._ask, self._suffix = bench, programme, ask, suffix
         self._recorder: Recorder | None = None
         self._approached = False
@@ -161,15 +161,22 @@ class _Execution:
 
     def end_run(self) -> None:
         """Disable the winches and finish the file."""
-        if self._recorder is not None:
+        recorder = self._recorder
+        if recorder is not None:
             self._hold(_LEAD)
             self._bench.stop()
-            self._finish()
+            self.abandon()
+            if recorder.rows == 0:
+                raise RunError(
+                    f"{recorder.path}: no reading came during the run; check the sensors"
+                )
 
     def abandon(self) -> None:
         """Keep what was logged, whatever happened."""
-        if self._recorder is not None:
-            self._finish()
+        recorder, self._recorder = self._recorder, None
+        if recorder is not None:
+            recorder.close()
+            self.written.append(recorder.path)
 
     def _question(self, step: Step) -> None:
         if not step.asks_beyond(self._hanging, self._warm):
@@ -191,6 +198,7 @@ class _Execution:
         }
         for place in range(max(map(len, places.values()), default=0)):
             lengths = {name: way[min(place, len(way) - 1)] for name, way in places.items()}
+            self._bench.raise_stop(self._stops)
             self._bench.move_together(lengths, self._fastest(), hold=True)
         self._approached = True
 
@@ -218,27 +226,19 @@ class _Execution:
                 return path
         raise UsageError(f"more than 26 runs would be named {name}; split the programme")
 
-    def _finish(self) -> None:
-        recorder, self._recorder = self._recorder, None
-        if recorder is None:
-            return
-        recorder.close()
-        self.written.append(recorder.path)
-        if recorder.rows == 0:
-            raise RunError(f"{recorder.path}: no reading came during the run; check the sensors")
-
     def _hold(self, duration: float) -> None:
         """Wait where it is, watching for whatever stops the bench."""
         clock = self._bench.clock
         end = clock.now() + duration
         while (left := end - clock.now()) > 0:
-            self._bench.raise_trouble()
+            self._bench.raise_stop(self._stops)
             clock.sleep(min(0.02, left))
 
     def _move(self, step: Step) -> None:
         """Move one winch or, started in one cycle and lasting equally long, all of them."""
         chosen = self._winches(step.winch)
         lengths = {name: self._target(step, winch) for name, winch in chosen.items()}
+        self._bench.raise_stop(self._stops)
         self._bench.move_together(lengths, step.speed, step.acceleration, hold=True)
 
     def _target(self, step: Step, winch: Winch) -> float:

@@ -173,6 +173,7 @@ class _Execution:
     ) -> None:
         self._bench, self._platform, self._progress = bench, platform, progress
         self._preload: Array | None = None
+        self._stops = bench.stops
 
     def play(self, repeat: int, motions: Motions) -> None:
         for number, motion in enumerate(motions, start=1):
@@ -180,6 +181,7 @@ class _Execution:
             if isinstance(motion, float):
                 self._hold(motion)
                 continue
+            self._bench.raise_stop(self._stops)
             self._preload = self._platform.begin(motion, hold=True, preload=self._preload)
             self._platform.wait()
 
@@ -187,7 +189,7 @@ class _Execution:
         clock = self._bench.clock
         end = clock.now() + duration
         while (left := end - clock.now()) > 0:
-            self._bench.raise_trouble()
+            self._bench.raise_stop(self._stops)
             clock.sleep(min(_POLL, left))
 
 

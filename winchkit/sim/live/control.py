@@ -68,6 +68,7 @@ def _status(live: LiveBench) -> str:
     with live.up_to_date():
         winches = [
             f"{name}: {winch.plant.cable_length:.4f} m, {winch.plant.tension:.1f} N, "
+            f"{winch.plant.motor_velocity:.3f} rad/s, "
             f"{winch.plant.load_mass:g} kg, {winch.drive.state.name.lower().replace('_', ' ')}"
             for name, winch in live.winches.items()
         ]
