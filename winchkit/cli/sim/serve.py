@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _CHECK_EVERY = 0.1
-_TURN = 5e-4
+_TURN = 1e-4
 
 
 @click.command(
@@ -81,7 +81,8 @@ def command(
     from winchkit.sim.live.bench import LiveBench
     from winchkit.sim.live.control import ControlServer
 
-    # Bus and instruments share this interpreter; 5 ms, its default turn, is a whole cycle.
+    # Bus and instruments share this interpreter, whose default turn of 5 ms is a whole cycle. The
+    # bus waits for a turn at each of several thousand system calls a second.
     sys.setswitchinterval(_TURN)
     declared = read_simbench(find("sim", bench))
     path = bench_file or Path(f"{Path(bench).stem}-bench.toml")

@@ -15,7 +15,8 @@ from winchkit.sim.drive.units import wrapped
 __all__ = ["Axis"]
 
 _MAX_SLICE = 1e-3
-_MIN_SLICE = 2e-5
+_LEAST_SLICE = 2e-5
+"""Shorter times are left to the next call, s."""
 
 
 class Axis:
@@ -42,10 +43,13 @@ class Axis:
         self._sampled_at = -inf
         self._following_since: float | None = None
 
-    def advance(self, now: float) -> None:
-        """Move until ``now``; set-points are computed in steps of at most a millisecond."""
+    def advance(self, now: float, tolerance: float = 0.0) -> None:
+        """Move until ``now``, if more than ``tolerance`` s is left.
+
+        Set-points are computed in steps of at most a millisecond.
+        """
         duration = now - self.now
-        if duration < _MIN_SLICE:
+        if duration < max(_LEAST_SLICE, tolerance):
             return
         count = ceil(duration / _MAX_SLICE - 1e-6)
         dt = duration / count
@@ -57,8 +61,8 @@ class Axis:
             if motion.stop_is_over(shaft.motor_velocity):
                 self._power.standstill()
             self._watch_following()
-            self._status.advance(shaft.motor_angle, shaft.motor_velocity, dt)
         self.now = now
+        self._status.advance(shaft.motor_angle, shaft.motor_velocity, duration)
 
     def sample(self, error_code: int) -> None:
         """Update the actual values in the object dictionary."""

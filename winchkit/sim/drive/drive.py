@@ -58,6 +58,8 @@ class SimDrive:
         Whether a holding brake is fitted.
     smoothing : float
         Length of the set-point filter in CSV, CSP and IP, s.
+    tolerance : float
+        Time by which the motion may be behind but at a SYNC, s.
     now : float
         Time at the start, s.
 
@@ -77,6 +79,7 @@ class SimDrive:
         *,
         brake: bool,
         smoothing: float = 0.0,
+        tolerance: float = 0.0,
         now: float = 0.0,
     ) -> None:
         check_objects(objects, modes_of(servo.modes), node)
@@ -84,6 +87,7 @@ class SimDrive:
         self.objects = objects
         self.nmt = NmtState.BOOTING
         self._servo, self._shaft, self._quirks = servo, shaft, servo.quirks
+        self._tolerance = tolerance
         self._booted_at = now
         self._error = 0
         self._sdo_refuses = self._inhibited = False
@@ -155,14 +159,16 @@ class SimDrive:
             self._serve_sdo(data, now)
         elif 0x700 < identifier <= 0x77F:
             self._heartbeats.heard(identifier - 0x700, now)
-        elif self.nmt is NmtState.OPERATIONAL:
+        elif self.nmt is not NmtState.OPERATIONAL:
+            return
+        elif self._pdos.listens(identifier):
             self.advance(now)
-            if identifier == self.objects.number(0x1005, 0, 0x80) & 0x7FF:
-                self._status.syncs += 1
-                self._pdos.latch()
-                self._pdos.on_sync(now)
-            else:
-                self._pdos.receive(identifier, data)
+            self._pdos.receive(identifier, data)
+        elif identifier == self.objects.number(0x1005, 0, 0x80) & 0x7FF:
+            self._axis.advance(now)
+            self._status.syncs += 1
+            self._pdos.latch()
+            self._pdos.on_sync(now)
 
     def tick(self, now: float) -> None:
         """Advance time to ``now``."""
@@ -304,7 +310,7 @@ class SimDrive:
 
     def advance(self, now: float) -> None:
         """Move until ``now``, without evaluating the network's timers."""
-        self._axis.advance(now)
+        self._axis.advance(now, self._tolerance)
 
     def _sample(self) -> None:
         self._axis.sample(self._error)

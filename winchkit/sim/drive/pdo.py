@@ -90,6 +90,10 @@ class Pdos:
         self._receive = {pdo.identifier: pdo for pdo in self._valid(0x1400)}
         self._transmit = self._valid(0x1800)
 
+    def listens(self, identifier: int) -> bool:
+        """Whether it is the identifier of a valid RPDO."""
+        return identifier in self._receive
+
     def receive(self, identifier: int, data: bytes) -> None:
         """Take a frame that may be an RPDO."""
         pdo = self._receive.get(identifier)

@@ -17,6 +17,7 @@ import can
 
 from winchkit.errors import ConnectionLost, UsageError
 from winchkit.schema.bench import BusSpec
+from winchkit.sim.live.multicast import MulticastPort
 
 __all__ = [
     "CanPort",
@@ -130,7 +131,7 @@ _GROUP = "239.74.163.2"
 _BETWEEN_PROCESSES = 0.2
 """Least heartbeat period of a bench that is served to other processes, s: its drives run in a
 program of normal priority, which may be suspended for up to 0.25 s."""
-_PROBE = can.Message(arbitration_id=0x7FF, is_extended_id=False)
+_PROBE = 0x7FF, b""
 _ROUTE = (
     "this machine has no route for multicast; add one with: ip route add 239.0.0.0/8 dev lo "
     "(as root), or keep to one process with the interface 'virtual'"
@@ -155,6 +156,26 @@ def wired(spec: BusSpec, name: str, interface: Interface) -> BusSpec:
     )
 
 
+class _Library:
+    """Any interface of python-can."""
+
+    def __init__(self, spec: BusSpec) -> None:
+        options: dict[str, Any] = {"interface": spec.interface, "channel": spec.channel}
+        if spec.interface != "virtual":
+            options["bitrate"] = spec.bitrate
+        self._bus = can.Bus(**options)
+        self.close = self._bus.shutdown
+
+    def send(self, identifier: int, data: bytes) -> None:
+        self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def receive(self, timeout: float) -> tuple[int, bytes] | None:
+        message = self._bus.recv(timeout)
+        if message is None or message.is_error_frame or message.is_extended_id:
+            return None
+        return message.arbitration_id, bytes(message.data)
+
+
 class CanPort:
     """An open CAN bus; raises ConnectionLost.
 
@@ -164,13 +185,13 @@ class CanPort:
     def __init__(self, spec: BusSpec, wire: Wire) -> None:
         self.wire = wire
         self._name = f"{spec.interface} channel '{spec.channel}'"
-        options: dict[str, Any] = {"interface": spec.interface, "channel": spec.channel}
-        if spec.interface == "udp_multicast":
-            options["port"] = spec.port
-        elif spec.interface != "virtual":
-            options["bitrate"] = spec.bitrate
         try:
-            self._bus = can.Bus(**options)
+            if spec.interface == "udp_multicast":
+                self._bus: MulticastPort | _Library = MulticastPort(
+                    str(spec.channel), int(spec.port or 0)
+                )
+            else:
+                self._bus = _Library(spec)
         except (can.CanError, OSError, ValueError, ImportError) as error:
             raise ConnectionLost(self._trouble(spec, error)) from error
         if spec.interface == "udp_multicast":
@@ -178,9 +199,9 @@ class CanPort:
 
     def _try_sending(self, spec: BusSpec) -> None:
         try:
-            self._bus.send(_PROBE)
-        except (can.CanError, OSError) as error:
-            self._bus.shutdown()
+            self._bus.send(*_PROBE)
+        except OSError as error:
+            self._bus.close()
             raise ConnectionLost(self._trouble(spec, error)) from error
 
     def _trouble(self, spec: BusSpec, error: Exception) -> str:
@@ -193,9 +214,8 @@ class CanPort:
             self._put(identifier, data)
 
     def _put(self, identifier: int, data: bytes) -> None:
-        message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
         try:
-            self._bus.send(message)
+            self._bus.send(identifier, data)
         except (can.CanError, OSError) as error:
             raise ConnectionLost(f"{self._name}: cannot send: {error}") from error
 
@@ -207,18 +227,17 @@ class CanPort:
         if arrived is not None:
             return arrived
         try:
-            message = self._bus.recv(timeout)
-        except (can.CanError, OSError) as error:
+            frame = self._bus.receive(timeout)
+        except (can.CanError, OSError, ValueError) as error:
             raise ConnectionLost(f"{self._name}: cannot receive: {error}") from error
-        if message is None or message.is_error_frame or message.is_extended_id:
+        if frame is None:
             return None
-        frame = message.arbitration_id, bytes(message.data)
         return frame if self.wire.carry(*frame, from_drive=False) else None
 
     def close(self) -> None:
         """Close the bus."""
         with suppress(can.CanError, OSError):
-            self._bus.shutdown()
+            self._bus.close()
 
 
 def _free_udp_port() -> int:

@@ -7,9 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.sim.robot.platform import LEAST_STEP, CablePlatform
+from winchkit.sim.robot.platform import CablePlatform
 
 __all__ = ["CableEnd", "Coupling"]
+
+_LEAST_STEP = 5e-4
+"""Shorter times of the platform are left to the next call, s: every instrument has its winch
+advance by itself."""
 
 
 class Coupling:
@@ -48,15 +52,14 @@ class Coupling:
         platform, ends = self.platform, self.ends
         to = min(end.time for end in ends)
         passed = to - platform.time
-        if passed <= 0.0:
+        if passed < _LEAST_STEP:
             return
         start = np.array([end.passed for end in ends])
         ahead = np.array([passed / (end.time - platform.time) for end in ends])
         goal = start + ahead * (np.array([end.unstrained for end in ends]) - start)
         platform.advance(to, start, goal, 1 / np.array([end.flexibility for end in ends]))
-        if platform.time == to:
-            for end, value in zip(ends, goal.tolist(), strict=True):
-                end.passed = value
+        for end, value in zip(ends, goal.tolist(), strict=True):
+            end.passed = value
 
 
 class CableEnd:
@@ -93,7 +96,7 @@ class CableEnd:
     def step(self, cable_end: float, end_speed: float, compliance: float, dt: float) -> None:
         """Advance by ``dt`` s; the unstrained length is then ``cable_end``."""
         # Only the winch that is furthest behind keeps the platform from advancing.
-        furthest = self.time - self._coupling.platform.time < LEAST_STEP
+        furthest = self.time - self._coupling.platform.time < _LEAST_STEP
         self.time += dt
         self.unstrained = cable_end
         self.flexibility = self._flexibility(compliance)

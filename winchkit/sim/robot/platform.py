@@ -18,10 +18,10 @@ from winchkit.sim.physics.state import GRAVITY
 from winchkit.sim.robot.pulleys import Pulleys
 from winchkit.sim.robot.rotation import turned
 
-__all__ = ["LEAST_STEP", "Body", "CablePlatform"]
+__all__ = ["Body", "CablePlatform"]
 
 _STEP = 1e-3
-LEAST_STEP = 5e-5
+_LEAST_STEP = 5e-5
 """Shorter times are left to the next call, s."""
 
 
@@ -109,7 +109,7 @@ class CablePlatform:
             Of the cables, N/m.
         """
         duration = to - self.time
-        if duration < LEAST_STEP:
+        if duration < _LEAST_STEP:
             return
         count = ceil(duration / _STEP - 1e-6)
         rate, dt = (end - start) / duration, duration / count
