@@ -39,8 +39,8 @@ _DEVIATION = (1e-3, 3e-3)
 """Deviation of an instrument's clock in simulated time: without it its conversions would be
 synchronous with the host's polls, with a constant age that no time stamp shows."""
 _TOLERANCE = 1e-3
-"""Time by which a winch of a robot may be behind but at a SYNC, s: each step of a single winch costs
-a step of the platform."""
+"""Time by which a winch of a robot may be behind but at a SYNC, s: each step of a single winch
+costs a step of the platform."""
 _AT_REST = 0.5
 """Motor speed below which a load can be changed, rad/s."""
 
