@@ -102,8 +102,12 @@ def _drop_from(taker: socket.socket, port: int) -> None:
     """Let the kernel of Linux drop what comes from a UDP port of the sender."""
     if sys.platform != "linux":
         return
-    rows = ((_LOAD_HALF, 0, 0, 0), (_JUMP_EQUAL, 0, 1, port), (_RETURN, 0, 0, 0))
-    rows = (*rows, (_RETURN, 0, 0, 0xFFFFFFFF))
+    rows = (
+        (_LOAD_HALF, 0, 0, 0),
+        (_JUMP_EQUAL, 0, 1, port),
+        (_RETURN, 0, 0, 0),
+        (_RETURN, 0, 0, 0xFFFFFFFF),
+    )
     code = ctypes.create_string_buffer(b"".join(_INSTRUCTION.pack(*row) for row in rows))
     program = struct.pack("HP", len(rows), ctypes.addressof(code))
     taker.setsockopt(socket.SOL_SOCKET, _SO_ATTACH_FILTER, program)
