@@ -55,7 +55,7 @@ def _run(script: list[float], work: list[float]) -> list[BenchSnapshot]:
     return seen
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=10)
 @given(st.lists(st.tuples(DELAYS | st.just(PROMPT), DELAYS | st.just(PROMPT)), min_size=1))
 def test_every_period_without_a_cycle_is_counted(delays: list[tuple[float, float]]) -> None:
     seen = _run([late for late, _ in delays], [took for _, took in delays])
