@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import bdtrc
 
 from winchkit.arrays import Array
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
@@ -66,9 +65,10 @@ def outlier_masks(run: Run) -> dict[str, NDArray[np.bool_]]:
 
     Notes
     -----
-    Spikes of independent transmission errors coincide too, with the share of samples at which other
-    channels deviate. Coinciding peaks are physical where there are more of them than that
-    (binomial test, level 1 %).
+    Spikes of independent transmission errors coincide too: each with a deviation of another channel
+    as often as that channel deviates. Peaks are physical where the spikes of a channel coincide
+    with more deviations, counted over the other channels, than that (test of a sum of binomial
+    counts, level 1 %).
     """
     names = [name for name in run if name.rpartition(".")[2] in CHANNEL_DIMENSIONS]
     found = {name: _spikes(run[name]) for name in names}
@@ -82,7 +82,7 @@ def outlier_masks(run: Run) -> dict[str, NDArray[np.bool_]]:
             for other, (_, shared) in found.items()
             if other != name and other.rpartition(".")[0] in {"", winch}
         ]
-        alone = spikes & ~_physical(spikes, _within_one(beside)) if beside else spikes
+        alone = spikes & ~_physical(spikes, beside)
         if alone.any():
             out[name] = alone
     return out
@@ -127,21 +127,37 @@ def _spikes(values: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     return out, event
 
 
-def _physical(spikes: NDArray[np.bool_], elsewhere: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _physical(spikes: NDArray[np.bool_], beside: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
     """Spikes at which other channels deviate; none where that is chance."""
-    together = spikes & elsewhere
-    count, chance = np.count_nonzero(together), float(np.mean(elsewhere))
-    # P(at least count of all spikes coincide).
-    by_chance = bdtrc(count - 1, np.count_nonzero(spikes), chance) if count else 1.0
-    return together if by_chance < _LEVEL else np.zeros_like(together)
+    elsewhere = [_within_one(mask) for mask in beside]
+    together = [spikes & mask for mask in elsewhere]
+    count = sum(int(np.count_nonzero(mask)) for mask in together)
+    shares = [float(np.mean(mask)) for mask in elsewhere]
+    if not count or _chance(count, int(np.count_nonzero(spikes)), shares) >= _LEVEL:
+        return np.zeros_like(spikes)
+    return np.any(np.stack(together), axis=0)
 
 
-def _within_one(masks: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-    """Samples of which one or a neighbour is in one of the masks."""
-    union: NDArray[np.bool_] = np.any(np.stack(masks), axis=0)
-    out = union.copy()
-    out[1:] |= union[:-1]
-    out[:-1] |= union[1:]
+def _chance(count: int, trials: int, shares: Sequence[float]) -> float:
+    """Probability that at least ``count`` of as many trials with each of these chances succeed.
+
+    References
+    ----------
+    Hong, On computing the distribution function for the Poisson binomial distribution, 2013.
+    """
+    length = trials * len(shares) + 1
+    roots = np.exp(2j * np.pi * np.arange(length) / length)
+    transform = np.ones(length, dtype=complex)
+    for share in shares:
+        transform *= (1 - share + share * roots) ** trials
+    return float(np.fft.fft(transform).real[count:].sum() / length)
+
+
+def _within_one(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Samples of which one or a neighbour is in the mask."""
+    out = mask.copy()
+    out[1:] |= mask[:-1]
+    out[:-1] |= mask[1:]
     return out
 
 
