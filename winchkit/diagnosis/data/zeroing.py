@@ -73,7 +73,8 @@ def zeroed_anew(
     left, whole = _left(observed.ravel(), np.hstack([regressors, offsets]))
     freedom = whole - rank, observed.size - whole
     within = float(left @ left) / max(freedom[1], 1)
-    if freedom[0] == 0 or within == 0:
+    rounding = observed.size * float(np.finfo(float).eps * np.linalg.norm(observed))
+    if freedom[0] == 0 or np.linalg.norm(left) <= rounding:
         return None
     between = float(without @ without - left @ left) / freedom[0]
     p_value = float(fdtrc(*freedom, between / within))
@@ -126,4 +127,4 @@ def wanders(means: Array) -> bool:
     first = float(np.mean(means[:, 0] ** 2))
     half = float(np.mean(np.diff(means, axis=1) ** 2)) / 2
     freedom = 2 * (BLOCKS - 1) ** 2 / (3 * BLOCKS - 4) * len(means)
-    return float(fdtrc(len(means), freedom, first / half)) >= _LEVEL_OF_WANDER
+    return half > 0.0 and float(fdtrc(len(means), freedom, first / half)) >= _LEVEL_OF_WANDER

@@ -135,7 +135,7 @@ def _physical(spikes: NDArray[np.bool_], beside: Sequence[NDArray[np.bool_]]) ->
     shares = [float(np.mean(mask)) for mask in elsewhere]
     if not count or _chance(count, int(np.count_nonzero(spikes)), shares) >= _LEVEL:
         return np.zeros_like(spikes)
-    return np.any(np.stack(together), axis=0)
+    return np.asarray(np.any(np.stack(together), axis=0))
 
 
 def _chance(count: int, trials: int, shares: Sequence[float]) -> float:
