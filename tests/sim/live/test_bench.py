@@ -19,6 +19,7 @@ from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NotPermitt
 from winchkit.schema.programme import Step
 from winchkit.schema.read import read_bench, read_simbench
 from winchkit.schema.simbench import FaultSpec, NoiseSpec, SimBench
+from winchkit.sim.live import buses
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.client import address_file, answer, is_simulated, send
 from winchkit.sim.live.control import ControlServer, obey
@@ -241,10 +242,10 @@ def test_another_process_finds_the_simulation_beside_its_bench_file(
 def test_a_machine_without_a_multicast_route_gets_the_command_for_one(
     declared: SimBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def refuse(**_: object) -> None:
+    def refuse(*_: object) -> None:
         raise OSError(19, "No such device")
 
-    monkeypatch.setattr(can, "Bus", refuse)
+    monkeypatch.setattr(buses, "MulticastPort", refuse)
     with (
         pytest.raises(ConnectionLost, match=r"ip route add 239\.0\.0\.0/8 dev lo"),
         LiveBench(declared, interface="udp_multicast"),
@@ -258,7 +259,7 @@ def test_a_bus_that_dies_is_not_hidden(declared: SimBench, monkeypatch: pytest.M
 
     def run() -> None:
         with LiveBench(declared) as live:
-            monkeypatch.setattr(live._ports["can"]._bus, "recv", unplugged)
+            monkeypatch.setattr(live._ports["can"]._bus, "receive", unplugged)
             wait_for(live._loops[0].done)
 
     with pytest.raises(ConnectionLost, match="cannot receive: unplugged"):
