@@ -14,13 +14,13 @@ from xml.etree import ElementTree
 import pytest
 
 pytest.importorskip("starlette")
-playwright = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("playwright.sync_api")
 
-from robot_poses.truth import Truth, csv, poses  # noqa: E402
-from winchkit.runs.writer import write_run  # noqa: E402
-from winchkit.web.examples import example_runs  # noqa: E402
+from chromium import NEEDS_CHROMIUM, chromium
+from robot_poses.truth import Truth, csv, poses
+from winchkit.runs.writer import write_run
+from winchkit.web.examples import example_runs
 
-CHROMIUM = shutil.which("chromium")
 STARTS = 60.0
 STOPS = 2.0
 """Bound for a jog to end after its release, s: dead-man 0.2 s, ramp 0.05 / 1 s, pictures 0.1 s,
@@ -28,16 +28,14 @@ and stalls of this computer."""
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium"),
+    NEEDS_CHROMIUM,
 ]
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+    with chromium() as opened:
         yield opened
-        opened.close()
 
 
 class Served:

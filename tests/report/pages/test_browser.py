@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,19 +11,19 @@ from xml.etree import ElementTree
 import pytest
 from click.testing import CliRunner
 
+from chromium import NEEDS_CHROMIUM, chromium
 from report_answers import recorded
 from winchkit.cli import main
 from winchkit.runs.writer import write_run
 
-playwright = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("playwright.sync_api")
 pytest.importorskip("matplotlib")
 
-CHROMIUM = shutil.which("chromium")
 SVG = "{http://www.w3.org/2000/svg}"
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium"),
+    NEEDS_CHROMIUM,
 ]
 
 
@@ -44,10 +43,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with playwright.sync_playwright() as driver:
-        opened = driver.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+    with chromium() as opened:
         yield opened
-        opened.close()
 
 
 @pytest.fixture
