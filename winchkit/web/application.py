@@ -340,7 +340,7 @@ class _Drawings:
 
     async def _multiples(self, request: Request) -> Response:
         output = request.query_params.get("output", "")
-        curves, known = self.workspace.curves(output), self.workspace.order_of(output)
+        curves, known = self.workspace.curves(output), self.workspace.state.order_of(output)
         return JSONResponse(await asyncio.to_thread(curves.multiples, known))
 
     async def _card(self, request: Request) -> Response:

@@ -1,0 +1,86 @@
+"""An addition to the profile of the page: refitted, and shown before it is diagnosed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from winchkit.diagnosis.add import grow_prepared
+from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.results import OutputFit
+from winchkit.diagnosis.write import write_addition
+from winchkit.effects.catalogue import Catalogue
+from winchkit.errors import UsageError
+from winchkit.report.words.numbers import quantity
+from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.web.curves import curves_of
+from winchkit.web.ladder import Rung
+from winchkit.web.state import State, Version
+
+__all__ = ["refit"]
+
+
+def refit(state: State, effect: str, dataset: Dataset, catalogue: Catalogue, folder: Path) -> State:
+    """State with an effect in the profile, its refitted errors and curves, not yet diagnosed.
+
+    Parameters
+    ----------
+    state : State
+        With a diagnosis.
+    effect : str
+        Effect to add.
+    dataset : Dataset
+        Runs of the state, prepared for its profile.
+    catalogue : Catalogue
+        Effects.
+    folder : Path
+        For the file of the new profile.
+
+    Raises
+    ------
+    UsageError
+        Without a diagnosis, and for an unknown effect.
+    """
+    answer = state.answer
+    if answer is None:
+        raise UsageError("nothing is diagnosed yet")
+    if effect not in catalogue:
+        raise UsageError(f"there is no effect '{effect}'")
+    grown = grow_prepared(effect, dataset, catalogue)
+    path = folder / f"version-{len(state.versions)}.toml"
+    names = [item.name for item in state.used]
+    write_addition(state.versions[-1].path, grown.addition, names, path)
+    outputs = grown.addition.outputs
+    before = {name: out.heldout_rms_before for name, out in outputs.items()}
+    label = "Profile as loaded" if len(state.versions) == 1 else f"+ {state.versions[-1].added}"
+    now = {
+        name: replace(out, heldout_rms_before=out.heldout_rms_after)
+        for name, out in outputs.items()
+    }
+    shown = replace(answer.diagnosis, outputs=now, steps=(), candidates=(), where=())
+    noise = {name: out.noise_rms for name, out in outputs.items()}
+    return replace(
+        state,
+        versions=(*state.versions, Version(path, effect)),
+        rungs=(*state.rungs, Rung(label, before)),
+        said=_said(outputs),
+        answer=WinchAnswer(answer.engine, answer.result, shown),
+        refitted=True,
+        curves=curves_of(grown.regression, grown.final.residual, noise),
+        before=(answer, state.curves),
+        faults=(),
+    )
+
+
+def _said(outputs: Mapping[str, OutputFit]) -> str:
+    """Error of the output that fell most, and what it was."""
+
+    def fall(name: str) -> float:
+        return outputs[name].heldout_rms_before / max(outputs[name].heldout_rms_after, 1e-300)
+
+    name = max(outputs, key=fall)
+    out = outputs[name]
+    after, before = (quantity(v, out.unit) for v in (out.heldout_rms_after, out.heldout_rms_before))
+    return f"{OUTPUT_NAMES.get(name, name).capitalize()} error {after}, was {before}"

@@ -1,0 +1,145 @@
+"""What the Diagnose view shows: runs, a profile with its history, and its diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.errors import UsageError
+from winchkit.model.variables import ANGLES
+from winchkit.runs.run import Run
+from winchkit.web.curves import OutputCurves
+from winchkit.web.ladder import Rung, ladder, refitted, verdict
+
+__all__ = ["LoadedRun", "State", "Version"]
+
+
+@dataclass(frozen=True)
+class LoadedRun:
+    """A run file of the page."""
+
+    path: Path
+    run: Run
+    used: bool = True
+
+    @property
+    def name(self) -> str:
+        """Name of the file."""
+        return self.path.name
+
+    def to_json(self) -> dict[str, Any]:
+        """The run as the page lists it."""
+        run = self.run
+        return {
+            "name": self.name,
+            "used": self.used,
+            "samples": len(run),
+            "seconds": float(run.time[-1] - run.time[0]) if len(run) > 1 else 0.0,
+            "load": run.metadata.get("load_mass", ""),
+            "programme": run.metadata.get("programme", ""),
+            "winches": run.winches(),
+        }
+
+
+@dataclass(frozen=True)
+class Version:
+    """A profile of the page: a file, and what was added last."""
+
+    path: Path
+    added: str = ""
+
+
+@dataclass(frozen=True)
+class State:
+    """What the page shows; replaced as a whole."""
+
+    runs: tuple[LoadedRun, ...] = ()
+    source: str = ""
+    """Profile as the user named it."""
+    versions: tuple[Version, ...] = ()
+    """The profile and what it became by additions, the present one last."""
+    winch: str = ""
+    answer: WinchAnswer | None = None
+    curves: Mapping[str, OutputCurves] = field(default_factory=dict)
+    before: tuple[WinchAnswer, Mapping[str, OutputCurves]] | None = None
+    """Answer and curves before the last addition, so that undoing it needs no fit; one only, for
+    the memory that an answer holds."""
+    refitted: bool = False
+    """Whether an addition is fitted and shown, and its diagnosis under way."""
+    rungs: tuple[Rung, ...] = ()
+    """Errors of the profiles before the present one."""
+    said: str = ""
+    """What the last addition changed, for the live region."""
+    truth: str | None = None
+    """What a simulated bench hides; None for measured runs."""
+    faults: tuple[str, ...] = ()
+    """Why files were not loaded, or the last request was refused."""
+
+    @property
+    def used(self) -> tuple[LoadedRun, ...]:
+        """Runs that are compared with the profile."""
+        return tuple(item for item in self.runs if item.used)
+
+    @property
+    def diagnosed(self) -> WinchAnswer:
+        """Diagnosis of the present profile; raises UsageError where there is none yet."""
+        if self.answer is None or self.refitted:
+            raise UsageError("nothing is diagnosed yet")
+        return self.answer
+
+    @property
+    def profile(self) -> Path:
+        """File of the present profile; raises UsageError where none is open."""
+        if not self.versions:
+            raise UsageError("no profile is open; choose one first")
+        return self.versions[-1].path
+
+    def order_of(self, output: str) -> tuple[str, int] | None:
+        """Angle and periods per turn of the main pattern of an output's residual, if any."""
+        found = () if self.answer is None else self.answer.diagnosis.where
+        for where in found:
+            if where.output == output and where.order is not None and where.variable in ANGLES:
+                return where.variable, where.order
+        return None
+
+    def commands(self) -> list[str]:
+        """What was clicked, as commands."""
+        runs = " ".join(item.name for item in self.used)
+        lines = [f"winchkit diagnose {runs} -p {self.source}"]
+        profile = self.source
+        for number, version in enumerate(self.versions[1:], start=1):
+            better = f"better-{number}.toml"
+            lines.append(f"winchkit add {version.added} --fit {runs} -p {profile} -o {better}")
+            lines.append(f"winchkit diagnose {runs} -p {better}")
+            profile = better
+        return lines
+
+    def to_json(self) -> dict[str, Any]:
+        """Runs, profile and diagnosis as the page shows them."""
+        out: dict[str, Any] = {
+            "runs": [item.to_json() for item in self.runs],
+            "profile": None,
+            "winch": self.winch,
+            "faults": list(self.faults),
+            "said": self.said,
+            "diagnosis": None,
+            "outputs": list(self.curves),
+            "can_undo": len(self.versions) > 1,
+        }
+        if self.versions:
+            added = [version.added for version in self.versions[1:]]
+            out["profile"] = {"name": self.source, "added": added}
+        if self.answer is not None:
+            words = refitted(self.said) if self.refitted else verdict(self.answer.diagnosis)
+            out["diagnosis"] = words | {
+                "ladder": ladder(self.answer, self.rungs),
+                "next": [
+                    {"separates": list(run.separates), "programme": run.programme}
+                    for run in self.answer.diagnosis.next_runs
+                ],
+            }
+            out["commands"] = self.commands()
+        return out
