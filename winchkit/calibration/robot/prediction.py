@@ -39,7 +39,7 @@ class PoseErrors:
     """Number of poses for which the forward kinematics did not converge."""
 
 
-def errors_at(equations: Equations, values: Array) -> PoseErrors:
+def errors_at(equations: Equations, values: Array, predicted: Pose | None = None) -> PoseErrors:
     """Predict every pose from its motor angles, and compare it with the measured one.
 
     Parameters
@@ -48,8 +48,10 @@ def errors_at(equations: Equations, values: Array) -> PoseErrors:
         Of the p poses to predict.
     values : (q,) array
         Parameters in fitted units.
+    predicted : Pose, optional
+        (p,), by the machine's numbers among `values`, where it is known already.
     """
-    found = predicted_poses(equations, values)
+    found = predicted_poses(equations, values) if predicted is None else predicted
     unfound = int(np.count_nonzero(_known(equations) & ~np.isfinite(found.position[:, 0])))
     measured = equations.measured
     pose = _reading(equations, values, found)

@@ -24,6 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import comb
 
 import numpy as np
 
@@ -165,14 +166,21 @@ def _sets(change: Array, covariance: Array) -> tuple[tuple[int, ...], list[tuple
     most = count if count <= _MOST_LINES else 1
     found = []
     for size in range(most + 1):
-        for chosen in combinations(range(count), size):
-            rest = [i for i in range(count) if i not in chosen]
-            own = covariance[np.ix_(rest, rest)] + _TOLERANCE**2 * np.eye(len(rest))
-            wald = float(change[rest] @ np.linalg.solve(own, change[rest]))
-            middle = float(np.mean(change[rest])) if rest else 0.0
-            small = any(abs(change[i] - middle) < _LEAST_SHARE for i in chosen)
-            if not small:
-                found.append((wald + _PENALTY * size, chosen))
+        # The complements of the sets in lexicographic order are in the reverse of that order.
+        sets = np.array([*combinations(range(count), size)], dtype=int).reshape(
+            comb(count, size), -1
+        )
+        rest = np.array([*combinations(range(count), count - size)], dtype=int)[::-1]
+        rest = rest.reshape(len(sets), count - size)
+        left = change[rest]
+        own = covariance[rest[:, :, None], rest[:, None, :]] + _TOLERANCE**2 * np.eye(count - size)
+        wald = np.sum(left * np.linalg.solve(own, left[..., None])[..., 0], axis=1)
+        middle = np.mean(left, axis=1) if size < count else np.zeros(len(sets))
+        small = np.any(np.abs(change[sets] - middle[:, None]) < _LEAST_SHARE, axis=1)
+        found += [
+            (float(value) + _PENALTY * size, tuple(chosen))
+            for value, chosen in zip(wald[~small], sets[~small].tolist(), strict=True)
+        ]
     found.sort()
     best, chosen = found[0]
     others = [other for value, other in found[1:] if value < best + _DELTA_CHI_SQUARE]

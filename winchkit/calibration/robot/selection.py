@@ -204,12 +204,12 @@ def _fitted_with_tracker(
         ]
         for count in range(len(_left(own.free)))
     ]
-    errors = [_nominal_error(trial) for trial in (declared, *chain(*wider))]
+    errors = [_nominal_error(trial, predicted) for trial in (declared, *chain(*wider))]
     least = np.nanmin(errors) if np.any(np.isfinite(errors)) else 0.0
     limit = max(_CLEARLY_WORSE * float(least), _LEAST_MISFIT)
 
     def is_near(trial: Equations) -> bool:
-        return not _nominal_error(trial) > limit
+        return not _nominal_error(trial, predicted) > limit
 
     first = _fitted(declared, options, progress) if is_near(declared) else None
     best = first
@@ -303,7 +303,7 @@ def _variants(
     other = [replace(t, turns_rotation=not t.turns_rotation) for t in used.trackers]
     both = [found, with_instruments(equations, replace(used, trackers=tuple(other)))]
     both.sort(key=lambda trial: not _first_tracker(trial).turns_rotation)
-    plain = [rms(errors_at(trial, trial.parameters.nominal).angle) for trial in both]
+    plain = [rms(errors_at(trial, trial.parameters.nominal, predicted).angle) for trial in both]
     least = min(plain)
     return [trial for trial, error in zip(both, plain, strict=True) if error <= _PLAINLY * least]
 
@@ -335,8 +335,8 @@ def with_instruments(equations: Equations, instruments: Instruments) -> Equation
     return replace(equations, parameters=wider, instruments=instruments)
 
 
-def _nominal_error(equations: Equations) -> float:
-    return rms(errors_at(equations, equations.parameters.nominal).distance)
+def _nominal_error(equations: Equations, predicted: Pose) -> float:
+    return rms(errors_at(equations, equations.parameters.nominal, predicted).distance)
 
 
 def _shows_more(first: Fitted, wider: Equations) -> bool:
