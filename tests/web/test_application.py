@@ -112,6 +112,9 @@ def test_nothing_but_this_server_may_be_loaded(client: TestClient) -> None:
             "library.js",
             "robot.js",
             "exports.js",
+            "figures.js",
+            "sides.js",
+            "ladder.js",
         )
     )
     assert "https://" not in text
@@ -213,10 +216,38 @@ def test_look_learn_add_and_the_error_falls(
     assert "<!DOCTYPE html>" in client.get("/api/report", headers=HEADERS).text
     assert any(line.startswith(f"winchkit add {effect}") for line in view["commands"])
 
+    _both_sides_have_one_axis(client, before, view)
+
     do(client, "undo")  # needs no fit
     view = settled(client)
     assert _today(view["diagnosis"]) == pytest.approx(before)
     assert effect not in client.get("/api/profile", headers=HEADERS).text
+
+
+def _both_sides_have_one_axis(client: TestClient, before: dict[str, float], after: Any) -> None:
+    """The earlier profile beside the present one: its errors, in the same units, and back."""
+    names = [run["name"] for run in after["runs"]]
+    do(client, "compare", profile=0, runs=names)
+    view = settled(client)
+    assert _today(view["beside"]["diagnosis"]) == pytest.approx(before)
+    ladders = [side["diagnosis"]["ladder"] for side in (view, view["beside"])]
+    assert ladders[0]["columns"] == ladders[1]["columns"]
+    for output in before:
+        (own, other) = (get(client, f"/api/curve?output={output}{s}") for s in ("", "&beside=1"))
+        assert (own["unit"], own["residual_unit"]) == (other["unit"], other["residual_unit"])
+        assert own["residual"] != other["residual"]
+    wanted = "/api/multiples?output=tension&over=speed&over=load"
+    for path in (wanted, f"{wanted}&beside=1"):
+        assert [panel["variable"] for panel in get(client, path)["panels"]] == ["speed", "load"]
+    do(client, "swap")
+    swapped = settled(client)
+    assert swapped["profile"]["added"] == []
+    assert swapped["beside"]["profile"] == after["profile"]
+    do(client, "swap")
+    do(client, "compare", profile=7, runs=names)
+    assert "there is no version 7" in settled(client)["faults"][0]
+    do(client, "end")
+    assert settled(client)["beside"] is None
 
 
 def _is_that_of_the_command_line(workspace: Workspace, effect: str, path: Path) -> None:

@@ -278,6 +278,9 @@ class _Work:
             "diagnose": work.diagnose,
             "add": lambda: work.add(str(asked["effect"])),
             "undo": work.undo,
+            "compare": lambda: work.compare(_version(asked["profile"]), list(asked["runs"])),
+            "swap": work.swap,
+            "end": work.end_comparison,
             "cancel": work.cancel,
         }
         name = str(asked.get("do"))
@@ -333,15 +336,17 @@ class _Drawings:
 
     async def _curve(self, request: Request) -> Response:
         query = request.query_params
-        curves = self.workspace.curves(query.get("output", ""))
+        curves = self.workspace.curves(query.get("output", ""), beside="beside" in query)
         first, last = float(query.get("from", "-inf")), float(query.get("to", "inf"))
         points = min(_MOST_POINTS, int(query.get("points", "1600")))
         return JSONResponse(await asyncio.to_thread(curves.over_time, first, last, points))
 
     async def _multiples(self, request: Request) -> Response:
-        output = request.query_params.get("output", "")
-        curves, known = self.workspace.curves(output), self.workspace.state.order_of(output)
-        return JSONResponse(await asyncio.to_thread(curves.multiples, known))
+        query = request.query_params
+        output, beside, wanted = query.get("output", ""), "beside" in query, query.getlist("over")
+        curves = self.workspace.curves(output, beside=beside)
+        known = self.workspace.side(beside).order_of(output)
+        return JSONResponse(await asyncio.to_thread(curves.multiples, known, wanted))
 
     async def _card(self, request: Request) -> Response:
         effect = request.query_params.get("effect", "")
@@ -423,6 +428,11 @@ def open_robot(
         Name or file.
     """
     workspace.task("calibrating", lambda: robot.open(runs, profile))
+
+
+def _version(asked: object) -> int | str:
+    """Number of a version, or a name."""
+    return asked if isinstance(asked, int) else str(asked)
 
 
 def _accepted() -> Response:

@@ -7,7 +7,7 @@ asks again for the part that it shows.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -62,16 +62,18 @@ class OutputCurves:
     variables: dict[str, Array]
     shares: dict[str, float]
     """Share of the residual variance that each variable explains (η²), largest first."""
+    sizes: tuple[float, float]
+    """Largest measured value and rms of the residual, by which the units are chosen."""
 
     @property
     def scale(self) -> Scale:
         """Unit of the residual."""
-        size = (
-            float(np.sqrt(np.nanmean(self.residual**2)))
-            if np.isfinite(self.residual).any()
-            else 0.0
-        )
-        return scale_for(3 * size, OUTPUT_UNITS[self.output])
+        return scale_for(3 * self.sizes[1], OUTPUT_UNITS[self.output])
+
+    def in_units_of(self, other: OutputCurves) -> OutputCurves:
+        """The same curves in the units that suit the larger of the two."""
+        largest, rms = map(max, self.sizes, other.sizes)
+        return replace(self, sizes=(largest, rms))
 
     def over_time(self, first: float, last: float, points: int) -> dict[str, Any]:
         """A part of the curves, reduced to the extremes of every pixel.
@@ -93,7 +95,7 @@ class OutputCurves:
         lines = [self.measured[part], self.predicted[part], self.residual[part] / self.scale.worth]
         shown = decimated(lines, max(points, 16) // (2 * len(lines)))
         x, reduced = self.time[part][shown], [values[shown] for values in lines]
-        whole = scale_for(_size(self.measured), OUTPUT_UNITS[self.output])
+        whole = scale_for(self.sizes[0], OUTPUT_UNITS[self.output])
         measured, predicted = (values / whole.worth for values in reduced[:2])
         return {
             "output": self.output,
@@ -112,19 +114,24 @@ class OutputCurves:
             "samples": len(self.time),
         }
 
-    def multiples(self, order: tuple[str, int] | None = None) -> dict[str, Any]:
-        """Residual over each of the variables that explain most of it, at the same samples.
+    def multiples(
+        self, order: tuple[str, int] | None = None, variables: Sequence[str] = ()
+    ) -> dict[str, Any]:
+        """Residual over each of some variables, at the same samples.
 
         Parameters
         ----------
         order : tuple of str and int, optional
             An angle, and the periods per turn of the residual over it.
+        variables : sequence of str
+            The variables; by default those that explain most of it.
         """
         compared = np.flatnonzero(np.isfinite(self.residual))
         kept = _thinned(compared)
         residual = self.residual / self.scale.worth
         panels = []
-        for name in list(self.shares)[:_PANELS]:
+        wanted = [name for name in variables if name in self.shares] or list(self.shares)
+        for name in wanted[:_PANELS]:
             periods = order[1] if order is not None and order[0] == name else None
             over, (means,) = self._over(name, periods, [residual], compared, kept)
             words = _capital_name(name)
@@ -220,19 +227,21 @@ def curves_of(
         starts = [0.0, *np.cumsum(lasts)[:-1].tolist()]
         names = [name for name in known[0] if all(name in one for one in known)]
         variables = {name: np.concatenate([one[name] for one in known]) for name in names}
+        measured = np.concatenate([trace.measured for trace in own])
         error = np.concatenate([trace.residual for trace in own])
         good, kept = np.isfinite(error), kept_rows(regression, output)
         shares = {name: binned_share(variables[name][good], error[good], kept) for name in names}
         out[output] = OutputCurves(
             output,
             np.concatenate([at + trace.time for at, trace in zip(starts, own, strict=True)]),
-            np.concatenate([trace.measured for trace in own]),
+            measured,
             np.concatenate([trace.predicted for trace in own]),
             error,
             tuple((at, _label(run)) for at, run in zip(starts, runs, strict=True)),
             noise.get(output),
             variables,
             dict(sorted(shares.items(), key=lambda item: -item[1])),
+            (_largest(measured), float(np.sqrt(np.mean(error[good] ** 2))) if good.any() else 0.0),
         )
     return out
 
@@ -253,5 +262,5 @@ def _capital_name(variable: str) -> str:
     return capital(VARIABLE_NAMES.get(variable, variable))
 
 
-def _size(values: Array) -> float:
+def _largest(values: Array) -> float:
     return float(np.nanmax(np.abs(values))) if np.isfinite(values).any() else 0.0

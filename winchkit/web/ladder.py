@@ -41,10 +41,12 @@ class Rung:
 def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
     """Chip, headline and sentence of a diagnosis."""
     first, _, rest = sentence(diagnosis).partition(". ")
+    head = headline(diagnosis)
+    first = capital(first.removeprefix(f"{head}: "))
     return {
         "verdict": diagnosis.verdict,
         "chip": _WORDS[diagnosis.verdict],
-        "headline": headline(diagnosis),
+        "headline": head,
         "sentence": rest if diagnosis.steps else f"{first}. {rest}".strip(". ") + ".",
         "changes": changes_text(diagnosis),
         "unexplained": [where_text(where) for where in diagnosis.where],
@@ -70,7 +72,9 @@ def refitted(said: str) -> dict[str, Any]:
     }
 
 
-def ladder(answer: WinchAnswer, history: Sequence[Rung]) -> dict[str, Any]:
+def ladder(
+    answer: WinchAnswer, history: Sequence[Rung], beside: Diagnosis | None = None
+) -> dict[str, Any]:
     """Rows and columns of the ladder.
 
     Parameters
@@ -79,6 +83,8 @@ def ladder(answer: WinchAnswer, history: Sequence[Rung]) -> dict[str, Any]:
         Diagnosis of the present profile.
     history : sequence of Rung
         Earlier profiles of the page, the oldest first.
+    beside : Diagnosis, optional
+        Another one, whose errors are given in the same units.
 
     Returns
     -------
@@ -93,8 +99,11 @@ def ladder(answer: WinchAnswer, history: Sequence[Rung]) -> dict[str, Any]:
     known = {c.effect: c for c in scores}
     first = [known[effect] for effect in named if effect in known]
     shown = (first + [c for c in scores if c not in first and c.score > 0])[:_SHOWN]
+    errors_of = [today, *(rung.errors for rung in history)]
+    if beside is not None:
+        errors_of.append({name: out.heldout_rms_before for name, out in beside.outputs.items()})
     scales = {
-        name: scale_for([today[name], *(rung.errors.get(name, 0.0) for rung in history)], out.unit)
+        name: scale_for([errors.get(name, 0.0) for errors in errors_of], out.unit)
         for name, out in diagnosis.outputs.items()
     }
     floors = {name: out.noise_rms for name, out in diagnosis.outputs.items()}

@@ -54,7 +54,11 @@ def refit(state: State, effect: str, dataset: Dataset, catalogue: Catalogue, fol
     write_addition(state.versions[-1].path, grown.addition, names, path)
     outputs = grown.addition.outputs
     before = {name: out.heldout_rms_before for name, out in outputs.items()}
-    label = "Profile as loaded" if len(state.versions) == 1 else f"+ {state.versions[-1].added}"
+    label = (
+        "Profile as loaded"
+        if len(state.versions) == 1
+        else f"+ {state.versions[-1].added.replace('-', ' ')}"
+    )
     now = {
         name: replace(out, heldout_rms_before=out.heldout_rms_after)
         for name, out in outputs.items()

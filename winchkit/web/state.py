@@ -24,11 +24,13 @@ class LoadedRun:
     path: Path
     run: Run
     used: bool = True
+    folder: str = ""
+    """Name of its folder, where another file has the same name."""
 
     @property
     def name(self) -> str:
-        """Name of the file."""
-        return self.path.name
+        """Name of the file, with its folder where it is not the only one."""
+        return f"{self.folder}/{self.path.name}" if self.folder else self.path.name
 
     def to_json(self) -> dict[str, Any]:
         """The run as the page lists it."""
@@ -77,6 +79,8 @@ class State:
     """What a simulated bench hides; None for measured runs."""
     faults: tuple[str, ...] = ()
     """Why files were not loaded, or the last request was refused."""
+    beside: State | None = None
+    """Another profile or other runs, shown beside these."""
 
     @property
     def used(self) -> tuple[LoadedRun, ...]:
@@ -117,8 +121,20 @@ class State:
             profile = better
         return lines
 
+    def winch_runs(self) -> tuple[str, list[Run]]:
+        """Winch of the used runs, and their channels of it; raises UsageError without runs."""
+        used = [item.run for item in self.used]
+        if not used:
+            raise UsageError("no run is loaded; drop run files on the page")
+        winch = self.winch or sorted({name for run in used for name in run.winches()})[0]
+        return winch, [run.of_winch(winch if winch in run.winches() else "") for run in used]
+
     def to_json(self) -> dict[str, Any]:
-        """Runs, profile and diagnosis as the page shows them."""
+        """Runs, profile and diagnosis as the page shows them, and those beside."""
+        other = self.beside
+        return self._side(other) | {"beside": None if other is None else other._side(self)}
+
+    def _side(self, other: State | None) -> dict[str, Any]:
         out: dict[str, Any] = {
             "runs": [item.to_json() for item in self.runs],
             "profile": None,
@@ -133,9 +149,11 @@ class State:
             added = [version.added for version in self.versions[1:]]
             out["profile"] = {"name": self.source, "added": added}
         if self.answer is not None:
+            known = None if other is None else other.answer
+            beside = None if known is None else known.diagnosis
             words = refitted(self.said) if self.refitted else verdict(self.answer.diagnosis)
             out["diagnosis"] = words | {
-                "ladder": ladder(self.answer, self.rungs),
+                "ladder": ladder(self.answer, self.rungs, beside),
                 "next": [
                     {"separates": list(run.separates), "programme": run.programme}
                     for run in self.answer.diagnosis.next_runs

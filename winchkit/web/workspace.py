@@ -35,6 +35,8 @@ from winchkit.web.state import LoadedRun, State, Version
 
 __all__ = ["Cancelled", "Workspace"]
 
+Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
+"""A diagnosis and the curves of its outputs."""
 _NO_NAME = re.compile(r"[^\w.-]+")
 
 
@@ -129,6 +131,26 @@ class Workspace:
         """Take the last addition back, and diagnose again."""
         return self.task("undoing", self._undo)
 
+    def compare(self, profile: int | str, runs: Sequence[str]) -> Future[None]:
+        """Show another profile, or other runs, beside the present ones.
+
+        Parameters
+        ----------
+        profile : int or str
+            Number of a version of the present profile, or the name or file of another one.
+        runs : sequence of str
+            Loaded runs to compare with it.
+        """
+        return self.task("diagnosing beside", lambda: self._compare(profile, runs))
+
+    def swap(self) -> Future[None]:
+        """Exchange the two sides."""
+        return self.task("exchanging", self._swap)
+
+    def end_comparison(self) -> Future[None]:
+        """Forget the profile and runs beside the present ones."""
+        return self.task("ending the comparison", lambda: self._set(beside=None))
+
     # What routes read.
 
     def view(self) -> dict[str, Any]:
@@ -137,13 +159,25 @@ class Workspace:
         busy = None if work is None else {"what": work.what, "share": work.share}
         return self._state.to_json() | {"busy": busy}
 
-    def curves(self, output: str) -> OutputCurves:
-        """Curves of an output; raises UsageError for an unknown one."""
+    def side(self, beside: bool = False) -> State:
+        """The present state or that beside it; raises UsageError without one."""
+        if not beside:
+            return self._state
+        if self._state.beside is None:
+            raise UsageError("nothing is shown beside these runs")
+        return self._state.beside
+
+    def curves(self, output: str, *, beside: bool = False) -> OutputCurves:
+        """Curves of an output, in units that suit both sides; raises UsageError."""
+        state = self.side(beside)
         try:
-            return self._state.curves[output]
+            own = state.curves[output]
         except KeyError:
-            known = ", ".join(self._state.curves) or "none; diagnose first"
+            known = ", ".join(state.curves) or "none; diagnose first"
             raise UsageError(f"no output '{output}'; there are {known}") from None
+        other = self._state if beside else self._state.beside
+        known_beside = None if other is None else other.curves.get(output)
+        return own if known_beside is None else own.in_units_of(known_beside)
 
     def card(self, effect: str) -> dict[str, Any]:
         """Card of a candidate, with its signature; fitted at the first request."""
@@ -235,8 +269,10 @@ class Workspace:
             except FileError as error:
                 faults += [str(fault) for fault in error.faults]
                 continue
-            runs = [item for item in runs if item.name != Path(path).name]
-            runs.append(LoadedRun(Path(path), run))
+            file = Path(path).resolve()
+            runs = [item for item in runs if item.path != file]
+            twin = any(item.path.name == file.name for item in runs)
+            runs.append(LoadedRun(file, run, folder=file.parent.name if twin else ""))
         self._set(runs=tuple(runs), answer=None, curves={}, faults=tuple(faults))
         if runs and self._state.versions:
             self._diagnose(faults)
@@ -254,7 +290,7 @@ class Workspace:
             write_run(run, path)
             runs.append(LoadedRun(path, read_run(path)))
         self._open_profile(simulated.profile)
-        self._set(runs=tuple(runs), winch="", truth=simulated.truth)
+        self._set(runs=tuple(runs), winch="", truth=simulated.truth, beside=None)
         self._diagnose()
 
     def _take(self, file: str, answers: Mapping[str, Any]) -> None:
@@ -270,16 +306,6 @@ class Workspace:
         self._set(runs=runs)
         self._diagnose()
 
-    def _runs(self) -> list[Run]:
-        used = [item.run for item in self._state.used]
-        if not used:
-            raise UsageError("no run is loaded; drop run files on the page")
-        names = sorted({name for run in used for name in run.winches()})
-        winch = self._state.winch or names[0]
-        if winch != self._state.winch:
-            self._set(winch=winch)
-        return [run.of_winch(winch if winch in run.winches() else "") for run in used]
-
     def _diagnose(self, faults: Sequence[str] = ()) -> None:
         profile = read_profile(self._state.profile)
         self._progress("reading the signals", 0.0)
@@ -292,14 +318,19 @@ class Workspace:
     def _dataset(self, profile: WinchProfile) -> Dataset:
         """Data set of the runs that are used; the last one is kept while these stay the same."""
         if self._prepared is None or self._prepared.profile != profile:
-            runs = self._runs()
-            self._prepared = prepare(
-                runs, profile, decimate=True, fast=True, catalogue=self.catalogue
-            )
+            winch, runs = self._state.winch_runs()
+            if winch != self._state.winch:
+                self._set(winch=winch)
+            self._prepared = self._prepare(runs, profile)
         return self._prepared
 
-    def _diagnosed(self, profile: WinchProfile) -> tuple[WinchAnswer, Mapping[str, OutputCurves]]:
-        dataset = self._dataset(profile)
+    def _prepare(self, runs: Sequence[Run], profile: WinchProfile) -> Dataset:
+        return prepare(runs, profile, decimate=True, fast=True, catalogue=self.catalogue)
+
+    def _diagnosed(self, profile: WinchProfile) -> Diagnosed:
+        return self._diagnosed_on(self._dataset(profile))
+
+    def _diagnosed_on(self, dataset: Dataset) -> Diagnosed:
         answer = diagnose_prepared(dataset, self.catalogue, progress=self._progress)
         initial = answer.result.initial_model
         noise = {name: out.noise_rms for name, out in answer.diagnosis.outputs.items()}
@@ -328,3 +359,42 @@ class Workspace:
         self._set(
             versions=versions, rungs=rungs, said="", answer=answer, curves=curves, before=None
         )
+
+    def _compare(self, profile: int | str, names: Sequence[str]) -> None:
+        state = self._state
+        runs = tuple(replace(item, used=item.name in names) for item in state.runs)
+        side = State(runs, state.source, state.versions, winch=state.winch)
+        if isinstance(profile, str):
+            path = find("profiles", profile)
+            read_profile(path)
+            version = Version(self.keep(path.name, path.read_bytes()))
+            side = replace(side, source=profile, versions=(version,))
+        elif 0 <= profile < len(state.versions):
+            side = replace(
+                side, versions=state.versions[: profile + 1], rungs=state.rungs[:profile]
+            )
+        else:
+            raise UsageError(f"there is no version {profile} of the profile")
+        known = self._known(state, side)
+        if known is None:
+            self._progress("diagnosing beside", 0.0)
+            winch, used = side.winch_runs()
+            side = replace(side, winch=winch)
+            known = self._diagnosed_on(self._prepare(used, read_profile(side.profile)))
+        self._set(beside=replace(side, answer=known[0], curves=known[1]))
+
+    @staticmethod
+    def _known(state: State, side: State) -> Diagnosed | None:
+        """Diagnosis of a side that is the present state, or that before the last addition."""
+        if [i.path for i in side.used] != [i.path for i in state.used]:
+            return None
+        if state.answer is None or state.refitted:
+            return None
+        if side.versions == state.versions:
+            return state.answer, state.curves
+        return state.before if side.versions == state.versions[:-1] else None
+
+    def _swap(self) -> None:
+        state, beside = self._state, self.side(beside=True)
+        first = replace(beside, beside=replace(state, beside=None), truth=state.truth)
+        self._cards, self._prepared, self._state = {}, None, first

@@ -1,15 +1,17 @@
 // The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
 import { alarm, ask, attempt, colour, dialog, download, el, fill, icon, number, order, say, sourceOf, svg } from "./page.js";
 import { exporter } from "./figures.js";
+import { counted, ladderFigure, ladderGrid, place, presentName, reach } from "./ladder.js";
 import { morph, slideRails } from "./motion.js";
-import { dots, legend, line, plot } from "./plots.js";
+import { both, drawSides } from "./sides.js";
+import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
 let view = null, root = null, shown = { effect: null, output: null }, brushed = null, panels = [], cards = {}, span = null, earlier = null, drawnCurve = null;
 
 export function enter(main, state) { root = main; shown = { effect: null, output: null }; brushed = null; update(state); }
 
 export function update(state) {
-  const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, !state.diagnosis && Boolean(state.busy)]);
+  const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, state.beside, !state.diagnosis && Boolean(state.busy)]);
   const same = root.dataset.signature === signature && root.firstChild;
   if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
   view = state;
@@ -32,7 +34,10 @@ function render() {
   const d = view.diagnosis;
   fill(root, context(), el("div", { id: "busy" }), faults());
   if (!view.runs.length) root.append(empty());
-  else if (d) {
+  else if (d && view.beside) {
+    if (!both(view).includes(shown.output)) shown.output = both(view).includes(d.ladder.focus) ? d.ladder.focus : both(view)[0];
+    drawSides(root, view, shown.output, focusOfSides);
+  } else if (d) {
     const focus = d.ladder.columns.some((c) => c.output === shown.output) ? shown.output : d.ladder.focus;
     shown.output = focus;
     const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
@@ -49,7 +54,7 @@ function render() {
   } else if (view.outputs.length) {
     if (!view.outputs.includes(shown.output)) shown.output = view.outputs[0];
     const heads = view.outputs.map((output) => el("button", { "aria-pressed": String(output === shown.output), onclick: () => { shown.output = output; span = null; render(); } }, output.replaceAll("_", " ")));
-    root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, heads, view.busy ? null : el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })));
+    root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, el("span", { class: "row segments" }, heads), view.busy ? null : el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })));
     drawTime();
   } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with.")));
   else if (!view.busy) root.append(el("div", { class: "panel" }, el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")));
@@ -65,6 +70,8 @@ function context() {
     el("span", { class: "label" }, "Profile"), profile,
     view.winch ? el("span", { class: "label" }, `Winch ${view.winch}`) : null,
     el("span", { class: "row end" },
+      view.beside ? [el("button", { onclick: () => attempt(() => order("swap")) }, "Swap sides"), el("button", { onclick: () => attempt(() => order("end")) }, "End comparison")]
+        : el("button", { disabled: !view.diagnosis || Boolean(view.busy), onclick: () => chooseBeside() }, "Compare…"),
       el("button", { disabled: !view.can_undo || Boolean(view.busy), onclick: () => attempt(() => order("undo")) }, "Undo"),
       el("button", { disabled: !view.profile, onclick: () => attempt(() => download("/api/profile")) }, "Save profile"),
       el("button", { disabled: !view.diagnosis, onclick: () => attempt(() => download("/api/report")) }, "Report"),
@@ -128,6 +135,20 @@ function chooseRuns() {
   el("p", { class: "note", style: { margin: "12px 0 4px" } }, "Add files"), input);
 }
 
+async function chooseBeside() {
+  const choices = await ask("/api/choices"), { name, added } = view.profile;
+  const versions = ["", ...added].map((effect, i) => el("option", { value: i, selected: i === Math.max(0, added.length - 1) }, i ? `${name} + ${added.slice(0, i).join(" + ")}` : `${name} as loaded`));
+  const list = el("select", { "aria-label": "Profile beside" }, el("optgroup", { label: "This profile" }, versions), el("optgroup", { label: "Others" }, choices.profiles.map((own) => el("option", {}, own))));
+  const boxes = view.runs.map((run) => [run.name, el("input", { type: "checkbox", checked: run.used, style: { minHeight: "auto" } })]);
+  dialog("Compare with", el("label", { class: "row" }, "Profile", list),
+    el("fieldset", {}, el("legend", { class: "note" }, "on these runs"), el("div", { class: "runs" }, boxes.map(([own, box]) => el("label", {}, box, el("span", {}, own))))),
+    el("button", { class: "primary", onclick: () => attempt(async () => {
+      const version = list.selectedIndex <= added.length ? Number(list.value) : list.value;
+      await order("compare", { profile: version, runs: boxes.filter(([, box]) => box.checked).map(([own]) => own) });
+      document.getElementById("dialog").close();
+    }) }, "Show beside"));
+}
+
 function showCommands() {
   const text = view.commands.join("\n");
   dialog("What was clicked, as commands", el("pre", { tabindex: 0 }, text), el("button", { onclick: () => navigator.clipboard.writeText(text) }, "Copy"));
@@ -141,77 +162,17 @@ function head(d) {
 // Places of the earlier profile's errors on the present axis, in percent.
 function earlierRails() {
   const { columns, rows } = earlier.diagnosis.ladder, today = rows.find((row) => row.kind === "today"), most = reach(view.diagnosis.ladder);
-  return Object.fromEntries(columns.flatMap(({ output }) => today.cells[output] && today.cells[output].ratio ? [[output, X(today.cells[output].ratio, most)]] : []));
+  return Object.fromEntries(columns.flatMap(({ output }) => today.cells[output] && today.cells[output].ratio ? [[output, place(today.cells[output].ratio, most)]] : []));
 }
-
-const reach = ({ columns, rows }) => Math.max(1.2, ...rows.flatMap((row) => columns.map((c) => row.cells[c.output] && row.cells[c.output].ratio ? LOG(row.cells[c.output].ratio) : 0)));
-
-const LOG = (ratio) => Math.log2(Math.max(ratio, 1));
 
 function drawLadder() {
-  const box = root.querySelector("#ladder"), { columns, rows, candidates } = view.diagnosis.ladder;
-  const narrow = matchMedia("(max-width: 699px)").matches;
-  const seen = narrow ? columns.filter((c) => c.output === shown.output) : columns;
-  const most = reach(view.diagnosis.ladder);
-  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, 190px) ${seen.map((c) => c.output === shown.output && !narrow ? "2fr" : "1fr").join(" ")}` } });
-  grid.append(el("span", {}));
-  for (const c of seen) grid.append(el("button", { class: `head ${c.output === shown.output ? "focus" : ""}`, "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name, el("span", {}, c.unit)));
-  const today = rows.find((row) => row.kind === "today"), joined = rows.filter((row) => row.equal);
-  for (const row of rows) {
-    const chosen = row.kind === "candidate" && row.effect === shown.effect ? "chosen" : "";
-    const name = row.kind === "candidate"
-      ? el("button", { class: `name ${chosen}`, "aria-pressed": String(Boolean(chosen)), title: row.effect, onclick: () => choose(row.effect) }, el("span", {}, row.label), row.equal ? el("b", { class: `bracket ${row === joined[0] ? "first" : ""} ${row === joined.at(-1) ? "last" : ""}`, title: "cannot be distinguished with these runs" }, el("span", { class: "visually-hidden" }, "cannot be distinguished"), row === joined[Math.floor((joined.length - 1) / 2)] ? "=" : "") : null)
-      : el("div", { class: `name ${row.kind}` }, el("span", {}, row.kind === "today" && view.profile && view.profile.added.length ? `+ ${view.profile.added.at(-1)}` : row.label), row.kind === "today" ? el("i", {}, "today") : null);
-    grid.append(name);
-    for (const c of seen) {
-      const cell = row.cells[c.output], now = today.cells[c.output];
-      grid.append(el("div", { class: `cell ${row.kind} ${chosen} ${c.output === shown.output && !chosen ? "focus" : ""}` }, rung(row, cell, now, most, c.output), el("span", { class: "value" }, cell ? cell.text : "–")));
-    }
-  }
-  grid.append(el("div", { class: "axis" }, "error ÷ noise floor"));
-  for (const c of seen) grid.append(el("div", { class: `cell axis ${c.output === shown.output ? "focus" : ""}` }, scale(most), el("span", { class: "value" })));
-  fill(box, el("header", {}, el("h2", {}, "Held-out error of each candidate"), el("span", { class: "note" }, `${rows.filter((r) => r.kind === "candidate").length} of ${candidates} candidates shown; the others have less evidence`), exporter("ladder", ladderFigure)),
-    narrow ? el("div", { class: "row", style: { marginBottom: "8px" } }, columns.map((c) => el("button", { "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name))) : null, grid);
+  const box = root.querySelector("#ladder"), own = view.diagnosis.ladder, narrow = matchMedia("(max-width: 699px)").matches;
+  fill(box, el("header", {}, el("h2", {}, counted(own) ? "Held-out error of each candidate" : "Held-out error"), el("span", { class: "note" }, counted(own)), exporter("ladder", () => ladderFigure(own, source()))),
+    narrow ? el("div", { class: "row segments" }, own.columns.map((c) => el("button", { "aria-pressed": String(c.output === shown.output), onclick: () => focus(c.output) }, c.name))) : null,
+    ladderGrid(own, { output: shown.output, effect: shown.effect, only: narrow, most: reach(own), present: presentName(view.profile), focus, choose }));
 }
 
-function ladderFigure() {
-  const { columns, rows } = view.diagnosis.ladder, today = rows.find((row) => row.kind === "today"), ratio = (row, c) => (row.cells[c.output] ? row.cells[c.output].ratio : null);
-  const end = (row, c) => (row.kind === "candidate" && ratio(row, c) ? ratio(today, c) : ratio(row, c));
-  return { title: "Held-out error of each candidate", source: source(), height: 80 + 22 * rows.length, legend: [{ name: "present profile", tone: "today" }, { name: "with the candidate", tone: "with" }, { name: "noise floor", tone: "edge" }],
-    panels: columns.map((c) => ({ title: c.name, xLabel: "error ÷ noise floor", range: [0.5, rows.length + 0.5], rows: rows.map((row) => row.label), marks: [1],
-      series: rows.map((row, i) => ({ name: `row of ${row.label}`, x: [end(row, c), ratio(row, c)], y: [rows.length - i, rows.length - i], tone: toneOf(row), width: row.kind === "candidate" ? 4 : 9 })) })) };
-}
-const toneOf = (row) => ({ history: "muted", today: "today", candidate: "with", floor: "edge" })[row.kind];
-
-const X = (ratio, most) => 10 + (LOG(ratio) / most) * 84;
-
-function rung(row, cell, now, most, output) {
-  const parts = [svg("rect", { x: "0%", y: 0, width: "10%", height: "100%", fill: "var(--band)" }), svg("line", { x1: "10%", x2: "10%", y1: 0, y2: "100%", stroke: "var(--edge)", "stroke-width": 1.5 })];
-  const right = now && now.ratio ? `${X(now.ratio, most)}%` : null;
-  const moving = (names) => ({ "data-rail": right, "data-moves": names });
-  if (right && row.kind !== "history" && row.kind !== "floor") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? "50%" : 0, y2: "100%", stroke: "var(--today)", "stroke-width": 2, class: "rail", ...moving("x1 x2") }));
-  const picked = row.effect === shown.effect && row.kind === "candidate";
-  if (cell && cell.ratio) {
-    const at = `${X(cell.ratio, most)}%`;
-    if (row.kind === "candidate") {
-      if (right) parts.push(svg("line", { x1: at, x2: right, y1: "50%", y2: "50%", stroke: "var(--with)", "stroke-width": picked ? 3.5 : 1.5, class: "rung", ...moving("x2") }));
-      parts.push(svg("circle", { cx: at, cy: "50%", r: picked ? 5.5 : 4, fill: picked ? "var(--with)" : "var(--surface)", stroke: "var(--with)", "stroke-width": 2, class: "dot" }));
-    } else if (row.kind === "today") parts.push(svg("circle", { cx: at, cy: "50%", r: 5, fill: "var(--today)", class: "dot", ...moving("cx") }));
-    else if (row.kind === "history") {
-      parts.push(svg("circle", { cx: at, cy: "50%", r: 4, fill: "var(--surface)", stroke: "var(--muted)", "stroke-width": 1.5 }));
-      parts.push(svg("line", { x1: at, x2: at, y1: "66%", y2: "100%", stroke: "var(--muted)", "stroke-dasharray": "2 2" }));
-    }
-  }
-  return svg("svg", { "aria-hidden": "true", "data-output": output }, parts);
-}
-
-function scale(most) {
-  const parts = [svg("line", { x1: "10%", x2: "96%", y1: 1, y2: 1, stroke: "var(--edge)" })];
-  const step = Math.max(1, Math.round(most / 3));
-  for (let k = 0; k <= most; k += step) parts.push(svg("text", { x: `${X(2 ** k, most)}%`, y: 17, "text-anchor": "middle", fill: "var(--muted)", "font-size": 12 }, `${2 ** k}×`));
-  return svg("svg", { "aria-hidden": "true" }, parts);
-}
-
+function focusOfSides(output) { shown.output = output; address(); render(); }
 function focus(output) { shown.output = output; span = null; brushed = null; address(); drawLadder(); drawTime(); drawMultiples(); }
 function choose(effect) { shown.effect = effect; address(); drawLadder(); drawCard(); }
 function address() { history.replaceState(null, "", `${location.pathname}${location.search}#diagnose/${shown.output || ""}/${shown.effect || ""}`); }
@@ -236,11 +197,6 @@ async function drawCard() {
   });
 }
 
-function sorted(x, ...others) {
-  const index = x.map((_, i) => i).filter((i) => x[i] !== null).sort((a, b) => x[a] - x[b]);
-  return { index, columns: [x, ...others].map((values) => index.map((i) => values[i])) };
-}
-
 // Two sets of points over one x, sorted.
 function mixed(x, y, others, marks) {
   const { columns } = sorted([...x, ...others], [...y, ...others.map(() => null)], [...x.map(() => null), ...marks]);
@@ -257,12 +213,6 @@ function signatureFigure({ name, signature: s }) {
   return { title: `${name}: its signature over the residual`, source: source(), legend: [{ name: "residual, mean", tone: "today" }, { name: "signature", tone: "with" }, { name: "noise floor ±1σ", tone: "edge" }],
     panels: [{ title: `Residual [${s.unit}]`, x: s.x, xLabel: s.label, noise: s.noise, range: sym(s.residual)(), logarithmic: s.logarithmic, series: [{ name: `residual [${s.unit}]`, y: s.residual, tone: "today", points: true, opacity: 0.28 },
       { name: `mean [${s.unit}]`, x: s.bins, y: s.means, tone: "today", width: 2 }, { name: `signature [${s.unit}]`, x: s.bins, y: s.signature, tone: "with", width: 3 }] }] };
-}
-
-const unitOf = (label) => (/\[(.+)\]$/.exec(label) || ["", ""])[1];
-function sym(values) {
-  const sizes = values.filter((v) => v !== null).map(Math.abs).sort((a, b) => a - b), top = 1.15 * (sizes[Math.floor(0.995 * (sizes.length - 1))] || 1);
-  return () => [-top, top];
 }
 
 export const add = (effect) => attempt(() => order("add", { effect }));
@@ -392,6 +342,7 @@ export function keys(event) {
   else if (event.key === "a" && shown.effect && !view.busy) add(shown.effect);
   else if (event.key === "u" && view.can_undo && !view.busy) attempt(() => order("undo"));
   else if (event.key === "s") attempt(() => download("/api/profile"));
+  else if (event.key === "c" && !view.beside && !view.busy) chooseBeside();
   else if (event.key === "Escape") return clear();
   else return false;
   return true;

@@ -107,7 +107,7 @@ export function dialog(title, ...content) {
   box.onclose = () => before && before.focus && before.focus();
   box.onkeydown = (event) => { if (event.key === "Escape") box.close(); };
   if (!box.open) box.show();
-  box.querySelector("button, input, select").focus();
+  (box.querySelector("select, input, .primary") || box.querySelector("button")).focus();
   return box;
 }
 

@@ -22,7 +22,7 @@ function axes(xLabel, logarithmic, flat) {
   return [
     { stroke: ink, font: FONT, size: 26, space: flat ? 44 : 64, grid: { show: false }, ticks: { stroke: () => colour("line"), size: 4 }, gap: 4,
       ...(logarithmic ? { splits: (u, axis, low, high) => powers(low, high), filter: (u, ticks) => ticks } : {}), values: (u, ticks) => label(ticks, xLabel, logarithmic ? power : number) },
-    { stroke: ink, font: FONT, size: flat ? 34 : 44, space: flat ? 24 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
+    { stroke: ink, font: FONT, size: flat ? 34 : 44, space: flat ? 18 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
       values: (u, ticks) => ticks.map((tick) => tick === null ? "" : number(tick)) },
   ];
 }
@@ -98,13 +98,13 @@ export function dots(tone, alpha, size = 3) {
 }
 
 // One plot; `more` are options of uPlot that replace these.
-export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, logarithmic = false, label }) {
+export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, label }) {
   const drag = { x: Boolean(select || zoom), y: false, setScale: false };
   const flat = height < 130;
   const options = {
     width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, 10, 0, 0],
     cursor: { drag, points: { show: false }, ...(sync ? { sync: { key: sync } } : {}), y: false },
-    scales: { x: { time: false, ...(logarithmic ? { distr: 3 } : {}) }, y: range ? { range } : {} },
+    scales: { x: { time: false, ...(xRange ? { range: () => xRange } : {}), ...(logarithmic ? { distr: 3 } : {}) }, y: range ? { range } : {} },
     axes: axes(xLabel, logarithmic, flat), series: [{}, ...series],
     hooks: {
       drawClear: [band(noise)], draw: [marks(runs), traced(traces)],
@@ -168,4 +168,17 @@ export const line = (tone, width, alpha = 1, more = {}) => ({ stroke: () => colo
 
 export function legend(...items) {
   return el("div", { class: "legend" }, items.map(([tone, words, box]) => el("span", {}, el("i", { class: box ? "box" : "", style: { background: `var(--${tone})` } }), words)));
+}
+
+// Values in the order of x, without those that have none.
+export function sorted(x, ...others) {
+  const index = x.map((_, i) => i).filter((i) => x[i] !== null).sort((a, b) => x[a] - x[b]);
+  return { index, columns: [x, ...others].map((values) => index.map((i) => values[i])) };
+}
+
+export const unitOf = (label) => (/\[(.+)\]$/.exec(label) || ["", ""])[1];
+// Range about zero for all but the largest 0.5 %.
+export function sym(values) {
+  const sizes = values.filter((v) => v !== null).map(Math.abs).sort((a, b) => a - b), top = 1.15 * (sizes[Math.floor(0.995 * (sizes.length - 1))] || 1);
+  return () => [-top, top];
 }

@@ -1,0 +1,77 @@
+// The ladder: held-out error ÷ noise floor of each model, one column per output.
+import { el, svg } from "./page.js";
+
+const LOG = (ratio) => Math.log2(Math.max(ratio, 1));
+
+// Largest ratio of a ladder, as a power of two; two ladders with the same reach have one axis.
+export const reach = ({ columns, rows }) => Math.max(1.2, ...rows.flatMap((row) => columns.map((c) => row.cells[c.output] && row.cells[c.output].ratio ? LOG(row.cells[c.output].ratio) : 0)));
+
+// Place of a ratio in its drawing, in percent.
+export const place = (ratio, most) => 10 + (LOG(ratio) / most) * 84;
+
+export const presentName = (profile) => (profile && profile.added.length ? `+ ${profile.added.at(-1).replaceAll("-", " ")}` : null);
+
+export function counted({ rows, candidates }) {
+  const shown = rows.filter((row) => row.kind === "candidate").length;
+  return shown ? `${shown} of ${candidates} candidates shown; the others have less evidence` : "";
+}
+
+// `output` has the focus, `effect` is chosen; `only` draws no other column; `most` is the reach;
+// without `choose` the candidates are names, without `focus` the heads.
+export function ladderGrid({ columns, rows }, { output, effect, only, most, present, focus, choose }) {
+  const seen = only ? columns.filter((c) => c.output === output) : columns;
+  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, 190px) ${seen.map((c) => c.output === output && !only ? "2fr" : "1fr").join(" ")}` } });
+  grid.append(el("span", {}));
+  for (const c of seen) grid.append(el("button", { class: `head ${c.output === output ? "focus" : ""}`, "aria-pressed": String(c.output === output), onclick: () => focus(c.output) }, c.name, el("span", {}, c.unit)));
+  const today = rows.find((row) => row.kind === "today"), joined = rows.filter((row) => row.equal);
+  for (const row of rows) {
+    const chosen = row.kind === "candidate" && row.effect === effect ? "chosen" : "";
+    const bracket = row.equal ? el("b", { class: `bracket ${row === joined[0] ? "first" : ""} ${row === joined.at(-1) ? "last" : ""}`, title: "cannot be distinguished with these runs" }, el("span", { class: "visually-hidden" }, "cannot be distinguished"), row === joined[Math.floor((joined.length - 1) / 2)] ? "=" : "") : null;
+    grid.append(row.kind === "candidate" && choose
+      ? el("button", { class: `name ${chosen}`, "aria-pressed": String(Boolean(chosen)), title: row.effect, onclick: () => choose(row.effect) }, el("span", {}, row.label), bracket)
+      : el("div", { class: `name ${row.kind}` }, el("span", {}, row.kind === "today" && present ? present : row.label), bracket, row.kind === "today" ? el("i", {}, "today") : null));
+    for (const c of seen) {
+      const cell = row.cells[c.output];
+      grid.append(el("div", { class: `cell ${row.kind} ${chosen} ${c.output === output && !chosen ? "focus" : ""}` }, rung(row, cell, today.cells[c.output], most, c.output, Boolean(chosen)), el("span", { class: "value" }, cell ? cell.text : "–")));
+    }
+  }
+  grid.append(el("div", { class: "axis" }, "error ÷ noise floor"));
+  for (const c of seen) grid.append(el("div", { class: `cell axis ${c.output === output ? "focus" : ""}` }, scale(most), el("span", { class: "value" })));
+  return grid;
+}
+
+export function ladderFigure({ columns, rows }, source) {
+  const today = rows.find((row) => row.kind === "today"), ratio = (row, c) => (row.cells[c.output] ? row.cells[c.output].ratio : null);
+  const end = (row, c) => (row.kind === "candidate" && ratio(row, c) ? ratio(today, c) : ratio(row, c));
+  return { title: "Held-out error of each candidate", source, height: 80 + 22 * rows.length, legend: [{ name: "present profile", tone: "today" }, { name: "with the candidate", tone: "with" }, { name: "noise floor", tone: "edge" }],
+    panels: columns.map((c) => ({ title: c.name, xLabel: "error ÷ noise floor", range: [0.5, rows.length + 0.5], rows: rows.map((row) => row.label), marks: [1],
+      series: rows.map((row, i) => ({ name: `row of ${row.label}`, x: [end(row, c), ratio(row, c)], y: [rows.length - i, rows.length - i], tone: toneOf(row), width: row.kind === "candidate" ? 4 : 9 })) })) };
+}
+const toneOf = (row) => ({ history: "muted", today: "today", candidate: "with", floor: "edge" })[row.kind];
+
+function rung(row, cell, now, most, output, picked) {
+  const parts = [svg("rect", { x: "0%", y: 0, width: "10%", height: "100%", fill: "var(--band)" }), svg("line", { x1: "10%", x2: "10%", y1: 0, y2: "100%", stroke: "var(--edge)", "stroke-width": 1.5 })];
+  const right = now && now.ratio ? `${place(now.ratio, most)}%` : null;
+  const moving = (names) => ({ "data-rail": right, "data-moves": names });
+  if (right && row.kind !== "history" && row.kind !== "floor") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? "50%" : 0, y2: "100%", stroke: "var(--today)", "stroke-width": 2, class: "rail", ...moving("x1 x2") }));
+  if (cell && cell.ratio) {
+    const at = `${place(cell.ratio, most)}%`;
+    if (row.kind === "candidate") {
+      if (right) parts.push(svg("line", { x1: at, x2: right, y1: "50%", y2: "50%", stroke: "var(--with)", "stroke-width": picked ? 3.5 : 1.5, class: "rung", ...moving("x2") }));
+      parts.push(svg("circle", { cx: at, cy: "50%", r: picked ? 5.5 : 4, fill: picked ? "var(--with)" : "var(--surface)", stroke: "var(--with)", "stroke-width": 2, class: "dot" }));
+    } else if (row.kind === "today") parts.push(svg("circle", { cx: at, cy: "50%", r: 5, fill: "var(--today)", class: "dot", ...moving("cx") }));
+    else if (row.kind === "history") {
+      parts.push(svg("circle", { cx: at, cy: "50%", r: 4, fill: "var(--surface)", stroke: "var(--muted)", "stroke-width": 1.5 }));
+      parts.push(svg("line", { x1: at, x2: at, y1: "66%", y2: "100%", stroke: "var(--muted)", "stroke-dasharray": "2 2" }));
+    }
+  }
+  return svg("svg", { "aria-hidden": "true", "data-output": output }, parts);
+}
+
+function scale(most) {
+  const parts = [svg("line", { x1: "10%", x2: "96%", y1: 1, y2: 1, stroke: "var(--edge)" })];
+  const step = Math.max(1, Math.round(most / 3));
+  for (let k = 0; k <= most; k += step) parts.push(svg("text", { x: `${place(2 ** k, most)}%`, y: 17, "text-anchor": "middle", fill: "var(--muted)", "font-size": 12 }, `${2 ** k}×`));
+  return svg("svg", { "aria-hidden": "true" }, parts);
+}
+
