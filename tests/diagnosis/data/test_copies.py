@@ -102,8 +102,7 @@ def test_repeats_that_round_alike_show_no_noise() -> None:
     dataset = prepare(runs, GROOVED)
     assert len(dataset.recordings) == 2
     found = {f.channel: f for f in dataset.sanity if f.code == "noise-floor-implausible"}
-    # The torque has fewer levels than a resolution is estimated from.
-    assert set(found) == {"cable_length", "tension"}
+    assert set(found) == {"cable_length", "tension", "motor_torque"}
     for name, finding in found.items():
         assert finding.value < sizes[name] / np.sqrt(12)
     assert "noise-floor-implausible" in dataset.caveats

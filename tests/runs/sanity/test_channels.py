@@ -221,6 +221,27 @@ def test_a_coarse_cell_that_does_not_saturate(seed: int, step: float) -> None:
     assert not found(run_of(step * np.round(tension(seed) / step)), "saturated")
 
 
+@given(SEEDS, st.floats(1.5, 10.0), st.floats(0.3, 1.5))
+@settings(max_examples=40, deadline=None)
+def test_a_channel_of_a_few_levels_is_quantised_and_nothing_else(
+    seed: int, levels: float, ratio: float
+) -> None:
+    """A resolution of many times the noise, and a slow signal of a few steps."""
+    random = np.random.default_rng(seed)
+    noise, step = ratio * 0.25, 2.0
+    signal = 150 + step * levels / 2 * np.sin(np.arange(COUNT) / 100)
+    values = step * np.round((signal + random.normal(0, noise, COUNT)) / step)
+    assert resolution(values) == pytest.approx(step, rel=1e-9)
+    codes = {finding.code for finding in inspect_run(run_of(values))}
+    assert codes <= {"quantised"}
+
+
+def test_a_command_of_three_levels_is_not_quantised() -> None:
+    values = 0.1 * np.sign(np.round(1.4 * np.sin(np.arange(20 * COUNT) / 60)))
+    assert len(np.unique(values)) == 3
+    assert resolution(values) == 0.0
+
+
 def test_a_smooth_signal_is_cut_off_at_a_slope() -> None:
     time = np.arange(COUNT) / RATE
     assert found(run_of(np.minimum(100 * np.sin(time), 60.0)), "saturated")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.quantisation import quantisation_noise, resolution
 from winchkit.runs.sanity.text import size
 
 __all__ = ["outlier_mask", "outlier_masks", "outliers"]
@@ -117,6 +118,8 @@ def _spikes(values: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     # Neighbours that are equal in a quantised or held channel have a local deviation of zero.
     floor = float(np.sqrt(np.mean(np.minimum(deviation, np.quantile(deviation, 0.95)) ** 2)))
     scale = np.maximum(_local(deviation), floor)
+    if np.any(deviation > _LIMIT * scale):  # else the resolution need not be known
+        scale = np.maximum(scale, quantisation_noise(resolution(values)))
     large = deviation > _LIMIT * scale
     before, after = np.append([False, False], large[:-2]), np.append(large[2:], [False, False])
     around[0] = np.where(before & ~after, around[1], around[0])

@@ -41,6 +41,11 @@ _LEAST_SHARE = 0.2
 """Share of the differences beyond rounding that are at least half a step."""
 _LEAST_LEVELS = 8
 _FEW_LEVELS = 4
+"""Exact levels of a command that changes in steps; with fewer, the values must be dithered."""
+_SHORT = 3.0
+"""Samples from a change of the level to the next or the last one, in the median, up to which noise
+makes it: white noise near a limit of rounding crosses it in every second sample, a command stays
+for many."""
 _NEAR = 50
 """Steps up to which a difference is not affected by the uncertainty of the step."""
 _MANY_MULTIPLES = 8
@@ -79,7 +84,10 @@ def resolution(values: Array) -> float:
         own = sizes[sizes <= np.quantile(sizes, scale)]
         step, score = _largest_step(own)
         levels = _levels(few, step) if step and _steps_are_multiples(few, step) else 0
-        if levels >= (_FEW_LEVELS if score >= _EXACT else _LEAST_LEVELS):
+        least = _LEAST_LEVELS
+        if score >= _EXACT:
+            least = 2 if _is_dithered(few) else _FEW_LEVELS
+        if levels >= least:
             return step
     return 0.0
 
@@ -157,6 +165,16 @@ def _steps_are_multiples(values: Array, step: float) -> bool:
     return len(near) < _LEAST_DIFFERENCES or bool(
         np.mean(np.cos(2 * np.pi * near / step)) >= _COHERENCE - _TIE
     )
+
+
+def _is_dithered(values: Array) -> bool:
+    """Whether noise changes the level of a channel."""
+    changes = np.flatnonzero(np.diff(values[np.isfinite(values)]) != 0)
+    if len(changes) < _LEAST_DIFFERENCES:
+        return False
+    apart = np.diff(changes)
+    nearest = np.minimum(np.append(apart[:1], apart), np.append(apart, apart[-1:]))
+    return float(np.median(nearest)) <= _SHORT
 
 
 def _levels(values: Array, step: float) -> int:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.quantisation import resolution
 from winchkit.runs.sanity.text import share, size
 
 __all__ = ["saturated"]
@@ -24,6 +25,8 @@ _LONGEST = 10
 _TIMES = 3
 _DITHERED = 12
 """Longest repetition elsewhere of a channel whose noise is not small against its resolution."""
+_LEAST_LEVELS = 8
+"""Levels below which the extreme of a quantised channel is one of the few values that it has."""
 _OVERSHOOT = 3.0
 _BEFORE = 6
 
@@ -51,6 +54,8 @@ def saturated(run: Run, name: str) -> Iterator[Finding]:
         count = int(np.count_nonzero(at))
         if count < _LEAST_SAMPLES or level == 0 or not _is_cut_off(signal, at, level):
             continue
+        if np.ptp(values) < _LEAST_LEVELS * resolution(values):
+            return
         limit = size(sign * level, run.channels[name].unit)
         text = (
             f"{share(count / len(values))} of the samples are at the {word} value, {limit}: the "
