@@ -29,7 +29,7 @@ from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.realtime import RealTime, RestCollector, acquire
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.drivers.can.bus.bus import CanBus
-from winchkit.drivers.can.bus.interface import _SocketCan
+from winchkit.drivers.can.bus.socketcan import SocketCan
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.reading import Quality, Reading
@@ -150,7 +150,7 @@ class OtherProcess(FarDrives):
     def open(self, spec: BusSpec, clock: Clock) -> CanBus:
         """The bench's bus to them."""
         library = PairLibrary(self.end)
-        with patch("winchkit.drivers.can.bus.bus.open_interface", lambda *_: _SocketCan(library)):
+        with patch("winchkit.drivers.can.bus.bus.open_interface", lambda *_: SocketCan(library)):
             return CanBus(spec, spec.channel or "can", clock)
 
     def run(self) -> None:

@@ -1,14 +1,17 @@
-"""A motion programme that somebody stops, in simulated time."""
+"""A motion programme, and a held tension, that somebody stops, in simulated time."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from winchkit import catalog, open_bench
+from winchkit.bench.bench import Bench
+from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.programme import run_programme
-from winchkit.errors import MotionError
+from winchkit.errors import MotionError, NotPermitted
 from winchkit.runs import read_run
 from winchkit.schema.programme import Programme, Step
 from winchkit.schema.read import read_simbench
@@ -16,27 +19,61 @@ from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 
 
-def test_a_stop_during_a_hold_ends_the_programme_and_keeps_its_log(tmp_path: Path) -> None:
-    """The winch stands then, so that the stop ends no motion; the next one must not begin."""
+@pytest.fixture(scope="module")
+def clock() -> SimulatedClock:
+    return SimulatedClock()
+
+
+@pytest.fixture(scope="module")
+def live(clock: SimulatedClock) -> Iterator[LiveBench]:
     declared = read_simbench(catalog.find("sim", "demo-adequate"))
+    with LiveBench(declared, simulated_time=clock) as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def bench(live: LiveBench, clock: SimulatedClock) -> Iterator[Bench]:
+    with open_bench(live.bench_spec, clock) as opened:
+        yield opened
+
+
+def test_a_stop_during_a_hold_ends_the_programme_and_keeps_its_log(
+    live: LiveBench, bench: Bench, tmp_path: Path
+) -> None:
+    """The winch stands then, so that the stop ends no motion; the next one must not begin."""
     steps = (Step(by=-0.1, speed=0.4), Step(hold=2.0), Step(by=-0.5, speed=0.4))
-    clock, places = SimulatedClock(), []
-    with (
-        LiveBench(declared, simulated_time=clock) as live,
-        open_bench(live.bench_spec, clock) as bench,
-    ):
-        plant = live.winches["A"].plant
+    plant, places = live.winches["A"].plant, []
 
-        def stop(_repeat: int, _number: int, step: Step) -> None:
-            if step.hold is not None:
-                places.append(plant.cable_length)
-                bench.stop_now()
+    def stop(_repeat: int, _number: int, step: Step) -> None:
+        if step.hold is not None:
+            places.append(plant.cable_length)
+            bench.stop_now()
 
-        with pytest.raises(MotionError, match="stopped the bench between two motions"):
-            run_programme(
-                bench, Programme("held", steps), tmp_path, lambda _step: None, progress=stop
-            )
-        clock.sleep(0.5)
-        assert bench.snapshot.at_rest
-        assert plant.cable_length == pytest.approx(places[0], abs=1e-3)
+    with pytest.raises(MotionError, match="stopped the bench between two motions"):
+        run_programme(bench, Programme("held", steps), tmp_path, lambda _step: None, progress=stop)
+    bench.clock.sleep(0.5)
+    assert bench.snapshot.at_rest
+    assert plant.cable_length == pytest.approx(places[0], abs=1e-3)
     assert len(read_run(tmp_path / "held-10kg-1.csv")) > 5
+
+
+def test_a_quick_stop_ends_a_held_tension(live: LiveBench, bench: Bench) -> None:
+    """And whoever goes on refreshing it is refused: nothing moves before it was released."""
+    winch, plant = bench.winch["A"], live.winches["A"].plant
+    wanted = winch.snapshot.rope_tension + 30.0  # the load hangs free: the winch winds in
+
+    def stop(snapshot: BenchSnapshot) -> None:
+        if snapshot.winch["A"].cable_speed < -2e-3:
+            remove()
+            bench.stop_now(wait=False)
+
+    remove = bench.on_cycle(stop)
+    with pytest.raises(MotionError, match="stopped"):
+        winch.hold_tension(wanted, duration=2.0, stiffness=1e3)
+    with pytest.raises(NotPermitted, match="release it"):
+        winch.hold_tension(wanted, stiffness=1e3)
+    bench.wait_at_rest("A")
+    place = plant.cable_length
+    bench.clock.sleep(0.5)
+    assert bench.snapshot.at_rest
+    assert plant.cable_length == pytest.approx(place, abs=1e-4)

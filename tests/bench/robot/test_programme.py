@@ -13,7 +13,7 @@ from winchkit import find, read_robot, read_run, robot_of
 from winchkit.bench.bench import Bench
 from winchkit.bench.robot.planner import Planner
 from winchkit.bench.robot.programme import planned_motions, run_robot_programme
-from winchkit.errors import FileError, NotPermitted, UsageError
+from winchkit.errors import FileError, MotionError, NotPermitted, UsageError
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.read import read_robot_programme
 from winchkit.schema.robot_bench import RobotWiring
@@ -86,6 +86,27 @@ def test_a_programme_is_played_and_logged_once_per_repeat(bench: Bench, tmp_path
     assert bench.snapshot.at_rest
     with pytest.raises(UsageError, match="holds an earlier run of 'corner'"):
         run_robot_programme(bench, programme, tmp_path)
+
+
+def test_a_quick_stop_during_a_hold_ends_the_programme(bench: Bench, tmp_path: Path) -> None:
+    """The platform stands then, so that the stop ends no motion; the next one must not begin."""
+    steps = (PoseStep(by=PoseSpec(x=0.002)), PoseStep(hold=2.0), PoseStep(by=PoseSpec(x=0.05)))
+    rested: list[list[float]] = []
+
+    def angles() -> list[float]:
+        return [winch.motor_angle for winch in bench.snapshot.winch.values()]
+
+    def stop(_repeat: int, number: int) -> None:
+        if number == 2:
+            bench.stop_now()
+            rested.append(angles())
+
+    with pytest.raises(MotionError, match="stopped the bench between two motions"):
+        run_robot_programme(bench, RobotProgramme("held", steps, 0.1), tmp_path, progress=stop)
+    bench.clock.sleep(0.5)
+    assert bench.snapshot.at_rest
+    assert rested == [pytest.approx(angles(), abs=1e-3)]
+    assert len(read_run(tmp_path / "held-1.csv").time) > 5, "the log until then is kept"
 
 
 def test_faults_of_a_robot_programme(tmp_path: Path) -> None:

@@ -7,9 +7,10 @@ import pytest
 
 import robot_rectangle
 import robot_self_calibrated
+from winchkit.bench.bench import Bench
 from winchkit.bench.robot.self_calibration import PoseVolume, self_calibrated
-from winchkit.bench.robot.tracker import Tracker
-from winchkit.errors import UsageError
+from winchkit.bench.robot.tracker import TrackedPose, Tracker
+from winchkit.errors import MotionError, UsageError
 
 
 @pytest.mark.slow
@@ -33,3 +34,24 @@ def test_the_rectangle_needs_an_estimate_of_the_friction() -> None:
 def test_too_few_poses_are_refused_before_anything_moves() -> None:
     with pytest.raises(UsageError, match="at least 10 and 1"):
         self_calibrated(None, Tracker(lambda: 0.0), poses=9)  # type: ignore[arg-type]
+
+
+def test_a_quick_stop_between_two_poses_ends_the_calibration(bench: Bench) -> None:
+    """The platform stands then, so that the stop ends no motion; the next one must not begin."""
+    rested: list[list[float]] = []
+
+    def angles() -> list[float]:
+        return [winch.motor_angle for winch in bench.snapshot.winch.values()]
+
+    class Stopping(Tracker):
+        def require(self, since: float, address: str) -> list[TrackedPose]:
+            bench.stop_now()
+            rested.append(angles())
+            return [TrackedPose(since, bench.clock.now(), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))]
+
+    volume = PoseVolume(0.002, 0.0, 0.1, 0.1)
+    with pytest.raises(MotionError, match="stopped the bench between two motions"):
+        self_calibrated(bench, Stopping(bench.clock.now), poses=10, volume=volume)
+    bench.clock.sleep(0.5)
+    assert bench.snapshot.at_rest
+    assert rested == [pytest.approx(angles(), abs=1e-3)]

@@ -178,6 +178,10 @@ class FakeBus:
     def heartbeat(self, node: int, state: int) -> None:
         self.beats += 1
 
+    def gather(self) -> None: ...
+
+    def send_gathered(self) -> None: ...
+
 
 @dataclass
 class FakeCell:

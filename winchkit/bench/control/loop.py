@@ -56,6 +56,12 @@ class BusPort(Protocol):
     def heartbeat(self, node: int, state: int) -> None:
         """Send the host's heartbeat."""
 
+    def gather(self) -> None:
+        """Let the RPDOs of this cycle wait for each other."""
+
+    def send_gathered(self) -> None:
+        """Send them."""
+
 
 class ControlLoop:
     """Runs ``step`` once a cycle on its own thread, or as its owner calls it in a test."""
@@ -363,6 +369,8 @@ class ControlLoop:
                 self._latch_bus(ConnectionLost(f"CAN bus: {bus.fault}; reset opens it again"))
 
     def _command(self, now: float) -> None:
+        for bus, _, _ in self._buses:
+            bus.gather()
         for name, parts in self.winches.items():
             try:
                 parts.controller.step(now, self._count * self.cycle, self._count)
@@ -373,6 +381,11 @@ class ControlLoop:
                 self.supervisor.latch(Trip("target", name, f"{error}; reset", latches=True))
                 parts.controller.stop()
                 parts.axis.emergency_stop(sdo=False)
+        for bus, _, _ in self._buses:
+            try:
+                bus.send_gathered()
+            except ConnectionLost as error:
+                self._latch_bus(error)
 
     def _latch_bus(self, error: ConnectionLost) -> None:
         self.supervisor.latch(Trip("bus", "", str(error), latches=True))

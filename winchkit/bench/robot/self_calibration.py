@@ -123,7 +123,8 @@ def self_calibrated(
     NotPermitted
         Where no pose of the volume is within the limits.
     MotionError, NoReply
-        Whatever stops a motion; a tracker that sends nothing.
+        Whatever stops a motion, a quick stop between two of them included; a tracker that sends
+        nothing.
     """
     if poses < 10 or validation < 1:
         raise UsageError(
@@ -207,6 +208,7 @@ class _Driver:
         self.bench, self.tracker, self.volume = bench, tracker, volume
         self._here = bench.robot.pose
         self._preload: Array | None = None
+        self._stops = bench.stops
 
     def drawn(self, random: np.random.Generator, count: int) -> Iterator[Array]:
         """Rows of random poses within the limits."""
@@ -240,6 +242,7 @@ class _Driver:
         except (NotPermitted, UsageError):
             return False
         for motion in planned:
+            self.bench.raise_stop(self._stops)
             self._preload = platform.begin(motion, hold=True, preload=self._preload)
             platform.wait()
         self._here = goal
@@ -267,7 +270,7 @@ class _Driver:
         bench = self.bench
         end = bench.clock.now() + duration
         while (left := end - bench.clock.now()) > 0:
-            bench.raise_trouble()
+            bench.raise_stop(self._stops)
             bench.clock.sleep(min(_POLL, left))
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import socket
-import struct
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import can
@@ -18,7 +16,7 @@ from drive_on_bus import DriveOnBus, bus_spec, device
 from winchkit.drivers.can.bus import bus as bus_module
 from winchkit.drivers.can.bus.bus import CanBus, FrameTime
 from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
-from winchkit.drivers.can.bus.interface import Frame, parse_socketcan
+from winchkit.drivers.can.bus.socketcan import Frame
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.can.cia402.state_machine import State, Wish
@@ -26,7 +24,6 @@ from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost
 
 CLOCK = MonotonicClock()
-_TIMESTAMPNS, _RXQ_OVFL = 35, 40
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -101,37 +98,6 @@ def test_no_error_frame_ends_the_counting(frames: list[tuple[int, bytes]]) -> No
     assert tally.overruns <= len(frames)
 
 
-# Raw frames of a CAN socket.
-
-
-def ancillary(stamp: tuple[int, int] | None, drops: int | None) -> list[tuple[int, int, bytes]]:
-    found = []
-    if stamp is not None:
-        found.append((socket.SOL_SOCKET, _TIMESTAMPNS, struct.pack("@qq", *stamp)))
-    if drops is not None:
-        found.append((socket.SOL_SOCKET, _RXQ_OVFL, struct.pack("=I", drops)))
-    return found
-
-
-def test_frames_of_a_can_socket() -> None:
-    raw = struct.pack("=IB3x8s", 0x181, 3, b"abcgarba")
-    frame, drops = parse_socketcan(raw, ancillary((12, 500_000_000), None))
-    assert frame == Frame(0x181, b"abc", 12.5)
-    assert drops is None
-    frame, drops = parse_socketcan(raw, ancillary((12, 0), 7))
-    assert frame is not None
-    assert drops == 7
-    error = struct.pack("=IB3x8s", 0x20000040, 8, bytes(8))
-    assert parse_socketcan(error, [])[0] == Frame(0x40, bytes(8), 0.0, error=True)
-
-
-@pytest.mark.parametrize("identifier", [0x80000181, 0x40000181, 0xC0000181])
-def test_long_identifiers_and_remote_frames_have_no_receiver(identifier: int) -> None:
-    raw = struct.pack("=IB3x8s", identifier, 0, bytes(8))
-    assert parse_socketcan(raw, []) == (None, None)
-    assert parse_socketcan(raw[:9], []) == (None, None)
-
-
 # Time stamps of another clock.
 
 
@@ -193,21 +159,32 @@ class Interface:
         self.frames: list[Frame] = []
         self.sent: list[tuple[int, bytes]] = []
         self.trouble: Exception | None = None
+        self.room = self.calls = 0
+        """Frames that one call takes, and calls of many frames."""
+        self.refused: tuple[int, bytes] | None = None
         self.closed = False
         self.controller: BusState | None = None
 
-    def receive(self, timeout: float) -> Frame | None:
+    def receive(self, timeout: float) -> list[Frame]:
         if self.trouble is not None:
             raise self.trouble
         if not self.frames:
             time.sleep(0.001)
-            return None
-        return self.frames.pop(0)
+            return []
+        return [self.frames.pop(0)]
 
     def send(self, identifier: int, data: bytes) -> None:
         if self.trouble is not None:
             raise self.trouble
+        if (identifier, data) == self.refused:
+            raise OSError(105, "No buffer space available")
         self.sent.append((identifier, data))
+
+    def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
+        took = 0 if self.trouble is not None else min(self.room, len(frames))
+        self.sent += frames[:took]
+        self.calls += 1
+        return took
 
     def state(self) -> BusState | None:
         return self.controller
@@ -255,6 +232,57 @@ def test_everything_that_goes_wrong_is_counted(bus: CanBus, interfaces: list[Int
     assert "error passive: received 2, sent 1, error frames 2" in str(health)
     assert bus.nodes == {1}
     assert BusHealth().lossless
+
+
+CYCLE = [(0x201, b"a"), (0x202, b"b"), (0x203, b"c")]
+
+
+@pytest.mark.parametrize("room", [0, 1, 3, 8])
+def test_the_frames_of_a_cycle_are_sent_together_and_in_their_order(
+    bus: CanBus, interfaces: list[Interface], room: int
+) -> None:
+    """What one call does not take is sent one by one; other frames do not wait for it."""
+    port = interfaces[0]
+    port.room = room
+    bus.post(*CYCLE[0])
+    assert port.sent == CYCLE[:1], "nobody gathers"
+    bus.gather()
+    for frame in CYCLE:
+        bus.post(*frame)
+    bus.sync()
+    assert port.sent == [*CYCLE[:1], (0x080, b"")]
+    bus.send_gathered()
+    assert port.sent[2:] == CYCLE
+    assert (bus.sent, port.calls) == (5, 1)
+    bus.gather()
+    bus.send_gathered()
+    bus.post(*CYCLE[1])
+    assert port.sent[5:] == [CYCLE[1]], "once sent, nothing is gathered"
+
+
+def test_a_full_queue_leaves_out_what_it_does_not_take(
+    bus: CanBus, interfaces: list[Interface]
+) -> None:
+    port = interfaces[0]
+    port.room, port.refused = 1, CYCLE[1]
+    bus.gather()
+    for frame in CYCLE:
+        bus.post(*frame)
+    bus.send_gathered()
+    assert port.sent == [CYCLE[0], CYCLE[2]]
+    assert (bus.unsent, bus.fault) == (1, None)
+
+
+def test_a_dead_interface_is_reported_once_every_frame_was_tried(
+    bus: CanBus, interfaces: list[Interface]
+) -> None:
+    bus.gather()
+    for frame in CYCLE:
+        bus.post(*frame)
+    interfaces[0].trouble = OSError(100, "Network is down")
+    with pytest.raises(ConnectionLost, match=r"cannot send: .*Network is down"):
+        bus.send_gathered()
+    assert bus.unsent == len(CYCLE)
 
 
 def test_bus_off_is_a_fault_until_it_is_opened_again(

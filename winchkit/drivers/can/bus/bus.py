@@ -6,7 +6,7 @@ import errno
 import logging
 import threading
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import can
@@ -14,7 +14,6 @@ import canopen
 
 from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
 from winchkit.drivers.can.bus.interface import (
-    Frame,
     Interface,
     hands_back,
     open_interface,
@@ -23,6 +22,7 @@ from winchkit.drivers.can.bus.interface import (
     simulated_interface,
 )
 from winchkit.drivers.can.bus.own_frames import OwnFrames
+from winchkit.drivers.can.bus.socketcan import Frame
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import event_of, thread_of
 from winchkit.errors import ConnectionLost
@@ -133,6 +133,7 @@ class CanBus:
         self._dropped = self._syncs_heard = 0
         self._syncs_sent = 0
         self._full_since: float | None = None
+        self._gathered: list[tuple[int, bytes]] | None = None
         self.on_foreign_sync: Callable[[str], None] = lambda _words: None
         """Called on the receive thread with each SYNC that was not sent here."""
         self.on(_SYNC, self._hear_sync)
@@ -265,6 +266,47 @@ class CanBus:
             self._full_since = None
         return True
 
+    def gather(self) -> None:
+        """Let the frames of :meth:`post` wait for :meth:`send_gathered`; for the control loop."""
+        self._gathered = []
+
+    def post(self, identifier: int, data: bytes) -> None:
+        """Send a frame, together with others of the cycle while they are gathered.
+
+        Raises ConnectionLost where it is sent at once.
+        """
+        if self._gathered is None:
+            self.send(identifier, data)
+        else:
+            self._gathered.append((identifier, data))
+
+    def send_gathered(self) -> None:
+        """Send what has been gathered, by one call where the interface has one for it.
+
+        A frame that cannot be sent keeps none of the others from being tried; then it raises
+        ConnectionLost. A full queue is dealt with as in :meth:`send`.
+        """
+        frames, self._gathered = self._gathered or [], None
+        lost: ConnectionLost | None = None
+        for frame in frames[self._sent_together(frames) :]:
+            try:
+                self.send(*frame)
+            except ConnectionLost as error:
+                lost = error
+        if lost is not None:
+            raise lost
+
+    def _sent_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
+        """How many of the first of these frames one call has sent."""
+        if not frames or self._own is not None:
+            return 0  # what comes back must be noted before it is sent
+        with self.network.send_lock:
+            count = self._port.send_together(frames)
+        self.sent += count
+        if count:
+            self._full_since = None
+        return count
+
     def remote(self, identifier: int) -> None:
         """Send a remote frame, to which a node answers with one byte; raises ConnectionLost.
 
@@ -332,7 +374,7 @@ class CanBus:
         failures, stopping = 0, self._stopping
         while not stopping.is_set():
             try:
-                frame = port.receive(_WAIT)
+                frames = port.receive(_WAIT)
             except (can.CanError, OSError, ValueError) as error:
                 self._errors.frames += 1
                 failures += 1
@@ -343,31 +385,32 @@ class CanBus:
                 stopping.wait(_FAILURE_PAUSE)
                 continue
             failures = 0
-            if frame is not None:
+            if not frames and (state := port.state()) is not None:
+                self._errors.enter(state)
+            now = self.clock.now()
+            for frame in frames:
                 try:
-                    self._dispatch(frame)
+                    self._dispatch(frame, now)
                 except Exception as error:  # noqa: BLE001 - a defect: it is named, the bench stops
                     self.fault = (
                         f"internal error in the receive thread at frame {frame.identifier:03X}h: "
                         f"{type(error).__name__}: {error}"
                     )
                     return
-            elif (state := port.state()) is not None:
-                self._errors.enter(state)
 
-    def _dispatch(self, frame: Frame) -> None:
-        if frame.error:
+    def _dispatch(self, frame: Frame, now: float) -> None:
+        identifier, data, stamp, error = frame
+        if error:
             self._take_error(frame)
             return
         self.received += 1
-        now = self.clock.now()
-        if frame.identifier > _HEARTBEAT:
-            self._heard.add(frame.identifier - _HEARTBEAT)
-        handler = self._handlers.get(frame.identifier)
+        if identifier > _HEARTBEAT:
+            self._heard.add(identifier - _HEARTBEAT)
+        handler = self._handlers.get(identifier)
         if handler is not None:
-            handler(frame.data, self._times.map(frame.stamp, now) if frame.stamp else now)
-        elif frame.identifier in _SDO_REPLY and len(frame.data) == _SDO_SIZE:
-            self.network.notify(frame.identifier, bytearray(frame.data), now)
+            handler(data, self._times.map(stamp, now) if stamp else now)
+        elif identifier in _SDO_REPLY and len(data) == _SDO_SIZE:
+            self.network.notify(identifier, bytearray(data), now)
 
     def _take_error(self, frame: Frame) -> None:
         """A bus-off is a fault: until the controller restarts no frame is sent."""

@@ -1,31 +1,26 @@
-"""The interface under a bus: python-can's, and on SocketCAN the socket itself.
-
-python-can's own reader does not report how many frames a full socket dropped: with SO_RXQ_OVFL
-set, it takes the count for a protocol error. So the socket is read here.
-"""
+"""The interface under a bus: python-can's, the socket of SocketCAN, or a simulated bus."""
 
 from __future__ import annotations
 
 import errno
 import socket
-import struct
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import can
 
 from winchkit.drivers.can.bus.health import BusState
+from winchkit.drivers.can.bus.socketcan import Frame, SocketCan
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
 __all__ = [
-    "Frame",
     "Interface",
     "hands_back",
     "open_interface",
-    "parse_socketcan",
     "queue_full",
     "sends_remote",
     "simulated_interface",
@@ -39,36 +34,11 @@ _HAND_BACK = ("udp_multicast",)
 _NO_REMOTE = ("socketcand", "neousys")
 """Interfaces for which python-can sends a remote frame as a data frame, or not at all."""
 
-_FRAME = struct.Struct("=IB3x8s")
-_EXTENDED, _REMOTE, _ERROR = 1 << 31, 1 << 30, 1 << 29
-_STAMP = struct.Struct("@qq")
-_INTERVAL = struct.Struct("@ll")
-_DROPS = struct.Struct("=I")
-_SO_TIMESTAMPNS, _SO_RXQ_OVFL = 35, 40
-_ANCILLARY = 128
-_CONFIRM = 0x800
-"""Flag of a frame that this very socket has sent (MSG_CONFIRM of Linux)."""
-_QUEUE = 1 << 20
-"""Bytes of the socket's queue; the usual one keeps 278 frames."""
-
 _STATES = {
     can.BusState.ACTIVE: BusState.ACTIVE,
     can.BusState.PASSIVE: BusState.PASSIVE,
     can.BusState.ERROR: BusState.OFF,
 }
-
-
-class Frame(NamedTuple):
-    """A frame as received: of 11 bits and with data, or an error frame.
-
-    A named tuple, since thousands of them are made a second.
-    """
-
-    identifier: int
-    data: bytes
-    stamp: float = 0.0
-    """By the interface's clock, s; 0 where it has none of its own."""
-    error: bool = False
 
 
 class Interface(Protocol):
@@ -79,14 +49,18 @@ class Interface(Protocol):
     dropped: int
     """Frames that its queue had no room for."""
 
-    def receive(self, timeout: float) -> Frame | None:
-        """Take the next frame; raises can.CanError or OSError.
+    def receive(self, timeout: float) -> Sequence[Frame]:
+        """Take the frames that wait, at least one within ``timeout`` (s); empty if there is none.
 
         A confirmation of what was sent here, where the interface marks it as one, is no frame.
+        Raises can.CanError or OSError.
         """
 
     def send(self, identifier: int, data: bytes) -> None:
         """Send a data frame of 11 bits; raises can.CanError or OSError."""
+
+    def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
+        """Send the first of these frames in one call; how many, 0 without such a call."""
 
     def send_remote(self, identifier: int) -> None:
         """Send a remote frame of 11 bits for one byte; raises can.CanError or OSError."""
@@ -107,70 +81,27 @@ class _Library:
         self._stamped = stamped
         self._tells = type(bus).state is not can.BusABC.state
 
-    def receive(self, timeout: float) -> Frame | None:
+    def receive(self, timeout: float) -> Sequence[Frame]:
         message = self.library.recv(timeout)
         if message is None or message.is_remote_frame or not message.is_rx:
-            return None
+            return ()
         if message.is_extended_id and not message.is_error_frame:
-            return None
+            return ()
         stamp = message.timestamp if self._stamped else 0.0
         data = bytes(message.data)
-        return Frame(message.arbitration_id, data, stamp, message.is_error_frame)
+        return (Frame(message.arbitration_id, data, stamp, message.is_error_frame),)
 
     def send(self, identifier: int, data: bytes) -> None:
         self.library.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
+        return 0
 
     def send_remote(self, identifier: int) -> None:
         self.library.send(_remote_frame(identifier))
 
     def state(self) -> BusState | None:
         return _STATES.get(self.library.state) if self._tells else None
-
-    def close(self) -> None:
-        with suppress(can.CanError, OSError):
-            self.library.shutdown()
-
-
-class _SocketCan:
-    """A raw CAN socket of Linux, opened by python-can."""
-
-    def __init__(self, bus: Any) -> None:
-        self.library = bus
-        self.dropped = 0
-        self._socket: socket.socket = bus.socket
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _QUEUE)
-        self._socket.setsockopt(socket.SOL_SOCKET, _SO_RXQ_OVFL, 1)
-        self._socket.setblocking(True)
-        self._timeout = -1.0
-
-    def receive(self, timeout: float) -> Frame | None:
-        if timeout != self._timeout:
-            self._set_timeout(timeout)
-        try:
-            data, ancillary, flags, _ = self._socket.recvmsg(_FRAME.size, _ANCILLARY)
-        except BlockingIOError:
-            return None
-        frame, drops = parse_socketcan(data, ancillary)
-        if drops is not None:
-            self.dropped = drops
-        return None if flags & _CONFIRM else frame
-
-    def send(self, identifier: int, data: bytes) -> None:
-        self._socket.send(_FRAME.pack(identifier, len(data), data))
-
-    def send_remote(self, identifier: int) -> None:
-        self._socket.send(_FRAME.pack(identifier | _REMOTE, 1, b""))
-
-    def state(self) -> BusState | None:
-        return None
-
-    def _set_timeout(self, timeout: float) -> None:
-        """Let the kernel wait: one call a frame, where ``select`` would be another."""
-        seconds = int(timeout)
-        microseconds = max(1, round((timeout - seconds) * 1e6))
-        interval = _INTERVAL.pack(seconds, microseconds)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, interval)
-        self._timeout = timeout
 
     def close(self) -> None:
         with suppress(can.CanError, OSError):
@@ -184,12 +115,15 @@ class _Simulated:
         self.library = port
         self.dropped = 0
 
-    def receive(self, timeout: float) -> Frame | None:
+    def receive(self, timeout: float) -> Sequence[Frame]:
         received = self.library.receive(timeout)
-        return None if received is None else Frame(*received)
+        return () if received is None else (Frame(*received),)
 
     def send(self, identifier: int, data: bytes) -> None:
         self.library.transmit(identifier, data)
+
+    def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
+        return 0
 
     def send_remote(self, identifier: int) -> None:
         self.library.send(_remote_frame(identifier))
@@ -203,32 +137,6 @@ class _Simulated:
 
 def _remote_frame(identifier: int) -> can.Message:
     return can.Message(arbitration_id=identifier, is_remote_frame=True, dlc=1, is_extended_id=False)
-
-
-def parse_socketcan(
-    data: bytes, ancillary: list[tuple[int, int, bytes]]
-) -> tuple[Frame | None, int | None]:
-    """A ``struct can_frame`` with its control messages: the frame, and the count of drops.
-
-    None in place of a frame of 29 bits, a remote frame or a fragment; None in place of a count
-    that the kernel did not send.
-    """
-    stamp, drops = 0.0, None
-    for level, kind, content in ancillary:
-        if level != socket.SOL_SOCKET:
-            continue
-        if kind == _SO_TIMESTAMPNS and len(content) >= _STAMP.size:
-            seconds, nanoseconds = _STAMP.unpack_from(content)
-            stamp = seconds + nanoseconds * 1e-9
-        elif kind == _SO_RXQ_OVFL and len(content) >= _DROPS.size:
-            (drops,) = _DROPS.unpack_from(content)
-    if len(data) < _FRAME.size:
-        return None, drops
-    identifier, size, payload = _FRAME.unpack_from(data)
-    error = bool(identifier & _ERROR)
-    if not error and identifier & (_EXTENDED | _REMOTE):
-        return None, drops
-    return Frame(identifier & (_ERROR - 1), payload[:size], stamp, error), drops
 
 
 def queue_full(error: BaseException) -> bool:
@@ -266,7 +174,7 @@ def open_interface(spec: BusSpec, name: str) -> Interface:
             socket.if_nametoindex(spec.channel)
         bus = can.Bus(**options)
         if spec.interface == "socketcan":
-            return _SocketCan(bus)
+            return SocketCan(bus)
     except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
         hint = ""
         if spec.interface == "udp_multicast" and isinstance(error, OSError):

@@ -357,7 +357,7 @@ class Cia402Axis:
         command = Command(wish, velocity, angle, torque, start)
         word, frames = commander.frames(word, command, feedback)
         for identifier, data in () if self.host.withholds_rpdos else frames:
-            self._bus.send(identifier, data)
+            self._bus.post(identifier, data)
         self._previous = word
         return word
 
