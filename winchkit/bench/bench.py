@@ -149,7 +149,7 @@ class Bench:
             """Who commands each winch."""
             self.stopped_by = ""
             """Who gave the last quick stop."""
-            self.stops = 0
+            self.stops: int = 0
             """Quick stops that were given."""
             self.cells = self._cell_desk()
             """Its instruments by name, for commands and whoever looks at them one by one."""
