@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -62,6 +63,14 @@ class Fed:
                     if self.cycle % EVERY[role] == 0:
                         value = tension(self.clock.time - DELAY) if role == "cell" else 20.0
                         give(cell, value, self.clock.time)
+
+    def run_until_written(self, recorder: Recorder, duration: float) -> None:
+        """So many seconds, and wait until the recorder has written four fifths of their rows."""
+        written = recorder.rows
+        self.run(recorder, duration)
+        while recorder.rows < written + 0.8 * duration / (EVERY["cell"] * CYCLE):
+            recorder.check()
+            os.sched_yield()
 
     def snapshot(self) -> BenchSnapshot:
         now = self.clock.time - CYCLE

@@ -102,10 +102,7 @@ def test_a_log_in_parts_holds_the_whole_name(tmp_path: Path, suffix: str) -> Non
     path = tmp_path / f"lift.{suffix}"
     with recording(path, "A", rotation=PARTS) as (fed, recorder):
         for _ in range(3):
-            fed.run(recorder, 1.1)
-            written = recorder.rows
-            while recorder.rows == written:
-                recorder.check()
+            fed.run_until_written(recorder, 1.1)
         first, last = recorder.parts[0], recorder.parts[-1]
         assert first != last
         for name in (path, first, last):
@@ -148,10 +145,7 @@ def test_a_log_that_is_taken_away_is_reported(tmp_path: Path, suffix: str, how: 
     clock = SetClock()
     fed = Fed(clock, "A")
     recorder = Recorder(path, fed.sensors, clock, {})
-    fed.run(recorder, 0.5)
-    written = recorder.rows
-    while recorder.rows == written:
-        recorder.check()
+    fed.run_until_written(recorder, 0.5)
     if how == "cut off":
         os.truncate(path, 0)
     elif how == "removed":

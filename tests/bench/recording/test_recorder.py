@@ -124,11 +124,7 @@ def test_every_log_has_its_trips_and_who_commanded_each_winch_when(
     with recording(path, "A", rotation=rotation) as (fed, recorder):
         for name in ("jog of anna", "move of ben", ""):
             fed.commander = name
-            fed.run(recorder, 1.0)
-            written = recorder.rows
-            while recorder.rows < written + 30:
-                recorder.check()
-                os.sched_yield()
+            fed.run_until_written(recorder, 1.0)
         fed.trip("tension 900 N above 800 N")
         fed.run(recorder, 0.5)
     assert len(recorder.parts) > 1 or rotation is None
@@ -170,11 +166,7 @@ def test_a_log_in_parts_reads_as_one(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with recording(path, "A", rotation=Rotation(size=10_000)) as (fed, recorder):
         for _ in range(4):
-            fed.run(recorder, 1.0)
-            written = recorder.rows
-            while recorder.rows < written + 40:
-                recorder.check()
-                os.sched_yield()
+            fed.run_until_written(recorder, 1.0)
     assert len(recorder.parts) >= 3
     assert recorder.path == tmp_path / "a.001.mcap"
     log = read_log(path)

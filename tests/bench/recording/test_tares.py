@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from pathlib import Path
 
 import numpy as np
@@ -20,13 +19,6 @@ from winchkit.runs.recording.rotation import Rotation
 
 mcap_reader = pytest.importorskip("mcap.reader")
 OF_HOST = "12.5 N of the host, the device does not say whether it is tared"
-
-
-def drained(recorder: Recorder) -> None:
-    written = recorder.rows
-    while recorder.rows == written:
-        recorder.check()
-        os.sched_yield()
 
 
 def tare(fed: Fed, name: str, value: float, device: bool | None = None) -> None:
@@ -71,11 +63,9 @@ def test_a_change_of_the_tare_during_a_log_is_an_event(tmp_path: Path) -> None:
     path = tmp_path / "lift.mcap"
     with recording(path) as (fed, recorder):
         begin = fed.clock.time
-        fed.run(recorder, 1.0)
-        drained(recorder)
+        fed.run_until_written(recorder, 1.0)
         tare(fed, "A", 12.5)
-        fed.run(recorder, 1.0)
-        drained(recorder)
+        fed.run_until_written(recorder, 1.0)
         tare(fed, "A", 12.5, device=True)
         fed.run(recorder, 1.0)
     with path.open("rb") as stream:
@@ -101,12 +91,10 @@ def test_a_change_of_the_tare_during_a_log_is_an_event(tmp_path: Path) -> None:
 def test_a_part_says_the_tare_with_which_it_begins(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"lift.{suffix}"
     with recording(path, "A", rotation=Rotation(duration=1.0)) as (fed, recorder):
-        fed.run(recorder, 0.8)
-        drained(recorder)
+        fed.run_until_written(recorder, 0.8)
         tare(fed, "A", 12.5)
         for _ in range(2):
-            fed.run(recorder, 0.9)
-            drained(recorder)
+            fed.run_until_written(recorder, 0.9)
     first, last = read_run(recorder.parts[0]), read_run(recorder.parts[-1])
     assert first.metadata["tare.A.cell"].startswith("0 N of the host")
     assert last.metadata["tare.A.cell"] == OF_HOST

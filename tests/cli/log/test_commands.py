@@ -70,10 +70,7 @@ def test_parts_are_exported_as_one(tmp_path: Path) -> None:
     path = tmp_path / "many.mcap"
     with recording(path, "AB", rotation=Rotation(duration=1.0)) as (fed, recorder):
         for _ in range(3):
-            fed.run(recorder, 1.0)
-            written = recorder.rows
-            while recorder.rows == written:
-                recorder.check()
+            fed.run_until_written(recorder, 1.0)
     parts = sorted(tmp_path.glob("many.0*.mcap"))
     assert len(parts) >= 2
     run("export", *parts, "-o", tmp_path / "all.csv")
