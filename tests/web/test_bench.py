@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from winchkit.catalog import find
 from winchkit.errors import UsageError
 from winchkit.schema.read import read_simbench
-from winchkit.web.bench import _Inbox
+from winchkit.web.browser import Inbox
 from winchkit.web.drive_objects import drive_objects
 
 
-def taken(inbox: _Inbox) -> list[dict[str, Any]]:
+def taken(inbox: Inbox) -> list[dict[str, Any]]:
     """Everything that waits, in its order."""
 
     async def all_of() -> list[dict[str, Any]]:
@@ -35,7 +35,7 @@ def taken(inbox: _Inbox) -> list[dict[str, Any]]:
 def test_of_jogs_that_wait_only_the_newest_is_left_and_every_other_message_ends_it(
     names: list[str],
 ) -> None:
-    inbox = _Inbox()
+    inbox = Inbox()
     for number, name in enumerate(names):
         inbox.put({"do": name, "number": number})
     left = taken(inbox)
@@ -49,7 +49,7 @@ def test_of_jogs_that_wait_only_the_newest_is_left_and_every_other_message_ends_
 def test_objects_are_not_read_where_a_winch_is_not_disabled(phase: str | None) -> None:
     spec = read_simbench(find("sim", "demo-adequate")).bench
     status = {} if phase is None else {"winch": {"A": {"phase": phase}}}
-    with pytest.raises(UsageError, match="read where it is disabled"):
+    with pytest.raises(UsageError, match="where it is disabled"):
         drive_objects(spec, status, "A")
     with pytest.raises(UsageError, match="there is no winch 'B'"):
         drive_objects(spec, status, "B")

@@ -31,12 +31,14 @@ from winchkit.bench.lifecycle import (
 from winchkit.bench.ownership import Ownership
 from winchkit.bench.recording.provenance import origin
 from winchkit.bench.recording.recorder import Recorder
+from winchkit.bench.recording.trip_history import TripHistory
 from winchkit.bench.remote.commander import Commanders, NotCommander
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.life_sign import LifeSigns
 from winchkit.bench.robot.wiring import no_robot
 from winchkit.bench.winch import Winch
+from winchkit.drivers.can.bus.frame_tap import FrameTap
 from winchkit.drivers.can.bus.health import BusHealth
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.tools.scan import Found, named_after, scan
@@ -57,6 +59,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Bench", "Stations"]
 
+_WATCHED = 2.0
+"""Frames are collected for so long after somebody asked for them, s."""
 _LISTEN = 1.1
 """For heartbeats of nodes that are no winch, s."""
 
@@ -153,6 +157,9 @@ class Bench:
             """Quick stops that were given."""
             self.cells = self._cell_desk()
             """Its instruments by name, for commands and whoever looks at them one by one."""
+            self.trip_history = TripHistory(self.loop.cycle)
+            """The cycles around the newest trip."""
+            self.loop.samplers.append(self.trip_history)
             self.loop.on_jog = self._jog_from_callback
             self.loop.callbacks.append(LifeSigns(self._going_on, self._end_silent))
             self.realtime: RealTime = acquire(realtime, self._urgent_threads())
@@ -231,6 +238,22 @@ class Bench:
     def bus_health(self) -> dict[str, BusHealth]:
         """What happened on each CAN bus since it was opened, by name."""
         return {name: bus.health for name, bus in self._wired.buses.items()}
+
+    def frames(self) -> dict[str, FrameTap]:
+        """Frames of each CAN bus by name, collected from the first call on while it is called.
+
+        Returns
+        -------
+        dict of str to FrameTap
+            The newest frame of each identifier, and the last ones.
+        """
+        expires = self.clock.now() + _WATCHED
+        found = {}
+        for name, bus in self._wired.buses.items():
+            tap = bus.tap or FrameTap(expires)
+            tap.expires = expires
+            bus.tap = found[name] = tap
+        return found
 
     def on_cycle(self, callback: Callback) -> Callable[[], None]:
         """Call a function with every cycle's snapshot, on the control thread.

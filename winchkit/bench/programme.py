@@ -31,6 +31,7 @@ def run_programme(
     *,
     suffix: str = ".csv",
     progress: Progress = lambda _repeat, _number, _step: None,
+    check: Callable[[], None] = lambda: None,
     replace: bool = False,
 ) -> list[Path]:
     """Run every step of every repeat of a motion programme.
@@ -49,6 +50,8 @@ def run_programme(
         Format, ``.csv`` or ``.mcap``.
     progress : callable, optional
         Called with repeat, number of the step, and step.
+    check : callable, optional
+        Called before each motion and every 20 ms of a hold; what it raises ends the programme.
     replace : bool
         Write over earlier runs of a programme of this name.
 
@@ -75,7 +78,9 @@ def run_programme(
     if not replace and (held := earlier_runs(programme, folder, suffix)):
         earlier = f"{held[0]} holds an earlier run of '{programme.name}'"
         raise UsageError(f"{earlier}; name another folder, or replace=True")
-    execution = _Execution(bench, programme, Path(folder), ask, suffix, replace=replace)
+    execution = _Execution(
+        bench, programme, Path(folder), ask, suffix, check=check, replace=replace
+    )
     execution.folder.mkdir(parents=True, exist_ok=True)
     numbered = list(enumerate(programme.step, start=1))
     try:
@@ -125,9 +130,10 @@ class _Execution:
         ask: Ask,
         suffix: str,
         *,
+        check: Callable[[], None],
         replace: bool,
     ) -> None:
-        self.folder = folder
+        self.folder, self._check = folder, check
         self.written: list[Path] = []
         self._replace, self._stops = replace, bench.stops
         self._bench, self._programme, self._ask, self._suffix = bench, programme, ask, suffix
@@ -198,7 +204,7 @@ class _Execution:
         }
         for place in range(max(map(len, places.values()), default=0)):
             lengths = {name: way[min(place, len(way) - 1)] for name, way in places.items()}
-            self._bench.raise_stop(self._stops)
+            self._require_going()
             self._bench.move_together(lengths, self._fastest(), hold=True)
         self._approached = True
 
@@ -226,19 +232,24 @@ class _Execution:
                 return path
         raise UsageError(f"more than 26 runs would be named {name}; split the programme")
 
+    def _require_going(self) -> None:
+        """Raise what has stopped the bench, or ends the programme."""
+        self._bench.raise_stop(self._stops)
+        self._check()
+
     def _hold(self, duration: float) -> None:
         """Wait where it is, watching for whatever stops the bench."""
         clock = self._bench.clock
         end = clock.now() + duration
         while (left := end - clock.now()) > 0:
-            self._bench.raise_stop(self._stops)
+            self._require_going()
             clock.sleep(min(0.02, left))
 
     def _move(self, step: Step) -> None:
         """Move one winch or, started in one cycle and lasting equally long, all of them."""
         chosen = self._winches(step.winch)
         lengths = {name: self._target(step, winch) for name, winch in chosen.items()}
-        self._bench.raise_stop(self._stops)
+        self._require_going()
         self._bench.move_together(lengths, step.speed, step.acceleration, hold=True)
 
     def _target(self, step: Step, winch: Winch) -> float:

@@ -72,6 +72,16 @@ class Step(Table):
             if getattr(self, key) is not None and given[0] != "ask":
                 yield key, f"belongs to a step with 'ask', not to '{given[0]}'"
 
+    @property
+    def words(self) -> str:
+        """What it does, in words."""
+        if self.ask is not None:
+            return f"ask: {self.ask}"
+        if self.hold is not None:
+            return f"hold {self.hold:g} s"
+        where = f"to {self.to:g} m" if self.to is not None else f"by {self.by:g} m"
+        return f"winch {self.winch} {where}"
+
     def asks_beyond(self, hanging: float | None, warm: float | None) -> bool:
         """Whether it requests a load or a temperature other than the present ones."""
         if self.ask is None:

@@ -10,18 +10,14 @@ from __future__ import annotations
 
 import asyncio
 import json
-import subprocess
-import sys
 import threading
-import time
 from collections import deque
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
+from urllib.parse import unquote
 
-import numpy as np
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
@@ -31,15 +27,16 @@ from winchkit.bench.control.dead_man import DEAD_MAN
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.bench.remote.session import attach
 from winchkit.catalog import find
-from winchkit.effects.bind import line_of
-from winchkit.effects.catalogue import load_catalogue
 from winchkit.errors import ConnectionLost, UsageError, WinchkitError
-from winchkit.model.line import Line
-from winchkit.model.stages import Signals
-from winchkit.schema.read import read_bench, read_profile
-from winchkit.web.drive_objects import drive_objects
+from winchkit.schema.read import read_bench
+from winchkit.web.browser import Browser, counting, received
+from winchkit.web.drive_objects import drive_objects, drive_settings, read_setting, write_setting
+from winchkit.web.frames import FrameWords
+from winchkit.web.live_model import CHANNELS, LiveModel
+from winchkit.web.live_robot import LiveRobot
+from winchkit.web.programmes import Programmes
 
-__all__ = ["BenchView", "simulated_bench"]
+__all__ = ["BenchView"]
 
 _PERIOD = 0.05
 """Pictures are sent 20 times a second."""
@@ -47,67 +44,12 @@ _KEPT = 60.0
 """History of the strip charts, s."""
 _PREDICTED = 0.5
 """Period of the model's prediction over the history, s."""
-_COUNTED = 0.5
-"""Period in which the rows of a log are asked for, s."""
+_POSES = 0.1
+"""Period of the pose of a robot's platform, s."""
 _LATEST_PICTURE = 0.4
 """Age of the picture that a browser had when it ordered a jog, s: eight periods."""
-_LARGEST = 4_000
-"""Bytes of a message of a browser."""
-_CHANNELS = (
-    "cable_length", "length", "tension", "load", "cable_speed",
-    "motor_angle", "motor_torque", "motor_velocity", "temperature",
-)  # fmt: skip
-_PATIENCE = 30.0
-"""For a simulated bench to start, s."""
-
-
-class simulated_bench:
-    """Runs a simulated bench in a process of its own; gives its bench file.
-
-    Parameters
-    ----------
-    name : str
-        Of the catalogue, or a file.
-    folder : Path
-        For the bench file.
-    """
-
-    def __init__(self, name: str, folder: Path) -> None:
-        self.name = name
-        self.file = folder / f"{Path(name).stem}-bench.toml"
-        self._process: subprocess.Popen[str] | None = None
-
-    def __enter__(self) -> str:
-        find("sim", self.name)
-        command = [sys.executable, "-m", "winchkit", "sim", "serve", self.name, "--json"]
-        self._process = subprocess.Popen(
-            [*command, "--bench-file", str(self.file)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,
-            text=True,
-            start_new_session=True,
-        )
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            self._process.wait(_PATIENCE)
-            raise ConnectionLost(
-                f"the simulated bench '{self.name}' did not start; "
-                f"'winchkit sim serve {self.name}' says why"
-            )
-        return str(json.loads(line)["bench"])
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        if self._process is not None:
-            self._process.terminate()
-            with suppress(subprocess.TimeoutExpired):
-                self._process.communicate(timeout=_PATIENCE)
+_LARGEST_PROGRAMME = 1_000_000
+"""Bytes of a programme file of the browser."""
 
 
 class BenchView:
@@ -121,9 +63,13 @@ class BenchView:
         Files with effects of the user's own.
     allow_motion : bool
         Whether a browser may command.
+    folder : Path
+        Of the server's own, for programmes of a browser.
     """
 
-    def __init__(self, bench: str, effects: Sequence[str] = (), *, allow_motion: bool) -> None:
+    def __init__(
+        self, bench: str, effects: Sequence[str] = (), *, allow_motion: bool, folder: Path
+    ) -> None:
         self.spec = read_bench(bench)
         self.file = bench
         self.effects = tuple(effects)
@@ -132,14 +78,22 @@ class BenchView:
         self._newest: dict[str, Any] = {}
         self._predicted: dict[str, dict[str, Any]] = {}
         self._lost: str = ""
+        self._watcher: RemoteStation | None = None
         self._ended = threading.Event()
+        self._lent = threading.Event()
+        """Set while the bench is given away, so that a drive can be written to."""
+        self._model = LiveModel(self.spec, self.file, self.effects)
+        self._robot = None if self.spec.robot is None else LiveRobot(self.spec)
+        self._posed: dict[str, Any] | None = None
+        self._words = FrameWords(self.spec)
+        self._programmes = Programmes(self.spec, folder, Path.cwd())
+        working = [self._watch, self._predict, *([] if self._robot is None else [self._pose])]
         self._threads = [
-            threading.Thread(target=self._watch, name="page-watch", daemon=True),
-            threading.Thread(target=self._predict, name="page-model", daemon=True),
+            threading.Thread(target=target, name=f"page{target.__name__}", daemon=True)
+            for target in working
         ]
-        self._commander: _Browser | None = None
+        self._commander: Browser | None = None
         self._browsers = 0
-        self._lines = {name: self._line(winch.profile) for name, winch in self.spec.winch.items()}
 
     def __enter__(self) -> Self:
         for thread in self._threads:
@@ -158,12 +112,25 @@ class BenchView:
         for thread in self._threads:
             thread.join(5.0)
 
+    @property
+    def robot_profile(self) -> str:
+        """File of the profile of the bench's robot; empty without one."""
+        wiring = self.spec.robot
+        return "" if wiring is None else str(find("profiles", wiring.profile, beside=self.file))
+
     def routes(self) -> list[Any]:
         """Routes of the Bench view."""
         return [
             Route("/api/bench", self._declared),
             Route("/api/bench/history", self._past),
+            Route("/api/bench/trip", self._trip),
+            Route("/api/bench/frames", self._frames),
+            Route("/api/bench/programmes", self._listed),
+            Route("/api/bench/programme", self._preview),
+            Route("/api/bench/programme", self._upload, methods=["POST"]),
             Route("/api/bench/objects", self._objects),
+            Route("/api/bench/setting", self._setting),
+            Route("/api/bench/setting", self._write, methods=["POST"]),
             Route("/api/bench/stop", self._stop, methods=["POST"]),
             WebSocketRoute("/live/bench", self._live),
         ]
@@ -171,30 +138,12 @@ class BenchView:
     # What is declared: limits and geometry for the picture.
 
     async def _declared(self, request: Request) -> Response:
-        winches = {}
-        for name, winch in self.spec.winch.items():
-            profile = read_profile(find("profiles", winch.profile, beside=self.file))
-            limits = winch.limits
-            winches[name] = {
-                "profile": profile.name,
-                "effects": [table.id for table in profile.effect],
-                "load_mass": winch.load_mass,
-                "limits": {
-                    "speed": limits.speed,
-                    "length": limits.length,
-                    "tension": [limits.tension_slack, limits.tension_high],
-                },
-                "ratio": profile.gearbox.ratio,
-                "drum_radius": profile.drum.winding_radius,
-                "pulleys": [
-                    {"radius": p.radius, "wrap": p.wrap} for p in getattr(profile, "pulley", ())
-                ],
-            }
         return JSONResponse(
             {
                 "name": self.spec.name,
                 "allow_motion": self.allow_motion,
-                "winch": winches,
+                "winch": {name: self._model.declared(name) for name in self.spec.winch},
+                "robot": None if self.spec.robot is None else self.spec.robot.profile,
                 "dead_man": DEAD_MAN,
             }
         )
@@ -202,9 +151,76 @@ class BenchView:
     async def _past(self, request: Request) -> Response:
         return JSONResponse({name: list(rows) for name, rows in self._history.items()})
 
+    async def _trip(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self._watched().trip_history))
+
+    def _watched(self) -> RemoteStation:
+        """The station that watches; raises ConnectionLost where there is none."""
+        station = self._watcher
+        if station is None:
+            raise ConnectionLost(self._lost or "the bench is not attached yet; ask again")
+        return station
+
+    async def _frames(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self._frame_table))
+
+    def _frame_table(self) -> dict[str, Any]:
+        return self._words.table(self._watched().frames())
+
+    async def _listed(self, request: Request) -> Response:
+        return JSONResponse({"programmes": list(await asyncio.to_thread(self._programmes.paths))})
+
+    async def _preview(self, request: Request) -> Response:
+        name = request.query_params.get("name", "")
+        here = {
+            winch: float(state["cable_length"])
+            for winch, state in self._newest.get("winch", {}).items()
+            if state["cable_length"] is not None
+        }
+        return JSONResponse(await asyncio.to_thread(self._programmes.preview, name, here))
+
+    async def _upload(self, request: Request) -> Response:
+        body = b""
+        async for part in request.stream():
+            body += part
+            if len(body) > _LARGEST_PROGRAMME:
+                raise UsageError(f"a programme has at most {_LARGEST_PROGRAMME / 1e6:g} MB")
+        name = unquote(request.headers.get("x-file-name", ""))
+        return JSONResponse({"name": await asyncio.to_thread(self._programmes.keep, name, body)})
+
     async def _objects(self, request: Request) -> Response:
         winch = request.query_params.get("winch", "")
-        return JSONResponse(await asyncio.to_thread(drive_objects, self.spec, self._newest, winch))
+        found = await asyncio.to_thread(drive_objects, self.spec, self._newest, winch)
+        known = drive_settings(self.spec, winch) if self.allow_motion else []
+        return JSONResponse(found | {"settings": known})
+
+    async def _setting(self, request: Request) -> Response:
+        query = request.query_params
+        winch, name = query.get("winch", ""), query.get("object", "")
+        value = await asyncio.to_thread(read_setting, self.spec, self._newest, winch, name)
+        return JSONResponse({"value": value})
+
+    async def _write(self, request: Request) -> Response:
+        asked = json.loads(await request.body())
+        winch, name, text = (str(asked[key]) for key in ("winch", "object", "value"))
+        return JSONResponse(await asyncio.to_thread(self._write_setting, winch, name, text))
+
+    def _write_setting(self, winch: str, name: str, text: str) -> dict[str, Any]:
+        """Write a setting of a drive while nobody commands and nothing owns the bench."""
+        if not self.allow_motion:
+            raise UsageError(
+                "this page only watches: start 'winchkit serve' with --allow-motion to write"
+            )
+        if self._commander is not None:
+            raise UsageError(
+                f"{self._commander.name} commands; it must release the bench first: the drives are "
+                "set up anew after a setting is written"
+            )
+        self._lent.set()
+        try:
+            return write_setting(self.spec, self._newest, winch, name, text)
+        finally:
+            self._lent.clear()
 
     async def _stop(self, request: Request) -> Response:
         await asyncio.to_thread(self._stop_now)
@@ -219,83 +235,53 @@ class BenchView:
 
     def _watch(self) -> None:
         while not self._ended.is_set():
+            if self._lent.is_set():
+                self._lost = "a setting of a drive is written; the bench is opened anew"
+                self._ended.wait(_PERIOD)
+                continue
             try:
                 with attach(self.file, self.effects, name="page", observer=True) as station:
-                    self._lost = ""
-                    while not self._ended.wait(_PERIOD):
+                    self._lost, self._watcher = "", station
+                    while not (self._ended.wait(_PERIOD) or self._lent.is_set()):
                         self._take(station.status())
+                    self._watcher = None
             except WinchkitError as error:
-                self._lost = str(error)
+                self._lost, self._watcher = str(error), None
                 self._ended.wait(1.0)
 
     def _take(self, status: dict[str, Any]) -> None:
-        self._newest = status
+        self._newest = status | {"drum": self._model.drums(status)}
         for name, winch in status["winch"].items():
             rows = self._history.setdefault(name, deque(maxlen=int(_KEPT / _PERIOD)))
-            row = {"time": status["time"]} | {key: winch.get(key) for key in _CHANNELS}
+            row = {"time": status["time"]} | {key: winch.get(key) for key in CHANNELS}
             if not rows or rows[-1]["time"] < row["time"]:
                 rows.append(row)
-
-    def _line(self, profile: str) -> Line | None:
-        try:
-            declared = read_profile(find("profiles", profile, beside=self.file))
-            return line_of(declared, load_catalogue(self.effects))
-        except WinchkitError:
-            return None
 
     def _predict(self) -> None:
         """Predict the outputs over the history from angle and force, for the residuals."""
         while not self._ended.wait(_PREDICTED):
-            for name, line in self._lines.items():
-                rows = list(self._history.get(name, ()))
-                if line is not None and len(rows) > 20:
-                    with suppress(WinchkitError, ValueError, FloatingPointError):
-                        self._predicted[name] = self._prediction(line, name, rows)
+            for name, rows in tuple(self._history.items()):
+                found = self._model.prediction(name, list(rows))
+                if found is not None:
+                    self._predicted[name] = found
 
-    def _prediction(self, line: Line, name: str, rows: list[dict[str, Any]]) -> dict[str, Any]:
-        column = {
-            key: np.array([np.nan if row[key] is None else row[key] for row in rows], dtype=float)
-            for key in ("time", *_CHANNELS)
-        }
-        known = {key: values for key, values in column.items() if np.isfinite(values).all()}
-        mass = self.spec.winch[name].load_mass
-        predicted = line.predict(
-            line.motion(
-                Signals(
-                    column["time"],
-                    column["motor_angle"],
-                    load=known.get("load"),
-                    load_mass=None if "load" in known else mass,
-                    tension=known.get("tension"),
-                    motor_torque=known.get("motor_torque"),
-                    temperature=known.get("temperature"),
-                )
-            )
-        )
-        measured = {"cable_length": "length", "tension": "tension", "motor_torque": "motor_torque"}
-        out: dict[str, Any] = {"time": column["time"].tolist()}
-        for output, channel in measured.items():
-            if output not in predicted or channel not in known:
-                continue
-            error = known[channel] - predicted[output]
-            if output == "cable_length":  # the instrument's zero is not the profile's
-                error = error - float(np.median(error))
-            out[output] = {
-                "predicted": (known[channel] - error).tolist(),
-                "residual": error.tolist(),
-            }
-        return out
+    def _pose(self) -> None:
+        """Find the pose of the platform from the motor angles."""
+        while not self._ended.wait(_POSES):
+            if self._robot is not None:
+                self._posed = self._robot.picture(self._newest)
 
     # Browsers.
 
     async def _live(self, socket: WebSocket) -> None:
         await socket.accept()
         self._browsers += 1
-        browser = _Browser(f"page {self._browsers}", self)
-        listening = asyncio.ensure_future(_received(socket, browser))
-        tasks = self._obeying(browser), _counting(browser)
+        browser = Browser(f"page {self._browsers}", self.spec, self._programmes)
+        listening = asyncio.ensure_future(received(socket, browser))
+        tasks = self._obeying(browser), counting(browser)
         working = [asyncio.ensure_future(task) for task in tasks]
         predicted: dict[str, Any] | None = None
+        posed: dict[str, Any] | None = None
         try:
             while not listening.done():
                 shown: dict[str, Any] = {
@@ -305,7 +291,10 @@ class BenchView:
                     "commander": self._commander.name if self._commander else "",
                     "said": browser.said,
                     "recording": browser.recording(),
+                    "programme": browser.programme,
                 }
+                if posed is not self._posed:
+                    posed = shown["robot"] = self._posed
                 if predicted is not self._predicted.get(browser.shown):
                     predicted = self._predicted.get(browser.shown)
                     shown["predicted"] = {browser.shown: predicted}
@@ -321,11 +310,11 @@ class BenchView:
                 self._commander = None
             await asyncio.to_thread(browser.leave)
 
-    async def _obeying(self, browser: _Browser) -> None:
+    async def _obeying(self, browser: Browser) -> None:
         """Carry out the messages of a browser in their order, one after another."""
         while True:
             asked = await browser.inbox.next()
-            keeps = asked.get("do") in {"jog", "alive"}
+            keeps = asked.get("do") in {"jog", "alive", "programme"}
             try:
                 await self._obey(asked, browser)
                 browser.said = browser.said if keeps else ""
@@ -334,7 +323,7 @@ class BenchView:
             except (ValueError, KeyError, TypeError) as error:
                 browser.said = f"the message is malformed: {error}"
 
-    async def _obey(self, asked: dict[str, Any], browser: _Browser) -> None:
+    async def _obey(self, asked: dict[str, Any], browser: Browser) -> None:
         name = str(asked.get("do"))
         if name == "show":
             browser.shown = str(asked["winch"])
@@ -361,7 +350,7 @@ class BenchView:
         now = self._newest.get("time")
         return now is not None and now - float(asked["seen"]) <= _LATEST_PICTURE
 
-    def _give_command(self, browser: _Browser) -> None:
+    def _give_command(self, browser: Browser) -> None:
         if not self.allow_motion:
             raise UsageError(
                 "this page only watches: start 'winchkit serve' with --allow-motion to move"
@@ -370,131 +359,3 @@ class BenchView:
             raise UsageError(f"{self._commander.name} commands; it must release the bench first")
         browser.take(attach(self.file, self.effects, name=browser.name))
         self._commander = browser
-
-
-class _Inbox:
-    """Messages in their order; a jog replaces one that waits, and every other message ends it."""
-
-    def __init__(self) -> None:
-        self._waiting: deque[dict[str, Any]] = deque()
-        self._filled = asyncio.Event()
-
-    def put(self, asked: dict[str, Any]) -> None:
-        """Take a message."""
-        kept = [item for item in self._waiting if item.get("do") != "jog"]
-        self._waiting = deque([*kept, asked])
-        self._filled.set()
-
-    async def next(self) -> dict[str, Any]:
-        """The oldest message."""
-        while not self._waiting:
-            self._filled.clear()
-            await self._filled.wait()
-        return self._waiting.popleft()
-
-
-async def _received(socket: WebSocket, browser: _Browser) -> None:
-    """Read messages until the browser closes; malformed ones are reported and dropped."""
-    with suppress(WebSocketDisconnect):
-        while True:
-            text = await socket.receive_text()
-            try:
-                asked = json.loads(text) if len(text) <= _LARGEST else None
-            except ValueError:
-                asked = None
-            if isinstance(asked, dict):
-                browser.inbox.put(asked)
-            else:
-                browser.said = f"the message is no JSON object of at most {_LARGEST} characters"
-
-
-async def _counting(browser: _Browser) -> None:
-    """Ask for the rows of the log that a browser started, while there is one."""
-    while True:
-        await asyncio.sleep(_COUNTED)
-        await asyncio.to_thread(browser.count)
-
-
-class _Browser:
-    """One open page; with a station of its own while it commands."""
-
-    def __init__(self, name: str, view: BenchView) -> None:
-        self.name = name
-        self.view = view
-        self.shown = next(iter(view.spec.winch))
-        self.said = ""
-        self.inbox = _Inbox()
-        self._station: RemoteStation | None = None
-        self._log: tuple[str, float] | None = None
-        self._counted: dict[str, Any] = {}
-
-    def take(self, station: RemoteStation) -> None:
-        """Command by a station."""
-        self.leave()
-        self._station = station
-
-    def leave(self) -> None:
-        """Close the station: the owner ends what was started by it."""
-        station, self._station, self._log = self._station, None, None
-        self._counted = {}
-        if station is not None:
-            with suppress(WinchkitError):
-                station.close()
-
-    def recording(self) -> dict[str, Any] | None:
-        """File, time and counters of the log that this browser started."""
-        if self._log is None:
-            return None
-        file, began = self._log
-        return {"file": file, "seconds": time.monotonic() - began, **self._counted}
-
-    def count(self) -> None:
-        """Count the rows of the log, and those that it lost."""
-        if self._station is not None and self._log is not None:
-            with suppress(WinchkitError, KeyError):
-                log = self._station.counters()["log"]
-                self._counted = {"rows": log["rows"], "lost": log["drops"]}
-
-    def do(self, name: str, asked: dict[str, Any]) -> None:
-        """Carry out a message; raises what the station raises."""
-        station = self._station
-        if station is None:
-            raise UsageError("this page only watches; request command first")
-        winch = str(asked["winch"]) if "winch" in asked else None
-        if winch is not None and winch != "all" and winch not in self.view.spec.winch:
-            raise UsageError(f"there is no winch '{winch}'")
-        actions: dict[str, Callable[[], object]] = {
-            "jog": lambda: station.jog(winch, _number(asked["speed"]), DEAD_MAN),
-            "release": lambda: station.jog(winch, 0.0, _PERIOD),
-            "alive": lambda: station.moving(winch),
-            "step": lambda: station.step(winch, _number(asked["change"]), _number(asked["speed"])),
-            "move": lambda: station.move(
-                winch, _number(asked["to"]), None, _number(asked["speed"])
-            ),
-            "reset": station.reset,
-            "tare": lambda: station.tare(winch),
-            "take_over": lambda: station.take_over(winch),
-            "record": lambda: self._record(station, str(asked["file"])),
-            "end_record": lambda: self._end_record(station),
-        }
-        if name not in actions:
-            raise UsageError(f"there is no action '{name}'; there are {', '.join(actions)}")
-        actions[name]()
-
-    def _record(self, station: RemoteStation, name: str) -> None:
-        path = Path(name)
-        if path.name != name or path.suffix not in {".csv", ".mcap"}:
-            raise UsageError("a log's name has no folder and ends with .csv or .mcap")
-        station.start_log(str(path.resolve()))
-        self._log, self._counted = (name, time.monotonic()), {}
-
-    def _end_record(self, station: RemoteStation) -> None:
-        station.end_log()
-        self._log = None
-
-
-def _number(value: Any) -> float:
-    number = float(value)
-    if not np.isfinite(number):
-        raise UsageError("a speed or a length is no finite number")
-    return number

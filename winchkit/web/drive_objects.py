@@ -1,17 +1,26 @@
-"""Objects of a winch's drive for the Bench view, read where the winch is disabled."""
+"""Objects of a winch's drive for the Bench view, read and written where it is disabled."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from winchkit.bench.control.snapshot import Phase
-from winchkit.bench.drives.node_access import drive_at
+from winchkit.bench.drives.node_access import declared_drive, drive_at
+from winchkit.drivers.can.tools.config import (
+    Config,
+    described,
+    named_setting,
+    one_setting,
+    write_config,
+)
 from winchkit.drivers.can.tools.info import DriveInfo, read_info
+from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["drive_objects"]
+__all__ = ["drive_objects", "drive_settings", "read_setting", "write_setting"]
 
 
 def drive_objects(spec: BenchSpec, status: Mapping[str, Any], winch: str) -> dict[str, Any]:
@@ -36,11 +45,7 @@ def drive_objects(spec: BenchSpec, status: Mapping[str, Any], winch: str) -> dic
     UsageError
         For an unknown winch, and where it is not disabled.
     """
-    if winch not in spec.winch:
-        raise UsageError(f"there is no winch '{winch}'; there are {', '.join(spec.winch)}")
-    phase = status.get("winch", {}).get(winch, {}).get("phase", "unknown")
-    if phase != Phase.DISABLED.value:
-        raise UsageError(f"winch {winch} is {phase}; its objects are read where it is disabled")
+    _require_disabled(spec, status, [winch])
     with drive_at(spec, winch) as node:
         return {"winch": winch, "groups": _groups(node.node, read_info(node.objects))}
 
@@ -68,3 +73,100 @@ def _groups(node: int, info: DriveInfo) -> list[dict[str, Any]]:
             if item.value is not None
         ]
     return [{"name": name, "rows": rows} for name, rows in groups.items() if rows]
+
+
+def drive_settings(spec: BenchSpec, winch: str) -> list[dict[str, Any]]:
+    """Settings of a winch's drive that can be written, by its EDS; the drive is not asked.
+
+    Parameters
+    ----------
+    spec : BenchSpec
+        The bench.
+    winch : str
+        Name of the winch.
+
+    Returns
+    -------
+    list of dict
+        ``object``, ``name``, ``type``, ``low`` and ``high`` (None for text).
+    """
+    return [asdict(item) for item in described(declared_drive(spec, winch).dictionary)]
+
+
+def read_setting(
+    spec: BenchSpec, status: Mapping[str, Any], winch: str, name: str
+) -> float | int | str | None:
+    """Value of a setting; None where the drive has no such object.
+
+    Parameters
+    ----------
+    spec : BenchSpec
+        The bench.
+    status : mapping
+        Its newest status.
+    winch : str
+        Name of the winch.
+    name : str
+        Object, e.g. ``6081h`` or ``6091h:1``.
+
+    Raises
+    ------
+    UsageError
+        For an unknown winch or setting, and where the winch is not disabled.
+    """
+    _require_disabled(spec, status, [winch])
+    with drive_at(spec, winch) as node:
+        return node.objects.value(named_setting(node.objects.dictionary, name))
+
+
+def write_setting(
+    spec: BenchSpec, status: Mapping[str, Any], winch: str, name: str, text: str
+) -> dict[str, Any]:
+    """Write a setting of a drive, and read it back; every winch of the bench is disabled.
+
+    Parameters
+    ----------
+    spec : BenchSpec
+        The bench.
+    status : mapping
+        Its newest status.
+    winch : str
+        Name of the winch.
+    name : str
+        Object, e.g. ``6081h``.
+    text : str
+        Value; whole numbers also as ``0x1F``.
+
+    Returns
+    -------
+    dict
+        ``object``, ``value`` as read back, and ``before``.
+
+    Raises
+    ------
+    UsageError
+        For an unknown setting, a value that does not fit it, and where a winch is not disabled.
+    NotPermitted
+        Where another program owns the bench, or uses it.
+    DeviceRefused
+        For what the drive does not take.
+    """
+    _require_disabled(spec, status, list(spec.winch))
+    dictionary = declared_drive(spec, winch).dictionary
+    values = one_setting(dictionary, name, text)
+    with drive_at(spec, winch, writes=True) as node:
+        changed = write_config(Config(identity_of(node.objects.port), values), node.objects)
+        value = node.objects.value(named_setting(dictionary, name))
+    before = changed[0].drive if changed else value
+    return {"object": name, "value": value, "before": before}
+
+
+def _require_disabled(spec: BenchSpec, status: Mapping[str, Any], winches: Sequence[str]) -> None:
+    for winch in winches:
+        if winch not in spec.winch:
+            raise UsageError(f"there is no winch '{winch}'; there are {', '.join(spec.winch)}")
+        phase = status.get("winch", {}).get(winch, {}).get("phase", "unknown")
+        if phase != Phase.DISABLED.value:
+            raise UsageError(
+                f"winch {winch} is {phase}; objects are read and written where it is disabled"
+            )

@@ -37,7 +37,7 @@ from winchkit.runs.read import read_run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.read import read_any, read_robot
 
-__all__ = ["RobotWork", "is_robot"]
+__all__ = ["RobotWork", "is_robot", "pose_picture"]
 
 _GRID = 22
 """Cells of the slice along its longer side: 484 linear programmes of 3 ms."""
@@ -169,16 +169,7 @@ class RobotWork:
         else:
             forces = quadratic(structure, robot.weight(pose)[0], ForceLimits(low, high))
             tension, source = forces.value, "computed" if forces.feasible else "none"
-        anchors = robot.geometry.anchor_point
-        position, rotation = pose.position[0], pose.rotation[0]
-        return {
-            "row": row,
-            "position": _rounded(position),
-            "anchors": _rounded(position + anchors @ rotation.T),
-            "corners": _rounded(position + _corners(anchors) @ rotation.T),
-            "tension": _rounded(tension),
-            "source": source,
-        }
+        return {"row": row, **pose_picture(robot, pose, tension, source)}
 
     def slice(self, height: float, row: int, limits: tuple[float, float]) -> dict[str, Any]:
         """Wrench feasibility at a height, with the rotation of a pose.
@@ -281,6 +272,31 @@ class RobotWork:
         if not np.all(np.isfinite(there.position)):
             raise UsageError(f"pose {row}: it was not measured, and its motor angles lead to none")
         return robot, there, measured.tension[row - 1]
+
+
+def pose_picture(robot: Robot, pose: Pose, tension: Array, source: str) -> dict[str, Any]:
+    """Platform and cables at a pose.
+
+    Parameters
+    ----------
+    robot : Robot
+        The robot.
+    pose : Pose
+        One pose.
+    tension : (n,) array
+        Cable forces, N; NaN where one is not known.
+    source : str
+        ``measured``, ``computed`` or ``none``.
+    """
+    anchors = robot.geometry.anchor_point
+    position, rotation = pose.position[0], pose.rotation[0]
+    return {
+        "position": _rounded(position),
+        "anchors": _rounded(position + anchors @ rotation.T),
+        "corners": _rounded(position + _corners(anchors) @ rotation.T),
+        "tension": _rounded(tension),
+        "source": source,
+    }
 
 
 def _calibration(found: Calibrated) -> dict[str, Any]:

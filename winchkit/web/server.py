@@ -81,12 +81,15 @@ def serve(
         stack.callback(workspace.close)
         view = None
         if bench is not None or sim is not None:
-            from winchkit.web.bench import BenchView, simulated_bench
+            from winchkit.web.bench import BenchView
+            from winchkit.web.simulated import simulated_bench
 
             if sim is not None:
                 bench = stack.enter_context(simulated_bench(sim, own))
             assert bench is not None
-            view = stack.enter_context(BenchView(bench, effects, allow_motion=allow_motion))
+            view = stack.enter_context(
+                BenchView(bench, effects, allow_motion=allow_motion, folder=own)
+            )
         robot = RobotWork(own)
         app = application(workspace, token, Library(Path(folder)), robot, view)
         of_robot = profile is not None and is_robot(profile)
@@ -96,6 +99,8 @@ def serve(
             open_robot(workspace, robot, runs, profile)
         elif runs or profile:
             workspace.open(runs, profile)
+        if view is not None and view.robot_profile and not of_robot:
+            open_robot(workspace, robot, [], view.robot_profile)
         listening = stack.enter_context(_listening(port))
         config = uvicorn.Config(
             app,

@@ -32,6 +32,7 @@ __all__ = [
     "Stop",
     "Target",
     "Trim",
+    "within_limits",
 ]
 
 _CALM = 0.5
@@ -274,15 +275,7 @@ class Move:
         self.length = length
         self._line = line
         self._limits = limits
-        self._speed = _within("speed", speed, limits.speed, "m/s")
-        self._acceleration = _within("acceleration", acceleration, limits.acceleration, "m/s^2")
-        if limits.length is not None and not limits.length[0] <= length <= limits.length[1]:
-            raise NotPermitted(
-                f"a cable length of {length:g} m is beyond the limits {limits.length[0]:g} m to "
-                f"{limits.length[1]:g} m; change its limits.length only if the cable allows it"
-            )
-        if not math.isfinite(length):
-            raise NotPermitted("a cable length must be a finite number of metres")
+        self._speed, self._acceleration = within_limits(limits, length, speed, acceleration)
         self._start = 0.0
         self._from = length
         self._knots: list[float] = []
@@ -343,6 +336,25 @@ class Move:
         index = min(int(position / span), len(knots) - 2)
         slope = (knots[index + 1] - knots[index]) / span
         return knots[index] + slope * (position - index * span), slope
+
+
+def within_limits(
+    limits: LimitSpec, length: float, speed: float | None, acceleration: float | None
+) -> tuple[float, float]:
+    """Speed (m/s) and acceleration (m/s²) of a move to a cable length (m), by default the limits.
+
+    Raises NotPermitted for what is beyond the winch's limits.
+    """
+    fast = _within("speed", speed, limits.speed, "m/s")
+    ramp = _within("acceleration", acceleration, limits.acceleration, "m/s^2")
+    if limits.length is not None and not limits.length[0] <= length <= limits.length[1]:
+        raise NotPermitted(
+            f"a cable length of {length:g} m is beyond the limits {limits.length[0]:g} m to "
+            f"{limits.length[1]:g} m; change its limits.length only if the cable allows it"
+        )
+    if not math.isfinite(length):
+        raise NotPermitted("a cable length must be a finite number of metres")
+    return fast, ramp
 
 
 def _within(name: str, asked: float | None, limit: float, unit: str) -> float:

@@ -83,6 +83,8 @@ class WinchSnapshot(NamedTuple):
     """Whether the motor angle counts every turn; if not, the cable length is NaN until homed."""
     commander: str = ""
     """Name of its commander; empty where it has none."""
+    commanded_speed: float = math.nan
+    """Commanded derivative of the cable length (positive pays out), m/s."""
 
 
 class WinchSnapshots(Mapping[str, WinchSnapshot]):

@@ -225,4 +225,5 @@ def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
         },
         turns_known=feedback.turns_known,
         commander=taken.commander,
+        commanded_speed=0.0 - seen.commanded,
     )

@@ -330,6 +330,67 @@ class RemoteStation:
         """What was counted by instrument, and for the log."""
         return dict(self._call("counters"))
 
+    def trip_history(self) -> dict[str, Any] | None:
+        """The cycles around the trip that is not reset yet; None without one.
+
+        Returns
+        -------
+        dict or None
+            ``at``: time of the trip, s; ``tripped`` and ``blocked``: message and forbidden
+            direction of each; ``time``: of the cycles, s from the trip; ``winch``: tension,
+            cable length, cable speed and commanded speed by winch, SI; ``events``: time and words.
+        """
+        found = self._call("trip_history")
+        return None if found is None else dict(found)
+
+    def frames(self) -> dict[str, dict[str, Any]]:
+        """Frames of each CAN bus by name, collected from the first call on while it is called.
+
+        Returns
+        -------
+        dict of str to dict
+            ``newest``: number, time (s), identifier and bytes in hexadecimal of each identifier's
+            newest frame; ``last``: time, identifier and bytes of the last 200 frames.
+        """
+        return dict(self._call("frames"))
+
+    def start_programme(
+        self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
+    ) -> None:
+        """Execute a motion programme in the owner's process; it ends where no call comes for 0.5 s.
+
+        Parameters
+        ----------
+        path : str
+            Programme file, absolute.
+        folder : str
+            Of the runs, absolute.
+        suffix : str
+            Format, ``.csv`` or ``.mcap``.
+        replace : bool
+            Write over earlier runs of a programme of this name.
+        """
+        self._call("start_programme", path, folder, suffix, replace)
+
+    def programme(self) -> dict[str, Any] | None:
+        """Where this station's programme is; None where it started none.
+
+        Returns
+        -------
+        dict or None
+            As of ``winchkit.bench.remote.programme_run.ProgrammeRun.state``.
+        """
+        found = self._call("programme")
+        return None if found is None else dict(found)
+
+    def answer_programme(self) -> None:
+        """What the programme asks for is done; raises UsageError where it asks nothing."""
+        self._call("answer_programme")
+
+    def end_programme(self) -> None:
+        """End this station's programme by a ramp; returns at rest."""
+        self._call("end_programme")
+
     def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
         """Something with an instrument, e.g. "zero"; ``arguments`` are times (s), or words.
 

@@ -13,7 +13,9 @@ from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.snapshot import to_dict
 from winchkit.bench.recording.recorder import Recorder, counters_of
 from winchkit.bench.remote.identity import Client, client_name
+from winchkit.bench.remote.programme_run import ProgrammeRun
 from winchkit.bench.winch import Winch
+from winchkit.drivers.can.bus.frame_tap import SeenFrame
 from winchkit.drivers.clock import Clock
 from winchkit.errors import UsageError
 from winchkit.schema.programme import ALL
@@ -112,6 +114,29 @@ class Station(Protocol):
     def counters(self) -> dict[str, dict[str, Any]]:
         """What was counted by instrument (``A.cell``), and for the log of this station."""
 
+    def trip_history(self) -> dict[str, Any] | None:
+        """The cycles around the trip that is not reset yet, as JSON has them; None without one."""
+
+    def frames(self) -> dict[str, dict[str, Any]]:
+        """Frames of each CAN bus as JSON has them, collected while it is called."""
+
+    def start_programme(
+        self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
+    ) -> None:
+        """Execute a programme file in the owner's process; it lasts while ``programme`` is called.
+
+        Its runs are written into ``folder``.
+        """
+
+    def programme(self) -> dict[str, Any] | None:
+        """Where this station's programme is, as JSON has it; None where it started none."""
+
+    def answer_programme(self) -> None:
+        """What the programme asks for is done."""
+
+    def end_programme(self) -> None:
+        """End this station's programme by a ramp; returns at rest."""
+
     def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
         """Something with an instrument by name: one of the tasks of ``winchkit.bench.cells.tasks``.
 
@@ -131,6 +156,7 @@ class LocalStation:
         self._bench = bench
         self._recorder: Recorder | None = None
         self._homing: Generator[None] | None = None
+        self._programme: ProgrammeRun | None = None
 
     @property
     def clock(self) -> Clock:
@@ -298,6 +324,45 @@ class LocalStation:
             return self._recorder.counters()
         return counters_of({name: winch.sensors for name, winch in self._bench.winch.items()})
 
+    def trip_history(self) -> dict[str, Any] | None:
+        """The cycles around the trip that is not reset yet, as JSON has them."""
+        return self._bench.trip_history.to_dict(self._bench.snapshot)
+
+    def frames(self) -> dict[str, dict[str, Any]]:
+        """Frames of each CAN bus, collected while it is called."""
+        return {
+            name: {
+                "newest": [[count, *_frame(item)] for count, item in tap.newest],
+                "last": [_frame(item) for item in tap.last],
+            }
+            for name, tap in self._bench.frames().items()
+        }
+
+    def start_programme(
+        self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
+    ) -> None:
+        """Execute a programme file."""
+        if self._programme is not None and not self._programme.ended:
+            raise UsageError("a programme of this client is under way; end it first")
+        self._programme = ProgrammeRun(
+            self._bench, self.client, path, folder, suffix, replace=replace
+        )
+
+    def programme(self) -> dict[str, Any] | None:
+        """Where this station's programme is, as JSON has it; None where it started none."""
+        return None if self._programme is None else self._programme.state()
+
+    def answer_programme(self) -> None:
+        """What the programme asks for is done."""
+        if self._programme is None:
+            raise UsageError("no programme is under way")
+        self._programme.answer()
+
+    def end_programme(self) -> None:
+        """End this station's programme by a ramp; returns at rest."""
+        if self._programme is not None:
+            self._programme.end()
+
     def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
         """Something with an instrument by name."""
         return do(self._bench.cells, task, name, *arguments)
@@ -310,6 +375,7 @@ class LocalStation:
         commanders = self._bench.commanders
         moved = [name for name in commanders.held_by(self.client) if self._bench.winch[name].moving]
         try:
+            self.end_programme()
             with self._acting():
                 if self._homing is not None:
                     self._homing.close()
@@ -327,3 +393,8 @@ class LocalStation:
         """One winch, or with "all" every one."""
         every = list(self._bench.winch.values())
         return every if winch == ALL else [self._bench.named(winch)]
+
+
+def _frame(frame: SeenFrame) -> list[Any]:
+    """Time, identifier and bytes in hexadecimal."""
+    return [round(frame.time, 4), frame.identifier, frame.data.hex()]

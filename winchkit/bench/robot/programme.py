@@ -98,6 +98,7 @@ def run_robot_programme(
     *,
     suffix: str = ".csv",
     progress: Callable[[int, int], None] = lambda _repeat, _number: None,
+    check: Callable[[], None] = lambda: None,
     replace_files: bool = False,
 ) -> list[Path]:
     """Run a programme of the platform, and log one run per repeat.
@@ -114,6 +115,8 @@ def run_robot_programme(
         Format, ``.csv`` or ``.mcap``.
     progress : callable, optional
         Called with repeat and number of the motion or hold.
+    check : callable, optional
+        Called before each motion and every 20 ms of a hold; what it raises ends the programme.
     replace_files : bool
         Write over earlier runs of a programme of this name.
 
@@ -151,7 +154,7 @@ def run_robot_programme(
         approach = [*planner.plan([there], start, programme.speed, programme.acceleration)]
         first, _ = planned_motions(planner, programme, end)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    execution = _Execution(bench, platform, progress)
+    execution = _Execution(bench, platform, progress, check)
     try:
         execution.play(0, approach)
         for repeat, path in enumerate(files, start=1):
@@ -169,9 +172,14 @@ class _Execution:
     """The motions of a programme, one after another, with the drives enabled between them."""
 
     def __init__(
-        self, bench: Bench, platform: Platform, progress: Callable[[int, int], None]
+        self,
+        bench: Bench,
+        platform: Platform,
+        progress: Callable[[int, int], None],
+        check: Callable[[], None],
     ) -> None:
         self._bench, self._platform, self._progress = bench, platform, progress
+        self._check = check
         self._preload: Array | None = None
         self._stops = bench.stops
 
@@ -181,15 +189,20 @@ class _Execution:
             if isinstance(motion, float):
                 self._hold(motion)
                 continue
-            self._bench.raise_stop(self._stops)
+            self._require_going()
             self._preload = self._platform.begin(motion, hold=True, preload=self._preload)
             self._platform.wait()
+
+    def _require_going(self) -> None:
+        """Raise what has stopped the bench, or ends the programme."""
+        self._bench.raise_stop(self._stops)
+        self._check()
 
     def _hold(self, duration: float) -> None:
         clock = self._bench.clock
         end = clock.now() + duration
         while (left := end - clock.now()) > 0:
-            self._bench.raise_stop(self._stops)
+            self._require_going()
             clock.sleep(min(_POLL, left))
 
 

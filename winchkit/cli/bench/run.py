@@ -144,7 +144,7 @@ def _execute(
 
     def tell(repeat: int, number: int, step: Step) -> None:
         place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
-        note(f"{place}: {_words(step)}")
+        note(f"{place}: {step.words}")
 
     name = client_name("run")
     with open_bench(bench, effects=effects, name=name, realtime="try") as opened:
@@ -189,12 +189,3 @@ def _agree(bench: str, step: Step) -> None:
 
     done = answer(bench, step)
     click.echo(f"{step.ask}: {'done by the simulation' if done else 'yes'}", err=True)
-
-
-def _words(step: Step) -> str:
-    if step.ask is not None:
-        return f"ask: {step.ask}"
-    if step.hold is not None:
-        return f"hold {step.hold:g} s"
-    where = f"to {step.to:g} m" if step.to is not None else f"by {step.by:g} m"
-    return f"winch {step.winch} {where}"

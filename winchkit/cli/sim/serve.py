@@ -57,6 +57,11 @@ _TURN = 1e-4
     help="Hide this instead of what the bench hides, as in 'sim record'.",
 )
 @click.option(
+    "--end-with-input",
+    is_flag=True,
+    help="End where standard input ends, as with the program that started it.",
+)
+@click.option(
     "--json", "as_json", is_flag=True, help="Print a line of JSON when it is ready, and per reply."
 )
 def command(
@@ -66,6 +71,7 @@ def command(
     bench_file: Path | None,
     interface: Interface,
     hidden: tuple[str, ...],
+    end_with_input: bool,
     as_json: bool,
 ) -> None:
     """Run a simulated BENCH live until Ctrl-C: drives on CAN, instruments on Modbus or serial.
@@ -91,7 +97,7 @@ def command(
         live.write_bench_file(path)
         with ControlServer(live, path, ended.set), _ended_by_signals(ended):
             _introduce(live, path, as_json=as_json)
-            _listen(live, ended, as_json=as_json)
+            _listen(live, ended, end_with_input=end_with_input, as_json=as_json)
             while not ended.wait(_CHECK_EVERY):
                 live.check()
     click.echo(f"ended; {path} leads nowhere any more", err=True)
@@ -122,13 +128,20 @@ def _introduce(live: LiveBench, path: Path, *, as_json: bool) -> None:
     click.echo("Lines here: load, fault, recover, status, quit, help. Ctrl-C ends it.", err=True)
 
 
-def _listen(live: LiveBench, ended: threading.Event, *, as_json: bool) -> None:
-    """Obey what is typed, on a thread; the end of the input ends nothing."""
-    arguments = (live, ended, as_json)
-    threading.Thread(target=_obey_input, args=arguments, name="sim-input", daemon=True).start()
+def _listen(
+    live: LiveBench, ended: threading.Event, *, end_with_input: bool, as_json: bool
+) -> None:
+    """Obey what is typed, on a thread; the end of the input ends nothing unless it is to."""
+
+    def listen() -> None:
+        _obey_input(live, ended, as_json=as_json)
+        if end_with_input:
+            ended.set()
+
+    threading.Thread(target=listen, name="sim-input", daemon=True).start()
 
 
-def _obey_input(live: LiveBench, ended: threading.Event, as_json: bool) -> None:
+def _obey_input(live: LiveBench, ended: threading.Event, *, as_json: bool) -> None:
     from winchkit.errors import WinchkitError
     from winchkit.sim.live.control import HELP, obey
 

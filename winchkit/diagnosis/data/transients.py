@@ -16,7 +16,7 @@ from winchkit.model.derivatives import Clock
 from winchkit.model.drum import Spiral, drum_of
 from winchkit.model.line import Motion
 
-__all__ = ["transient_mask", "uncertain_force_mask", "with_neighbours"]
+__all__ = ["transient_mask", "uncertain_force_mask", "white_noise", "with_neighbours"]
 
 Mask = NDArray[np.bool_]
 _NEIGHBOURS = 2
@@ -56,9 +56,8 @@ def transient_mask(time: Array, measured: Array, output: str, motion: Motion) ->
     force = motion.load_mass * speed * (drum.growth / drum.winding_radius) / Clock(time).span
     if output == "motor_torque":
         force = force * speed / np.maximum(np.abs(at.motor_rate), 1e-12)
-    transients = (
-        steps & (np.abs(at.direction) > _MOVING) & (force > _LEAST_TRANSIENT * _white(measured))
-    )
+    acting = force > _LEAST_TRANSIENT * white_noise(measured)
+    transients = steps & (np.abs(at.direction) > _MOVING) & acting
     if not transients.any():
         return none
     return with_neighbours(transients, time)
@@ -83,7 +82,7 @@ def uncertain_force_mask(measured: Array, nominal: Array, motion: Motion) -> Mas
     if load is None or std is None or not std.any():
         return np.zeros(len(measured), dtype=bool)
     std = std * np.abs(nominal / np.where(load == 0.0, np.inf, load))
-    usual = np.hypot(_white(measured), np.median(std))
+    usual = np.hypot(white_noise(measured), np.median(std))
     return np.asarray(std > _LEAST_TRANSIENT * usual)
 
 
@@ -93,7 +92,13 @@ def with_neighbours(marked: Mask, time: Array) -> Mask:
     return np.asarray(np.convolve(marked, np.ones(2 * reach + 1), mode="same") > 0)
 
 
-def _white(measured: Array) -> float:
-    """Standard deviation of white noise, from second differences by their median absolute value."""
+def white_noise(measured: Array) -> float:
+    """Standard deviation of white noise, from second differences by their median absolute value.
+
+    Parameters
+    ----------
+    measured : (n,) array
+        Readings at equal intervals.
+    """
     second_differences = np.diff(measured, 2)
     return float(_NORMAL * np.median(np.abs(second_differences)) / np.sqrt(6))

@@ -2,9 +2,10 @@
 import { alarm, ask, attempt, dialog, download, el, fill, icon, number, order, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
 
-let root = null, view = null, newest = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
+let root = null, view = null, now = null, newest = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
 
 export function enter(main, state) { root = main; signature = null; update(state); }
+export function leave() { root = null; }
 
 export function update(state) {
   newest = state;
@@ -14,27 +15,56 @@ export function update(state) {
   signature = now;
   if (!state.robot) { view = null; fill(root, faults(state), empty()); return; }
   if (!fresh && view) { render(state); return; }
-  attempt(async () => {
-    const next = await ask("/api/robot");
-    if (!view || next.name !== view.name) { shown = { row: 0, side: "Iso", z: null, limits: next.limits }; slice = null; }
-    view = next;
-    shown.row = Math.min(shown.row, view.poses);
-    await fetchPicture();
-    render(newest);
-    fetchSlice();
-  });
+  read();
 }
+
+// One reading at a time, and again where the state has changed meanwhile: answers cannot overtake
+// each other. A reading that failed is repeated while the view is open.
+let reading = false, again = false;
+async function read() {
+  again = reading;
+  if (reading) return;
+  reading = true;
+  try {
+    do {
+      again = false;
+      const next = await ask("/api/robot");
+      if (!view || next.name !== view.name) { shown = { row: now ? "live" : 0, side: "Iso", z: null, limits: next.limits }; slice = null; }
+      view = next;
+      if (shown.row !== "live") shown.row = Math.min(shown.row, view.poses);
+      await fetchPicture();
+      if (root && newest.robot) { render(newest); fetchSlice(); }
+    } while (again);
+  } catch (error) {
+    alarm(`${error.message} (read again in a second)`);
+    setTimeout(() => { if (root && newest.robot) read(); }, 1000);
+  } finally { reading = false; }
+}
+
+// The platform of the bench as its motor angles have it: drawn while it is chosen and nothing else is.
+export function live(found, profile) {
+  now = found && profile ? found : null;
+  if (!root || !view || !picture || shown.row !== "live" || !now) return;
+  picture = now;
+  const old = root.querySelector("#picture > svg"), head = root.querySelector("#picture h2");
+  if (old && head) { old.replaceWith(scene()); head.textContent = where(); }
+}
+
+const FORCES = { live: "Cable forces now", measured: "Measured cable forces", computed: "Computed cable forces", none: "No forces within the limits hold the platform" };
+const where = () => { const at = picture.position.map((v) => number(v, 3)); return `${FORCES[shown.row === "live" ? "live" : picture.source]} at x ${at[0]}, y ${at[1]}, z ${at[2]} m`; };
 
 async function fetchPicture() {
   const [low, high] = shown.limits;
-  picture = await ask(`/api/robot/picture?row=${shown.row}&low=${low}&high=${high}`);
+  if (shown.row === "live" && !now) shown.row = 0;
+  if (shown.row === "live") picture = now;
+  else picture = await ask(`/api/robot/picture?row=${shown.row}&low=${low}&high=${high}`);
   if (shown.z === null) shown.z = picture.position[2];
 }
 
 function fetchSlice() {
   const mine = ++asked, [low, high] = shown.limits;
   attempt(async () => {
-    const found = await ask(`/api/robot/slice?z=${shown.z}&row=${shown.row}&low=${low}&high=${high}`);
+    const found = await ask(`/api/robot/slice?z=${shown.z}&row=${shown.row === "live" ? 0 : shown.row}&low=${low}&high=${high}`);
     if (mine !== asked) return;
     slice = found;
     drawPicture();
@@ -175,20 +205,18 @@ function drawPicture() {
   if (!box || !picture) return;
   const [low, high] = shown.limits, focus = document.activeElement && document.activeElement.id;
   const drawn = scene();
-  const where = picture.position.map((v) => number(v, 3));
   const z = el("input", { type: "range", id: "height", min: bounds()[0][2], max: bounds()[1][2], step: "any", value: shown.z, "aria-label": "Height of the slice", oninput: (event) => { shown.z = Number(event.target.value); height.textContent = `Slice height z = ${number(shown.z, 3)} m`; }, onchange: fetchSlice });
   const height = el("span", {}, `Slice height z = ${number(shown.z, 3)} m`);
   const limit = (index, name) => el("input", { type: "number", class: "narrow", min: 0, value: shown.limits[index], "aria-label": `${name} cable force, N`, onchange: (event) => { const next = [...shown.limits]; next[index] = Number(event.target.value); if (!(next[0] < next[1])) { alarm("the lower force limit is not below the upper one"); return; } shown.limits = next; attempt(async () => { await fetchPicture(); drawPicture(); fetchSlice(); }); } });
   const margins = slice ? slice.margin.flat().filter((v) => v !== null) : [];
-  const tension = { measured: "Measured cable forces", computed: "Computed cable forces", none: "No forces within the limits hold the platform" }[picture.source];
-  fill(box, el("header", {}, el("h2", {}, `${tension} at x ${where[0]}, y ${where[1]}, z ${where[2]} m`),
-    el("span", { class: "row end" }, Object.keys(SIDES).map((side) => el("button", { class: "plain", "aria-pressed": String(shown.side === side), style: { fontWeight: shown.side === side ? 700 : 400 }, onclick: () => { shown.side = side; drawPicture(); } }, side)), drawingExporter("robot", `${view.name}: ${tension.toLowerCase()}`, drawn, source, [["cable", view.lines], ["force [N]", picture.tension], ["exit x [m]", view.exit_points.map((p) => p[0])], ["exit y [m]", view.exit_points.map((p) => p[1])], ["exit z [m]", view.exit_points.map((p) => p[2])]]))),
+  fill(box, el("header", {}, el("h2", {}, where()),
+    el("span", { class: "row end" }, now ? el("button", { class: "plain", "aria-pressed": String(shown.row === "live"), style: { fontWeight: shown.row === "live" ? 700 : 400 }, onclick: () => attempt(async () => { shown.row = shown.row === "live" ? 0 : "live"; await fetchPicture(); drawPicture(); fetchSlice(); }) }, "Live") : null, Object.keys(SIDES).map((side) => el("button", { class: "plain", "aria-pressed": String(shown.side === side), style: { fontWeight: shown.side === side ? 700 : 400 }, onclick: () => { shown.side = side; drawPicture(); } }, side)), drawingExporter("robot", `${view.name}: ${where()}`, drawn, source, [["cable", view.lines], ["force [N]", picture.tension], ["exit x [m]", view.exit_points.map((p) => p[0])], ["exit y [m]", view.exit_points.map((p) => p[1])], ["exit z [m]", view.exit_points.map((p) => p[2])]]))),
     drawn,
     el("div", { class: "under" },
       el("div", {}, el("span", { class: "note" }, "Cable force, N (colour and width)"), el("div", { class: "row" }, limit(0, "Least"), el("span", { class: "scale" }, STEPS.map((c) => el("i", { class: "swatch", style: { background: c } }))), limit(1, "Largest"))),
       el("div", {}, el("span", { class: "note" }, `Feasible at z = ${number(slice ? slice.height : shown.z, 3)} m, ${number(low)} to ${number(high)} N`), el("div", { class: "row" }, el("span", { class: "scale" }, [0.25, 0.5, 0.75, 1].map((o) => el("i", { class: "swatch", style: { background: `color-mix(in srgb, var(--ok) ${o * 50}%, transparent)` } }))), el("span", { class: "note" }, slice ? (margins.length ? `margin 0 to ${number(Math.max(...margins), 3)} N` : "no feasible pose at this height") : "computing"))),
       el("label", {}, el("span", { class: "note" }, height), z),
-      view.poses ? el("label", {}, el("span", { class: "note" }, shown.row === 0 ? `Home; ${view.poses} poses` : `Pose ${shown.row} of ${view.poses}`), el("input", { type: "range", id: "row", min: 0, max: view.poses, value: shown.row, "aria-label": "Pose", onchange: (event) => { shown.row = Number(event.target.value); attempt(async () => { await fetchPicture(); drawPicture(); fetchSlice(); }); } })) : null));
+      view.poses ? el("label", {}, el("span", { class: "note" }, shown.row === "live" ? `Now; ${view.poses} poses` : shown.row === 0 ? `Home; ${view.poses} poses` : `Pose ${shown.row} of ${view.poses}`), el("input", { type: "range", id: "row", min: 0, max: view.poses, value: shown.row === "live" ? 0 : shown.row, "aria-label": "Pose", onchange: (event) => { shown.row = Number(event.target.value); attempt(async () => { await fetchPicture(); drawPicture(); fetchSlice(); }); } })) : null));
   if (focus) box.querySelector(`#${focus}`)?.focus();
 }
 

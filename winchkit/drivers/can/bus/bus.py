@@ -12,6 +12,7 @@ from functools import partial
 import can
 import canopen
 
+from winchkit.drivers.can.bus.frame_tap import FrameTap
 from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
 from winchkit.drivers.can.bus.interface import (
     Interface,
@@ -123,8 +124,10 @@ class CanBus:
         """Whether the interface sends remote frames, as far as that is known."""
         self.sync_held = self.heartbeat_held = False
         """Whether :meth:`sync` or :meth:`heartbeat` send nothing, while a drive is to miss them."""
+        self.tap: FrameTap | None = None
+        """Who watches the frames; taken off where it has expired."""
         self._own = OwnFrames() if hands_back(spec) else None
-        self.network = _Network(self._own)
+        self.network = _Network(self._own, self._show_sent)
         self._spec = spec
         self._foreign: dict[int, list[Handler]] = {}
         self._handlers: dict[int, Handler] = {}
@@ -262,6 +265,8 @@ class CanBus:
                 return False
             raise self._unsendable(port, error) from error
         self.sent += 1
+        if self.tap is not None:
+            self._show_sent(identifier, data)
         if self._full_since is not None:
             self._full_since = None
         return True
@@ -303,6 +308,9 @@ class CanBus:
         with self.network.send_lock:
             count = self._port.send_together(frames)
         self.sent += count
+        if self.tap is not None:
+            for frame in frames[:count]:
+                self._show_sent(*frame)
         if count:
             self._full_since = None
         return count
@@ -404,6 +412,8 @@ class CanBus:
             self._take_error(frame)
             return
         self.received += 1
+        if self.tap is not None:
+            self._show(now, identifier, data)
         if identifier > _HEARTBEAT:
             self._heard.add(identifier - _HEARTBEAT)
         handler = self._handlers.get(identifier)
@@ -411,6 +421,20 @@ class CanBus:
             handler(data, self._times.map(stamp, now) if stamp else now)
         elif identifier in _SDO_REPLY and len(data) == _SDO_SIZE:
             self.network.notify(identifier, bytearray(data), now)
+
+    def _show_sent(self, identifier: int, data: bytes) -> None:
+        """Show a frame that was sent here, unless the interface hands it back."""
+        if self._own is None:
+            self._show(self.clock.now(), identifier, data)
+
+    def _show(self, now: float, identifier: int, data: bytes) -> None:
+        tap = self.tap
+        if tap is None:
+            return
+        if now < tap.expires:
+            tap.take(now, identifier, bytes(data))
+        else:
+            self.tap = None
 
     def _take_error(self, frame: Frame) -> None:
         """A bus-off is a fault: until the controller restarts no frame is sent."""
@@ -424,11 +448,13 @@ class CanBus:
 class _Network(canopen.Network):
     """The canopen library's network; what its SDO clients send is noted as sent here."""
 
-    def __init__(self, own: OwnFrames | None) -> None:
+    def __init__(self, own: OwnFrames | None, show: Callable[[int, bytes], None]) -> None:
         super().__init__()
-        self._own = own
+        self._own, self._show = own, show
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         if self._own is not None and not remote:
             self._own.note(can_id, bytes(data))
         super().send_message(can_id, data, remote)
+        if not remote:
+            self._show(can_id, bytes(data))

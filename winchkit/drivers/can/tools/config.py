@@ -20,7 +20,7 @@ from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.drivers.can.canopen.node import Objects, Value, object_name, variables
 from winchkit.drivers.can.cia402.state_machine import State, state_of
 from winchkit.drivers.can.tools.scan import identity_of
-from winchkit.errors import DeviceRefused, Fault, FileError, NotPermitted
+from winchkit.errors import DeviceRefused, Fault, FileError, NotPermitted, UsageError
 from winchkit.regular_file import read_text
 
 __all__ = [
@@ -28,10 +28,14 @@ __all__ = [
     "STORE",
     "Config",
     "Difference",
+    "Setting",
     "check_fits",
     "check_quiet",
+    "described",
     "difference",
     "fitting_config",
+    "named_setting",
+    "one_setting",
     "read_config",
     "read_config_file",
     "restore",
@@ -95,6 +99,97 @@ def settings(dictionary: Any) -> dict[Key, ODVariable]:
         and not any(item.index in part for part in _NOT_SETTINGS)
         and not (item.subindex == 0 and item.parent is not dictionary)
     }
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting as a dictionary declares it."""
+
+    object: str
+    name: str
+    type: str
+    """``whole number``, ``number`` or ``text``."""
+    low: float | None
+    """Least value; None where there is none."""
+    high: float | None
+    """Greatest value; None where there is none."""
+
+
+def described(dictionary: Any) -> list[Setting]:
+    """The settings of a dictionary with their types and limits.
+
+    Parameters
+    ----------
+    dictionary : object dictionary
+        Of the drive.
+    """
+    return [
+        Setting(object_name(*key), _name(item), _type(item), *_range(item))
+        for key, item in settings(dictionary).items()
+    ]
+
+
+def named_setting(dictionary: Any, name: str) -> ODVariable:
+    """A setting by its object, e.g. ``6081h`` or ``6091h:1``; raises UsageError for another.
+
+    Parameters
+    ----------
+    dictionary : object dictionary
+        Of the drive.
+    name : str
+        Object.
+    """
+    for key, item in settings(dictionary).items():
+        if object_name(*key) == name:
+            return item
+    raise UsageError(f"'{name}' is no setting of this drive")
+
+
+def one_setting(dictionary: Any, name: str, text: str) -> dict[Key, Value]:
+    """A setting with its value, for a :class:`Config`.
+
+    Parameters
+    ----------
+    dictionary : object dictionary
+        Of the drive.
+    name : str
+        Object, e.g. ``6081h``.
+    text : str
+        Value; whole numbers also as ``0x1F``.
+
+    Raises
+    ------
+    UsageError
+        For an unknown setting, and for a value beyond its type or limits.
+    """
+    item = named_setting(dictionary, name)
+    value = _parsed(item, text.strip())
+    low, high = _range(item)
+    outside = isinstance(value, int | float) and not (
+        (low is None or low <= value) and (high is None or value <= high)
+    )
+    if value is None or outside:
+        limits = "" if low is None or high is None else f" from {low:.10g} to {high:.10g}"
+        raise UsageError(f"{name} ({_name(item)}): '{text}' is no {_type(item)}{limits}")
+    return {(item.index, item.subindex): value}
+
+
+def _type(variable: ODVariable) -> str:
+    if variable.data_type == datatypes.VISIBLE_STRING:
+        return "text"
+    return "number" if variable.data_type in datatypes.FLOAT_TYPES else "whole number"
+
+
+def _range(variable: ODVariable) -> tuple[float | None, float | None]:
+    """Limits of a value: those of the EDS, else of a whole number's type; None where unknown."""
+    low = high = None
+    if _type(variable) == "whole number":
+        bits = len(variable) - (variable.data_type in datatypes.SIGNED_TYPES)
+        low, high = -(2.0**bits) if bits < len(variable) else 0.0, 2.0**bits - 1
+    return (
+        low if variable.min is None else float(variable.min),
+        high if variable.max is None else float(variable.max),
+    )
 
 
 def read_config(objects: Objects) -> Config:

@@ -1,0 +1,63 @@
+"""Frames of a CAN bus for somebody who watches: the newest of each identifier, the last ones."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+__all__ = ["FrameTap", "SeenFrame"]
+
+_KEPT = 200
+"""Frames of any identifier."""
+
+
+@dataclass(frozen=True, slots=True)
+class SeenFrame:
+    """A frame as it was seen."""
+
+    time: float
+    """On the bench's clock, s."""
+    identifier: int
+    data: bytes
+
+
+class FrameTap:
+    """Collects frames until it expires; cheap, for the threads that send and receive.
+
+    Parameters
+    ----------
+    expires : float
+        Time after which nothing is collected, s.
+    """
+
+    def __init__(self, expires: float) -> None:
+        self.expires = expires
+        self._last: deque[SeenFrame] = deque(maxlen=_KEPT)
+        self._newest: dict[int, tuple[int, SeenFrame]] = {}
+
+    def take(self, time: float, identifier: int, data: bytes) -> None:
+        """Take a frame.
+
+        Parameters
+        ----------
+        time : float
+            On the bench's clock, s.
+        identifier : int
+            COB-ID.
+        data : bytes
+            At most 8.
+        """
+        frame = SeenFrame(time, identifier, data)
+        self._last.append(frame)
+        before = self._newest.get(identifier)
+        self._newest[identifier] = (1 if before is None else before[0] + 1, frame)
+
+    @property
+    def last(self) -> tuple[SeenFrame, ...]:
+        """The last frames, the newest one last."""
+        return tuple(self._last)
+
+    @property
+    def newest(self) -> list[tuple[int, SeenFrame]]:
+        """Number of frames and the newest one of each identifier."""
+        return list(self._newest.values())

@@ -1,0 +1,156 @@
+"""Motion programmes of the Bench view: which there are, and what one would do."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from winchkit.bench.programme_plan import plan_programme
+from winchkit.bench.robot.planner import Planner
+from winchkit.bench.robot.programme import planned_motions
+from winchkit.catalog import folder as shipped
+from winchkit.errors import UsageError
+from winchkit.plain_json import significant
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.programme import Programme
+from winchkit.schema.read import load
+from winchkit.schema.robot_programme import RobotProgramme
+
+__all__ = ["Programmes"]
+
+_DIGITS = 6
+_NO_NAME = re.compile(r"[^\w.-]+")
+
+
+class Programmes:
+    """The programmes that a bench can execute: shipped, beside the page's work, and uploaded.
+
+    Parameters
+    ----------
+    spec : BenchSpec
+        The bench.
+    folder : Path
+        Of the server's own, for programmes of the browser.
+    work : Path
+        Where the user's programmes lie, and where runs are written.
+    """
+
+    def __init__(self, spec: BenchSpec, folder: Path, work: Path) -> None:
+        self.spec, self.folder, self.work = spec, folder, work
+        self._kind = "programme" if spec.robot is None else "robot-programme"
+
+    def paths(self) -> dict[str, Path]:
+        """Programme files by the name that is shown."""
+        found = {}
+        for place in (shipped("sim"), self.work, self.folder):
+            for path in sorted(place.glob("*.toml")):
+                if _kind_of(path) == self._kind:
+                    found[path.stem if place == shipped("sim") else path.name] = path
+        return found
+
+    def path(self, name: str) -> Path:
+        """File of a programme.
+
+        Parameters
+        ----------
+        name : str
+            One of :meth:`paths`; raises UsageError for another.
+        """
+        known = self.paths()
+        if name not in known:
+            raise UsageError(f"there is no programme '{name}'; there are {', '.join(known)}")
+        return known[name]
+
+    def keep(self, name: str, content: bytes) -> str:
+        """Keep a programme of the browser; raises FileError where it is none of this bench.
+
+        Parameters
+        ----------
+        name : str
+            Of its file.
+        content : bytes
+            What is in it.
+        """
+        target = self.folder / (_NO_NAME.sub("-", Path(name).stem).lstrip(".-") + ".toml")
+        target.write_bytes(content)
+        try:
+            load(target, self._kind)
+        except BaseException:
+            target.unlink()
+            raise
+        return target.name
+
+    def preview(self, name: str, here: Mapping[str, float]) -> dict[str, Any]:
+        """What a programme would do; compares it with the limits.
+
+        Parameters
+        ----------
+        name : str
+            One of :meth:`paths`.
+        here : mapping of str to float
+            Present cable length by winch, m, where it is known.
+
+        Returns
+        -------
+        dict
+            ``name``, ``description``, ``repeats``, ``duration`` of a repeat (s), ``steps`` in
+            words, ``asks``: time and text, ``time`` (s) and ``curves`` by name in m.
+        """
+        declared = load(self.path(name), self._kind).value
+        if isinstance(declared, RobotProgramme):
+            return self._robot(declared)
+        assert isinstance(declared, Programme)
+        limits = {winch: item.limits for winch, item in self.spec.winch.items()}
+        start = {winch: here.get(winch, np.nan) for winch in limits}
+        plan = plan_programme(declared, limits, start)
+        curves = {f"winch {winch}": significant(v, _DIGITS) for winch, v in plan.length.items()}
+        return _about(declared) | {
+            "duration": plan.duration,
+            "steps": [step.words for step in declared.step],
+            "asks": [list(item) for item in plan.asks],
+            "time": significant(plan.time, _DIGITS),
+            "curves": curves,
+        }
+
+    def _robot(self, declared: RobotProgramme) -> dict[str, Any]:
+        planner = Planner.of(self.spec)
+        motions, _ = planned_motions(planner, declared, planner.robot.home)
+        now, time, places = 0.0, [], []
+        for motion in motions:
+            if isinstance(motion, float):
+                now += motion
+                continue
+            time.append(now + motion.time)
+            places.append(motion.pose.position)
+            now += motion.duration
+        if not time:
+            raise UsageError(f"the programme '{declared.name}' moves nothing")
+        position = np.concatenate(places)
+        return _about(declared) | {
+            "duration": now,
+            "steps": [f"{len(declared.step)} steps, planned from the home pose"],
+            "asks": [],
+            "time": significant(np.concatenate(time), _DIGITS),
+            "curves": {axis: significant(position[:, i], _DIGITS) for i, axis in enumerate("xyz")},
+        }
+
+
+def _about(declared: Programme | RobotProgramme) -> dict[str, Any]:
+    return {
+        "name": declared.name,
+        "description": declared.description,
+        "repeats": declared.repeat,
+    }
+
+
+def _kind_of(path: Path) -> str:
+    """Kind of a TOML file; empty where it is none."""
+    try:
+        return str(tomllib.loads(path.read_text(encoding="utf-8")).get("kind", ""))
+    except (OSError, ValueError):
+        return ""
