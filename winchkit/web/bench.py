@@ -206,7 +206,7 @@ class BenchView:
         return JSONResponse(await asyncio.to_thread(self._write_setting, winch, name, text))
 
     def _write_setting(self, winch: str, name: str, text: str) -> dict[str, Any]:
-        """Write a setting of a drive while nobody commands and nothing owns the bench."""
+        """Write a setting of a drive while no page commands."""
         if not self.allow_motion:
             raise UsageError(
                 "this page only watches: start 'winchkit serve' with --allow-motion to write"

@@ -20,7 +20,7 @@ _AGREE = 0.02
 
 
 class LiveRobot:
-    """The robot of a bench, and the pose that was found last, from which the next is sought.
+    """The robot of a bench, and the pose that was found last, from which the next is computed.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ def rig(opened: tuple[Bench, LiveBench, SimulatedClock]) -> Iterator[Rig]:
     found.station.close()
 
 
-def test_it_tells_its_steps_waits_for_answers_and_names_its_files(rig: Rig, tmp_path: Path) -> None:
+def test_its_steps_its_question_and_its_files_are_reported(rig: Rig, tmp_path: Path) -> None:
     before = rig.length
     rig.start(tmp_path, Step(by=-0.02, speed=SPEED), Step(ask="look at it"), Step(hold=0.2))
     assert rig.until(lambda state: state["step"] == 1)["does"] == "winch all by -0.02 m"

@@ -98,14 +98,14 @@ export function dots(tone, alpha, size = 3) {
 }
 
 // One plot; `more` are options of uPlot that replace these.
-export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, label }) {
+export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, bare = false, label }) {
   const drag = { x: Boolean(select || zoom), y: false, setScale: false };
   const flat = height < 130;
   const options = {
-    width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, 10, 0, 0],
+    width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, 10, bare ? 8 : 0, 0],
     cursor: { drag, points: { show: false }, ...(sync ? { sync: { key: sync } } : {}), y: false },
     scales: { x: { time: false, ...(xRange ? { range: () => xRange } : {}), ...(logarithmic ? { distr: 3 } : {}) }, y: range ? { range } : {} },
-    axes: axes(xLabel, logarithmic, flat), series: [{}, ...series],
+    axes: axes(xLabel, logarithmic, flat).map((axis, i) => (bare && i === 0 ? { ...axis, show: false } : axis)), series: [{}, ...series],
     hooks: {
       drawClear: [band(noise)], draw: [marks(runs), traced(traces)],
       setSelect: [(u) => {

@@ -8,23 +8,30 @@ const WHOLE = [-60, 0], DEFAULT = [["tension", "tension predicted"], ["tension r
 const measured = (key, sign = 1) => ({ rows }) => rows.map((row) => (row[key] === null || row[key] === undefined ? null : sign * row[key]));
 const modelled = (output, part) => ({ rows, predicted }) => { const own = predicted && predicted[output], at = new Map(own ? predicted.time.map((t, i) => [t, own[part][i]]) : []); return rows.map((row) => at.get(row.time) ?? null); };
 const CHANNELS = {
-  tension: { unit: "N", digits: 1, read: measured("tension"), style: ["ink", 1.6, 0.5] },
-  "tension predicted": { unit: "N", digits: 1, read: modelled("tension", "predicted"), style: ["today", 1.25] },
-  "tension residual": { unit: "N", digits: 2, read: modelled("tension", "residual"), mean: modelled("tension", "mean"), noise: "tension", style: ["today", 1, 0.45] },
-  "motor torque": { unit: "N m", digits: 3, read: measured("motor_torque"), style: ["ink", 1.6, 0.5] },
-  "motor torque predicted": { unit: "N m", digits: 3, read: modelled("motor_torque", "predicted"), style: ["today", 1.25] },
-  "motor torque residual": { unit: "N m", digits: 3, read: modelled("motor_torque", "residual"), mean: modelled("motor_torque", "mean"), noise: "motor_torque", style: ["today", 1, 0.45] },
-  "cable length": { unit: "m", digits: 3, read: measured("cable_length"), style: ["ink", 1.4] },
-  "length instrument": { unit: "m", digits: 3, read: measured("length"), style: ["ink", 1.6, 0.5] },
-  "length predicted": { unit: "m", digits: 3, read: modelled("cable_length", "predicted"), style: ["today", 1.25] },
-  "length residual": { unit: "m", digits: 4, read: modelled("cable_length", "residual"), mean: modelled("cable_length", "mean"), noise: "cable_length", style: ["today", 1, 0.45] },
-  speed: { unit: "m/s, + winds in", digits: 3, read: measured("cable_speed", -1), style: ["ink", 1.4] },
-  "commanded speed": { unit: "m/s, + winds in", digits: 3, read: measured("commanded_speed", -1), style: ["with", 1.8, 0.8] },
-  load: { unit: "N", digits: 1, read: measured("load"), style: ["with", 1.4] },
-  "motor angle": { unit: "rad", digits: 2, read: measured("motor_angle"), style: ["ink", 1.4] },
-  "motor velocity": { unit: "rad/s", digits: 2, read: measured("motor_velocity"), style: ["ink", 1.4] },
-  temperature: { unit: "°C", digits: 1, read: measured("temperature"), style: ["ink", 1.4] },
+  tension: { unit: "N", least: 2, digits: 1, read: measured("tension"), style: ["ink", 1.6, 0.5] },
+  "tension predicted": { unit: "N", least: 2, digits: 1, read: modelled("tension", "predicted"), style: ["today", 1.25] },
+  "tension residual": { unit: "N", least: 2, digits: 2, read: modelled("tension", "residual"), mean: modelled("tension", "mean"), noise: "tension", style: ["today", 1, 0.45] },
+  "motor torque": { unit: "N m", least: 0.01, digits: 3, read: measured("motor_torque"), style: ["ink", 1.6, 0.5] },
+  "motor torque predicted": { unit: "N m", least: 0.01, digits: 3, read: modelled("motor_torque", "predicted"), style: ["today", 1.25] },
+  "motor torque residual": { unit: "N m", least: 0.01, digits: 3, read: modelled("motor_torque", "residual"), mean: modelled("motor_torque", "mean"), noise: "motor_torque", style: ["today", 1, 0.45] },
+  "cable length": { unit: "m", least: 0.01, digits: 3, read: measured("cable_length"), style: ["ink", 1.4] },
+  "length instrument": { unit: "m", least: 0.01, digits: 3, read: measured("length"), style: ["ink", 1.6, 0.5] },
+  "length predicted": { unit: "m", least: 0.01, digits: 3, read: modelled("cable_length", "predicted"), style: ["today", 1.25] },
+  "length residual": { unit: "m", least: 0.01, digits: 4, read: modelled("cable_length", "residual"), mean: modelled("cable_length", "mean"), noise: "cable_length", style: ["today", 1, 0.45] },
+  speed: { unit: "m/s, + winds in", least: 0.05, digits: 3, read: measured("cable_speed", -1), style: ["ink", 1.4] },
+  "commanded speed": { unit: "m/s, + winds in", least: 0.05, digits: 3, read: measured("commanded_speed", -1), style: ["with", 1.8, 0.8] },
+  load: { unit: "N", least: 2, digits: 1, read: measured("load"), style: ["with", 1.4] },
+  "motor angle": { unit: "rad", least: 0.1, digits: 2, read: measured("motor_angle"), style: ["ink", 1.4] },
+  "motor velocity": { unit: "rad/s", least: 0.5, digits: 2, read: measured("motor_velocity"), style: ["ink", 1.4] },
+  temperature: { unit: "°C", least: 2, digits: 1, read: measured("temperature"), style: ["ink", 1.4] },
 };
+
+// The range of values, no narrower than `least`, with a margin.
+function spread(low, high, least) {
+  if (low === null || high === null) return [-least, least];
+  const middle = (low + high) / 2, half = Math.max(0.55 * (high - low), least / 2);
+  return [middle - half, middle + half];
+}
 
 let chosen = DEFAULT.map((names) => [...names]), span = [...WHOLE], drawn = [], paused = false, kept = null;
 
@@ -56,7 +63,7 @@ export function strips(box, read, { winch, limits, bench, profile }) {
       if (residual) columns.push(now.rows.map(() => noise), now.rows.map(() => (noise === null ? null : -noise)));
       return [now.rows.map((row) => row.time - end), ...columns];
     };
-    const own = plot(host, data(), series, { height: axis ? 104 : 84, label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
+    const own = plot(host, data(), series, { height: axis ? 110 : 84, label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", bare: !axis, range: (u, low, high) => spread(low, high, CHANNELS[names[0]].least), zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
     const top = names[0] === "tension" ? limits.tension : names[0] === "speed" ? [-limits.speed, limits.speed] : names[0] === "cable length" ? limits.length || [] : [];
     const beyond = last.parentElement.querySelector(".beyond");
     drawn.push(() => {

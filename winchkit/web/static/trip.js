@@ -32,7 +32,7 @@ export function consequences(found) {
 }
 
 function panel({ title, unit, top, height, times, curves, limits }) {
-  const values = curves.flatMap(([own]) => own.filter((v) => v !== null)), least = Math.min(...values), most = Math.max(...values), margin = Math.max(0.15 * (most - least), 1e-3 * Math.max(Math.abs(least), Math.abs(most)), 1e-6);
+  const values = curves.flatMap(([own]) => own.filter((v) => v !== null)), least = Math.min(...values), most = Math.max(...values), known = limits.filter((v) => v !== null && v !== undefined), margin = Math.max(0.15 * (most - least), 0.02 * ((known.length ? Math.max(...known.map(Math.abs)) : 0) || 1));
   const low = least - margin, high = most + margin, y = (v) => top + height - ((Math.max(low, Math.min(high, v)) - low) / (high - low)) * height;
   const [under, over] = limits, away = [under, over].filter((v) => v !== null && v !== undefined && (v <= low || v >= high)).map((v) => number(v, 3));
   const out = [svg("text", { x: LEFT, y: top - 8, "font-weight": 600, fill: "var(--ink)" }, title, svg("tspan", { "font-weight": 400, fill: "var(--muted)" }, ` ${unit}${away.length ? ` · limit${away.length > 1 ? "s" : ""} ${away.join(" and ")} outside this range` : ""}`))];

@@ -77,6 +77,6 @@ export function card(name, own, state, drum, tripped, chosen, choose) {
   return el("button", { class: `winch ${chosen ? "chosen" : ""}`, "aria-pressed": String(chosen), onclick: choose, "aria-label": `Winch ${name}: ${words(state, tripped)}` },
     svg("svg", { viewBox: "0 0 40 40", width: 40, height: 40, "aria-hidden": "true" }, svg("circle", { cx: 20, cy: 20, r: 18, fill: "var(--sunk)", stroke: "var(--edge)" }), svg("circle", { cx: 20, cy: 20, r: 10 + 7 * share, fill: "none", stroke: "var(--with)", "stroke-width": 2 }),
       svg("line", { x1: 20, y1: 20, x2: 20 + 10 * Math.cos((state.motor_angle || 0) / (own.ratio || 1)), y2: 20 - 10 * Math.sin((state.motor_angle || 0) / (own.ratio || 1)), stroke: "var(--ink2)", "stroke-width": 3 })),
-    el("span", { class: "name" }, el("b", {}, name), el("span", { class: tripped ? "state tripped" : arrow(state.cable_speed) ? "state moving" : "state" }, words(state, tripped)), el("small", {}, state.commander ? `${state.commander} commands` : "nobody commands")),
+    el("span", { class: "name" }, el("b", {}, name), el("span", { class: tripped ? "state tripped" : arrow(state.cable_speed) ? "state moving" : "state" }, words(state, tripped)), el("small", {}, state.commander ? `${state.commander} commands` : "no commander")),
     el("span", { class: "bars" }, bar(state.cable_length, most, limits, "m", 3), bar(state.tension, high * 1.05, own.limits.tension, "N", 0), el("small", {}, `${state.cable_speed === null ? "–" : (-state.cable_speed).toFixed(3).replace("-", "−")} m/s`)));
 }
