@@ -116,6 +116,16 @@ def test_a_cell_that_was_tared_under_the_load_has_no_wrong_unit() -> None:
     assert codes([with_channel(run, "tension", run["tension"] - 98.0665)]) == []
 
 
+def test_slopes_that_differ_from_run_to_run_are_no_wrong_unit() -> None:
+    """As of a cell that was zeroed anew under a constant load: one is near that of pounds."""
+    runs = [made(seed) for seed in range(4)]
+    pounds, others = 0.45359, (0.95, 1.3, 1.1)
+    alone = scaled(runs[0], "tension", pounds)
+    assert codes([alone, *runs[1:]]) == [("tension", "wrong-factor")]
+    pairs = zip(runs[1:], others, strict=True)
+    assert codes([alone, *(scaled(run, "tension", share) for run, share in pairs)]) == []
+
+
 def joint(seed: int, sign: float) -> tuple[Run, WinchProfile]:
     """A joint without a load: inertia, friction, gravity over its angle, an offset."""
     random = np.random.default_rng(seed)

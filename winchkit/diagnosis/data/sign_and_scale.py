@@ -4,7 +4,8 @@ Every run's tension and torque are regressed on their prediction; a slope far fr
 of a winch, but a wrong unit, factor or sign of a channel. The standard deviation of the slope is
 that of a block jackknife. Friction and inertia, which the profile may lack, are fitted beside; a
 run whose motion does not separate them from the load, as one in one direction, has the slope of all
-runs together.
+runs together. A factor is the same in all runs, or in some and the others have none: where the
+slopes of the others differ from each other, as with an offset for every run, none is suspected.
 Without a load the prediction of the torque may vanish: then the work of its dissipative part must
 not be negative (passivity).
 
@@ -26,7 +27,7 @@ from winchkit.diagnosis.data.sampling import bridged
 from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.model.line import Line
-from winchkit.model.stages import Signals
+from winchkit.model.stages import OUTPUTS, Signals
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.factors import KNOWN_FACTORS, Slope, named_factor, slope_text
 from winchkit.runs.sanity.finding import Finding
@@ -65,7 +66,10 @@ def sign_and_scale(
         same factor, the load is.
     """
     wrong: dict[tuple[str, str, str, str], list[tuple[str, Slope]]] = {}
-    for run, slopes in zip(runs, _slopes(runs, profile, catalogue), strict=True):
+    every = _slopes(runs, profile, catalogue)
+    scattered = {name for name in OUTPUTS if _differ([own[name] for own in every if name in own])}
+    for run, own in zip(runs, every, strict=True):
+        slopes = {name: slope for name, slope in own.items() if name not in scattered}
         for (channel, other), slope in _suspects(run, slopes).items():
             code = "inverted-sign" if slope.value < 0 else "wrong-factor"
             known = named_factor(slope) if _outside(abs(slope.value)) else ""
@@ -198,6 +202,12 @@ def _is_wrong(slope: Slope) -> bool:
     """Whether a slope is negative or outside the range of effects, beyond its uncertainty."""
     low, high = abs(slope.value) - _SIGMAS * slope.std, abs(slope.value) + _SIGMAS * slope.std
     return slope.value < 0 or low > _LARGEST or high < 1 / _LARGEST
+
+
+def _differ(slopes: Sequence[Slope]) -> bool:
+    """Whether the slopes that are not wrong differ from run to run."""
+    sizes = [slope.value for slope in slopes if not _is_wrong(slope)]
+    return len(sizes) > 1 and max(sizes) > _EQUAL * min(sizes)
 
 
 def _slope(measured: Array, columns: Array) -> Slope | None:
