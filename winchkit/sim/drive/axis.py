@@ -14,13 +14,12 @@ from winchkit.sim.drive.units import wrapped
 
 __all__ = ["Axis"]
 
-_MAX_SLICE = 1e-3
 _LEAST_SLICE = 2e-5
 """Shorter times are left to the next call, s."""
 
 
 class Axis:
-    """Motion and feedback, starting at the time ``now``.
+    """Motion and feedback, starting at the time ``now``, in steps of at most ``longest_step`` s.
 
     ``following_failed`` is called while the following error (60F4h) has been beyond its window
     (6065h) for longer than 6066h allows.
@@ -35,7 +34,9 @@ class Axis:
         status: StatusBits,
         *,
         now: float,
+        longest_step: float,
     ) -> None:
+        self._longest_step = longest_step
         self._objects, self._shaft = objects, shaft
         self._power, self._motion, self._status = power, motion, status
         self.following_failed: Callable[[], None] = lambda: None
@@ -44,14 +45,11 @@ class Axis:
         self._following_since: float | None = None
 
     def advance(self, now: float, tolerance: float = 0.0) -> None:
-        """Move until ``now``, if more than ``tolerance`` s is left.
-
-        Set-points are computed in steps of at most a millisecond.
-        """
+        """Move until ``now``, if more than ``tolerance`` s is left."""
         duration = now - self.now
         if duration < max(_LEAST_SLICE, tolerance):
             return
-        count = ceil(duration / _MAX_SLICE - 1e-6)
+        count = ceil(duration / self._longest_step - 1e-6)
         dt = duration / count
         start, shaft, motion = self.now, self._shaft, self._motion
         for index in range(count):

@@ -59,7 +59,9 @@ class SimDrive:
     smoothing : float
         Length of the set-point filter in CSV, CSP and IP, s.
     tolerance : float
-        Time by which the motion may be behind but at a SYNC, s.
+        Time by which the motion may be behind at a tick, s.
+    longest_step : float
+        Time between two set-points of the motion, s.
     now : float
         Time at the start, s.
 
@@ -80,6 +82,7 @@ class SimDrive:
         brake: bool,
         smoothing: float = 0.0,
         tolerance: float = 0.0,
+        longest_step: float = 1e-3,
         now: float = 0.0,
     ) -> None:
         check_objects(objects, modes_of(servo.modes), node)
@@ -107,7 +110,15 @@ class SimDrive:
             smoothing=smoothing,
         )
         self._status = StatusBits(objects, self._motion, toggling=self._quirks.toggles_bit_10)
-        self._axis = Axis(objects, shaft, self._power, self._motion, self._status, now=now)
+        self._axis = Axis(
+            objects,
+            shaft,
+            self._power,
+            self._motion,
+            self._status,
+            now=now,
+            longest_step=longest_step,
+        )
         self._axis.following_failed = lambda: self._fault(FAULTS["following error"])
         Actions(objects, shaft, self._power, self._motion, self._axis, quirks=self._quirks)
         self._show_modes()
@@ -162,17 +173,23 @@ class SimDrive:
         elif self.nmt is not NmtState.OPERATIONAL:
             return
         elif self._pdos.listens(identifier):
-            self.advance(now)
+            if not self._pdos.waits(identifier):
+                self.advance(now)
             self._pdos.receive(identifier, data)
         elif identifier == self.objects.number(0x1005, 0, 0x80) & 0x7FF:
-            self._axis.advance(now)
+            self.advance(now)
             self._status.syncs += 1
             self._pdos.latch()
             self._pdos.on_sync(now)
 
+    def beat(self, now: float) -> None:
+        """Send the heartbeat if it is due; time is not advanced."""
+        if self.nmt is not NmtState.BOOTING:
+            self._heartbeats.beat(now)
+
     def tick(self, now: float) -> None:
         """Advance time to ``now``."""
-        self.advance(now)
+        self._axis.advance(now, self._tolerance)
         if self.nmt is NmtState.BOOTING:
             if now >= self._booted_at:
                 self._boot_up(now)
@@ -310,7 +327,7 @@ class SimDrive:
 
     def advance(self, now: float) -> None:
         """Move until ``now``, without evaluating the network's timers."""
-        self._axis.advance(now, self._tolerance)
+        self._axis.advance(now)
 
     def _sample(self) -> None:
         self._axis.sample(self._error)

@@ -76,6 +76,12 @@ class Heartbeats:
 
     def tick(self, now: float) -> None:
         """Send a heartbeat that is due and detect missing ones."""
+        self.beat(now)
+        for node in [node for node, limit in self._deadlines.items() if now > limit]:
+            self._fail(node)
+
+    def beat(self, now: float) -> None:
+        """Send a heartbeat that is due."""
         if self._changed:
             self._changed = False
             self._due = now if self._period else inf
@@ -83,8 +89,6 @@ class Heartbeats:
             if self.producing:
                 self._send()
             self._due = max(self._due + self._period, now)
-        for node in [node for node, limit in self._deadlines.items() if now > limit]:
-            self._fail(node)
 
     def lose(self) -> None:
         """Lose all monitored nodes, as after their time-outs."""

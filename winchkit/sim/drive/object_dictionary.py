@@ -23,6 +23,8 @@ Value = int | bytes
 Guard = Callable[[int, int], "Abort | None"]
 Watcher = Callable[[int, int], None]
 
+_SET_POINTS = frozenset((0x6040, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60C1, 0x60FF))
+"""Objects that a master writes in every cycle."""
 _FORMATS = {0x02: "b", 0x03: "h", 0x04: "i", 0x05: "B", 0x06: "H", 0x07: "I", 0x15: "q", 0x1B: "Q"}
 _BOOLEAN = 0x01
 _LIMITS = {0x6065, 0x6072, 0x6073, 0x607F, 0x6080, 0x60E0, 0x60E1}
@@ -105,9 +107,12 @@ class ObjectDictionary:
         self._entries = dict(entries)
         self._indices = {index for index, _ in entries}
         self._values: dict[Key, Value] = {}
+        self._layouts: dict[tuple[Key, ...], tuple[struct.Struct, tuple[Key, ...]]] = {}
         self._stored: dict[Key, Value] = {}
         self.guards: dict[int, Guard] = {0x1010: self._store, 0x1011: self._restore}
         self.watchers: dict[int, Watcher] = {}
+        self.changes = 0
+        """Number of changes by clients and resets, but of the set-points of a cycle."""
         self.reset()
 
     def __contains__(self, key: Key) -> bool:
@@ -125,6 +130,7 @@ class ObjectDictionary:
 
     def reset(self, indices: range = range(0x10000)) -> None:
         """Load the stored values, else the defaults, of a range of indices, as after power-on."""
+        self.changes += 1
         for key, entry in self._entries.items():
             if key[0] in indices:
                 self._values[key] = self._stored.get(key, entry.default)
@@ -151,6 +157,17 @@ class ObjectDictionary:
             return entry
         return entry.pack(self._values[key]) if entry.readable else Abort.WRITE_ONLY
 
+    def packed(self, keys: tuple[Key, ...]) -> bytes:
+        """Values of several objects on the bus, without those that cannot be read."""
+        layout = self._layouts.get(keys)
+        if layout is None:
+            declared = [(key, self._entries[key]) for key in keys if key in self._entries]
+            kept = [(key, entry) for key, entry in declared if entry.readable and entry.format]
+            pattern = "<" + "".join(entry.format for _, entry in kept)
+            layout = self._layouts[keys] = struct.Struct(pattern), tuple(key for key, _ in kept)
+        values = self._values
+        return layout[0].pack(*[values[key] for key in layout[1]])
+
     def refusal(self, key: Key) -> Abort | None:
         """Abort code for a write of any value by a client; None where writing is permitted."""
         entry = self.entry(key)
@@ -173,6 +190,7 @@ class ObjectDictionary:
             if refused is not None:
                 return refused
         self._values[key] = value
+        self.changes += key[0] not in _SET_POINTS
         watcher = self.watchers.get(key[0])
         if watcher is not None and isinstance(value, int):
             watcher(key[1], value)

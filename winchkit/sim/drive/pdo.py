@@ -94,6 +94,10 @@ class Pdos:
         """Whether it is the identifier of a valid RPDO."""
         return identifier in self._receive
 
+    def waits(self, identifier: int) -> bool:
+        """Whether the data of an RPDO take effect at the next SYNC only."""
+        return self._receive[identifier].synchronous
+
     def receive(self, identifier: int, data: bytes) -> None:
         """Take a frame that may be an RPDO."""
         pdo = self._receive.get(identifier)
@@ -158,8 +162,7 @@ class Pdos:
             self._send(pdo.identifier, data)
 
     def _pack(self, pdo: _Pdo) -> bytes:
-        parts = (self._objects.read(key) for key in pdo.keys)
-        return b"".join(part for part in parts if not isinstance(part, Abort))
+        return self._objects.packed(pdo.keys)
 
     def _apply(self, pdo: _Pdo, data: bytes) -> None:
         start = 0

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import inf, pi
+from math import inf, nan, pi
+from typing import NamedTuple
 
 from winchkit.schema.devices.servo import ServoSpec
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
@@ -23,6 +24,13 @@ _INSTEAD = {0x6084: 0x6083, 0x6085: 0x6084, 0x60C6: 0x6085}
 _UNWATCHED = 0xFFFFFFFF
 
 
+class _Limits(NamedTuple):
+    torque: tuple[float, float]
+    angle: tuple[float, float]
+    top_speed: float
+    period: float
+
+
 class Settings:
     """Present units, zero, limits and ramps.
 
@@ -33,6 +41,7 @@ class Settings:
         self.number = objects.number
         self._objects, self._servo = objects, servo
         self.zero = 0.0
+        self._valid_for = (-1, nan)
         self.read_units()
 
     def read_units(self) -> None:
@@ -64,7 +73,21 @@ class Settings:
 
     def top_speed(self) -> float:
         """Maximum motor speed (6080h), rad/s."""
-        return self.number(0x6080) * _RPM if (0x6080, 0) in self._objects else inf
+        return self._limits().top_speed
+
+    def _limits(self) -> _Limits:
+        """Values that every step of the motion needs, computed anew after a change."""
+        present = self._objects.changes, self.zero
+        if present != self._valid_for:
+            self._valid_for = present
+            declared = (0x6080, 0) in self._objects
+            self._found = _Limits(
+                self._torque_band(),
+                self._soft_limits(),
+                self.number(0x6080) * _RPM if declared else inf,
+                self.number(0x60C2, 1, 0) * 10.0 ** self.number(0x60C2, 2, -3),
+            )
+        return self._found
 
     def profile_speed(self) -> float:
         """Maximum profile velocity (607Fh), rad/s."""
@@ -79,6 +102,9 @@ class Settings:
         A current limit is in per mille of the rated current, like a torque limit of the rated
         torque.
         """
+        return self._limits().torque
+
+    def _torque_band(self) -> tuple[float, float]:
         number, most = self.number, 0xFFFF
         both = min(number(0x6072, 0, most), number(0x6073, 0, most))
         unit = self.units.torque
@@ -86,6 +112,9 @@ class Settings:
 
     def soft_limits(self) -> tuple[float, float]:
         """Lowest and highest motor angle by 607Dh, rad."""
+        return self._limits().angle
+
+    def _soft_limits(self) -> tuple[float, float]:
         low, high = self.number(0x607D, 1, _NO_LIMITS[0]), self.number(0x607D, 2, _NO_LIMITS[1])
         if (low, high) == _NO_LIMITS or low >= high:
             return -inf, inf
@@ -93,7 +122,7 @@ class Settings:
 
     def period(self) -> float:
         """Interpolation period (60C2h), s; 0 where the drive does not interpolate."""
-        return self.number(0x60C2, 1, 0) * 10.0 ** self.number(0x60C2, 2, -3)
+        return self._limits().period
 
     def following_window(self) -> float:
         """Following error window (6065h), rad."""

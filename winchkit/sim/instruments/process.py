@@ -71,6 +71,11 @@ class ProcessInstrument(SimulatedInstrument):
 
     # Network.
 
+    def beat(self, now: float) -> None:
+        """Send the heartbeat if it is due."""
+        if self.nmt is not NmtState.BOOTING:
+            self._heartbeats.beat(now)
+
     def tick(self, now: float) -> None:
         """Evaluate the network's timers."""
         self.show(now)

@@ -97,7 +97,7 @@ class LiveBench:
         """Number of ticks that were more than 20 ms late."""
         self.worst_lateness = 0.0
         """s."""
-        self._skipped = self._ticked = 0.0
+        self._skipped = 0.0
         self._started_at = self._last = clock()
         self._faults = sorted(self.sim_bench.fault, key=lambda fault: fault.time)
 
@@ -219,10 +219,10 @@ class LiveBench:
 
     @contextmanager
     def up_to_date(self) -> Iterator[None]:
-        """Advance the simulation to the present time and lock it; a robot's to the last tick."""
+        """Advance the simulation to the present time and lock it; a robot's is at its last tick."""
         with self._lock:
-            now = self._now()
-            if self.robot is None or now - self._ticked > 2 * TICK:
+            if self.robot is None:
+                now = self._now()
                 for winch in self.winches.values():
                     winch.advance(now)
             yield
@@ -357,6 +357,7 @@ class LiveBench:
             self._clock,
             self._stopping.is_set,
             deliver=partial(self._deliver, winches),
+            beat=lambda: self._beat(winches),
             tick=lambda: self._tick(winches),
             late=self._note_lateness,
         )
@@ -367,14 +368,18 @@ class LiveBench:
             for winch in winches:
                 winch.receive(identifier, data, now)
 
+    def _beat(self, winches: list[LiveWinch]) -> None:
+        with self._lock:
+            now = self._now()
+            for winch in winches:
+                winch.beat(now)
+
     def _tick(self, winches: list[LiveWinch]) -> None:
         with self._lock:
             now = self._now()
             while self._faults and now - self._started_at >= self._faults[0].time:
                 self._go_wrong(self._faults.pop(0))
-            self._ticked = now
             for winch in winches:
-                winch.advance(now)
                 winch.tick(now)
             if self.robot is not None:
                 self.robot.advance()

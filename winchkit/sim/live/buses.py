@@ -16,8 +16,8 @@ from typing import Any, Literal
 import can
 
 from winchkit.errors import ConnectionLost, UsageError
+from winchkit.multicast import MulticastPort
 from winchkit.schema.bench import BusSpec
-from winchkit.sim.live.multicast import MulticastPort
 
 __all__ = [
     "CanPort",

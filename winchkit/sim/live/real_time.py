@@ -19,13 +19,15 @@ def serve(
     stopped: Callable[[], bool],
     *,
     deliver: Callable[[int, bytes], None],
+    beat: Callable[[], None],
     tick: Callable[[], None],
     late: Callable[[float], None],
 ) -> None:
     """Deliver frames when they arrive and tick every two milliseconds, until ``stopped``.
 
     Waiting frames are taken before the tick, so that a stall of this process is not taken for a
-    loss of the master. ``late`` is called with each tick's lateness, s.
+    loss of the master; ``beat`` sends the heartbeats that are due meanwhile. ``late`` is called
+    with each tick's lateness, s.
     """
     due = clock()
     while not stopped():
@@ -34,6 +36,8 @@ def serve(
             if frame is None:
                 break
             deliver(*frame)
+            if clock() > due:
+                beat()
             frame = port.receive(0.0)
         lateness = clock() - due
         if lateness >= 0:

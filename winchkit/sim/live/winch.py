@@ -33,14 +33,16 @@ _QUANTITIES = {
 """Measured quantity of each role in a bench file."""
 _SMOOTHING = 0.024
 """Set-point filter of the drives, s: the cycle of an ordinary computer has 1 ms of jitter."""
-_TO_ALL, _NODE = 0x080, 0x07F
-"""Highest identifier for all nodes (SYNC); others mostly concern the node in their lower bits."""
+_TO_ALL, _REQUEST = 0x080, 0x600
+"""Highest identifier for all nodes (SYNC); SDO request to node 0."""
 _DEVIATION = (1e-3, 3e-3)
 """Deviation of an instrument's clock in simulated time: without it its conversions would be
 synchronous with the host's polls, with a constant age that no time stamp shows."""
-_TOLERANCE = 1e-3
-"""Time by which a winch of a robot may be behind but at a SYNC, s: each step of a single winch
-costs a step of the platform."""
+_TOLERANCE = 5e-3
+"""Time by which a winch of a robot may be behind at a tick, s: between two SYNCs nothing is
+computed that only the next one needs."""
+_STEP, _ROBOT_STEP = 1e-3, 2.5e-3
+"""Longest step of a winch with a load of its own, and of one of a robot, s."""
 _AT_REST = 0.5
 """Motor speed below which a load can be changed, rad/s."""
 
@@ -64,7 +66,10 @@ class LiveWinch:
         load: Load | None = None,
     ) -> None:
         self.name = name
-        self.plant = WinchPlant(profile, truth, seed=f"{seed}/{name}", noise=noise, load=load)
+        step = _STEP if load is None else _ROBOT_STEP
+        self.plant = WinchPlant(
+            profile, truth, seed=f"{seed}/{name}", noise=noise, load=load, longest_step=step
+        )
         servo, eds = _servo(wiring.servo, beside)
         if wiring.servo.node is None:
             raise UsageError(f"winch {name}: its servo has no node; give it one, e.g. node = 1")
@@ -79,12 +84,15 @@ class LiveWinch:
             brake=wiring.brake,
             smoothing=_SMOOTHING,
             tolerance=0.0 if load is None else _TOLERANCE,
+            longest_step=step,
             now=now,
         )
         self.drive.power_on(now, boot_time=0.0)
         read = self.plant.read
         measuring = {role: partial(read, quantity) for role, quantity in _QUANTITIES.items()}
         self.instruments = instruments_of(wiring, beside, measuring, send, now=now)
+        devices = self.instruments.values()
+        self._on_can = [one for one in devices if isinstance(one, ProcessInstrument)]
         if clocks_deviate:
             for role, one in self.instruments.items():
                 random = Random(f"{seed}/{name}/{role}/clock")
@@ -92,31 +100,42 @@ class LiveWinch:
 
     def advance(self, now: float) -> None:
         """Advance to ``now``, with each conversion at its own instant."""
-        instruments = list(self.instruments.values())
+        self._convert(now)
+        self.drive.advance(now)
+        for one in self.instruments.values():
+            one.show(now)
+
+    def _convert(self, now: float) -> None:
+        """Advance to the conversions that are due."""
+        instruments = self.instruments.values()
         while (due := min([one.next_conversion for one in instruments], default=inf)) <= now:
             self.drive.advance(due)
             for one in instruments:
                 if one.next_conversion <= due:
                     one.convert()
-        self.drive.advance(now)
-        for one in instruments:
-            one.show(now)
 
     def receive(self, identifier: int, data: bytes, now: float) -> None:
         """Take a frame from the CAN bus."""
-        if identifier <= _TO_ALL or identifier & _NODE == self.drive.node:
+        if identifier <= _TO_ALL or identifier == _REQUEST + self.drive.node:
             self.advance(now)
         self.drive.receive(identifier, data, now)
-        for one in self.instruments.values():
-            if isinstance(one, ProcessInstrument):
-                one.receive(identifier, data, now)
+        for one in self._on_can:
+            one.receive(identifier, data, now)
+
+    def beat(self, now: float) -> None:
+        """Send the heartbeats that are due."""
+        self.drive.beat(now)
+        for one in self._on_can:
+            one.beat(now)
 
     def tick(self, now: float) -> None:
-        """Evaluate the timers of the devices on the CAN bus."""
+        """Make the conversions that are due, and evaluate the timers of the devices."""
+        self._convert(now)
         self.drive.tick(now)
         for one in self.instruments.values():
-            if isinstance(one, ProcessInstrument):
-                one.tick(now)
+            one.show(now)
+        for one in self._on_can:
+            one.tick(now)
 
     def hang(self, mass: float) -> None:
         """Attach another load (kg); NotPermitted while the winch moves."""

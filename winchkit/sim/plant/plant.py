@@ -27,7 +27,7 @@ _SMALLEST_INERTIA_SHARE = 0.05
 
 
 class WinchPlant:
-    """Mechanics of one winch, integrated in steps of at most 1 ms.
+    """Mechanics of one winch, integrated in short steps.
 
     It starts at rest, loaded, with all effects with memory at their null. Formulas and signs are
     those of the line model; the code is independent of it.
@@ -46,6 +46,8 @@ class WinchPlant:
         Initial cable length, m; by default that of the reference.
     load : Load, optional
         Load at the end of the cable in place of a hanging one, such as a robot's platform.
+    longest_step : float
+        Of the integration, s.
 
     Raises
     ------
@@ -62,7 +64,9 @@ class WinchPlant:
         noise: NoiseSpec | None = None,
         cable_length: float | None = None,
         load: Load | None = None,
+        longest_step: float = MAX_STEP,
     ) -> None:
+        self._longest_step = longest_step
         nominal = Kinematics.of(profile)
         true, self._pieces = _true_winch(profile, truth)
         self._kinematics = Kinematics.of(true, CLIMB)
@@ -174,7 +178,7 @@ class WinchPlant:
         """Integrate ``duration`` s under one command; UsageError for a negative duration."""
         if not duration >= 0:
             raise UsageError(f"time cannot advance by {duration:g} s")
-        count = ceil(duration / MAX_STEP - 1e-9)
+        count = ceil(duration / self._longest_step - 1e-9)
         for _ in range(count):
             self._step(duration / count, command)
 

@@ -32,6 +32,8 @@ class Noise:
 
     def sample(self, interval: float) -> float:
         """Next value, ``interval`` s after the one before."""
+        if not (self._white or self._slow_sigma):
+            return 0.0
         if self._slow_sigma > 0.0:
             keep = exp(-interval / self._time) if self._time > 0.0 else 0.0
             kick = self._slow_sigma * sqrt(1.0 - keep * keep)

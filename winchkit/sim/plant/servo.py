@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import copysign, exp, inf
+from typing import NamedTuple
 
 from winchkit.errors import UsageError
 
@@ -14,8 +14,7 @@ _POSITION_GAIN = 25.0
 _BRAKE_DECELERATION = 2000.0
 
 
-@dataclass(frozen=True)
-class DriveCommand:
+class DriveCommand(NamedTuple):
     """Command to a drive's power stage, SI, in the motor's frame.
 
     With ``power`` the motor follows ``speed``, and ``angle`` if given (``speed`` is then its feed

@@ -2,8 +2,9 @@
 
 A cable is a Kelvin-Voigt spring of the unstrained length that its drum has paid out. Steps use the
 implicit midpoint rule, linearised in the cable lengths: it is stable for the rotation of a light
-platform on stiff cables (500 rad/s and more) in steps of 1 ms, and has no numerical damping. Cable
-directions are those in the middle of a step; those at its beginning make slow oscillations grow.
+platform on stiff cables (500 rad/s and more) in steps of 2.5 ms, and has no numerical damping.
+Cable directions are those in the middle of a step; those at its beginning make slow oscillations
+grow.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from winchkit.sim.robot.rotation import turned
 
 __all__ = ["Body", "CablePlatform"]
 
-_STEP = 1e-3
+_STEP = 2.5e-3
 _LEAST_STEP = 5e-5
 """Shorter times are left to the next call, s."""
 

@@ -5,63 +5,18 @@ from __future__ import annotations
 import socket
 import threading
 import time
-from collections import Counter
 from typing import Any
 
 import can
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.bus.interface import _Library
-from winchkit.drivers.can.bus.own_frames import OwnFrames
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.bench import BusSpec
 
 _GROUP = "239.74.163.2"
 _RPDO, _SDO, _NMT = 0x201, 0x601, 0x000
-
-
-@given(
-    st.lists(st.tuples(st.integers(0, 3), st.integers(0, 63), st.booleans()), max_size=300),
-    st.lists(st.integers(0, 300), max_size=10),
-)
-def test_own_frames_are_known_in_whatever_order_they_come_back(
-    frames: list[tuple[int, int, bool]], moments: list[int]
-) -> None:
-    """Some are lost, some overtake up to 63 others; few contents, so that many are alike."""
-    own, returning = OwnFrames(), []
-    own.watch(_RPDO)
-    for number, (content, delay, lost) in enumerate(frames):
-        data = bytes((content,))
-        own.note(_RPDO, data)
-        if not lost:
-            returning.append((number + delay, number, data))
-    strangers = Counter(moments)
-    for moment, (_, _, data) in enumerate(sorted(returning)):
-        for _ in range(strangers[moment]):
-            assert not own.take(_RPDO, b"stranger")
-        assert own.take(_RPDO, data)
-
-
-def test_one_frame_more_than_was_sent_is_somebody_elses() -> None:
-    own = OwnFrames()
-    own.watch(_RPDO)
-    for _ in range(3):
-        own.note(_RPDO, b"alike")
-    assert [own.take(_RPDO, b"alike") for _ in range(4)] == [True, True, True, False]
-
-
-def test_what_never_came_back_hides_nothing_for_long() -> None:
-    own = OwnFrames()
-    own.watch(_RPDO)
-    own.note(_RPDO, b"lost")
-    for number in range(70):
-        own.note(_RPDO, bytes((number,)))
-    for number in range(70):
-        assert own.take(_RPDO, bytes((number,)))
-    assert not own.take(_RPDO, b"lost")
 
 
 @pytest.fixture
@@ -107,7 +62,7 @@ def test_over_multicast_only_foreign_frames_are_received(group: BusSpec) -> None
         while not seen:
             assert time.monotonic() < deadline
             time.sleep(0.01)
-        assert bus.received > 600, "what was sent comes back"
+        assert bus.received == 2, "what was sent does not come back"
         assert heard == [b"\x06\0"]
     finally:
         stranger.shutdown()

@@ -16,13 +16,11 @@ from winchkit.drivers.can.bus.frame_tap import FrameTap
 from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
 from winchkit.drivers.can.bus.interface import (
     Interface,
-    hands_back,
     open_interface,
     queue_full,
     sends_remote,
     simulated_interface,
 )
-from winchkit.drivers.can.bus.own_frames import OwnFrames
 from winchkit.drivers.can.bus.socketcan import Frame
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import event_of, thread_of
@@ -126,15 +124,15 @@ class CanBus:
         """Whether :meth:`sync` or :meth:`heartbeat` send nothing, while a drive is to miss them."""
         self.tap: FrameTap | None = None
         """Who watches the frames; taken off where it has expired."""
-        self._own = OwnFrames() if hands_back(spec) else None
-        self.network = _Network(self._own, self._show_sent)
+        self.network = _Network(self._show_sent)
         self._spec = spec
         self._foreign: dict[int, list[Handler]] = {}
         self._handlers: dict[int, Handler] = {}
         self._errors = ErrorTally()
         self._heard: set[int] = set()
-        self._dropped = self._syncs_heard = 0
-        self._syncs_sent = 0
+        self._dropped = 0
+        self.foreign_syncs = 0
+        """SYNC frames on the bus that were not sent here."""
         self._full_since: float | None = None
         self._gathered: list[tuple[int, bytes]] | None = None
         self.on_foreign_sync: Callable[[str], None] = lambda _words: None
@@ -196,12 +194,6 @@ class CanBus:
         return frozenset(self._heard.union(node for node in known if 0 < node <= _LAST_NODE))
 
     @property
-    def foreign_syncs(self) -> int:
-        """SYNC frames on the bus that were not sent here."""
-        own = 0 if self._own is None else self._syncs_sent
-        return max(0, self._syncs_heard - own)
-
-    @property
     def foreign_sync(self) -> str:
         """Report of a second SYNC producer; empty without one."""
         count = self.foreign_syncs
@@ -213,7 +205,7 @@ class CanBus:
         )
 
     def _hear_sync(self, _data: bytes, _now: float) -> None:
-        self._syncs_heard += 1
+        self.foreign_syncs += 1
         if words := self.foreign_sync:
             self.on_foreign_sync(words)
 
@@ -224,19 +216,15 @@ class CanBus:
     def on_foreign(self, identifier: int, handler: Handler) -> None:
         """Call ``handler`` too for every frame with this identifier that was not sent here.
 
-        To be called before anything is sent with it: what is sent from then on is noted where the
-        interface hands it back. Other frames of the bus cost nothing by it.
+        Other frames of the bus cost nothing by it: no interface hands back what was sent here.
         """
-        handlers, own = self._foreign.setdefault(identifier, []), self._own
+        handlers = self._foreign.setdefault(identifier, [])
         if handler not in handlers:
             handlers.append(handler)
-        if own is not None:
-            own.watch(identifier)
 
         def receive(data: bytes, now: float) -> None:
-            if own is None or not own.take(identifier, data):
-                for each in handlers:
-                    each(data, now)
+            for each in handlers:
+                each(data, now)
 
         self.on(identifier, receive)
 
@@ -255,8 +243,6 @@ class CanBus:
         returned), and only a queue that stays full is a fault.
         """
         port = self._port
-        if self._own is not None:
-            self._own.note(identifier, data)
         try:
             with self.network.send_lock:
                 port.send(identifier, data)
@@ -303,8 +289,8 @@ class CanBus:
 
     def _sent_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
         """How many of the first of these frames one call has sent."""
-        if not frames or self._own is not None:
-            return 0  # what comes back must be noted before it is sent
+        if not frames:
+            return 0
         with self.network.send_lock:
             count = self._port.send_together(frames)
         self.sent += count
@@ -334,7 +320,6 @@ class CanBus:
     def sync(self) -> None:
         """Send SYNC."""
         if not self.sync_held:
-            self._syncs_sent += 1
             self.send(_SYNC, b"")
 
     def nmt(self, command: int, node: int) -> None:
@@ -423,9 +408,8 @@ class CanBus:
             self.network.notify(identifier, bytearray(data), now)
 
     def _show_sent(self, identifier: int, data: bytes) -> None:
-        """Show a frame that was sent here, unless the interface hands it back."""
-        if self._own is None:
-            self._show(self.clock.now(), identifier, data)
+        """Show a frame that was sent here; no interface hands it back."""
+        self._show(self.clock.now(), identifier, data)
 
     def _show(self, now: float, identifier: int, data: bytes) -> None:
         tap = self.tap
@@ -446,15 +430,13 @@ class CanBus:
 
 
 class _Network(canopen.Network):
-    """The canopen library's network; what its SDO clients send is noted as sent here."""
+    """The canopen library's network; what its SDO clients send is shown to the tap."""
 
-    def __init__(self, own: OwnFrames | None, show: Callable[[int, bytes], None]) -> None:
+    def __init__(self, show: Callable[[int, bytes], None]) -> None:
         super().__init__()
-        self._own, self._show = own, show
+        self._show = show
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
-        if self._own is not None and not remote:
-            self._own.note(can_id, bytes(data))
         super().send_message(can_id, data, remote)
         if not remote:
             self._show(can_id, bytes(data))

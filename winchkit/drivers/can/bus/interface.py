@@ -15,11 +15,11 @@ from winchkit.drivers.can.bus.socketcan import Frame, SocketCan
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler
 from winchkit.errors import ConnectionLost
+from winchkit.multicast import MulticastPort
 from winchkit.schema.bench import BusSpec
 
 __all__ = [
     "Interface",
-    "hands_back",
     "open_interface",
     "queue_full",
     "sends_remote",
@@ -29,10 +29,11 @@ __all__ = [
 _STAMPED = {"pcan", "kvaser", "ixxat", "vector", "neovi", "nican"}
 """Interfaces whose time stamps are the hardware's or its driver's."""
 _NO_BITRATE = ("virtual", "udp_multicast")
-_HAND_BACK = ("udp_multicast",)
-"""Interfaces that hand back what is sent through them, like frames of others."""
 _NO_REMOTE = ("socketcand", "neousys")
 """Interfaces for which python-can sends a remote frame as a data frame, or not at all."""
+
+_GROUP, _PORT = "239.74.163.2", 43113
+"""Default of python-can for ``udp_multicast``."""
 
 _STATES = {
     can.BusState.ACTIVE: BusState.ACTIVE,
@@ -108,6 +109,39 @@ class _Library:
             self.library.shutdown()
 
 
+class _Multicast:
+    """A group of UDP multicast."""
+
+    def __init__(self, port: MulticastPort) -> None:
+        self.library = _Sender(port)
+        self.dropped = 0
+        self._port = port
+        self.send, self.close = port.send, port.close
+
+    def receive(self, timeout: float) -> Sequence[Frame]:
+        received = self._port.receive(timeout)
+        return () if received is None else (Frame(*received),)
+
+    def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
+        return 0
+
+    def send_remote(self, identifier: int) -> None:
+        self._port.send(identifier, b"", remote=True)
+
+    def state(self) -> BusState | None:
+        return None
+
+
+class _Sender:
+    """Sends messages of python-can, for canopen's SDO clients."""
+
+    def __init__(self, port: MulticastPort) -> None:
+        self._port = port
+
+    def send(self, message: can.Message, timeout: float | None = None) -> None:
+        self._port.send(message.arbitration_id, bytes(message.data), remote=message.is_remote_frame)
+
+
 class _Simulated:
     """A port of a simulated bus in this process, in simulated time."""
 
@@ -150,11 +184,6 @@ def sends_remote(spec: BusSpec) -> bool:
     return spec.interface not in _NO_REMOTE
 
 
-def hands_back(spec: BusSpec) -> bool:
-    """Whether what is sent through this interface comes back, unmarked."""
-    return spec.interface in _HAND_BACK
-
-
 def simulated_interface(spec: BusSpec, clock: Clock) -> Interface | None:
     """The bus that a clock of simulated time has under this channel; None where it has none."""
     port = clock.can_port(spec.channel or "") if isinstance(clock, Scheduler) else None
@@ -167,11 +196,13 @@ def open_interface(spec: BusSpec, name: str) -> Interface:
     if spec.interface not in _NO_BITRATE:
         options["bitrate"] = spec.bitrate
     if spec.port is not None:
-        options["port"] = int(spec.port) if spec.interface == "udp_multicast" else spec.port
+        options["port"] = spec.port
     try:
         if spec.interface == "socketcan" and spec.channel:
             # python-can leaves its socket open where it cannot be bound.
             socket.if_nametoindex(spec.channel)
+        if spec.interface == "udp_multicast":
+            return _Multicast(MulticastPort(spec.channel or _GROUP, int(spec.port or _PORT)))
         bus = can.Bus(**options)
         if spec.interface == "socketcan":
             return SocketCan(bus)

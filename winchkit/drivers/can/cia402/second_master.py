@@ -34,9 +34,7 @@ _COMMANDS = {
 class SecondMaster:
     """What somebody else commanded one drive to do, on the bus of a bench.
 
-    It listens from the beginning on, before anything is sent to the drive from here, so that no
-    frame of this bench comes back without having been noted
-    (:mod:`~winchkit.drivers.can.bus.own_frames`).
+    It listens from the beginning on; no interface hands back what is sent from here.
     """
 
     def __init__(self, bus: CanBus, node: int, rpdos: Iterable[int], host: int) -> None:

@@ -8,9 +8,9 @@ from contextlib import ExitStack, closing
 import can
 import pytest
 
+from winchkit.multicast import MulticastPort
 from winchkit.schema.bench import BusSpec
 from winchkit.sim.live.buses import wired
-from winchkit.sim.live.multicast import MulticastPort
 
 Ports = tuple[MulticastPort, MulticastPort, can.BusABC]
 
