@@ -260,6 +260,29 @@ def test_the_frames_of_a_cycle_are_sent_together_and_in_their_order(
     assert port.sent[5:] == [CYCLE[1]], "once sent, nothing is gathered"
 
 
+def test_an_emergency_stop_takes_back_the_command_that_waits() -> None:
+    """Nothing of the cycle follows its quick stop; by what the drive receives."""
+    spec = bus_spec()
+    with DriveOnBus(spec) as drive:
+        bus = CanBus(spec, "can", CLOCK)
+        axis = Cia402Axis(bus, 1, device(), WatchSpec(127, 0.05, 0.004, True), CLOCK)
+        try:
+            axis.commission()
+            cycle(bus, axis, Wish.ENABLE, 25, velocity=0.0)
+            axis.begin_cycle(25, CLOCK.now())
+            bus.gather()
+            axis.send(Wish.ENABLE, velocity=3.0)
+            bus.post(0x202, b"other")
+            axis.emergency_stop(sdo=False)
+            until(lambda: (0x201, axis._stop_frames[0][1]) in drive.frames)
+            bus.send_gathered()
+            until(lambda: (0x202, b"other") in drive.frames)
+            mine = [data for identifier, data in drive.frames if identifier == 0x201]
+            assert mine[-1] == axis._stop_frames[0][1]
+        finally:
+            bus.close()
+
+
 def test_a_full_queue_leaves_out_what_it_does_not_take(
     bus: CanBus, interfaces: list[Interface]
 ) -> None:

@@ -271,6 +271,12 @@ class CanBus:
         else:
             self._gathered.append((identifier, data))
 
+    def withdraw(self, identifier: int) -> None:
+        """Take back what waits with this identifier; for a stop, which nothing may follow."""
+        waiting = self._gathered
+        if waiting:
+            waiting[:] = [frame for frame in waiting if frame[0] != identifier]
+
     def send_gathered(self) -> None:
         """Send what has been gathered, by one call where the interface has one for it.
 

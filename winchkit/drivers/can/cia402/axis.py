@@ -140,6 +140,7 @@ class Cia402Axis:
         """
         self._previous = QUICK_STOP
         for identifier, data in () if self.host.withholds_rpdos else self._stop_frames:
+            self._bus.withdraw(identifier)
             self._bus.send(identifier, data)
         if sdo:
             self._sdo_stop.send()
