@@ -29,6 +29,7 @@ OWN = Supervised(
     ),
     stale=0.1,
 )
+NOW = 50.0
 GOOD = WinchInput(
     feedback_age=0.004,
     missed_syncs=0,
@@ -41,9 +42,15 @@ GOOD = WinchInput(
     commanded=0.1,
     cable_length=5.0,
     moving=True,
-    tension=Instrumented(100.0, 0.01, 0.1, "good", 0.0, gross=100.0),
+    now=NOW,
+    tension=Instrumented(100.0, NOW - 0.01, 0.1, "good", 0.0, gross=100.0),
 )
 OTHERWISE = {
+    "second_master": ("", "NMT command stop"),
+    "moving": (True, False),
+    "follows": (False, True),
+    "disabled": (False, True),
+    "winding_speed": (0.1, 0.0, 0.3),
     "heartbeat_lost": (False, True),
     "boot_ups": (0, 1, 2),
     "operational": (True, False),
@@ -55,7 +62,7 @@ OTHERWISE = {
     "frozen": ("", "stands still"),
     "turns_known": (True, False),
     "cable_length": (5.0, 0.5, 9.5),
-    "tension": (GOOD.tension, None, Instrumented(600.0, 0.01, 0.1, "good", 0.0, gross=600.0)),
+    "tension": (GOOD.tension, None, Instrumented(600.0, NOW - 0.01, 0.1, "good", 0.0, gross=600.0)),
 }
 """Values of the fields that change from cycle to cycle."""
 
@@ -83,11 +90,21 @@ def test_a_condition_on_facts_asks_for_nothing_else(row: Condition) -> None:
     assert memory.asked <= {"boot_ups"}
 
 
+def _unmarked(row: Condition) -> Condition:
+    """The same row, which itself looks whether the winch is what it is tested on."""
+
+    def holds(item: WinchInput, own: Supervised, memory: Memory) -> bool:
+        applies = not row.when or getattr(item, row.when)
+        return bool(applies) and row.holds(item, own, memory)
+
+    return replace(row, by_facts=False, when="", holds=holds)
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_the_verdict_is_that_of_every_row_in_every_cycle(seed: int) -> None:
     """The same rows with none marked are tested in every cycle."""
     chance = random.Random(seed)
-    unmarked = [replace(row, by_facts=False) for row in CONDITIONS]
+    unmarked = [_unmarked(row) for row in CONDITIONS]
     marked = Supervisor({"A": OWN, "B": OWN})
     plain = Supervisor({"A": OWN, "B": OWN}, unmarked)
     items = {"A": GOOD, "B": GOOD}
@@ -121,8 +138,8 @@ def test_a_flag_of_the_cell_counts_once_the_cell_is_there() -> None:
 
 def test_a_reading_that_does_not_count_is_no_overload() -> None:
     """Too old, or no number: it trips as such, and not by its tension."""
-    old = Instrumented(600.0, 0.2, 0.1, "good", 0.0, gross=600.0)
-    none = Instrumented(math.nan, 0.01, 0.1, "fault", 0.0, gross=600.0)
+    old = Instrumented(600.0, NOW - 0.2, 0.1, "good", 0.0, gross=600.0)
+    none = Instrumented(math.nan, NOW - 0.01, 0.1, "fault", 0.0, gross=600.0)
     for tension, kind in ((old, "cell stale"), (none, "cell")):
         supervisor = Supervisor({"A": OWN})
         blocked = supervisor.check(0.0, {"A": GOOD._replace(tension=tension)})

@@ -43,7 +43,7 @@ def well(now: float, change: State) -> WinchInput:
     tension = change.get("tension", 100.0)
     cell = Instrumented(
         value=change.get("value", tension),
-        age=change.get("age", 0.01),
+        since=now - change.get("age", 0.01),
         max_age=0.3,
         quality="good",
         time=now,
@@ -64,6 +64,7 @@ def well(now: float, change: State) -> WinchInput:
         "follows": True,
         "target_speed": 0.1,
         "length": 2.0,
+        "now": now,
     }
     own = {key: value for key, value in change.items() if key in WinchInput._fields}
     return WinchInput(**{**base, **own, "tension": cell})

@@ -89,6 +89,10 @@ class Bus:
     def send(self, identifier: int, data: bytes) -> None:
         self.sent.append((identifier, data))
 
+    def post(self, identifier: int, data: bytes) -> None:
+        """No cycle is gathered here."""
+        self.send(identifier, data)
+
     def deliver(self, identifier: int, data: bytes) -> None:
         handler = self.handlers.get(identifier)
         if handler is not None:

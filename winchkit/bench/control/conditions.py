@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from winchkit.bench.control.observation import Instrumented, Memory, Supervised, WinchInput
 from winchkit.bench.control.snapshot import Direction
@@ -42,6 +43,8 @@ _SLIP_TIME = 0.5
 
 Test = Callable[[WinchInput, Supervised, Memory], bool]
 Words = Callable[[WinchInput, Supervised, Memory], str]
+When = Literal["", "moving", "disabled", "follows"]
+"""A field of :class:`WinchInput`; empty for always."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +64,8 @@ class Condition:
     """How long it has to hold, s."""
     by_facts: bool = False
     """Whether it looks at nothing but ``observation.FACTS``, and at boot-ups dealt with."""
+    when: When = ""
+    """What the winch is to be, for the condition to be tested."""
     needs: str = ""
     """The key of ``[winch.A.limits]`` or the instrument without which it is not tested."""
 
@@ -68,6 +73,11 @@ class Condition:
 def _cell(item: WinchInput) -> Instrumented:
     assert item.tension is not None, "tested only where there is a cell"
     return item.tension
+
+
+def _age(item: WinchInput) -> float:
+    """Of the load cell's newest reading, s."""
+    return item.now - _cell(item).since
 
 
 def _high(_item: WinchInput, own: Supervised, memory: Memory) -> bool:
@@ -88,12 +98,11 @@ def _rate(_item: WinchInput, own: Supervised, memory: Memory) -> bool:
 
 def _unreadable(item: WinchInput, _own: Supervised, _memory: Memory) -> bool:
     cell = _cell(item)
-    return math.isnan(cell.value) and cell.age <= cell.max_age
+    return math.isnan(cell.value) and _age(item) <= cell.max_age
 
 
 def _stale(item: WinchInput, _own: Supervised, _memory: Memory) -> bool:
-    cell = _cell(item)
-    return cell.age > cell.max_age
+    return _age(item) > _cell(item).max_age
 
 
 def _short(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
@@ -114,8 +123,8 @@ def _following_limit(own: Supervised) -> float:
 
 
 def _stale_words(item: WinchInput, _own: Supervised, _memory: Memory) -> str:
-    cell = _cell(item)
-    since = "yet" if math.isinf(cell.age) else f"for {cell.age:.2f} s"
+    cell, age = _cell(item), _age(item)
+    since = "yet" if math.isinf(age) else f"for {age:.2f} s"
     reason = f": {cell.problem}" if cell.problem else ""
     return f"no load cell reading {since} (limit {cell.max_age:.2f} s){reason}"
 
@@ -131,6 +140,7 @@ CONDITIONS: tuple[Condition, ...] = (
             "other master or tool on the bus, then reset"
         ),
         latches=True,
+        by_facts=True,
     ),
     Condition(
         "boot-up",
@@ -203,32 +213,33 @@ CONDITIONS: tuple[Condition, ...] = (
         "motion at rest",
         "cable speed by the motor while the drive is commanded to be disabled",
         "3 steps of 606Ch, at least 1 % of limits.speed",
-        lambda item, own, _memory: item.disabled and abs(item.winding_speed) > own.rest_speed,
+        lambda item, own, _memory: abs(item.winding_speed) > own.rest_speed,
         lambda item, own, _memory: (
             f"the motor turns although rest is commanded: {item.winding_speed:.3f} m/s of "
             f"cable (limit {own.rest_speed:.3f} m/s); check the brake and who turns it, reset"
         ),
         latches=True,
         debounce=_REST_TIME,
+        when="disabled",
     ),
     Condition(
         "slowing down",
         "measured cable speed while the commanded speed falls",
         "the fastest commanded within limits.response_time, and 5 %",
-        lambda item, _own, memory: item.follows and memory.unresponsive,
+        lambda _item, _own, memory: memory.unresponsive,
         lambda item, own, _memory: (
             f"the drive does not slow down as commanded: {item.winding_speed:.3f} m/s, commanded "
             f"{item.target_speed:.3f} m/s, within {own.limits.response_time:g} s "
             "(limits.response_time); it does not receive its targets, or they have no effect"
         ),
+        when="follows",
     ),
     Condition(
         "deviation",
         "measured against commanded cable speed",
         "25 % of limits.speed",
         lambda item, own, _memory: (
-            item.follows
-            and abs(item.winding_speed - item.commanded) > _DEVIATION * own.limits.speed
+            abs(item.winding_speed - item.commanded) > _DEVIATION * own.limits.speed
         ),
         lambda item, own, _memory: (
             f"the motor does not follow: {item.winding_speed:.3f} m/s, commanded "
@@ -237,14 +248,14 @@ CONDITIONS: tuple[Condition, ...] = (
             f"{_DEVIATION_TIME:g} s); check load, brake and drive limits"
         ),
         debounce=_DEVIATION_TIME,
+        when="follows",
     ),
     Condition(
         "runaway",
         "measured cable speed against the direction and above the size of the commanded one",
         "25 % of limits.speed",
         lambda item, own, _memory: (
-            item.follows
-            and _beyond(item.winding_speed, item.commanded) > _DEVIATION * own.limits.speed
+            _beyond(item.winding_speed, item.commanded) > _DEVIATION * own.limits.speed
         ),
         lambda item, own, _memory: (
             f"the motor turns faster than commanded, or the other way: {item.winding_speed:.3f} "
@@ -252,19 +263,19 @@ CONDITIONS: tuple[Condition, ...] = (
             f"{_DEVIATION * own.limits.speed:.3f} m/s); check direction, scale and load"
         ),
         debounce=_RUNAWAY_TIME,
+        when="follows",
     ),
     Condition(
         "following error",
         "target position less measured position, in cable",
         "limits.following_error, else 0.25 s at limits.speed",
-        lambda item, own, _memory: (
-            item.follows and abs(item.following_error) > _following_limit(own)
-        ),
+        lambda item, own, _memory: abs(item.following_error) > _following_limit(own),
         lambda item, own, _memory: (
             f"following error {abs(item.following_error) * 1e3:.0f} mm of cable (limit "
             f"{_following_limit(own) * 1e3:.0f} mm); check load, brake and drive limits"
         ),
         debounce=_FOLLOWING_DEBOUNCE,
+        when="follows",
     ),
     Condition(
         "speed",
@@ -315,14 +326,13 @@ CONDITIONS: tuple[Condition, ...] = (
         "cable slip",
         "change of the length sensor against the change by the motor, since the motion began",
         "50 mm and 5 % of the moved length",
-        lambda item, _own, memory: (
-            item.moving and abs(memory.slip) > _SLIP + _SLIP_SHARE * memory.moved
-        ),
+        lambda _item, _own, memory: abs(memory.slip) > _SLIP + _SLIP_SHARE * memory.moved,
         lambda _item, _own, memory: (
             f"the length sensor and the motor disagree by {memory.slip * 1e3:.0f} mm after "
             f"{memory.moved:.2f} m of motion; the cable slips, sticks or the profile is wrong"
         ),
         debounce=_SLIP_TIME,
+        when="moving",
         needs="length instrument",
     ),
     Condition(
@@ -428,7 +438,7 @@ CONDITIONS: tuple[Condition, ...] = (
         by_facts=True,
     ),
 )
-"""Tested in this order, on each winch that has what a row needs."""
+"""Tested in this order, on each winch that has what a row needs and is what it is tested on."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,16 +28,13 @@ _STEPS, _REST_STEPS = 4, 3
 
 
 class Instrumented(NamedTuple):
-    """Newest reading of a sensor as the supervisor needs it.
-
-    A named tuple, as is :class:`WinchInput`: they are made in every cycle of every winch, and a
-    frozen dataclass takes several times as long to make.
-    """
+    """Newest reading of a sensor as the supervisor needs it; the same until another one comes."""
 
     value: float
     """SI; NaN where the device flags it."""
-    age: float
-    """Since it was received, s; infinity before the first."""
+    since: float
+    """When its age begins to count, s: when it was received, or when this computer went on after
+    a standstill; minus infinity before the first."""
     max_age: float
     """s."""
     quality: str
@@ -52,7 +49,11 @@ class Instrumented(NamedTuple):
 
 
 class WinchInput(NamedTuple):
-    """What is known of one winch in this cycle; SI."""
+    """What is known of one winch in this cycle; SI.
+
+    A named tuple, since one is made of every winch in every cycle: a frozen dataclass takes
+    several times as long to make.
+    """
 
     feedback_age: float
     """Since the SYNC of the newest complete feedback, s; infinity before the first."""
@@ -99,9 +100,12 @@ class WinchInput(NamedTuple):
     """Whether the motor angle counts every turn; if not, the cable length is NaN."""
     sensors: Mapping[str, Instrumented] = MappingProxyType({})
     """Newest reading of each instrument by its role; ``tension`` is that of the cell."""
+    now: float = 0.0
+    """Time of the cycle, s."""
 
 
 FACTS = (
+    "second_master",
     "heartbeat_lost",
     "boot_ups",
     "operational",
@@ -200,7 +204,7 @@ class Memory:
             self.gross = math.nan
         else:
             value, gross = cell.value, cell.gross
-            counts = cell.age <= cell.max_age and not math.isnan(value)
+            counts = item.now - cell.since <= cell.max_age and not math.isnan(value)
             self.gross = (gross if math.isfinite(gross) else value) if counts else math.nan
             if cell.time == cell.time:
                 self._follow_tension(cell)

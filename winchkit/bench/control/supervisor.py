@@ -7,6 +7,7 @@ condition needs (debounce, rates, boot-ups) and the trips that it latched.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
 
 from winchkit.bench.control.conditions import CONDITIONS, Condition, Test
 from winchkit.bench.control.observation import Memory, Supervised, WinchInput, facts_of
@@ -17,6 +18,8 @@ __all__ = ["Supervisor", "direction_of"]
 _BY_CELL = ("cell", "tension_high", "tension_slack", "tension_rate")
 """Needs of conditions that are tested only where there is a load cell."""
 _Rows = tuple[tuple[Test, Condition], ...]
+_Case = tuple[bool, bool, bool, bool]
+"""Whether the load cell is there, and the winch moving, disabled and to follow."""
 
 
 class Supervisor:
@@ -32,15 +35,7 @@ class Supervisor:
         self.warnings: tuple[Trip, ...] = ()
         """Conditions that hold and forbid nothing."""
         self._memory = {name: Memory(own) for name, own in winches.items()}
-        applying = {
-            name: [row for row in conditions if _applies(row, own)] for name, own in winches.items()
-        }
-        self._rows = {name: _split(rows) for name, rows in applying.items()}
-        self._without = {
-            name: _split([row for row in rows if row.needs not in _BY_CELL])
-            for name, rows in applying.items()
-        }
-        """The same for a winch whose load cell is not there."""
+        self._rows = {name: _by_case(conditions, own) for name, own in winches.items()}
 
     def check(self, now: float, inputs: Mapping[str, WinchInput]) -> tuple[Trip, ...]:
         """Everything that forbids motion now; latches what must stop a motion under way."""
@@ -49,7 +44,8 @@ class Supervisor:
             memory = self._memory[name]
             memory.observe(item)
             own, cell = memory.own, item.tension is not None
-            every, by_numbers = self._rows[name] if cell else self._without[name]
+            case = (cell, item.moving, item.disabled, item.follows)
+            every, by_numbers = self._rows[name][case]
             # Under the same facts a condition on facts holds no more than before.
             facts = (cell, facts_of(item))
             rows = by_numbers if facts == memory.quiet else every
@@ -108,10 +104,20 @@ def _debounced(
             yield row
 
 
-def _split(rows: Sequence[Condition]) -> tuple[_Rows, _Rows]:
-    """All of the conditions with their tests, and those on more than facts."""
-    every = tuple((row.holds, row) for row in rows)
-    return every, tuple((holds, row) for holds, row in every if not row.by_facts)
+def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, tuple[_Rows, _Rows]]:
+    """The conditions that are tested in each case: all of them, and those on more than facts."""
+    applying = [row for row in conditions if _applies(row, own)]
+    found = {}
+    for cell, moving, disabled, follows in product((False, True), repeat=4):
+        holds = {"": True, "moving": moving, "disabled": disabled, "follows": follows}
+        rows = tuple(
+            (row.holds, row)
+            for row in applying
+            if holds[row.when] and (cell or row.needs not in _BY_CELL)
+        )
+        by_numbers = tuple((test, row) for test, row in rows if not row.by_facts)
+        found[cell, moving, disabled, follows] = rows, by_numbers
+    return found
 
 
 def _applies(row: Condition, own: Supervised) -> bool:

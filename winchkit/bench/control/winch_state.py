@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import AxisPort, Controller
@@ -25,6 +25,7 @@ _IDLE = (Phase.DISABLED, Phase.RESETTING)
 _ANSWERED = 2
 """SYNCs that a drive may leave unanswered and still counts as heard."""
 _FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
+_new = tuple.__new__
 _NOTHING = AxisFeedback(math.nan, 0, State.UNKNOWN, 0, math.nan, math.nan, math.nan)
 """What is shown of a drive that has said nothing yet."""
 
@@ -61,6 +62,19 @@ class WinchParts:
     """Name of the client that commands it."""
     cable_spec: CableSpec = field(default_factory=CableSpec)
     """The cable as the profile declares it."""
+    _read: tuple[Any, ...] = ()
+    _instruments: Mapping[str, Instrumented] = field(default_factory=dict)
+
+    def instruments(self, resumed: float) -> Mapping[str, Instrumented]:
+        """Newest reading of each instrument; the same mapping until another one comes."""
+        read = (resumed, [(sensor.latest, sensor.problem) for sensor in self.sensors.values()])
+        if read != self._read:
+            self._read = read
+            self._instruments = {
+                role: _instrumented(*seen, self.sensors[role].max_age, resumed)
+                for role, seen in zip(self.sensors, read[1], strict=True)
+            }
+        return self._instruments
 
 
 def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) -> WinchInput:
@@ -69,55 +83,60 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     Silence counts from ``resumed`` (s) on at the earliest: before, this computer stood still.
     """
     axis, feedback, controller = parts.axis, parts.axis.feedback, parts.controller
-    phase = controller.phase
-    length = speed = arm = math.nan
-    fault = False
+    phase, frozen = controller.phase, parts.frozen
+    cable_length = winding_speed = arm = target_speed = math.nan
+    following_error, feedback_age, missed_syncs = 0.0, math.inf, sync
+    fault, turns_known = False, True
     if feedback is not None:
         if parts.cable.bends:
             parts.cable.feel(_sample(parts, feedback, now))
-        length, arm = parts.cable.at(feedback.angle)
-        speed = feedback.velocity * arm
-        fault = feedback.state in _FAULTS
-        if not feedback.turns_known:
-            length = math.nan
-    sensors = {}
-    for role, sensor in parts.sensors.items():
-        sensors[role] = _instrumented(sensor, now, resumed)
-    heartbeat, operational = axis.heartbeat, axis.operational
-    alarms = () if fault else axis.alarms
-    missed = sync if feedback is None else sync - 1 - feedback.sync
+        cable_length, arm = parts.cable.at(feedback.angle)
+        winding_speed = feedback.velocity * arm
+        fault, turns_known = feedback.state in _FAULTS, feedback.turns_known
+        if not turns_known:
+            cable_length = math.nan
+        feedback_age = now - (feedback.time if feedback.time > resumed else resumed)
+        missed_syncs = sync - 1 - feedback.sync
     # The last feedback of a silent drive must not be compared with its present command.
-    follows = controller.follows and missed <= _ANSWERED
-    target_speed, following_error = math.nan, 0.0
+    follows = controller.follows and missed_syncs <= _ANSWERED
     if follows and feedback is not None:
         target_speed, following_error = controller.tracking(feedback.angle, arm)
-    return WinchInput(
-        feedback_age=math.inf if feedback is None else now - max(feedback.time, resumed),
-        missed_syncs=missed,
-        heartbeat_lost=heartbeat.lost(now, resumed),
-        boot_ups=heartbeat.boot_ups,
-        operational=operational,
-        mode_kept=axis.mode_kept,
-        fault=axis.fault_text if fault else "",
-        winding_speed=speed,
-        commanded=controller.commanded,
-        cable_length=length,
-        moving=phase not in _IDLE,
-        tension=sensors.get("cell"),
-        nmt="" if operational else axis.nmt_text,
-        uncommanded=controller.take_uncommanded(),
-        second_master=axis.second_master,
-        disabled=phase is Phase.DISABLED,
-        follows=follows,
-        target_speed=target_speed,
-        following_error=following_error,
-        length=_fresh(sensors["length"], now) if "length" in sensors else math.nan,
-        emergencies=alarms,
-        emergency_text=axis.alarm_text if alarms else "",
-        frozen="" if parts.frozen is None else _frozen(parts, parts.frozen, now, speed),
-        turns_known=feedback is None or feedback.turns_known,
-        unstable="" if parts.frozen is None else parts.frozen.unstable,
-        sensors=sensors,
+    sensors = parts.instruments(resumed)
+    heartbeat, operational = axis.heartbeat, axis.operational
+    emergencies = () if fault else axis.alarms
+    length = sensors.get("length")
+    # What WinchInput(...) makes, without matching 27 keywords, which takes ten times as long.
+    return _new(
+        WinchInput,
+        (
+            feedback_age,
+            missed_syncs,
+            heartbeat.lost(now, resumed),
+            heartbeat.boot_ups,
+            operational,
+            axis.mode_kept,
+            axis.fault_text if fault else "",
+            winding_speed,
+            controller.commanded,
+            cable_length,
+            phase not in _IDLE,  # moving
+            sensors.get("cell"),  # tension
+            "" if operational else axis.nmt_text,
+            controller.take_uncommanded(),
+            axis.second_master,
+            phase is Phase.DISABLED,
+            follows,
+            target_speed,
+            following_error,
+            math.nan if length is None else _fresh(length, now),
+            emergencies,
+            axis.alarm_text if emergencies else "",
+            "" if frozen is None else frozen.unstable,
+            "" if frozen is None else _frozen(parts, frozen, now, winding_speed),
+            turns_known,
+            sensors,
+            now,
+        ),
     )
 
 
@@ -138,17 +157,18 @@ def _fresh(sensor: Instrumented, now: float) -> float:
     return sensor.value if now - sensor.received <= sensor.max_age else math.nan
 
 
-def _instrumented(sensor: SensorPort, now: float, resumed: float) -> Instrumented:
-    """Newest reading of a sensor and its age."""
-    reading, trouble = sensor.latest, sensor.problem
+def _instrumented(
+    reading: Reading | None, trouble: ConnectionLost | None, max_age: float, resumed: float
+) -> Instrumented:
+    """Newest reading of a sensor; its age counts from ``resumed`` (s) on at the earliest."""
     problem = "" if trouble is None else str(trouble)
     if reading is None:
-        return Instrumented(math.nan, math.inf, sensor.max_age, "", math.nan, problem)
+        return Instrumented(math.nan, -math.inf, max_age, "", math.nan, problem)
     received = reading.t_receive
     return Instrumented(
         reading.value,
-        now - (received if received > resumed else resumed),
-        sensor.max_age,
+        max(received, resumed),
+        max_age,
         str(reading.quality),
         reading.t_sample,
         problem,

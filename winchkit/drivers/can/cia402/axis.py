@@ -282,7 +282,10 @@ class Cia402Axis:
     @property
     def state(self) -> State:
         """Its power state as far as it is certain: UNKNOWN once what it said is stale."""
-        feedback = self.feedback
+        return self._certain(self.feedback)
+
+    def _certain(self, feedback: AxisFeedback | None) -> State:
+        """The state that a feedback, the newest, shows."""
         if feedback is None or self.mapping_lost:
             return State.UNKNOWN
         sync, now = self._cycle
@@ -349,11 +352,11 @@ class Cia402Axis:
             # The drive's watchdog arms on the first life sign that it receives.
             wish = Wish.DISABLE
         word = control_word(
-            self.state,
+            self._certain(feedback),
             wish,
             previous=self._previous,
             age=self._cycle[0] - feedback.sync,
-            at_rest=self.at_rest,
+            at_rest=self._position.at_rest(feedback),
         )
         command = Command(wish, velocity, angle, torque, start)
         word, frames = commander.frames(word, command, feedback)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterable, Iterator
 from enum import Enum
+from itertools import accumulate, islice
 from typing import NamedTuple
 
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
@@ -110,7 +110,14 @@ class Commander:
         )
         self._objects = [key for _, codec in self._codecs for key in codec.position]
         """Of all RPDOs in their order; the values of a cycle stand in the same order."""
-        self._slices = tuple(_slices(len(codec.objects) for _, codec in self._codecs))
+        self._layout = struct.Struct("<" + "".join(codec.layout for _, codec in self._codecs))
+        """Of all RPDOs, which are packed at once."""
+        ends = list(accumulate(codec.size for _, codec in self._codecs))
+        self._parts = tuple(
+            (identifier, slice(end - codec.size, end))
+            for (identifier, codec), end in zip(self._codecs, ends, strict=True)
+        )
+        """Identifier of each RPDO, and its bytes among those of all."""
         self._zeros = [self._mode.number if key == _MODE else 0 for key in self._objects]
         kind, feeds = self._mode.kind, (_VELOCITY_OFFSET,)
         self._controls = self._places(_CONTROL)
@@ -162,18 +169,27 @@ class Commander:
 
     def _packed(self, values: list[int]) -> list[tuple[int, bytes]]:
         """The RPDOs with these values."""
-        frames = []
-        for (identifier, codec), own in zip(self._codecs, self._slices, strict=True):
+        try:
+            data = self._layout.pack(*values)
+        except struct.error:
+            raise NotPermitted(self._beyond(values)) from None
+        return [(identifier, data[part]) for identifier, part in self._parts]
+
+    def _beyond(self, values: list[int]) -> str:
+        """Which RPDO a target does not fit into, in words."""
+        left = iter(values)
+        for _, codec in self._codecs:
+            own = list(islice(left, len(codec.objects)))
             try:
-                frames.append((identifier, codec.encode(values[own])))
+                codec.encode(own)
             except struct.error:
-                said = zip(codec.position, values[own], strict=True)
+                said = zip(codec.position, own, strict=True)
                 words = ", ".join(f"{_text(key)} = {value}" for key, value in said)
-                raise NotPermitted(
+                return (
                     f"{self._name}: a target does not fit into RPDO {codec.spec.number} ({words}); "
                     "it is beyond the drive's range"
-                ) from None
-        return frames
+                )
+        raise AssertionError("what fits into each RPDO fits into all")
 
     def _aim(self, command: Command, feedback: AxisFeedback, moves: bool) -> tuple[int, int]:
         """The bits of the mode and the target position: the actual one where nothing is asked."""
@@ -196,14 +212,6 @@ class Commander:
         """Bit 4 in modes without a handshake: follow (IP), start a homing (HM)."""
         name = self._mode.name
         return START if name == "IP" or (name == "HM" and command.start) else 0
-
-
-def _slices(sizes: Iterable[int]) -> Iterator[slice]:
-    """Where each of several pieces stands in what they make together."""
-    end = 0
-    for size in sizes:
-        start, end = end, end + size
-        yield slice(start, end)
 
 
 def _check(name: str, drive: Commissioned, mode: str, target: Key | None) -> None:
