@@ -51,6 +51,28 @@ def test_an_effect_that_vanishes_is_at_zero(effect: Effect) -> None:
 
 
 @every
+@settings(max_examples=10, deadline=None)
+@given(data=st.data(), reach=st.floats(0.1, 5.0))
+def test_an_interval_around_a_coordinate_has_the_value_inside(
+    effect: Effect, data: st.DataObject, reach: float
+) -> None:
+    """Also where it reaches beyond the null, which for a stiffness is an infinite one."""
+    coordinates = Coordinates(effect)
+    x = drawn(effect, data)
+    polar = {name for pair in effect.polar_pairs for name in pair}
+    here = coordinates.values(x, effect.null)
+    for index, name in enumerate(coordinates.names):
+        if name in polar:
+            continue
+        ends = []
+        for side in (-reach, reach):
+            moved = x.copy()
+            moved[index] += side
+            ends.append(coordinates.values(moved, effect.null)[name])
+        assert min(ends) <= here[name] <= max(ends)
+
+
+@every
 def test_usual_sizes_are_near_one_and_within_bounds(effect: Effect) -> None:
     coordinates = Coordinates(effect)
     low, high = coordinates.bounds()

@@ -153,7 +153,8 @@ def _to_coordinate(parameter: Parameter, value: float) -> float:
 
 def _to_value(parameter: Parameter, x: float) -> float:
     if parameter.reciprocal:
-        value = parameter.typical / x if x else inf
+        # A stiffness beyond the null, as at the end of an interval, is infinite.
+        value = parameter.typical / x if x > 0 or (x and parameter.low < 0) else inf
     elif parameter.role == "shape" and parameter.low > 0:
         value = parameter.typical * exp(min(x, 700.0))
     else:

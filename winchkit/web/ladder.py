@@ -12,7 +12,7 @@ from winchkit.diagnosis.results import Diagnosis, Estimate
 from winchkit.effects.effect import Effect
 from winchkit.report.detectability import effects_of
 from winchkit.report.words.headline import headline
-from winchkit.report.words.numbers import Scale, quantity, scale_for, significant, with_std
+from winchkit.report.words.numbers import Scale, between, scale_for, significant, with_std
 from winchkit.report.words.sentence import capital, changes_text, sentence, where_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
 
@@ -182,9 +182,7 @@ def card(
             {
                 "name": parameter_name(name),
                 "text": with_std(e.value, e.std, e.unit),
-                "interval": None
-                if e.interval is None
-                else f"{quantity(e.interval[0], e.unit)} … {quantity(e.interval[1], e.unit)}",
+                "interval": None if e.interval is None else between(*e.interval, e.unit),
             }
             for name, e in values.items()
         ],

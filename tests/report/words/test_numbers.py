@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.report.words.numbers import (
+    between,
     percent,
     quantity,
     scale_for,
@@ -98,7 +99,7 @@ def test_one_scale_serves_several_sizes_by_the_largest_that_is_finite() -> None:
 
 def test_numbers_beyond_reach_are_written_in_powers_of_ten() -> None:
     assert significant(3.2e-9, 2) == "3.2e−09"
-    assert significant(float("-inf")) == "−∞"
+    assert significant(float("-math.inf")) == "−∞"
     assert significant(9.999, 2) == "10"
 
 
@@ -123,3 +124,11 @@ def test_figures_keep_together_with_their_units() -> None:
         "in",
         "it",
     ]
+
+
+def test_an_interval_without_one_of_its_ends() -> None:
+    """As of a stiffness, which may be infinite."""
+    assert between(236e3, 259e3, "N") == "236 to 259 kN"
+    assert between(751.7e3, math.inf, "N") == "above 752 kN"
+    assert between(-math.inf, 0.02, "m") == "below 20.0 mm"
+    assert between(-math.inf, math.inf, "N") == "any value"

@@ -153,7 +153,11 @@ def significant(value: float, digits: int = 3) -> str:
 
 
 def between(low: float, high: float, unit: str) -> str:
-    """An SI interval with two digits of its width: ``236 to 259 kN``."""
+    """An SI interval with two digits of its width: ``236 to 259 kN``; one end: ``above 236 kN``."""
+    if not isfinite(high) or not isfinite(low):
+        if not isfinite(high) and not isfinite(low):
+            return "any value"
+        return f"below {quantity(high, unit)}" if isfinite(high) else f"above {quantity(low, unit)}"
     scale = scale_for((low, high), unit)
     ends, apart = (low / scale.worth, high / scale.worth), abs(high - low) / scale.worth
     decimals = 1 - floor(log10(apart)) if apart > 0 else 2
