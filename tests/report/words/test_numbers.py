@@ -99,7 +99,7 @@ def test_one_scale_serves_several_sizes_by_the_largest_that_is_finite() -> None:
 
 def test_numbers_beyond_reach_are_written_in_powers_of_ten() -> None:
     assert significant(3.2e-9, 2) == "3.2e−09"
-    assert significant(float("-math.inf")) == "−∞"
+    assert significant(float("-inf")) == "−∞"
     assert significant(9.999, 2) == "10"
 
 
