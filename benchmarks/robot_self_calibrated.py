@@ -1,11 +1,12 @@
 """A robot calibrates itself: CABTIVE's procedure on its bench, in one call.
 
 ``python benchmarks/robot_self_calibrated.py [--seed 1] [--poses 60] [--json]``: the simulated robot
-``cabtive-robot`` has exit and anchor points that differ from the profile's by 2.5 mm, elastic
-cables, and a tracker (0.02 mm) in a frame of its own. The bench moves the platform by CAN frames to
-random poses, waits for rest, averages tracker and cells, fits, and judges poses that were never
-used. Prints one JSON object: position errors of these in mm, before and after. Exits with 1 above
-0.04 mm. The paper: 1.1 mm before, 0.47 mm after, on its machine.
+``cabtive-robot`` has exit and anchor points that differ from the profile's by 5 mm per coordinate,
+drums whose radii differ by 0.5 mm, elastic cables, and a tracker (0.02 mm) in a frame of its own.
+The bench moves the platform by CAN frames to random poses, waits for rest, averages tracker and
+cells, fits, and judges poses that were never used. Prints one JSON object: position errors of these
+in mm, before and after. Exits with 1 above 0.04 mm. The paper: 1.1 mm before, 0.47 mm after, on its
+machine.
 """
 
 from __future__ import annotations

@@ -60,6 +60,8 @@ class PlatformTruth(Table):
     center_of_mass: Point | None = None
     geometry: Noise = 0.0
     """Standard deviation of the exit and anchor points against the profile, m per coordinate."""
+    winding_radius: Noise = 0.0
+    """Standard deviation of the drums' winding radii against the profile, cut at twice of it, m."""
     geometry_seed: WholeNumber = 0
     tracker: TrackerTruth = field(default_factory=TrackerTruth)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import can
 import pytest
 
+from winchkit import open_bench
 from winchkit.schema.read import read_bench
 from winchkit.sim.live.client import address_file, send
 
@@ -21,9 +22,11 @@ COMMAND = [sys.executable, "-c", "from winchkit.cli import main; main()", "sim",
 
 
 @contextmanager
-def serving(folder: Path, *options: str) -> Iterator[subprocess.Popen[str]]:
+def serving(
+    folder: Path, *options: str, bench: str = "spiral-bench"
+) -> Iterator[subprocess.Popen[str]]:
     process = subprocess.Popen(
-        [*COMMAND, "spiral-bench", *options],
+        [*COMMAND, bench, *options],
         cwd=folder,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -80,6 +83,22 @@ def test_it_serves_until_it_is_interrupted(tmp_path: Path, number: int) -> None:
     assert out.splitlines()[0] == "spiral-bench-bench.toml"
     assert "winchkit jog A --bench spiral-bench-bench.toml" in err
     assert not address_file(path).exists()
+
+
+@pytest.mark.realtime
+def test_a_served_robot_moves_its_platform_without_a_trip(tmp_path: Path) -> None:
+    path = tmp_path / "robot.toml"
+    with serving(tmp_path, "-o", "robot.toml", bench="cabtive-robot") as process:
+        wait_for_file(process, address_file(path))
+        with open_bench(path) as bench:
+            end = time.monotonic() + 5
+            while bench.snapshot.blocked and time.monotonic() < end:
+                time.sleep(0.05)
+            before = bench.robot.coordinates()
+            bench.robot.move(bench.robot.moved({"x": 0.02}, relative=True), 0.05)
+            after = bench.robot.coordinates()
+            assert after["x"] - before["x"] == pytest.approx(0.02, abs=1e-3)
+            assert bench.snapshot.tripped == ()
 
 
 def test_it_takes_lines_on_its_input(tmp_path: Path) -> None:

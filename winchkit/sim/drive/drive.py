@@ -182,19 +182,16 @@ class SimDrive:
             self._pdos.latch()
             self._pdos.on_sync(now)
 
-    def beat(self, now: float) -> None:
-        """Send the heartbeat if it is due; time is not advanced."""
-        if self.nmt is not NmtState.BOOTING:
-            self._heartbeats.beat(now)
-
-    def tick(self, now: float) -> None:
-        """Advance time to ``now``."""
+    def tick(self, now: float, all_heard: bool = True) -> None:
+        """Advance time to ``now``; missing heartbeats are judged where ``all_heard``."""
         self._axis.advance(now, self._tolerance)
         if self.nmt is NmtState.BOOTING:
             if now >= self._booted_at:
                 self._boot_up(now)
             return
-        self._heartbeats.tick(now)
+        self._heartbeats.produce(now)
+        if all_heard:
+            self._heartbeats.watch(now)
         self._line.tick(now)
         if self.nmt is NmtState.OPERATIONAL:
             self._pdos.poll(now)

@@ -74,13 +74,12 @@ class Heartbeats:
             self._failed.discard(node)
             self._back()
 
-    def tick(self, now: float) -> None:
-        """Send a heartbeat that is due and detect missing ones."""
-        self.beat(now)
+    def watch(self, now: float) -> None:
+        """Detect missing heartbeats."""
         for node in [node for node, limit in self._deadlines.items() if now > limit]:
             self._fail(node)
 
-    def beat(self, now: float) -> None:
+    def produce(self, now: float) -> None:
         """Send a heartbeat that is due."""
         if self._changed:
             self._changed = False

@@ -71,11 +71,6 @@ class ProcessInstrument(SimulatedInstrument):
 
     # Network.
 
-    def beat(self, now: float) -> None:
-        """Send the heartbeat if it is due."""
-        if self.nmt is not NmtState.BOOTING:
-            self._heartbeats.beat(now)
-
     def tick(self, now: float) -> None:
         """Evaluate the network's timers."""
         self.show(now)
@@ -83,7 +78,7 @@ class ProcessInstrument(SimulatedInstrument):
             self._send(0x700 + self.node, b"\0")
             self.nmt = NmtState.PRE_OPERATIONAL
             self._heartbeats.start(now)
-        self._heartbeats.tick(now)
+        self._heartbeats.produce(now)
         if self.nmt is NmtState.OPERATIONAL:
             self._pdos.poll(now)
 

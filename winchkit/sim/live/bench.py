@@ -15,7 +15,7 @@ from types import TracebackType
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.schema.bench import BenchSpec, BusSpec
 from winchkit.schema.programme import ALL, Step
-from winchkit.schema.simbench import FaultSpec, SimBench
+from winchkit.schema.simbench import FaultSpec, SimBench, WinchTruth
 from winchkit.sim.bench import hiding, profiles_of
 from winchkit.sim.clock.can_bus import SimulatedCanBus
 from winchkit.sim.clock.simulated_clock import SimulatedClock
@@ -279,11 +279,13 @@ class LiveBench:
     def _make_winches(self) -> None:
         sim, now = self.sim_bench, self._now()
         loads: Mapping[str, Load] = {}
+        truth: Mapping[str, WinchTruth] = sim.truth
         if sim.platform is None:
             profiles = profiles_of(sim)
         else:
             self.robot = LiveRobot(sim, sim.platform, self.seed, sends=self._simulated is None)
             profiles, loads = self.robot.profiles, self.robot.ends
+            truth = self.robot.truth
         for name, wiring in sim.bench.winch.items():
             port = self._ports.get(wiring.servo.bus)
             if port is None:
@@ -294,7 +296,7 @@ class LiveBench:
                 name,
                 wiring,
                 profiles[name],
-                sim.truth[name],
+                truth[name],
                 sim.noise,
                 seed=self.seed,
                 send=port.send,
@@ -357,8 +359,7 @@ class LiveBench:
             self._clock,
             self._stopping.is_set,
             deliver=partial(self._deliver, winches),
-            beat=lambda: self._beat(winches),
-            tick=lambda: self._tick(winches),
+            tick=partial(self._tick, winches),
             late=self._note_lateness,
         )
 
@@ -368,19 +369,13 @@ class LiveBench:
             for winch in winches:
                 winch.receive(identifier, data, now)
 
-    def _beat(self, winches: list[LiveWinch]) -> None:
-        with self._lock:
-            now = self._now()
-            for winch in winches:
-                winch.beat(now)
-
-    def _tick(self, winches: list[LiveWinch]) -> None:
+    def _tick(self, winches: list[LiveWinch], all_heard: bool = True) -> None:
         with self._lock:
             now = self._now()
             while self._faults and now - self._started_at >= self._faults[0].time:
                 self._go_wrong(self._faults.pop(0))
             for winch in winches:
-                winch.tick(now)
+                winch.tick(now, all_heard)
             if self.robot is not None:
                 self.robot.advance()
 

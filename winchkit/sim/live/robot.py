@@ -31,7 +31,7 @@ class LiveRobot:
     """
 
     def __init__(self, bench: SimBench, truth: PlatformTruth, seed: int, *, sends: bool) -> None:
-        self.platform, self.profiles, self.ends = build_robot(bench, truth)
+        self.platform, self.profiles, self.ends, self.truth = build_robot(bench, truth)
         self.on_pose: Callable[[bytes], None] | None = None
         """Called with each datagram of the tracker, also in simulated time."""
         self._socket: socket.socket | None = None

@@ -122,16 +122,13 @@ class LiveWinch:
         for one in self._on_can:
             one.receive(identifier, data, now)
 
-    def beat(self, now: float) -> None:
-        """Send the heartbeats that are due."""
-        self.drive.beat(now)
-        for one in self._on_can:
-            one.beat(now)
+    def tick(self, now: float, all_heard: bool = True) -> None:
+        """Make the conversions that are due, and evaluate the timers of the devices.
 
-    def tick(self, now: float) -> None:
-        """Make the conversions that are due, and evaluate the timers of the devices."""
+        A loss of the master is judged where all frames have been heard.
+        """
         self._convert(now)
-        self.drive.tick(now)
+        self.drive.tick(now, all_heard)
         for one in self.instruments.values():
             one.show(now)
         for one in self._on_can:

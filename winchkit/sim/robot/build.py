@@ -11,7 +11,7 @@ from winchkit.catalog import find
 from winchkit.errors import FileError
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.sim_platform import PlatformTruth
-from winchkit.schema.simbench import SimBench
+from winchkit.schema.simbench import SimBench, WinchTruth
 from winchkit.sim.robot.cable_end import CableEnd, Coupling
 from winchkit.sim.robot.platform import Body, CablePlatform
 from winchkit.sim.robot.pulleys import Pulleys
@@ -30,6 +30,8 @@ class BuiltRobot(NamedTuple):
     profiles: dict[str, WinchProfile]
     """With the unstrained cable length at home as their reference."""
     ends: dict[str, CableEnd]
+    truth: dict[str, WinchTruth]
+    """With the true radii of the drums."""
 
 
 def build_robot(bench: SimBench, truth: PlatformTruth) -> BuiltRobot:
@@ -74,7 +76,14 @@ def build_robot(bench: SimBench, truth: PlatformTruth) -> BuiltRobot:
     for name, one in profiles.items():
         reference = replace(one.reference, cable_length=ends[name].home_length)
         profiles[name] = replace(one, reference=reference)
-    return BuiltRobot(platform, profiles, ends)
+    true: dict[str, WinchTruth] = {}
+    changes = truth.winding_radius * np.clip(random.standard_normal(len(lines)), -2, 2)
+    for name, change in zip(profiles, changes.tolist(), strict=True):
+        radius = profiles[name].drum.winding_radius + change
+        given = bench.truth[name]
+        overrides = {"drum.winding_radius": f"{radius!r} m"} if truth.winding_radius else {}
+        true[name] = replace(given, overrides={**overrides, **given.overrides})
+    return BuiltRobot(platform, profiles, ends, true)
 
 
 def _winch(winch: str | WinchProfile, name: str) -> WinchProfile:
