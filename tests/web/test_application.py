@@ -338,3 +338,12 @@ def test_a_cancelled_addition_leaves_the_profile_as_it_was(tmp_path: Path) -> No
     for key in ("profile", "diagnosis", "commands", "can_undo"):
         assert after[key] == before[key]
     workspace.close()
+
+
+def test_an_unexpected_error_of_a_task_is_shown_and_not_lost(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    workspace.task("calibrating", [].pop).result(60.0)
+    view = workspace.view()
+    assert view["busy"] is None
+    assert view["faults"] == ["calibrating: internal error: IndexError: pop from empty list"]
+    workspace.close()

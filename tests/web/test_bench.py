@@ -1,8 +1,9 @@
-"""Messages of a browser that commands: none that waited moves a winch."""
+"""The Bench view without a browser: messages, programmes, drums, frames, settings of drives."""
 
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,10 +14,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.catalog import find
-from winchkit.errors import UsageError
+from winchkit.errors import FileError, NotPermitted, UsageError
+from winchkit.schema.bench import BenchSpec
+from winchkit.schema.programme import Programme, Step, write_programme
 from winchkit.schema.read import read_simbench
 from winchkit.web.browser import Inbox
-from winchkit.web.drive_objects import drive_objects
+from winchkit.web.drive_objects import drive_objects, drive_settings, write_setting
+from winchkit.web.frames import FrameWords
+from winchkit.web.live_model import LiveModel
+from winchkit.web.programmes import Programmes
 
 
 def taken(inbox: Inbox) -> list[dict[str, Any]]:
@@ -46,10 +52,97 @@ def test_of_jogs_that_wait_only_the_newest_is_left_and_every_other_message_ends_
 
 
 @pytest.mark.parametrize("phase", ["moving", "running down", "enabling", None])
-def test_objects_are_not_read_where_a_winch_is_not_disabled(phase: str | None) -> None:
-    spec = read_simbench(find("sim", "demo-adequate")).bench
+def test_objects_are_not_read_where_a_winch_is_not_disabled(
+    spec: BenchSpec, phase: str | None
+) -> None:
     status = {} if phase is None else {"winch": {"A": {"phase": phase}}}
     with pytest.raises(UsageError, match="where it is disabled"):
         drive_objects(spec, status, "A")
     with pytest.raises(UsageError, match="there is no winch 'B'"):
         drive_objects(spec, status, "B")
+
+
+@pytest.fixture(scope="module")
+def spec() -> BenchSpec:
+    return read_simbench(find("sim", "demo-adequate")).bench
+
+
+def test_a_programme_is_planned_in_closed_form_and_compared_with_the_limits(
+    spec: BenchSpec, tmp_path: Path
+) -> None:
+    work = tmp_path / "work"
+    work.mkdir()
+    programmes = Programmes(spec, tmp_path, work)
+    steps = (Step(to=3.0, speed=0.1, acceleration=0.5), Step(ask="look"), Step(hold=2.0))
+    write_programme(Programme("own", steps), work / "own.toml")
+    (work / "other.toml").write_text("no = 'programme'")
+    found = programmes.preview("own.toml", {"A": 4.0})
+    # Trapezoid with ramps of constant jerk: distance / speed + speed / acceleration + rise time.
+    assert found["duration"] == pytest.approx(1.0 / 0.1 + 0.1 / 0.5 + 0.1 / 0.5 + 2.0, abs=0.11)
+    assert found["curves"]["winch A"][0] == 4.0
+    assert found["curves"]["winch A"][-1] == 3.0
+    assert found["asks"] == [[pytest.approx(found["duration"] - 2.0), "look"]]
+    with pytest.raises(UsageError, match="there are programme-demo"):
+        programmes.preview("other.toml", {"A": 4.0})
+    with pytest.raises(NotPermitted, match="step 1: the cable length of winch A is not known"):
+        programmes.preview("own.toml", {})
+    name = programmes.keep("../far.toml", (work / "own.toml").read_bytes().replace(b"3 m", b"9 m"))
+    assert name == "far.toml"
+    with pytest.raises(NotPermitted, match="step 1: a cable length of 9 m is beyond the limits"):
+        programmes.preview("far.toml", {"A": 4.0})
+    with pytest.raises(FileError):
+        programmes.keep("bad.toml", b"schema = 1\nkind = 'programme'\n")
+    assert not (tmp_path / "bad.toml").exists()
+
+
+def test_turns_on_the_drum_are_those_of_its_winding_law(spec: BenchSpec) -> None:
+    model = LiveModel(spec, "", ())
+    profile = model.profiles["A"]
+    drum = model.drums({"winch": {"A": {"cable_length": profile.reference.cable_length}}})["A"]
+    assert drum["turns"] == pytest.approx(profile.reference.wound_turns)
+    shorter = model.drums({"winch": {"A": {"cable_length": None}}})["A"]
+    assert shorter == {"turns": None, "radius": None, "guide": None}
+
+
+def test_frames_are_said_in_words_the_newest_of_each_identifier_first(spec: BenchSpec) -> None:
+    frames = {
+        "can": {
+            "newest": [[7, 1.0, 0x701, "05"], [9, 1.1, 0x80, ""]],
+            "last": [[0.9, 0x80, ""], [1.0, 0x701, "05"]],
+        }
+    }
+    table = FrameWords(spec).table(frames)
+    assert [(row["identifier"], row["count"]) for row in table["newest"]] == [(0x80, 9), (0x701, 7)]
+    assert table["newest"][1]["words"] == "A: operational"
+    assert [row["kind"] for row in table["last"]] == ["heartbeat", "SYNC"]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("6040h", "1", "'6040h' is no setting"),
+        ("6083h", "-1", "is no whole number from 0 to 4294967295"),
+        ("6083h", "fast", "'fast' is no whole number"),
+        ("605Ah", "99", "is no whole number from -32768 to 8"),
+    ],
+)
+def test_a_setting_is_refused_before_the_drive_is_asked(
+    spec: BenchSpec, name: str, text: str, message: str
+) -> None:
+    status = {"winch": {"A": {"phase": "disabled"}}}
+    with pytest.raises(UsageError, match=message):
+        write_setting(spec, status, "A", name, text)
+    with pytest.raises(UsageError, match="winch A is moving"):
+        write_setting(spec, {"winch": {"A": {"phase": "moving"}}}, "A", name, text)
+
+
+def test_settings_are_listed_with_types_and_limits_of_the_eds(spec: BenchSpec) -> None:
+    known = {item["object"]: item for item in drive_settings(spec, "A")}
+    assert known["605Ah"] | {"name": ""} == {
+        "object": "605Ah",
+        "name": "",
+        "type": "whole number",
+        "low": -32768.0,
+        "high": 8.0,
+    }
+    assert "6040h" not in known

@@ -6,6 +6,7 @@ it was. Files are kept in a folder of the server's own: nothing of the user's is
 
 from __future__ import annotations
 
+import logging
 import re
 import threading
 from collections.abc import Callable, Mapping, Sequence
@@ -37,6 +38,7 @@ __all__ = ["Cancelled", "Workspace"]
 
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
+_LOGGER = logging.getLogger(__name__)
 _NO_NAME = re.compile(r"[^\w.-]+")
 
 
@@ -237,6 +239,9 @@ class Workspace:
             self._set(faults=tuple(str(fault) for fault in error.faults))
         except WinchkitError as error:
             self._set(faults=(str(error),))
+        except Exception as error:
+            _LOGGER.exception("%s failed", what)
+            self._set(faults=(f"{what}: internal error: {type(error).__name__}: {error}",))
         finally:
             self._work = None
             self.changed()

@@ -11,26 +11,38 @@ import { consequences, trip } from "./trip.js";
 import { card, picture as drawn, words as said } from "./winch.js";
 
 const PERIOD = 50, MOVING = new Set(["moving", "running down"]);
-let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, cardsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv";
+let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, cardsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null;
 
+// A request that fails is repeated: without it there is no Stop.
 export async function station(state) {
-  if (!state.bench) return;
-  await attempt(async () => {
-    declared = await ask("/api/bench");
-    winch = Object.keys(declared.winch)[0];
+  if (!state.bench || declared) return;
+  try {
+    const found = await ask("/api/bench");
     history = await ask("/api/bench/history");
+    declared = found;
+    winch = Object.keys(declared.winch)[0];
     link = socket("/live/bench", receive, () => { picture = null; release(); show(); });
     show();
-  });
+    if (root) enter(root);
+  } catch (error) {
+    alarm(`${error.message} (the bench is asked again in a second)`);
+    setTimeout(() => station(state), 1000);
+  }
 }
 
 export function enter(main) {
   root = main;
+  if (wanted) { const parts = wanted; wanted = null; restore(parts); }
   if (!declared) { fill(root, el("div", { class: "drop" }, el("h1", {}, "No bench"), el("p", { class: "note" }, "Start with winchkit serve --bench BENCH.toml, or --sim NAME; with --allow-motion the page may move it."))); return; }
   build();
 }
 export function leave() { release(); root = null; }
-export function restore([name, part]) { if (declared && declared.winch[name]) winch = name; if (tabs().includes(part)) tab = part; }
+export function restore(parts) {
+  if (!declared) { wanted = parts; return; }
+  const [name, part] = parts.map(decodeURIComponent);
+  if (declared.winch[name]) winch = name;
+  if (tabs().includes(part)) tab = part;
+}
 const keep = () => window.history.replaceState(null, "", `${location.search}#bench/${encodeURIComponent(winch)}/${encodeURIComponent(tab)}`);
 export function update() {}
 
