@@ -12,7 +12,8 @@ import asyncio
 import json
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -48,6 +49,8 @@ _POSES = 0.1
 """Period of the pose of a robot's platform, s."""
 _LATEST_PICTURE = 0.4
 """Age of the picture that a browser had when it ordered a jog, s: eight periods."""
+_ORDERS = 8
+"""Browsers whose orders are carried out at once."""
 _LARGEST_PROGRAMME = 1_000_000
 """Bytes of a programme file of the browser."""
 
@@ -92,8 +95,12 @@ class BenchView:
             threading.Thread(target=target, name=f"page{target.__name__}", daemon=True)
             for target in working
         ]
+        self._stops = ThreadPoolExecutor(2, "page-stop")
+        self._orders = ThreadPoolExecutor(_ORDERS, "page-order")
+        """Threads of their own: neither Stop nor a jog waits behind a picture that is computed."""
         self._commander: Browser | None = None
         self._browsers = 0
+        self._open: set[Browser] = set()
 
     def __enter__(self) -> Self:
         for thread in self._threads:
@@ -111,6 +118,8 @@ class BenchView:
             self._commander.leave()
         for thread in self._threads:
             thread.join(5.0)
+        for pool in (self._stops, self._orders):
+            pool.shutdown(wait=False, cancel_futures=True)
 
     @property
     def robot_profile(self) -> str:
@@ -223,8 +232,13 @@ class BenchView:
             self._lent.clear()
 
     async def _stop(self, request: Request) -> Response:
-        await asyncio.to_thread(self._stop_now)
+        await self._in(self._stops, self._stop_now)
         return JSONResponse({"stopped": True})
+
+    async def _in(
+        self, pool: ThreadPoolExecutor, call: Callable[..., None], *arguments: Any
+    ) -> None:
+        await asyncio.get_running_loop().run_in_executor(pool, call, *arguments)
 
     def _stop_now(self) -> None:
         """Quick-stop by a station of its own, which waits behind no other call."""
@@ -258,10 +272,10 @@ class BenchView:
                 rows.append(row)
 
     def _predict(self) -> None:
-        """Predict the outputs over the history from angle and force, for the residuals."""
+        """Predict the outputs of the winches that are shown, over their history."""
         while not self._ended.wait(_PREDICTED):
-            for name, rows in tuple(self._history.items()):
-                found = self._model.prediction(name, list(rows))
+            for name in {browser.shown for browser in tuple(self._open)}:
+                found = self._model.prediction(name, list(self._history.get(name, ())))
                 if found is not None:
                     self._predicted[name] = found
 
@@ -277,6 +291,7 @@ class BenchView:
         await socket.accept()
         self._browsers += 1
         browser = Browser(f"page {self._browsers}", self.spec, self._programmes)
+        self._open.add(browser)
         listening = asyncio.ensure_future(received(socket, browser))
         tasks = self._obeying(browser), counting(browser)
         working = [asyncio.ensure_future(task) for task in tasks]
@@ -303,12 +318,13 @@ class BenchView:
         except (WebSocketDisconnect, RuntimeError):
             pass
         finally:
+            self._open.discard(browser)
             listening.cancel()
             for task in working:
                 task.cancel()
             if self._commander is browser:
                 self._commander = None
-            await asyncio.to_thread(browser.leave)
+            await self._in(self._orders, browser.leave)
 
     async def _obeying(self, browser: Browser) -> None:
         """Carry out the messages of a browser in their order, one after another."""
@@ -326,21 +342,22 @@ class BenchView:
     async def _obey(self, asked: dict[str, Any], browser: Browser) -> None:
         name = str(asked.get("do"))
         if name == "show":
-            browser.shown = str(asked["winch"])
+            if asked["winch"] in self.spec.winch:
+                browser.shown = str(asked["winch"])
             return
         if name == "command":
-            await asyncio.to_thread(self._give_command, browser)
+            await self._in(self._orders, self._give_command, browser)
             return
         if name == "leave":
             if self._commander is browser:
                 self._commander = None
-            await asyncio.to_thread(browser.leave)
+            await self._in(self._orders, browser.leave)
             return
         if self._commander is not browser:
             raise UsageError("this page only watches; request command first")
         if name == "jog" and not self._is_fresh(asked):
             raise UsageError("the page answers too late to jog; the winch stops")
-        await asyncio.to_thread(browser.do, name, asked)
+        await self._in(self._orders, browser.do, name, asked)
 
     def _is_fresh(self, asked: dict[str, Any]) -> bool:
         """Whether a jog was ordered by somebody who saw the bench within the last 0.4 s.

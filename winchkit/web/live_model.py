@@ -19,7 +19,7 @@ from winchkit.model.drum import drum_of
 from winchkit.model.guide import guide_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
-from winchkit.plain_json import finite_or_none, significant
+from winchkit.plain_json import finite_or_none
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_profile
@@ -35,7 +35,8 @@ _MEASURED = {"cable_length": "length", "tension": "tension", "motor_torque": "mo
 """Channel that measures an output of the model."""
 _FEWEST = 20
 """Samples for a prediction."""
-_DIGITS = 6
+_DECIMALS = 6
+"""Of what is sent, in SI."""
 
 
 class LiveModel:
@@ -179,9 +180,9 @@ def _predicted(line: Line, rows: Sequence[Mapping[str, Any]], mass: float | None
         if output == "cable_length":  # the instrument's zero is not the profile's
             error = error - float(np.median(error))
         out[output] = {
-            "predicted": significant(known[channel] - error, _DIGITS),
-            "residual": significant(error, _DIGITS),
-            "mean": significant(_mean(column["time"], error), _DIGITS),
+            "predicted": _plain(known[channel] - error),
+            "residual": _plain(error),
+            "mean": _plain(_mean(column["time"], error)),
             "noise": finite_or_none(white_noise(known[channel])),
         }
     return out
@@ -192,3 +193,12 @@ def _mean(time: Array, values: Array) -> Array:
     low, high = np.searchsorted(time, time - 0.5), np.searchsorted(time, time + 0.5)
     total = np.concatenate([[0.0], np.cumsum(values)])
     return np.asarray((total[high] - total[low]) / np.maximum(high - low, 1))
+
+
+def _plain(values: Array) -> list[float | None]:
+    """Rounded numbers, None where one is not finite."""
+    finite = np.isfinite(values)
+    return [
+        value if known else None
+        for value, known in zip(np.round(values, _DECIMALS).tolist(), finite.tolist(), strict=True)
+    ]

@@ -101,12 +101,15 @@ def test_a_served_robot_moves_its_platform_without_a_trip(tmp_path: Path) -> Non
             assert bench.snapshot.tripped == ()
 
 
-def test_it_takes_lines_on_its_input(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("options", "last"), [([], "quit\n"), (["--end-with-input"], "")])
+def test_it_takes_lines_on_its_input(tmp_path: Path, options: list[str], last: str) -> None:
     path = tmp_path / "here.toml"
-    with serving(tmp_path, "--bench-file", "here.toml", "--interface", "virtual") as process:
+    own = ("--bench-file", "here.toml", "--interface", "virtual", *options)
+    with serving(tmp_path, *own) as process:
         wait_for_file(process, address_file(path))
         assert process.stdin is not None
-        out, err = process.communicate("load A 21 kg\nstatus\nlood A 3 kg\nquit\n", timeout=30)
+        lines = f"load A 21 kg\nstatus\nlood A 3 kg\n{last}"
+        out, err = process.communicate(lines, timeout=30)
     assert process.returncode == 0
     assert "21 kg on A" in out
     assert "did you mean 'load'?" in err

@@ -37,9 +37,10 @@ export function enter(main) {
   build();
 }
 export function leave() { release(); root = null; }
+const plain = (text) => { try { return decodeURIComponent(text); } catch { return text; } };
 export function restore(parts) {
   if (!declared) { wanted = parts; return; }
-  const [name, part] = parts.map(decodeURIComponent);
+  const [name, part] = parts.map(plain);
   if (declared.winch[name]) winch = name;
   if (tabs().includes(part)) tab = part;
 }
@@ -50,6 +51,7 @@ function receive(message) {
   if (message.predicted) Object.assign(predictions, message.predicted);
   if (message.robot !== undefined) live(message.robot, declared.robot);
   const before = picture;
+  if (!before) send("show", { winch });
   picture = message;
   const time = message.status.time;
   for (const [name, now] of Object.entries(message.status.winch || {})) {

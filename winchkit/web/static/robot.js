@@ -43,15 +43,18 @@ async function read() {
 
 // The platform of the bench as its motor angles have it: drawn while it is chosen and nothing else is.
 export function live(found, profile) {
+  const first = !now;
   now = found && profile ? found : null;
-  if (!root || !view || !picture || shown.row !== "live" || !now) return;
-  picture = now;
+  if (!root || !view || !picture) return;
+  if (first && now && shown.row === 0 && !view.poses) { shown.row = "live"; picture = now; drawPicture(); return; }
+  if (shown.row !== "live") return;
+  picture = now || picture;
   const old = root.querySelector("#picture > svg"), head = root.querySelector("#picture h2");
   if (old && head) { old.replaceWith(scene()); head.textContent = where(); }
 }
 
 const FORCES = { live: "Cable forces now", measured: "Measured cable forces", computed: "Computed cable forces", none: "No forces within the limits hold the platform" };
-const where = () => { const at = picture.position.map((v) => number(v, 3)); return `${FORCES[shown.row === "live" ? "live" : picture.source]} at x ${at[0]}, y ${at[1]}, z ${at[2]} m`; };
+const where = () => { if (shown.row === "live" && !now) return "The motor angles fit no pose now"; const at = picture.position.map((v) => number(v, 3)); return `${FORCES[shown.row === "live" ? "live" : picture.source]} at x ${at[0]}, y ${at[1]}, z ${at[2]} m`; };
 
 async function fetchPicture() {
   const [low, high] = shown.limits;
