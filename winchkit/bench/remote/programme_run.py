@@ -124,10 +124,14 @@ class ProgrammeRun:
             raise UsageError("the programme asks nothing now")
         self._answered.set()
 
-    def end(self) -> None:
-        """End it by a ramp; returns at rest."""
+    def begin_no_more(self) -> None:
+        """End it with the motion under way; returns at once."""
         self._leaving = True
         self._answered.set()
+
+    def end(self) -> None:
+        """End it by a ramp; returns at rest."""
+        self.begin_no_more()
         if not self._ended:
             with self._bench.commanders.acting(self._client), suppress(WinchkitError):
                 self._bench.stop_commanded(list(self._bench.winch))
@@ -202,5 +206,4 @@ class ProgrammeRun:
         while not self._answered.wait(_POLL):
             self._bench.raise_trouble()
         self._asks = ""
-        if self._leaving:
-            raise MotionError("the programme was ended by its client")
+        self._require_going()

@@ -99,6 +99,8 @@ class StationServer:
         """Turn everybody out; the bench stops the winches, then finishes the logs."""
         self._closing = True
         self._path.unlink(missing_ok=True)
+        for seat in tuple(self._seats):
+            seat.station.begin_no_more()
         for item in (self._socket, *(seat.connection for seat in tuple(self._seats))):
             _shut(item)
         self._thread.join(timeout=2.0)

@@ -328,6 +328,11 @@ class LocalStation:
         """The cycles around the trip that is not reset yet, as JSON has them."""
         return self._bench.trip_history.to_dict(self._bench.snapshot)
 
+    def begin_no_more(self) -> None:
+        """Let this station's programme begin no further motion: the bench is closed."""
+        if self._programme is not None:
+            self._programme.begin_no_more()
+
     def frames(self) -> dict[str, dict[str, Any]]:
         """Frames of each CAN bus, collected while it is called."""
         return {

@@ -72,14 +72,15 @@ function watchTrip() {
   }
   if (askedTrip) return;
   const mine = askedTrip = performance.now();
-  setTimeout(() => attempt(async () => {
-    const found = await ask("/api/bench/trip");
-    if (askedTrip !== mine || !found) return;
-    lastTrip = found; tab = "Trip";
-    document.getElementById("trips").dataset.text = "again";
-    if (root) build();
-    show();
-  }), 700);
+  setTimeout(async () => {
+    try {
+      const found = await ask("/api/bench/trip");
+      if (askedTrip !== mine || !found) return;
+      lastTrip = found; tab = "Trip";
+      if (root) build();
+      show();
+    } catch { if (askedTrip === mine) askedTrip = 0; }
+  }, 700);
 }
 
 const predictions = {};
