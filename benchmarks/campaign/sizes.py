@@ -44,7 +44,7 @@ OUTSIDE = (
 )  # fmt: skip
 RECENT = (
     "load-lever", "cell-crosstalk", "cell-clipping", "friction-growth", "friction-at-place",
-    "drum-unbalance", "spring-balancer", "torque-ripple",
+    "drum-unbalance", "spring-balancer", "torque-ripple", "motor-dahl",
 )  # fmt: skip
 """Effects that the catalogue got after seeds were first drawn."""
 
@@ -324,6 +324,11 @@ def _motor_stribeck(d: _Shape) -> Sized:
     return lambda z: {"torque": 0.02 * z, "stribeck_speed": speed}
 
 
+def _motor_dahl(d: _Shape) -> Sized:
+    distance = d.random.uniform(1e-3, 2e-2) * d.scene.stroke / d.winch.radius * d.winch.ratio
+    return lambda z: {"torque": 0.02 * z, "distance": distance}
+
+
 def _efficiency(_: _Shape) -> Sized:
     return lambda z: {"efficiency": float(np.exp(-0.1 * z))}
 
@@ -368,6 +373,7 @@ _SHAPED: dict[str, Callable[[_Shape], Sized]] = {
     "pulley-stribeck": _pulley_stribeck,
     "pulley-dahl": _pulley_dahl,
     "motor-stribeck": _motor_stribeck,
+    "motor-dahl": _motor_dahl,
     "gear-efficiency": _efficiency,
     "torque-ripple": _ripple,
     "load-lever": _lever,
@@ -409,6 +415,7 @@ _PARTS = {
     "pulley-stribeck": (3, 2),
     "pulley-dahl": (3,),
     "motor-stribeck": (3,),
+    "motor-dahl": (3,),
     "spring-balancer": (2, 2),
     "friction-at-place": (6,),
     "cell-crosstalk": (2,),

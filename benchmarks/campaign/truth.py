@@ -226,6 +226,14 @@ class _Line:
             shown = lag(shown, self.time, p["time_constant"], float(shown[0]))
         return shown
 
+    def _presliding(self) -> Array | float:
+        """Friction of the motor side that builds up over its angle."""
+        p = self.get("motor-dahl")
+        if not p:
+            return 0.0
+        limit = np.full_like(self.run.motor_angle, p["torque"])
+        return dahl(self.run.motor_angle, limit, limit / p["distance"])
+
     def _torque(self, tension: Array, arm: Array, free: Array) -> Array:
         torque = tension * arm
         rate = self.motor_rate
@@ -233,6 +241,7 @@ class _Line:
             torque = torque * p["efficiency"] ** (-self.s)
         torque = torque * (1 + (self.get("torque-constant") or {}).get("gain_error", 0.0))
         way = np.tanh(rate / 0.5)
+        torque = torque + self._presliding()
         torque = torque + (self.get("motor-coulomb") or {}).get("torque", 0.0) * way
         torque = torque + (self.get("motor-coulomb-asymmetry") or {}).get("offset", 0.0)
         torque = torque + (self.get("motor-viscous") or {}).get("viscosity", 0.0) * rate

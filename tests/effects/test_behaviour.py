@@ -48,6 +48,7 @@ LINEAR = {
     "motor-viscous",
     "motor-viscous-asymmetry",
     "motor-stribeck",
+    "motor-dahl",
     "motor-cogging",
     "rotor-inertia",
     "joint-gravity",

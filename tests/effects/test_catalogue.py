@@ -70,6 +70,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "motor-viscous": {"viscosity": ("N m s", 0)},
     "motor-viscous-asymmetry": {"viscosity_difference": ("N m s", 0)},
     "motor-stribeck": {"torque": ("N m", 0), "stribeck_speed": ("rad/s", SHAPE)},
+    "motor-dahl": {"torque": ("N m", 0), "distance": ("rad", SHAPE)},
     "motor-cogging": {
         "amplitude": ("N m", 0),
         "phase": ("rad", SHAPE),

@@ -334,7 +334,13 @@ CASES: dict[str, Case] = {
         lambda: {"tension": np.minimum(X.T, 300.0)},
     ),
 }
-OWN_TESTS = {"pulley-dahl", "length-time-offset", "drum-winding-tension", "torque-lead"}
+OWN_TESTS = {
+    "pulley-dahl",
+    "motor-dahl",
+    "length-time-offset",
+    "drum-winding-tension",
+    "torque-lead",
+}
 
 
 def test_every_effect_is_tested_here() -> None:

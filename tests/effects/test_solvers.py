@@ -57,6 +57,26 @@ def test_dahl_friction_follows_its_differential_equation() -> None:
     assert np.ptp(found) > 10
 
 
+def test_presliding_of_the_motor_follows_its_differential_equation() -> None:
+    profile = profile_with("grooved")
+    time = np.linspace(0, 4, 2001)
+    signals = Signals(time, 2.0 * np.sin(2.0 * time), load=np.full_like(time, 300.0))
+    line = Line(profile)
+    values = {"torque": 0.05, "distance": 0.7, "start": -0.4}
+    motion = line.motion(signals)
+    found = predict(profile, motion, CATALOGUE["motor-dahl"], values)["motor_torque"]
+
+    def rate(t: float, friction: np.ndarray) -> list[float]:
+        moving = 4.0 * cos(2.0 * t)
+        return [moving * (0.05 - np.sign(moving) * float(friction[0])) / 0.7]
+
+    solved = solve_ivp(
+        rate, (0, 4), [-0.4 * 0.05], t_eval=time, rtol=1e-9, atol=1e-9, max_step=0.005
+    )
+    added = found - line.predict(motion)["motor_torque"]
+    assert np.allclose(added, solved.y[0], atol=1e-5)
+
+
 def test_an_instrument_that_is_late_shows_the_length_of_a_moment_ago() -> None:
     profile = profile_with("grooved")
     time = np.linspace(0, 10, 501)

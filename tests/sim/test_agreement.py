@@ -67,6 +67,7 @@ PAIRS = [
     Pair("motor grease", "motor-viscous"),
     Pair("one-way grease", "motor-viscous-asymmetry"),
     Pair("motor stiction", "motor-stribeck"),
+    Pair("presliding motor", "motor-dahl"),
     Pair("cogging", "motor-cogging"),
     Pair("heavy rotor", "rotor-inertia"),
     Pair("weak motor", "torque-constant"),

@@ -20,7 +20,7 @@ EFFECT = Effect(
     formula="τ + s c",
     source="Coulomb friction",
     looks_like="A step of the torque error with the direction, the same at every load.",
-    confused_with=("gear-efficiency", "motor-stribeck", "motor-viscous"),
+    confused_with=("gear-efficiency", "motor-stribeck", "motor-viscous", "motor-dahl"),
     told_apart="Two loads in both directions; a ladder of speeds.",
     family="motor friction",
 )

@@ -106,6 +106,7 @@ _CLAUSES = {
     "motor-cogging": "the motor has cogging torque",
     "motor-coulomb": "the motor side has Coulomb friction",
     "motor-coulomb-asymmetry": "the torque signal has an offset",
+    "motor-dahl": "the motor side has presliding friction (Dahl)",
     "motor-stribeck": "the motor side has Coulomb friction with a Stribeck curve",
     "motor-viscous": "the motor side has viscous friction",
     "motor-viscous-asymmetry": "the viscous friction of the motor side depends on the direction",

@@ -21,6 +21,7 @@ from winchkit.sim.physics.base import (
     motor_direction,
     winding_direction,
 )
+from winchkit.sim.physics.presliding import relax
 from winchkit.sim.physics.state import State
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "MotorGrease",
     "MotorStiction",
     "OneWayGrease",
+    "PreslidingMotor",
     "RippledMotor",
     "RoughPlace",
     "SlowTorque",
@@ -104,6 +106,25 @@ class MotorStiction(Physics):
         """Torque that decreases with the square of the speed."""
         fall = exp(-((state.motor_speed / self.stribeck_speed) ** 2))
         return motor_direction(state) * self.torque * fall
+
+
+@dataclass
+class PreslidingMotor(Physics):
+    """Presliding friction (Dahl) of motor and gearbox over the motor angle."""
+
+    torque: Torque = 0.03
+    distance: Annotated[float, Quantity("angle", 0.0, above=True)] = 2.0
+    size: ClassVar[str] = "torque"
+    _force: float = 0.0
+    _angle: float | None = None
+
+    def motor(self, state: State) -> float:
+        """Dahl friction after the travel since the last step."""
+        travel = 0.0 if self._angle is None else state.motor_angle - self._angle
+        slope = self.torque / self.distance
+        self._force = relax(self._force, travel, self.torque, slope, 1.0)
+        self._angle = state.motor_angle
+        return self._force
 
 
 @dataclass

@@ -55,6 +55,7 @@ PHYSICS: dict[str, type[Physics]] = {
     "motor grease": motor.MotorGrease,
     "one-way grease": motor.OneWayGrease,
     "motor stiction": motor.MotorStiction,
+    "presliding motor": motor.PreslidingMotor,
     "cogging": motor.Cogging,
     "unbalanced drum": motor.UnbalancedDrum,
     "hanging joint": motor.HangingJoint,
