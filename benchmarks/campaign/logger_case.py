@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
+from campaign.answers import keep, kept
 from campaign.bench import Bench, draw_bench
 from campaign.case import ATTEMPTS, Plan, size_effects
 from campaign.identifiable import Identity, identity
@@ -152,23 +152,21 @@ def _one(job: tuple[int, LoggerPlan, str | None]) -> LoggerScore | None:
 
 
 def run_logger_cases(
-    seed: int, plans: Sequence[LoggerPlan], jobs: int, keep: Path | None, log: Path | None = None
+    seed: int, plans: Sequence[LoggerPlan], jobs: int, folder: Path | None, log: Path | None = None
 ) -> list[LoggerScore]:
     """Scores in the order of the plans; progress on stderr.
 
     Each score is a line of ``log``; cases whose score is there already are not run again.
     """
-    known = {score.seed: score for score in _logged(log)}
-    work = [(seed * 100_000 + i, p, str(keep) if keep else None) for i, p in enumerate(plans)]
+    known = kept(log, LoggerScore.read)
+    work = [(seed * 100_000 + i, p, str(folder) if folder else None) for i, p in enumerate(plans)]
     left = [job for job in work if job[0] not in known]
     for job, got in zip(left, _answers(left, jobs), strict=True):
         if got is None:
             print(f"none {job[0]} cannot be made: {job[1]}", file=sys.stderr)
             continue
         known[got.seed] = got
-        if log is not None:
-            with log.open("a", encoding="utf-8") as lines:
-                lines.write(json.dumps(asdict(got)) + "\n")
+        keep(got, log)
         print(got.line, file=sys.stderr, flush=True)
     return [known[job[0]] for job in work if job[0] in known]
 
@@ -181,9 +179,3 @@ def _answers(
         return
     with ProcessPoolExecutor(processes) as pool:
         yield from pool.map(_one, jobs)
-
-
-def _logged(log: Path | None) -> Iterator[LoggerScore]:
-    if log is not None and log.exists():
-        for line in log.read_text(encoding="utf-8").splitlines():
-            yield LoggerScore.read(json.loads(line))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
 from pathlib import Path
 
+from campaign.answers import keep, kept
 from campaign.case import Case, Plan, make_case
 from campaign.score import Score, refused, score
 
@@ -51,27 +50,21 @@ def _one(job: tuple[int, Plan, str | None]) -> Score | None:
 
 
 def run_cases(
-    seed: int, plans: Sequence[Plan], jobs: int, keep: Path | None, log: Path | None = None
+    seed: int, plans: Sequence[Plan], jobs: int, folder: Path | None, log: Path | None = None
 ) -> list[Score]:
-    """Scores in the order of the plans; progress on stderr, each score as a line of ``log``."""
-    work = [(seed * 100_000 + i, p, str(keep) if keep else None) for i, p in enumerate(plans)]
-    if jobs == 1:
-        return list(_told(zip(work, map(_one, work), strict=True), log))
-    with ProcessPoolExecutor(jobs) as pool:
-        return list(_told(zip(work, pool.map(_one, work), strict=True), log))
+    """Scores in the order of the plans; progress on stderr.
 
-
-def _told(
-    answers: Iterable[tuple[tuple[int, Plan, str | None], Score | None]], log: Path | None
-) -> Iterator[Score]:
-    """Answers as they come, each reported and kept at once."""
-    for job, got in answers:
+    Each score is a line of ``log``; cases whose score is there already are not run again.
+    """
+    known = kept(log, Score.read)
+    work = [(seed * 100_000 + i, p, str(folder) if folder else None) for i, p in enumerate(plans)]
+    left = [job for job in work if job[0] not in known]
+    for job, got in zip(left, _answers(left, jobs), strict=True):
         if got is None:
             print(f"none {job[0]} cannot be made: {job[1]}", file=sys.stderr)
             continue
-        if log is not None:
-            with log.open("a", encoding="utf-8") as lines:
-                lines.write(json.dumps(asdict(got)) + "\n")
+        known[got.seed] = got
+        keep(got, log)
         told = "ok  " if got.ok else "FAIL"
         print(
             f"{told} {got.seed} {got.kind} {got.snr:g} {','.join(got.truth)} -> {got.verdict} "
@@ -80,4 +73,14 @@ def _told(
             file=sys.stderr,
             flush=True,
         )
-        yield got
+    return [known[job[0]] for job in work if job[0] in known]
+
+
+def _answers(
+    jobs: Sequence[tuple[int, Plan, str | None]], processes: int
+) -> Iterator[Score | None]:
+    if processes == 1:
+        yield from map(_one, jobs)
+        return
+    with ProcessPoolExecutor(processes) as pool:
+        yield from pool.map(_one, jobs)

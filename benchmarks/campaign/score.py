@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -61,6 +61,17 @@ class Score:
     intervals: tuple[Interval, ...]
     seconds: float
     scene: str
+
+    @classmethod
+    def read(cls, line: Mapping[str, Any]) -> Score:
+        """From JSON."""
+        lists = {
+            "truth": tuple(line["truth"]),
+            "steps": tuple(tuple(s) for s in line["steps"]),
+            "wrong_single_names": tuple(line["wrong_single_names"]),
+            "intervals": tuple(Interval(**i) for i in line["intervals"]),
+        }
+        return cls(**{**line, **lists})
 
     @property
     def covered(self) -> tuple[int, int]:

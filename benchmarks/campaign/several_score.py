@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from campaign.answers import keep, kept
 from campaign.case import Plan
 from campaign.several import EXTENTS, Several, make_several
 
@@ -33,6 +33,16 @@ class SeveralScore:
     shared: tuple[dict[str, Any], ...]
     seconds: float
     scene: str
+
+    @classmethod
+    def read(cls, line: Mapping[str, Any]) -> SeveralScore:
+        """From JSON."""
+        lists = {
+            "truth": {w: tuple(effects) for w, effects in line["truth"].items()},
+            "steps": {w: tuple(map(tuple, steps)) for w, steps in line["steps"].items()},
+            "shared": tuple(line["shared"]),
+        }
+        return cls(**{**line, **lists})
 
     @property
     def there(self) -> list[str]:
@@ -120,24 +130,28 @@ def run_several(
     seed: int,
     plans: Sequence[tuple[str, Plan]],
     winches: int,
-    keep: Path | None = None,
+    folder: Path | None = None,
     log: Path | None = None,
 ) -> list[SeveralScore]:
-    """Scores in the order of the plans (extent and size); progress on stderr, lines into a log."""
-    out = []
+    """Scores in the order of the plans (extent and size); progress on stderr.
+
+    Each score is a line of ``log``; cases whose score is there already are not run again.
+    """
+    known, out = kept(log, SeveralScore.read), []
     for index, (extent, plan) in enumerate(plans):
         number = seed * 100_000 + index
-        with tempfile.TemporaryDirectory() as folder:
-            place = keep / f"case-{number}" if keep else Path(folder)
+        if number in known:
+            out.append(known[number])
+            continue
+        with tempfile.TemporaryDirectory() as temporary:
+            place = folder / f"case-{number}" if folder else Path(temporary)
             case = make_several(number, extent, plan, winches, place)
             if case is None:
                 print(f"none {number} cannot be made: {plan}", file=sys.stderr)
                 continue
             got = answer_several(case)
         out.append(got)
-        if log is not None:
-            with log.open("a", encoding="utf-8") as lines:
-                lines.write(json.dumps(asdict(got)) + "\n")
+        keep(got, log)
         print(_line(got), file=sys.stderr, flush=True)
     return out
 

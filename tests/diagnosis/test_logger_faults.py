@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import binomtest
 
 from campaign import logger_case
+from campaign.answers import keep, kept
 from campaign.bench import Bench, draw_bench
 from campaign.identifiable import RATIO, identity
 from campaign.likelihood import gram, least_along, without
@@ -18,6 +19,8 @@ from campaign.logger_case import LoggerPlan, make_logger_case, run_logger_cases
 from campaign.logger_score import LoggerScore, clopper_pearson, logger_summary
 from campaign.loggers import FAULTS, MISREAD, Fault, fault_of
 from campaign.record import AR, Recording, recordings
+from campaign.score import Interval, Score
+from campaign.several_score import SeveralScore
 from campaign.truth import OUTPUTS, Hidden, Situation, show
 from winchkit.arrays import Array
 from winchkit.runs.read import read_run
@@ -259,3 +262,24 @@ def test_a_campaign_goes_on_where_its_log_ends(
     assert got == [scored(700_000 + k) for k in range(3)]
     figures = logger_summary(got)["figures"]
     assert figures["truth_in_first"]["hits"] == figures["truth_in_first"]["cases"] == 3
+
+
+def test_scores_of_every_campaign_are_read_from_their_log(tmp_path: Path) -> None:
+    path = tmp_path / "log"
+    interval = Interval("cell-gain", "gain_error", 0.02, 0.021, 0.02, 0.022, 1.0)
+    score = Score(
+        seed=3, kind="single", snr=1.0, hidden={"cell-gain": {"gain_error": 0.02}},
+        truth=("cell-gain",), verdict="explained", steps=(("cell-gain", "cell-crosstalk"),),
+        share=0.0, p_value=0.5, truth_in_first=True, wrong_single_names=(), found=1,
+        heldout_over_noise=1.0, intervals=(interval,), seconds=1.0, scene="spiral",
+    )  # fmt: skip
+    several = SeveralScore(
+        seed=4, extent="one", snr=1.0, truth={"A": ("cell-gain",), "B": ()},
+        verdicts={"A": "explained", "B": "adequate"}, steps={"A": (("cell-gain",),), "B": ()},
+        shared=({"winches": ["A"]},), seconds=1.0, scene="spiral",
+    )  # fmt: skip
+    keep(score, path)
+    assert kept(path, Score.read) == {3: score}
+    path.unlink()
+    keep(several, path)
+    assert kept(path, SeveralScore.read) == {4: several}

@@ -11,7 +11,7 @@ from scipy.stats import ttest_1samp
 from diagnosis_runs import GROOVED, SPIRAL, Ride, made, recorded, term, with_channel
 from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.data.zeroing import zeroed_anew
+from winchkit.diagnosis.data.zeroing import wanders, zeroed_anew
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.runs.run import Run
@@ -38,10 +38,28 @@ def test_one_difference_is_a_t_test_of_batch_means() -> None:
 
 
 def test_a_wander_is_no_new_zero() -> None:
-    random = np.random.default_rng(2)
-    for _ in range(100):
-        wander = np.cumsum(random.normal(0, 1, 400))
-        assert zeroed_anew("cable_length", [wander, np.cumsum(random.normal(0, 1, 400))]) is None
+    """200 recordings of two walks at a level of 1 %: more than eight are 1 in 1000."""
+    walks = np.random.default_rng(2).normal(0, 1, (200, 2, 400)).cumsum(axis=2)
+    found = [zeroed_anew("cable_length", list(pair)) for pair in walks]
+    assert sum(one is not None for one in found) <= 8
+
+
+@pytest.mark.parametrize("walk", [0.0, 0.3, 1.0, np.inf])
+def test_a_level_beside_a_walk_is_taken_for_one_in_a_hundredth_of_cases(walk: float) -> None:
+    """400 recordings of three runs, white noise and a walk: more than eleven are 1 in 1000."""
+    random = np.random.default_rng(5)
+    steps = random.normal(0, 1, (400, 3, 8 * 20)).cumsum(axis=2).reshape(400, 3, 8, 20)
+    white, walked = random.normal(0, 1, (400, 3, 8)), steps.mean(axis=3) / np.sqrt(20)
+    means = walked if np.isinf(walk) else white + np.sqrt(walk) * walked
+    assert sum(not wanders(one) for one in means) <= 11
+
+
+def test_levels_of_white_block_means_are_no_wander() -> None:
+    """Levels of two standard deviations of a block, of both signs: all blocks show them."""
+    random = np.random.default_rng(6)
+    levels = 2.0 * np.array([[1.0], [-1.0], [1.0], [-1.0], [1.0], [-1.0]])
+    drawn = [wanders(levels + random.normal(0, 1, (6, 8))) for _ in range(100)]
+    assert sum(drawn) <= 5
 
 
 def test_a_new_zero_is_found_beside_what_the_temperature_does_and_not_instead() -> None:

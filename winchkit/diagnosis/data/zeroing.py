@@ -2,8 +2,9 @@
 
 Repeats have equal predictions, so that their difference is noise, and a constant where the
 instrument was zeroed in between. The mean of every difference is tested against its variation over
-blocks of time (batch means, one F test per output), and its first block against the change from
-block to block, so that a slow wander of the instrument is none. Repeats at different temperatures
+blocks of time (batch means, one F test per output), and against a random walk of the instrument
+beside white noise (local level model), so that a slow wander is none. Repeats at different
+temperatures
 may differ by what a temperature does: a straight line over it, and over its product with the
 output, is fitted beside.
 
@@ -11,8 +12,8 @@ References
 ----------
 Schmeiser, B. (1982). Batch size effects in the analysis of simulation output. Oper. Res. 30,
 556-568.
-von Neumann, J. (1941). Distribution of the ratio of the mean square successive difference to the
-variance. Ann. Math. Statist. 12, 367-395.
+Harvey, A. C. (1989). Forecasting, Structural Time Series Models and the Kalman Filter. Cambridge
+University Press, ch. 4 (local level model, restricted likelihood).
 Draper, N. R., Smith, H. (1998). Applied Regression Analysis, 3rd ed., ch. 2 (pure error).
 """
 
@@ -34,6 +35,7 @@ BLOCKS = 8
 LEVEL = 1e-4
 _LEAST_SAMPLES = 64
 _LEVEL_OF_WANDER = 0.01
+_REGION = 3.841
 
 
 def zeroed_anew(
@@ -111,7 +113,7 @@ def anew(output: str, spread: float, p_value: float, between: str) -> Finding:
 
 
 def wanders(means: Array) -> bool:
-    """Whether the first blocks are no larger than a random walk makes them.
+    """Whether a random walk from zero, beside white noise, explains the level of block means.
 
     Parameters
     ----------
@@ -120,11 +122,28 @@ def wanders(means: Array) -> bool:
 
     Notes
     -----
-    Half the mean square successive difference of block means (von Neumann) is their variance under
-    white noise, and that of the first block of a random walk that starts at zero; its degrees of
-    freedom are 2 (b − 1)²/(3 b − 4) per difference.
+    Local level model: block means have one level each, and the covariance w (I + r M) with the M of
+    means of a random walk that starts at zero. The level is that of generalised least squares, its
+    p-value (F with n and 7 n degrees of freedom) the largest over the ratios r that the restricted
+    likelihood does not reject at 5 %: from r = 0, white noise, of which all blocks determine the
+    level, to a walk alone, of which only the first does.
     """
-    first = float(np.mean(means[:, 0] ** 2))
-    half = float(np.mean(np.diff(means, axis=1) ** 2)) / 2
-    freedom = 2 * (BLOCKS - 1) ** 2 / (3 * BLOCKS - 4) * len(means)
-    return half > 0.0 and float(fdtrc(len(means), freedom, first / half)) >= _LEVEL_OF_WANDER
+    count = len(means)
+    block = np.arange(1.0, BLOCKS + 1)
+    walk = np.minimum.outer(block, block) - 0.5 - np.eye(BLOCKS) / 6
+    ratios = np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 25)])
+    covariance = np.eye(BLOCKS) + ratios[:, None, None] * walk
+    inverse = np.linalg.inv(covariance)
+    weights, information = inverse.sum(axis=1), inverse.sum(axis=(1, 2))
+    levels = weights @ means.T / information[:, None]
+    squares = np.einsum("ni,rij,nj->r", means, inverse, means)
+    left = squares - information * np.sum(levels**2, axis=1)
+    freedom = count * (BLOCKS - 1)
+    if np.any(left <= 0.0):
+        return False
+    deviance = freedom * np.log(left) + count * (
+        np.linalg.slogdet(covariance)[1] + np.log(information)
+    )
+    statistic = np.mean(levels**2, axis=1) * information * freedom / left
+    p_values = fdtrc(count, freedom, statistic[deviance <= deviance.min() + _REGION])
+    return float(np.max(p_values)) >= _LEVEL_OF_WANDER

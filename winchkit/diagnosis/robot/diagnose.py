@@ -18,9 +18,7 @@ from winchkit.diagnosis.design.detectability import DetectionThreshold, detectab
 from winchkit.diagnosis.diagnose import (
     Answer,
     ProgressCallback,
-    candidates_of,
     no_progress,
-    steps_of,
 )
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
@@ -47,6 +45,7 @@ from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.trajectory_regression import regression_at
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
+from winchkit.diagnosis.steps import candidates_of, steps_of
 from winchkit.diagnosis.verdict.decision import Judgement, judge
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
