@@ -33,7 +33,7 @@ import numpy as np
 from winchkit.catalog import find
 from winchkit.diagnosis.fleet.history import FleetHistory, fleet_history
 from winchkit.diagnosis.fleet.sessions import SessionEstimate, fit_session, null_term
-from winchkit.diagnosis.fleet.swapped_profiles import swapped_profiles
+from winchkit.diagnosis.fleet.swapped_profiles import swapped_by_radius
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -183,6 +183,13 @@ def catalogue() -> Catalogue:
     return Catalogue([known[effect] for effect in EFFECTS])
 
 
+@cache
+def _shipped() -> WinchProfile:
+    """Profile of the bench that the winches are variants of."""
+    (shipped,) = profiles_of(read_simbench(find("sim", "demo-adequate"))).values()
+    return shipped
+
+
 def runs_of(session: Session) -> tuple[list[Run], WinchProfile]:
     """Simulate a session, and the profile that its winch declares."""
     hidden = [f"warm cell, sensitivity={ZERO_DRIFT:g} N/K"]
@@ -192,7 +199,7 @@ def runs_of(session: Session) -> tuple[list[Run], WinchProfile]:
         hidden.append(f"{kind.physics}, {kind.parameter}={number:.12g}{kind.unit}")
     bench = hiding(read_simbench(find("sim", "demo-adequate")), hidden)
     truth = {name: replace(t, temperature=session.temperature) for name, t in bench.truth.items()}
-    (shipped,) = profiles_of(bench).values()
+    shipped = _shipped()
     true, declared = (
         replace(shipped, drum=replace(shipped.drum, winding_radius=radius))
         for radius in (session.true_radius, session.radius)
@@ -292,14 +299,13 @@ def _dated(history: FleetHistory, name: str, step: Step) -> bool:
 
 
 def _swaps(fleet: Fleet, history: FleetHistory) -> Sequence[Any]:
-    """Exchanged profiles by the winding radius; winches share the scatter of their radii."""
-    (radius,) = (p for p in history.parameters if p.effect == "drum-radius")
-    identified, covariances = {}, {}
-    for winch in radius.winches:
-        identified[winch.winch] = np.array([fleet.radii[winch.winch] + winch.value])
-        covariances[winch.winch] = np.array([[winch.std**2 + KINDS[-1].spread ** 2]])
-    profiles = {name: np.array([value]) for name, value in fleet.radii.items()}
-    return swapped_profiles(identified, covariances, profiles)
+    """Exchanged profiles by the winding radius."""
+    shipped = _shipped()
+    profiles = {
+        name: replace(shipped, drum=replace(shipped.drum, winding_radius=radius))
+        for name, radius in fleet.radii.items()
+    }
+    return swapped_by_radius(history.parameters, profiles, catalogue())
 
 
 def _creep_found_at(fleet: Fleet, found: Sequence[SessionEstimate], sessions: int) -> float | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -20,8 +21,11 @@ from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.diagnosis.fleet.history import fleet_history
 from winchkit.diagnosis.fleet.sessions import SessionEstimate
+from winchkit.effects.term import Term
 from winchkit.library.history import common_effects
 from winchkit.report.fleet_text import history_text
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.winch import WinchProfile
 
 pytest.importorskip("pyarrow")
 START = datetime(2026, 1, 5, 8, tzinfo=UTC)
@@ -124,23 +128,123 @@ def test_a_step_is_found_and_dated_on_the_command_line(library: Path) -> None:
     assert abs(changed[0]["change"]["date"] - edge) <= WEEK.total_seconds()
 
 
-@pytest.mark.slow
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Eight winches over six weeks, of which nothing but the files is known; their profiles."""
+    folder = tmp_path_factory.mktemp("small")
+    ticks, shipped = np.linspace(0.0, 1.9, 20), find("profiles", "bench-spiral").read_text()
+    (folder / "profiles").mkdir()
+    for winch, radius in enumerate(RADII):
+        own = shipped.replace("60 mm", f"{radius:.4f} mm")
+        assert own != shipped
+        (folder / "profiles" / f"W{winch}.toml").write_text(own)
+        for week in range(6):
+            place = folder / f"W{winch}" / f"{(START + week * WEEK).date()}.csv"
+            place.parent.mkdir(exist_ok=True)
+            angle = np.random.default_rng([winch, week]).normal(size=20).cumsum()
+            write_run(Run("x", ticks, {"motor_angle": Channel(angle, "rad")}, {}), place)
+    index_library(folder)
+    return folder
+
+
+RADII = 60.0 + np.random.default_rng(5).normal(0.0, 0.3, 8)
+"""Of the profiles, mm."""
+
+
+@pytest.fixture
+def fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Estimates that are given: W1 and W4 have each other's profiles, the cell of W2 creeps."""
+    true = RADII.copy()
+    true[[1, 4]] = RADII[[4, 1]]
+
+    def given(
+        _: object,
+        profile: WinchProfile,
+        terms: Sequence[Term],
+        *,
+        winch: str,
+        time: float,
+        **__: object,
+    ) -> tuple[SessionEstimate, ...]:
+        number, week = int(winch[1:]), (time - START.timestamp()) / WEEK.total_seconds()
+        noise = np.random.default_rng([number, round(week)]).normal(0.0, 1.0, 2)
+        radius = 1e-3 * true[number] + 2e-6 * noise[0] - profile.drum.winding_radius
+        gain = 1e-4 * noise[1] + (0.003 * week if number == 2 else 0.0)
+        known = {"drum-radius": (radius, 2e-6), "cell-gain": (gain, 1e-4)}
+        return tuple(
+            SessionEstimate(
+                winch, time, term.effect.id, term.effect.parameters[0].name,
+                *map(float, known[term.effect.id]), "1", (1.0,) * len(terms), {"tension": 150.0},
+            )
+            for term in terms
+        )  # fmt: skip
+
+    monkeypatch.setattr("winchkit.diagnosis.fleet.sessions.fit_session", given)
+
+
+FOLLOWED = ("--effect", "drum-radius", "--effect", "cell-gain")
+
+
+@pytest.mark.usefixtures("fits")
+def test_a_folder_of_profiles_shows_which_were_exchanged_and_a_trend_its_limit(
+    small: Path, tmp_path: Path
+) -> None:
+    page = tmp_path / "page.html"
+    wanted = (small, "-p", small / "profiles", *FOLLOWED)
+    limit = ("--limit", "cell-gain.gain_error=2 %")
+    result = run(*wanted, *limit, "--html", page)
+    assert result.exit_code == 1, result.output
+    text = " ".join(result.stdout.split())
+    assert "winches W1 and W4 have exchanged profiles: W1 fits that of W4" in text
+    assert "winch W2: the span of the load cell is wrong" in text
+    # 0.3 % a week from week 0 reach 2 % after 6 2/3 weeks.
+    day = datetime.fromisoformat(text.partition("reaches the limit of 2 % on ")[2][:10])
+    assert abs(day.replace(tzinfo=UTC) - START - 6.67 * WEEK) < timedelta(days=3)
+    content = page.read_text(encoding="utf-8")
+    assert "W1 and W4 have exchanged profiles" in content
+    assert "reaches the limit of 2 %" in content
+
+
+@pytest.mark.usefixtures("fits")
+def test_one_profile_of_all_winches_cannot_be_exchanged(small: Path) -> None:
+    result = run(small, "-p", small / "profiles" / "W0.toml", *FOLLOWED, "--json")
+    found = json.loads(result.stdout)
+    assert (found["sessions"], found["swapped"], found["failures"]) == (48, [], {})
+
+
+@pytest.mark.usefixtures("fits")
+def test_a_winch_without_a_profile_costs_its_sessions_only(small: Path, tmp_path: Path) -> None:
+    shutil.copytree(small / "profiles", tmp_path / "own")
+    (tmp_path / "own" / "W3.toml").unlink()
+    result = run(small, "-p", tmp_path / "own", *FOLLOWED, "--json")
+    found = json.loads(result.stdout)
+    assert (found["sessions"], len(found["failures"])) == (42, 6)
+    assert "W3.toml" in found["failures"][f"W3 {START.date()}"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
         (["--effect", "cell-gian"], 2, "did you mean 'cell-gain'?"),
         (["--limit", "cell-gain=3"], 2, "write EFFECT.PARAMETER=VALUE"),
         (["--limit", "cell-gain.size=3"], 2, "cell-gain has gain_error"),
+        (["--limit", "cell-gain.gain_error=0"], 2, "above or below 0"),
+        (["--limit", "cable-elongation-linear.axial_stiffness=-1 kN"], 2, "it is above 0"),
         ([], 2, "run 'winchkit fleet diagnose' first"),
     ],
 )
-def test_wrong_input(library: Path, arguments: list[str], code: int, words: str) -> None:
-    result = run(library, "-p", find("profiles", "bench-spiral"), *arguments)
+def test_wrong_input(small: Path, arguments: list[str], code: int, words: str) -> None:
+    result = run(small, "-p", find("profiles", "bench-spiral"), *arguments)
     assert result.exit_code == code, result.output
     assert words in result.stderr
 
 
 def test_a_folder_without_an_index_is_refused(tmp_path: Path) -> None:
-    result = run(tmp_path, "-p", "bench-spiral", "--effect", "cell-gain")
+    wanted = ("-p", "bench-spiral", "--effect", "cell-gain")
+    result = run(tmp_path, *wanted)
     assert result.exit_code == 3
     assert "winchkit library index" in result.stderr
+    result = run(tmp_path / "nowhere", *wanted)
+    assert result.exit_code == 3
+    assert "no such folder" in result.stderr
+    assert "library index" not in result.stderr

@@ -16,8 +16,10 @@ from winchkit.library.sessions import WinchSession, winch_sessions
 if TYPE_CHECKING:
     from winchkit.diagnosis.fleet.history import FleetHistory
     from winchkit.diagnosis.fleet.sessions import SessionEstimate
+    from winchkit.diagnosis.fleet.swapped_profiles import Swap
     from winchkit.effects.catalogue import Catalogue
     from winchkit.effects.term import Term
+    from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["LibraryHistory", "common_effects", "library_history"]
 
@@ -34,6 +36,8 @@ class LibraryHistory:
     """Every parameter over winches and time."""
     failures: Mapping[str, str]
     """``winch session`` to the reason why it was not fitted."""
+    swapped: tuple[Swap, ...] = ()
+    """Winches that have each other's profiles, where each has its own."""
 
 
 def common_effects(sets: Iterable[Sequence[str]]) -> tuple[str, ...]:
@@ -78,18 +82,19 @@ def library_history(
     profile : str or Path
         Profile of all winches, or a folder with ``WINCH.toml`` for each (``/`` as ``-``).
     effects : sequence of str, optional
-        Effects to follow; by default those that ``winchkit fleet diagnose`` named.
+        Effects to follow; by default those that ``winchkit fleet diagnose`` named, and those of the
+        profiles.
     effect_files : sequence of str or Path, optional
         Files of user effects.
     limits : mapping, optional
-        (effect, parameter) to the value that must not be reached, SI.
+        (effect, parameter) to the value that must not be reached, SI, not zero.
     progress : callable, optional
         Called with a text and the share of the work done.
 
     Returns
     -------
     LibraryHistory
-        Changes with dates, odd winches, costs and dates of limits.
+        Changes with dates, odd winches, exchanged profiles, costs and dates of limits.
 
     Raises
     ------
@@ -100,32 +105,69 @@ def library_history(
     """
     from winchkit.diagnosis.fleet.history import fleet_history
     from winchkit.diagnosis.fleet.sessions import null_term
+    from winchkit.diagnosis.fleet.swapped_profiles import swapped_by_radius
+    from winchkit.effects.bind import terms_of
     from winchkit.effects.catalogue import load_catalogue
 
     tables = indexed(folder)
     catalogue = load_catalogue(effect_files)
-    chosen = tuple(effects) or common_effects(_named_sets(tables))
-    if not chosen:
-        raise UsageError(
-            f"{folder}: no effect is named in its diagnoses; run 'winchkit fleet diagnose' first, "
-            "or name the effects to follow (--effect)"
-        )
+    sessions = winch_sessions(tables)
+    profiles, faults = _profiles(profile, {session.winch for session in sessions})
+    own = {t.effect.id for known in profiles.values() for t in terms_of(known, catalogue)}
+    chosen = tuple(effects) or _followed(tables, sorted(own))
     for name in chosen:
         if name not in catalogue:
             known = [effect.id for effect in catalogue]
             raise UsageError(f"there is no effect '{name}'{suggest(name, known)}")
     terms = [null_term(catalogue[name]) for name in chosen]
-    sessions = winch_sessions(tables)
     estimates: list[SessionEstimate] = []
     failures: dict[str, str] = {}
     for number, session in enumerate(sessions):
         progress(f"{session.winch} {session.session}", number / len(sessions))
+        name = f"{session.winch} {session.session}"
+        if session.winch in faults:
+            failures[name] = faults[session.winch]
+            continue
         try:
-            estimates += _fitted(tables, session, profile, terms, catalogue)
+            estimates += _fitted(tables, session, profiles[session.winch], terms, catalogue)
         except (FileError, RunError) as error:
-            failures[f"{session.winch} {session.session}"] = str(error)
+            failures[name] = str(error)
     fitted = len(sessions) - len(failures)
-    return LibraryHistory(chosen, fitted, fleet_history(estimates, limits), failures)
+    history = fleet_history(estimates, limits)
+    swapped = swapped_by_radius(history.parameters, profiles, catalogue)
+    return LibraryHistory(chosen, fitted, history, failures, swapped)
+
+
+def _profiles(
+    profile: str | Path, winches: Iterable[str]
+) -> tuple[dict[str, WinchProfile], dict[str, str]]:
+    """Profile of every winch, and the faults of the others."""
+    from winchkit.schema.read import read_profile
+
+    profiles: dict[str, WinchProfile] = {}
+    faults: dict[str, str] = {}
+    for winch in winches:
+        try:
+            profiles[winch] = read_profile(profile_path(profile, winch))
+        except FileError as error:
+            faults[winch] = str(error)
+    return profiles, faults
+
+
+def _followed(tables: Partitions, own: Sequence[str]) -> tuple[str, ...]:
+    """Effects that the diagnoses named, and those of the profiles; raises UsageError for none."""
+    if not tables.files("diagnoses"):
+        raise UsageError(
+            f"{tables.runs}: has no diagnoses; run 'winchkit fleet diagnose' first, or name the "
+            "effects to follow (--effect)"
+        )
+    chosen = common_effects([*_named_sets(tables), *([effect] for effect in own)])
+    if not chosen:
+        raise UsageError(
+            f"{tables.runs}: its diagnoses name no effect and its profiles have none; name the "
+            "effects to follow (--effect)"
+        )
+    return chosen
 
 
 def _named_sets(tables: Partitions) -> list[Sequence[str]]:
@@ -138,17 +180,16 @@ def _named_sets(tables: Partitions) -> list[Sequence[str]]:
 def _fitted(
     tables: Partitions,
     session: WinchSession,
-    profile: str | Path,
+    profile: WinchProfile,
     terms: Sequence[Term],
     catalogue: Catalogue,
 ) -> tuple[SessionEstimate, ...]:
     from winchkit.diagnosis.fleet.sessions import fit_session
-    from winchkit.schema.read import read_profile
 
     library = tables.runs.resolve()
     return fit_session(
         [run.read(library) for run in session.runs],
-        read_profile(profile_path(profile, session.winch)),
+        profile,
         terms,
         winch=session.winch,
         time=session.time.timestamp(),

@@ -66,13 +66,15 @@ def profile_of_runs(profile: str | Path) -> ProfileOfRuns:
 
 
 def indexed(folder: str | Path) -> Partitions:
-    """Tables of a folder; raises FileError where it has no index.
+    """Tables of a folder; raises FileError where it has no index, or is not there.
 
     Parameters
     ----------
     folder : str or Path
         Folder of the runs.
     """
+    if not Path(folder).is_dir():
+        raise FileError(Fault("no such folder of runs", str(folder)))
     tables = Partitions(Path(folder))
     if not tables.files("runs"):
         raise FileError(f"{folder}: has no indexed runs; run 'winchkit library index' on it first")

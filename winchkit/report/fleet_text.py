@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from math import isfinite
 
 from winchkit.diagnosis.fleet.history import FleetHistory, FleetParameter, WinchHistory
+from winchkit.diagnosis.fleet.swapped_profiles import Swap
 from winchkit.report.words.numbers import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
 
-__all__ = ["ChangeText", "change_text", "day_text", "history_text", "odd_texts"]
+__all__ = [
+    "ChangeText",
+    "beyond_text",
+    "change_text",
+    "day_text",
+    "history_text",
+    "odd_texts",
+    "swap_text",
+]
 
 _DO = {
     "cell": "calibrate the load cell with known weights, look for damage and moisture of its cable",
@@ -46,21 +55,26 @@ class ChangeText:
     advice: str
 
 
-def history_text(history: FleetHistory) -> str:
+def history_text(history: FleetHistory, swapped: Sequence[Swap] = ()) -> str:
     """Report of a fleet's history for a terminal.
 
     Parameters
     ----------
     history : FleetHistory
         Changes and differences.
+    swapped : sequence of Swap
+        Winches that have each other's profiles.
 
     Returns
     -------
     str
-        Lines: changes, the most significant first, then winches that differ from the others.
+        Lines: changes, the most significant first, then winches beyond a limit without a change,
+        winches that differ from the others, and exchanged profiles.
     """
     lines = [line for pair in history.changed for line in _changed(*pair)]
+    lines += [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
     lines += [line for pair in history.odd for line in odd_texts(*pair)]
+    lines += [swap_text(swap) for swap in swapped]
     if not lines:
         lines = ["No change over time, and no winch that differs from the others."]
     tested = sum(len(parameter.winches) for parameter in history.parameters)
@@ -102,7 +116,7 @@ def change_text(parameter: FleetParameter, winch: WinchHistory) -> ChangeText:
         since,
         _value(winch.value, winch.std, parameter.unit),
         ", ".join(costs),
-        "" if winch.limit is None else _limit(winch, parameter.unit),
+        _limit(winch, parameter.unit),
         _do(parameter.effect),
     )
 
@@ -147,11 +161,61 @@ def odd_texts(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
     )
 
 
+def beyond_text(parameter: FleetParameter, winch: WinchHistory) -> str:
+    """Sentence on a winch beyond a limit.
+
+    Parameters
+    ----------
+    parameter : FleetParameter
+        The parameter.
+    winch : WinchHistory
+        The winch.
+
+    Returns
+    -------
+    str
+    """
+    own = _value(winch.value, winch.std, parameter.unit)
+    name = f"{parameter.effect} {parameter.parameter}"
+    return f"winch {winch.winch}: {name} {own}, {_limit(winch, parameter.unit)}"
+
+
+def swap_text(swap: Swap) -> str:
+    """Sentence on exchanged profiles.
+
+    Parameters
+    ----------
+    swap : Swap
+        Winches that have each other's profiles.
+
+    Returns
+    -------
+    str
+    """
+    names, p_value = swap.winches, f"p = {swap.p_value:.1g}"
+    following = (*names[1:], names[0])
+    pairs = [f"{own} fits that of {other}" for own, other in zip(names, following, strict=True)]
+    return (
+        f"winches {', '.join(names[:-1])} and {names[-1]} have exchanged profiles: "
+        f"{', '.join(pairs)} ({p_value}); do: compare drums and files, and exchange the profiles"
+    )
+
+
 def _limit(winch: WinchHistory, unit: str) -> str:
-    limit = winch.limit
-    assert limit is not None, "asked for where there is one"
+    """Sentence on the limit of a winch; empty where there is nothing to say."""
+    value, limit = winch.limit_value, winch.limit
+    if value is None or (limit is None and not winch.is_beyond_limit):
+        return ""
+    known = f"limit of {_plain(value, unit)}"
+    if limit is None:
+        return f"beyond the {known}"
+    verb = "passed" if limit.date <= winch.series.times[-1] else "reaches"
     ends = f"95 %: {day_text(limit.earliest)} to {day_text(limit.latest)}"
-    return f"reaches the limit of {quantity(limit.limit, unit)} on {day_text(limit.date)} ({ends})"
+    return f"{verb} the {known} on {day_text(limit.date)} ({ends})"
+
+
+def _plain(value: float, unit: str) -> str:
+    return f"{100 * value:.4g} %" if unit == "1" else quantity(value, unit)
 
 
 def _value(value: float, std: float, unit: str) -> str:

@@ -122,3 +122,14 @@ def test_a_trend_has_the_date_of_its_limit() -> None:
     assert winch.kind == "trend"
     assert winch.limit is not None
     assert winch.limit.earliest < winch.limit.date < winch.limit.latest
+    assert not winch.is_beyond_limit
+
+
+def test_a_step_has_no_date_of_a_limit_but_may_be_beyond_it() -> None:
+    random = np.random.default_rng(8)
+    step = {(2, "cell-gain"): np.where(np.arange(24) < 12, 0.0, 20.0)}
+    history = fleet_history(fleet(random, 12, 24, step), {("cell-gain", "size"): 12.0})
+    ((_, winch),) = history.beyond_limit
+    assert (winch.winch, winch.changed, winch.kind, winch.limit) == ("W002", True, "step", None)
+    told = [each.to_json()["beyond_limit"] for p in history.parameters for each in p.winches]
+    assert told == [w == 2 for w in range(12)] + [None] * 12

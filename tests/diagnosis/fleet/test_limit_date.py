@@ -19,6 +19,7 @@ def line(slope: float, noise: np.ndarray | float = 0.0) -> Series:
 
 def test_a_line_reaches_its_limit_at_the_quotient() -> None:
     found = limit_date(line(2.0), KNOWN, 40.0)
+    assert found is not None
     assert found.date == pytest.approx(20.0)
     assert found.earliest < 20.0 < found.latest
     # Delta method, exact in the limit of a small relative error of the slope.
@@ -27,15 +28,17 @@ def test_a_line_reaches_its_limit_at_the_quotient() -> None:
     assert (found.latest - found.earliest) / (2 * 1.96 * std) == pytest.approx(1.0, abs=0.02)
 
 
-def test_a_slope_that_is_not_significant_gives_no_date_limits() -> None:
-    found = limit_date(line(0.05), KNOWN, 40.0)
-    assert (found.earliest, found.latest) == (-np.inf, np.inf)
+@pytest.mark.parametrize(("slope", "limit"), [(0.05, 40.0), (2.0, -40.0), (-2.0, 40.0)])
+def test_a_slope_that_is_not_significant_or_leads_away_gives_no_date(
+    slope: float, limit: float
+) -> None:
+    assert limit_date(line(slope), KNOWN, limit) is None
 
 
 def test_the_interval_covers_the_date_in_95_of_100() -> None:
     random = np.random.default_rng(2)
     inside = [
-        found.earliest <= 20.0 <= found.latest
+        found is not None and found.earliest <= 20.0 <= found.latest
         for found in (
             limit_date(line(0.5, random.normal(size=12)), KNOWN, 10.0) for _ in range(600)
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from winchkit.diagnosis.fleet.partial_pooling import odd_p_values, partial_pooling
 
@@ -53,11 +54,31 @@ def test_pooled_values_are_nearer_to_the_truth_and_their_std_covers_it() -> None
     assert 0.92 < np.mean(np.abs(z) < 1.96) < 0.98
 
 
-def test_p_values_of_alike_winches_are_valid() -> None:
-    random = np.random.default_rng(4)
-    p = [odd_p_values(random.normal(0, np.hypot(1, 0.5), 12), np.full(12, 0.5)) for _ in range(200)]
+@pytest.mark.parametrize("count", [5, 8, 12])
+def test_p_values_of_alike_winches_are_valid(count: int) -> None:
+    random, std = np.random.default_rng(4), np.full(count, 0.1)
+    p = [odd_p_values(random.normal(0, np.hypot(1, 0.1), count), std) for _ in range(200)]
     for level in (0.01, 0.05):
-        assert np.mean(np.concatenate(p) < level) <= level + 3 * np.sqrt(level / 2400)
+        bound = level + 3 * np.sqrt(level / (200 * count))
+        assert np.mean(np.concatenate(p) < level) <= bound
+
+
+def test_one_winch_is_tested_by_its_externally_studentised_difference() -> None:
+    values = np.array([0.3, -1.2, 0.8, 9.0, 0.1, -0.4])
+    others = np.delete(values, 3)
+    t = (9.0 - others.mean()) / (others.std(ddof=1) * np.sqrt(1 + 1 / 5))
+    p = odd_p_values(values, np.full(6, 1e-6))
+    assert p[3] == pytest.approx(2 * stats.t.sf(t, 4), rel=1e-4)
+    assert np.all(np.delete(p, 3) == 1.0)
+
+
+def test_of_eight_winches_one_that_is_far_from_the_others_is_found() -> None:
+    random, found = np.random.default_rng(6), 0
+    for _ in range(20):
+        values = random.normal(0.0, 1.0, 8)
+        values[5] += 20.0
+        found += odd_p_values(values, np.full(8, 0.1))[5] < 0.01 / 40 / 4.3
+    assert found >= 18
 
 
 def test_two_odd_winches_do_not_hide_each_other() -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from winchkit.catalog import find
 from winchkit.diagnosis.fleet.sessions import SessionEstimate, fit_session, null_term
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import EffectTable, WinchProfile
 from winchkit.schema.read import read_programme, read_simbench
 from winchkit.sim.bench import hiding, profiles_of, programme_path
 from winchkit.sim.record import simulate
@@ -17,14 +21,19 @@ SET = ("cell-gain", "cable-elongation-linear", "drum-eccentricity")
 
 
 @pytest.fixture(scope="module")
-def estimates() -> dict[str, SessionEstimate]:
+def recorded() -> tuple[list[Run], WinchProfile]:
     hidden = ["stretched cell, gain_error=0.01", "elastic rope, axial_stiffness=300 kN"]
     bench = hiding(read_simbench(find("sim", "demo-adequate")), hidden)
     profiles = profiles_of(bench)
     programme = read_programme(programme_path("programme-demo"))
-    runs = list(simulate(bench, profiles, programme, seed=3, rate=25.0))
+    return list(simulate(bench, profiles, programme, seed=3, rate=25.0)), profiles["A"]
+
+
+@pytest.fixture(scope="module")
+def estimates(recorded: tuple[list[Run], WinchProfile]) -> dict[str, SessionEstimate]:
+    runs, profile = recorded
     terms = [null_term(CATALOGUE[effect]) for effect in SET]
-    found = fit_session(runs, profiles["A"], terms, winch="A", time=0.0, catalogue=CATALOGUE)
+    found = fit_session(runs, profile, terms, winch="A", time=0.0, catalogue=CATALOGUE)
     return {each.parameter: each for each in found}
 
 
@@ -37,6 +46,18 @@ def test_hidden_values_are_within_their_uncertainty(
     found = estimates[parameter]
     assert abs(found.value - truth) < 4 * found.std
     assert found.std < 0.1 * truth
+
+
+def test_an_effect_that_the_profile_has_is_estimated_as_a_whole(
+    recorded: tuple[list[Run], WinchProfile], estimates: dict[str, SessionEstimate]
+) -> None:
+    runs, profile = recorded
+    known = replace(profile, effect=(EffectTable("cell-gain", {"gain_error": "0.4 %"}),))
+    terms = [null_term(CATALOGUE[effect]) for effect in SET]
+    (found, *_) = fit_session(runs, known, terms, winch="A", time=0.0, catalogue=CATALOGUE)
+    assert found.effect == "cell-gain"
+    assert found.value == pytest.approx(estimates["gain_error"].value, rel=1e-3)
+    assert found.std == pytest.approx(estimates["gain_error"].std, rel=1e-2)
 
 
 def test_an_absent_amplitude_with_a_phase_is_normal_about_zero(

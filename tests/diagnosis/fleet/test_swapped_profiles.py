@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from winchkit.diagnosis.fleet.swapped_profiles import swapped_profiles
+from winchkit.catalog import find
+from winchkit.diagnosis.fleet.history import FleetParameter, fleet_history
+from winchkit.diagnosis.fleet.sessions import SessionEstimate
+from winchkit.diagnosis.fleet.swapped_profiles import swapped_by_radius, swapped_profiles
+from winchkit.effects.catalogue import load_catalogue
+from winchkit.schema.profiles.winch import EffectTable, WinchProfile
+from winchkit.schema.read import read_profile
 
 NAMES = "ABCDE"
+CATALOGUE = load_catalogue()
+SHIPPED = read_profile(find("profiles", "bench-spiral"))
 TRUE = np.random.default_rng(1).normal(0.0, 20.0, (5, 2))
 ONE = np.eye(2)
 
@@ -76,3 +85,53 @@ def test_a_pair_is_found_alone_in_a_fleet_whose_profiles_are_close(seed: int) ->
     profiles = {name: np.array([x]) for name, x in zip(names, declared, strict=True)}
     found = swapped_profiles(identified, covariances, profiles)
     assert [sorted(swap.winches) for swap in found] == [[names[index] for index in pair]]
+
+
+RADII = 0.06 + np.random.default_rng(7).normal(0.0, 3e-4, 8)
+
+
+def fleet(effect: str, declared: np.ndarray, seed: int) -> tuple[FleetParameter, ...]:
+    """Estimates of eight winches of the radii RADII whose profiles declare others."""
+    random, own = np.random.default_rng(seed), []
+    common = 1e-4  # of all winches: the diameter of the cable, say
+    for winch, (true, radius) in enumerate(zip(RADII, declared, strict=True)):
+        error = true + common + random.normal(0.0, 3e-6) - radius
+        value = error if effect == "drum-radius" else radius / (radius + error) - 1.0
+        std = 2e-6 if effect == "drum-radius" else 2e-6 / 0.06
+        own.append(SessionEstimate(f"W{winch}", 0.0, effect, "error", float(value), std, "1"))
+    return fleet_history(own).parameters
+
+
+def profiles(declared: np.ndarray) -> dict[str, WinchProfile]:
+    return {
+        f"W{winch}": replace(SHIPPED, drum=replace(SHIPPED.drum, winding_radius=float(radius)))
+        for winch, radius in enumerate(declared)
+    }
+
+
+@pytest.mark.parametrize("effect", ["drum-radius", "gear-ratio"])
+def test_exchanged_profiles_of_drums_are_found_by_either_effect(effect: str) -> None:
+    declared = RADII.copy()
+    declared[[2, 6]] = RADII[[6, 2]]
+    (swap,) = swapped_by_radius(fleet(effect, declared, 1), profiles(declared), CATALOGUE)
+    assert sorted(swap.winches) == ["W2", "W6"]
+    assert swapped_by_radius(fleet(effect, RADII, 2), profiles(RADII), CATALOGUE) == ()
+    both = (*fleet("drum-radius", declared, 1), *fleet("gear-ratio", declared, 1))
+    assert swapped_by_radius(both, profiles(declared), CATALOGUE) == ()
+
+
+def test_the_error_of_a_radius_that_a_profile_has_belongs_to_the_profile() -> None:
+    declared = RADII.copy()
+    declared[[2, 6]] = RADII[[6, 2]]
+    written = {
+        name: replace(
+            SHIPPED,
+            drum=replace(SHIPPED.drum, winding_radius=0.06),
+            effect=(EffectTable("drum-radius", {"radius_error": f"{1e3 * (r - 0.06):.6f} mm"}),),
+        )
+        for name, r in zip(profiles(declared), declared, strict=True)
+    }
+    # The estimates are whole errors, from the one radius that all profiles have.
+    found = fleet("drum-radius", np.full(8, 0.06), 1)
+    (swap,) = swapped_by_radius(found, written, CATALOGUE)
+    assert sorted(swap.winches) == ["W2", "W6"]

@@ -36,14 +36,14 @@ __all__ = ["command"]
     multiple=True,
     metavar="NAME",
     shell_complete=complete_effect,
-    help="Follow this effect.  [default: those that 'fleet diagnose' named]",
+    help="Follow this effect.  [default: named by 'fleet diagnose', and of the profiles]",
 )
 @click.option(
     "--limit",
     "limits",
     multiple=True,
     metavar="EFFECT.PARAMETER=VALUE",
-    help="Value that must not be reached; its date is estimated.",
+    help="Value that must not be reached; a trend towards it has a date.",
 )
 @click.option(
     "--effects",
@@ -70,7 +70,8 @@ def command(
     The same effects are fitted to all winches and dates, so that names do not change from session
     to session. Every series is tested for a step or a trend, and every winch against the others,
     at a false discovery rate of 1 % over all of them. The report says date, size, cost and what to
-    do. Exit code 1: something changed, or a winch differs from the others.
+    do. Exit code 1: something changed, a winch differs from the others or is beyond a limit, or
+    profiles were exchanged.
     """
     from winchkit.library.history import library_history
     from winchkit.report.fleet_text import history_text
@@ -94,16 +95,19 @@ def command(
             "effects": list(found.effects),
             "sessions": found.sessions,
             "failures": dict(found.failures),
+            "swapped": [vars(swap) for swap in found.swapped],
         }
         echo_json(told)
     else:
         click.echo(f"{found.sessions} sessions, effects {', '.join(found.effects)}\n")
-        click.echo(history_text(history))
+        click.echo(history_text(history, found.swapped))
     if html:
         from winchkit.report.pages.fleet_history import fleet_history_html
 
-        write_page(html, fleet_history_html(history, "Maintenance report of a fleet"))
-    return 1 if history.changed or history.odd else 0
+        title = "Maintenance report of a fleet"
+        write_page(html, fleet_history_html(found.history, title, found.swapped))
+    is_clear = not (history.changed or history.odd or history.beyond_limit or found.swapped)
+    return 0 if is_clear else 1
 
 
 def _limit(text: str, effect_files: Sequence[str]) -> tuple[tuple[str, str], float]:
@@ -124,8 +128,9 @@ def _limit(text: str, effect_files: Sequence[str]) -> tuple[tuple[str, str], flo
         raise UsageError(f"--limit '{text}': {name} has {', '.join(names)}")
     declared = catalogue[name].parameter(parameter)
     limit = parse(value.strip(), dimension_of(declared.unit) or "ratio")
+    if limit == 0 or (declared.reciprocal and limit < 0):
+        where = "above 0" if declared.reciprocal else "above or below 0, which is no effect"
+        raise UsageError(f"--limit '{text}': it is {where}")
     if declared.reciprocal:
-        if not limit > 0:
-            raise UsageError(f"--limit '{text}': it is above 0")
         return (name, f"1/{parameter}"), 1 / limit
     return (name, parameter), limit

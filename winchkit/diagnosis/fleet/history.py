@@ -15,7 +15,7 @@ under dependency. Ann. Stat. 29, 1165-1188.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -57,8 +57,10 @@ class WinchHistory:
     rms_per_unit: Mapping[str, float]
     series: Series
     """Own estimates of the sessions."""
+    limit_value: float | None = None
+    """Value that must not be reached; None without one."""
     limit: LimitDate | None = None
-    """Date at which a trend reaches the limit of this parameter, where one is given."""
+    """Date at which it is reached; None unless there is a trend towards it at a known rate."""
 
     @property
     def changed(self) -> bool:
@@ -69,6 +71,12 @@ class WinchHistory:
     def odd(self) -> bool:
         """Whether the winch differs from the others at a false discovery rate of 1 %."""
         return bool(self.odd_q_value < _FALSE_DISCOVERY_RATE)
+
+    @property
+    def is_beyond_limit(self) -> bool:
+        """Whether the present value is as far from zero as the limit, on its side."""
+        limit = self.limit_value
+        return limit is not None and self.value / limit >= 1.0
 
     @property
     def kind(self) -> Literal["step", "trend", "step or trend"]:
@@ -108,6 +116,7 @@ class WinchHistory:
             "odd_q_value": self.odd_q_value,
             "change": change,
             "limit": None if self.limit is None else vars(self.limit),
+            "beyond_limit": None if self.limit_value is None else self.is_beyond_limit,
         }
 
 
@@ -152,6 +161,11 @@ class FleetHistory:
         found = [(p, w) for p in self.parameters for w in p.winches if w.odd]
         return sorted(found, key=lambda pair: pair[1].odd_q_value)
 
+    @property
+    def beyond_limit(self) -> list[tuple[FleetParameter, WinchHistory]]:
+        """Winches whose present value is beyond the limit of its parameter."""
+        return [(p, w) for p in self.parameters for w in p.winches if w.is_beyond_limit]
+
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""
         return {
@@ -173,7 +187,7 @@ def fleet_history(
     estimates
         Of one fixed set of effects, any order.
     limits
-        (effect, parameter) to the value that must not be reached, SI.
+        (effect, parameter) to the value that must not be reached, SI, not zero.
 
     Notes
     -----
@@ -209,12 +223,11 @@ def fleet_history(
                 next(odd_q),
                 own[-1].rms_per_unit,
                 each.series[index],
-                None
-                if limit is None or len(own) < 2
-                else limit_date(each.series[index], each.between, limit),
+                limit,
             )
             for index, (winch, own) in enumerate(group.items())
         ]
+        winches = [_with_limit_date(winch, each.between) for winch in winches]
         unit = next(iter(group.values()))[0].unit
         pooling, session_std = each.pooling, float(np.sqrt(each.between.value))
         parameters.append(
@@ -271,6 +284,13 @@ def _present(series: Series, change: Change | None, between: Variance) -> tuple[
         return change.level, change.level_std
     weight = 1 / (series.stds**2 + between.value)
     return float(np.average(series.values, weights=weight)), float(1 / np.sqrt(weight.sum()))
+
+
+def _with_limit_date(winch: WinchHistory, between: Variance) -> WinchHistory:
+    """The winch with the date of its limit, where it changed by a trend and not by a step."""
+    if winch.limit_value is None or not winch.changed or winch.kind != "trend":
+        return winch
+    return replace(winch, limit=limit_date(winch.series, between, winch.limit_value))
 
 
 def _p_value(change: Change | None) -> float:

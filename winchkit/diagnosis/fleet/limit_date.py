@@ -25,15 +25,14 @@ class LimitDate:
     limit: float
     """SI."""
     date: float
-    """Before the last session where the line crossed the limit, or moves away from it."""
+    """Before the last session where the limit was passed already."""
     earliest: float
-    """End of the 95 % confidence set; minus infinity where the slope is not significant."""
+    """End of the 95 % confidence set."""
     latest: float
-    """Infinite where the slope is not significant."""
 
 
-def limit_date(series: Series, between: Variance, limit: float) -> LimitDate:
-    """Date at which the trend of a series reaches a limit.
+def limit_date(series: Series, between: Variance, limit: float) -> LimitDate | None:
+    """Date at which the trend of a series reaches a limit; None where its rate leaves none.
 
     Parameters
     ----------
@@ -42,13 +41,14 @@ def limit_date(series: Series, between: Variance, limit: float) -> LimitDate:
     between
         Variance of the session effect.
     limit
-        Value of the parameter, SI.
+        Value of the parameter, SI, not zero.
 
     Notes
     -----
     With the line a + b (t − t̄) the 95 % set of dates is that of all t at which
     (a + b (t − t̄) − limit)² ≤ q² Var(a + b (t − t̄)): an interval where b differs from zero at
-    5 %, otherwise unbounded. q is the quantile of t with the degrees of freedom of τ².
+    5 %, otherwise unbounded, which is no date. A line towards zero reaches no limit. q is the
+    quantile of t with the degrees of freedom of τ².
     """
     weight = 1 / (series.stds**2 + between.value)
     centre = float(np.average(series.times, weights=weight))
@@ -59,9 +59,9 @@ def limit_date(series: Series, between: Variance, limit: float) -> LimitDate:
     square = float(stdtrit(between.dof, 0.975)) ** 2
     # (b² − q² var_b) u² − 2 gap b u + gap² − q² var_a = 0, with u = t − t̄.
     first, last = slope**2 - square * var_b, gap**2 - square * var_a
-    date = centre + gap / slope if slope else np.inf
-    if first <= 0:
-        return LimitDate(limit, float(date), -np.inf, np.inf)
+    if first <= 0 or slope * limit <= 0:
+        return None
     root = np.sqrt(max(gap**2 * slope**2 - first * last, 0.0))
     ends = (gap * slope - root) / first, (gap * slope + root) / first
-    return LimitDate(limit, float(date), centre + float(ends[0]), centre + float(ends[1]))
+    date, earliest, latest = (centre + float(u) for u in (gap / slope, *ends))
+    return LimitDate(limit, date, earliest, latest)

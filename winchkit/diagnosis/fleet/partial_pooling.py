@@ -2,13 +2,15 @@
 
 The value of winch w is μ + b + e with b ~ N(0, τ²) between winches and e of known variance. μ and
 τ² are estimated by restricted maximum likelihood, the value of each winch by its best linear
-unbiased prediction, beside its own estimate. A winch is tested against the others by a robust
-variance between winches, so that odd winches do not hide themselves or each other.
+unbiased prediction, beside its own estimate. Winches are tested against the others one after
+another, so that odd winches do not hide each other.
 
 References
 ----------
 Patterson, H. D., Thompson, R. (1971). Recovery of inter-block information when block sizes are
 unequal. Biometrika 58, 545-554.
+Rosner, B. (1983). Percentage points for a generalized ESD many-outlier procedure. Technometrics 25,
+165-172.
 Robinson, G. K. (1991). That BLUP is a good thing. Stat. Sci. 6, 15-32.
 Prasad, N. G. N., Rao, J. N. K. (1990). The estimation of the mean squared error of small-area
 estimators. J. Am. Stat. Assoc. 85, 163-171.
@@ -23,14 +25,13 @@ from scipy.optimize import minimize_scalar
 from scipy.special import stdtr
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.fleet.robust_variance import robust_variance
 
 __all__ = ["PartialPooling", "odd_p_values", "partial_pooling"]
 
 LEAST_WINCHES = 4
 """Winches from which one can differ from a majority of the others."""
+_WINCHES_PER_ODD = 4
 _GRID = 60
-_NEAR = 3.0
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,8 @@ def partial_pooling(values: Array, stds: Array) -> PartialPooling:
     REML estimate has the variance 2/Σ 1/(v + τ²)²; it is at most that of the own estimate.
     """
     own = stds**2
-    between = _reml(values, own)
+    between, common, variance = _common(values, own)
     weight = 1 / (own + between)
-    variance = float(1 / weight.sum())
-    common = float(weight @ values) * variance
     share = between * weight  # of the own estimate
     pooled = common + share * (values - common)
     of_between = own**2 * weight**3 * 2 / float(weight @ weight)
@@ -85,25 +84,48 @@ def partial_pooling(values: Array, stds: Array) -> PartialPooling:
 def odd_p_values(values: Array, stds: Array) -> Array:
     """P-value of every winch of being one of the others, shape (n,); NaN with fewer than four.
 
-    The difference of a winch from the weighted mean of the others, over its standard deviation
-    with the robust variance between the winches, is t distributed with the degrees of freedom of
-    that variance.
+    Parameters
+    ----------
+    values
+        Own estimate of every winch, shape (n,).
+    stds
+        Their standard deviations, shape (n,), positive.
+
+    Notes
+    -----
+    The winch farthest from the common value in its standard deviations is left out, then the
+    farthest of those that remain, for k = n // 4 winches. The difference of each from the common
+    value of the m that remain, over its standard deviation with their τ², is t distributed with
+    m − 1 degrees of freedom. Its p-value is the smallest of its own and those of the winches left
+    out later (Rosner 1983), times k (Bonferroni). Winches that are never left out have the p-value
+    1.
     """
     n = len(values)
     if n < LEAST_WINCHES:
         return np.full(n, np.nan)
-    out = np.empty(n)
-    for index in range(n):
-        rest = np.arange(n) != index
-        median = float(np.median(values[rest]))
-        between = robust_variance(values[rest] - median, stds[rest] ** 2)
-        # The mean of the others is robust too: those far from the median have no weight.
-        near = rest & (np.abs(values - median) <= _NEAR * np.sqrt(stds**2 + between.value))
-        weight = 1 / (stds[near] ** 2 + between.value)
-        mean, variance = float(np.average(values[near], weights=weight)), 1 / weight.sum()
-        z = abs(values[index] - mean) / np.sqrt(stds[index] ** 2 + between.value + variance)
-        out[index] = 2 * stdtr(between.dof, -z)
+    own, left = stds**2, np.arange(n)
+    between, common, _ = _common(values, own)
+    order, p_values = [], []
+    for _ in range(n // _WINCHES_PER_ODD):
+        distance = np.abs(values[left] - common) / np.sqrt(own[left] + between)
+        winch = int(left[np.argmax(distance)])
+        left = left[left != winch]
+        between, common, variance = _common(values[left], own[left])
+        z = abs(values[winch] - common) / np.sqrt(own[winch] + between + variance)
+        order.append(winch)
+        p_values.append(2 * float(stdtr(len(left) - 1, -z)))
+    out = np.ones(n)
+    smallest = np.minimum.accumulate(p_values[::-1])[::-1]
+    out[order] = np.minimum(1.0, len(order) * smallest)
     return out
+
+
+def _common(values: Array, own: Array) -> tuple[float, float, float]:
+    """Variance between winches, their common value, and its variance."""
+    between = _reml(values, own)
+    weight = 1 / (own + between)
+    variance = float(1 / weight.sum())
+    return between, float(weight @ values) * variance, variance
 
 
 def _reml(values: Array, own: Array) -> float:
@@ -112,21 +134,25 @@ def _reml(values: Array, own: Array) -> float:
         return 0.0
     scale = float(np.var(values, ddof=1))
 
-    def criterion(variance: float) -> float:
-        total = own + variance
+    def criterion(variance: Array) -> Array:
+        total = own + variance[..., None]
         weight = 1 / total
-        mean = weight @ values / weight.sum()
-        deviance = np.log(total).sum() + np.log(weight.sum()) + weight @ (values - mean) ** 2
-        return float(deviance)
+        mean = weight @ values / weight.sum(axis=-1)
+        squares = np.sum(weight * (values - mean[..., None]) ** 2, axis=-1)
+        deviance = np.log(total).sum(axis=-1) + np.log(weight.sum(axis=-1)) + squares
+        return np.asarray(deviance)
 
     # A likelihood in one unknown may have two maxima: the best of a grid is refined.
     high = 2 * len(values) * scale
     grid = np.concatenate([[0.0], np.geomspace(1e-6 * high, high, _GRID)]) if high else np.zeros(1)
-    best = int(np.argmin([criterion(x) for x in grid]))
+    best = int(np.argmin(criterion(grid)))
     if best == 0:
         return 0.0
     ends = grid[best - 1], grid[min(best + 1, len(grid) - 1)]
     found = minimize_scalar(
-        criterion, bounds=ends, method="bounded", options={"xatol": 1e-9 * high}
+        lambda variance: float(criterion(np.asarray(variance))),
+        bounds=ends,
+        method="bounded",
+        options={"xatol": 1e-9 * high},
     )
     return float(found.x)

@@ -100,7 +100,7 @@ def fit_session(
     time: float,
     catalogue: Catalogue | None = None,
 ) -> tuple[SessionEstimate, ...]:
-    """Fit a given set of effects, beside those of the profile, to the runs of one session.
+    """Fit a given set of effects, and those of the profile, to the runs of one session.
 
     Parameters
     ----------
@@ -109,7 +109,8 @@ def fit_session(
     profile
         The winch.
     terms
-        Effects at their starting values, the same for all sessions.
+        Effects at their starting values, the same for all sessions. An effect that the profile has
+        starts at the profile's values.
     winch
         Name of the winch.
     time
@@ -120,7 +121,8 @@ def fit_session(
     Returns
     -------
     tuple of SessionEstimate
-        Every fitted parameter of ``terms``, with the covariance of the linearised fit.
+        Every fitted parameter of ``terms``, with the covariance of the linearised fit; of an effect
+        of the profile the whole value, not its difference from the profile.
 
     Raises
     ------
@@ -137,13 +139,17 @@ def fit_session(
     dataset = prepare(runs, profile, None, decimate=True, fast=True, catalogue=catalogue)
     regression = TimeSeriesRegression(dataset)
     start = initial_hypothesis(profile, catalogue, regression)
-    first = len(start.terms)
+    declared = {term.label: index for index, term in enumerate(start.terms)}
+    places = []
     for term in terms:
-        start = start.with_term(term, regression.n_runs)
+        places.append(declared.get(term.label, len(start.terms)))
+        if term.label not in declared:
+            start = start.with_term(term, regression.n_runs)
     engine = TimeSeriesSelection(regression, start, [term.effect for term in terms])
     fitted, noise = engine.fit_with_noise(start)
     covariance = _covariance(fitted.jacobian * noise.inverse_sigma(regression)[:, None])
-    parts = _parts(regression, fitted)[first:]
+    every = _parts(regression, fitted)
+    parts = [every[place] for place in places]
     columns = [at for part, _ in parts for at in range(part.start, part.stop)]
     linear = [each for part, term in parts for each in _linear(term, fitted.vector[part])]
     slopes = np.array([each.slope for each in linear])

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.fleet.history import FleetHistory, FleetParameter, WinchHistory
+from winchkit.diagnosis.fleet.swapped_profiles import Swap
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
-from winchkit.report.fleet_text import change_text, day_text, odd_texts
+from winchkit.report.fleet_text import beyond_text, change_text, day_text, odd_texts, swap_text
 from winchkit.report.html.markup import Markup, element, section, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
@@ -21,8 +24,8 @@ _HEIGHT = 120.0
 _DAY = 86400.0
 
 
-def fleet_history_html(history: FleetHistory, title: str) -> str:
-    """The page: a row and a figure per change, and winches that differ from the others.
+def fleet_history_html(history: FleetHistory, title: str, swapped: Sequence[Swap] = ()) -> str:
+    """The page: a row and a figure per change, limits, odd winches, exchanged profiles.
 
     Parameters
     ----------
@@ -30,6 +33,8 @@ def fleet_history_html(history: FleetHistory, title: str) -> str:
         Changes and differences.
     title : str
         Title of the page.
+    swapped : sequence of Swap
+        Winches that have each other's profiles.
 
     Returns
     -------
@@ -49,8 +54,10 @@ def fleet_history_html(history: FleetHistory, title: str) -> str:
     headline = (
         f"{len(changed)} changes in {len(winches)} winches" if changed else "No change over time"
     )
-    tone = "partly" if changed or history.odd else "adequate"
-    chip = "Changes" if changed else "Differences" if history.odd else "No change"
+    beyond = [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
+    differs = bool(history.odd or beyond or swapped)
+    tone = "partly" if changed or differs else "adequate"
+    chip = "Changes" if changed else "Differences" if differs else "No change"
     blocks = [figure_block(figure, _SIDE) for figure in figures]
     over_time = element("div", *blocks, class_="pair maps output") if blocks else Markup("")
     odd = [" ".join(" ".join(odd_texts(*pair)).split()) for pair in history.odd]
@@ -60,7 +67,9 @@ def fleet_history_html(history: FleetHistory, title: str) -> str:
         lead(title, chip, tone, headline, rows),
         section("changes", "Changes", _table(history)) if changed else Markup(""),
         section("time", "Estimates over time", over_time),
+        section("limits", "Beyond a limit", bullets(beyond)),
         section("odd", "Winches that differ from the others", bullets(odd)),
+        section("swapped", "Exchanged profiles", bullets([swap_text(swap) for swap in swapped])),
         headed=False,
     )
 
