@@ -225,6 +225,7 @@ def test_a_winch_without_a_profile_costs_its_sessions_only(small: Path, tmp_path
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
+        (["-p", "nosuch"], 3, "there is no profile 'nosuch'"),
         (["--effect", "cell-gian"], 2, "did you mean 'cell-gain'?"),
         (["--limit", "cell-gain=3"], 2, "write EFFECT.PARAMETER=VALUE"),
         (["--limit", "cell-gain.size=3"], 2, "cell-gain has gain_error"),

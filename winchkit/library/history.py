@@ -126,7 +126,7 @@ def library_history(
         progress(f"{session.winch} {session.session}", number / len(sessions))
         name = f"{session.winch} {session.session}"
         if session.winch in faults:
-            failures[name] = faults[session.winch]
+            failures[name] = str(faults[session.winch])
             continue
         try:
             estimates += _fitted(tables, session, profiles[session.winch], terms, catalogue)
@@ -140,17 +140,19 @@ def library_history(
 
 def _profiles(
     profile: str | Path, winches: Iterable[str]
-) -> tuple[dict[str, WinchProfile], dict[str, str]]:
-    """Profile of every winch, and the faults of the others."""
+) -> tuple[dict[str, WinchProfile], dict[str, FileError]]:
+    """Profile of every winch, and the faults of the others; raises FileError where none is left."""
     from winchkit.schema.read import read_profile
 
     profiles: dict[str, WinchProfile] = {}
-    faults: dict[str, str] = {}
+    faults: dict[str, FileError] = {}
     for winch in winches:
         try:
             profiles[winch] = read_profile(profile_path(profile, winch))
         except FileError as error:
-            faults[winch] = str(error)
+            faults[winch] = error
+    if faults and not profiles:
+        raise next(iter(faults.values()))
     return profiles, faults
 
 
