@@ -160,6 +160,10 @@ class SimDrive:
         self._heartbeats.producing = True
         self.nmt = NmtState.BOOTING
 
+    def listens(self, identifier: int) -> bool:
+        """Whether it is the identifier of a valid RPDO."""
+        return self._pdos.listens(identifier)
+
     def receive(self, identifier: int, data: bytes, now: float) -> None:
         """Take a frame from the bus."""
         if self._line.cut or self.nmt is NmtState.BOOTING:

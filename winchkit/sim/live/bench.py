@@ -32,6 +32,8 @@ __all__ = ["LiveBench"]
 
 _OVERRUN = 0.02
 """Lateness of a tick from which it is counted, s."""
+_RPDOS = range(0x200, 0x580)
+"""Identifiers of RPDOs, each of which one drive listens to."""
 _SUSPENDED = 1.0
 """Gap from which the process counts as suspended, in which simulated time stands still, s."""
 
@@ -366,7 +368,10 @@ class LiveBench:
     def _deliver(self, winches: list[LiveWinch], identifier: int, data: bytes) -> None:
         with self._lock:
             now = self._now()
-            for winch in winches:
+            concerned = winches
+            if identifier in _RPDOS:
+                concerned = [one for one in winches if one.listens(identifier)]
+            for winch in concerned:
                 winch.receive(identifier, data, now)
 
     def _tick(self, winches: list[LiveWinch], all_heard: bool = True) -> None:

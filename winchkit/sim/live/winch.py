@@ -114,6 +114,10 @@ class LiveWinch:
                 if one.next_conversion <= due:
                     one.convert()
 
+    def listens(self, identifier: int) -> bool:
+        """Whether it is an RPDO of the drive."""
+        return self.drive.listens(identifier)
+
     def receive(self, identifier: int, data: bytes, now: float) -> None:
         """Take a frame from the CAN bus."""
         if identifier <= _TO_ALL or identifier == _REQUEST + self.drive.node:
