@@ -168,7 +168,7 @@ function build() {
       el("fieldset", {}, el("legend", {}, "Inch, mm (+ winds in)"), el("div", { class: "segments" }, [-10, -1, 1, 10].map(step))),
       el("fieldset", {}, el("legend", {}, "Move to, m"), el("div", { class: "row" }, target, el("button", { onclick: () => { send("move", { winch, to: Number(target.value.replace(",", ".")), speed }); watchMotion(); } }, "Move"))),
       el("fieldset", {}, el("legend", {}, "Load cell"), el("button", { onclick: () => send("tare", { winch }) }, "Tare ", el("kbd", {}, "T"))),
-      el("fieldset", {}, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused(commands(), tripped().length > 0)) choose(declared, (name, folder) => send("run_programme", { name, folder })); } }, "Run…"))),
+      el("fieldset", {}, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused(commands(), tripped().length > 0)) choose((name, folder) => send("run_programme", { name, folder })); } }, "Run…"))),
     el("div", { class: "stopbar" }, jogButton(1), stopButton(), jogButton(-1)));
   if (tab === "Charts") strips.strips(document.getElementById("strips"), () => ({ rows: [...(history[winch] || [])], predicted: predictions[winch] }), { winch, limits, bench: declared.name, profile: declared.winch[winch].profile });
   if (tab === "Trip") trip(document.getElementById("trip"), lastTrip, winch, declared);

@@ -5,7 +5,7 @@ const HOLD = 800, SIGN = 100;
 let signs = null;
 
 // `start` orders it; the dialog leaves Stop free.
-export function choose(declared, start) {
+export function choose(start) {
   attempt(async () => {
     const { programmes } = await ask("/api/bench/programmes");
     const shown = el("div", { id: "preview" }), folder = el("input", { value: "runs", "aria-label": "Folder of the runs" });
@@ -23,7 +23,7 @@ export function choose(declared, start) {
       fill(shown, el("p", { class: "note" }, "Planning"));
       try {
         const plan = await ask(`/api/bench/programme?name=${encodeURIComponent(name)}`);
-        fill(shown, el("p", {}, plan.description || plan.name), curves(plan, declared), el("p", { class: "note" }, `${plan.repeats} repeat${plan.repeats === 1 ? "" : "s"} of ${number(plan.duration, 3)} s${plan.asks.length ? `, ${plan.asks.length} question${plan.asks.length === 1 ? "" : "s"}` : ""}; all within the limits. It ends where this page is hidden or closed.`),
+        fill(shown, el("p", {}, plan.description || plan.name), curves(plan), el("p", { class: "note" }, `${plan.repeats} repeat${plan.repeats === 1 ? "" : "s"} of ${number(plan.duration, 3)} s${plan.asks.length ? `, ${plan.asks.length} question${plan.asks.length === 1 ? "" : "s"}` : ""}; all within the limits. It ends where this page is hidden or closed.`),
           el("details", {}, el("summary", {}, `${plan.steps.length} step${plan.steps.length === 1 ? "" : "s"}`), el("ol", {}, plan.steps.map((words) => el("li", {}, words)))), held("Hold to start", () => { document.getElementById("dialog").close(); start(name, folder.value); }));
       } catch (error) { fill(shown, el("p", {}, error.message)); }
     }
@@ -44,7 +44,7 @@ function held(words, act) {
   return button;
 }
 
-function curves(plan, declared) {
+function curves(plan) {
   const names = Object.keys(plan.curves), width = 640, height = 220, left = 48, right = width - 96, bottom = 192, values = names.flatMap((name) => plan.curves[name]);
   const least = Math.min(...values), most = Math.max(...values), margin = 0.08 * (most - least || 1), low = least - margin, high = most + margin;
   const x = (t) => left + (t / (plan.duration || 1)) * (right - left), y = (v) => bottom - ((v - low) / (high - low)) * (bottom - 16), parts = [];
@@ -52,7 +52,7 @@ function curves(plan, declared) {
   for (let k = 0; k <= 4; k++) parts.push(svg("text", { x: x((plan.duration * k) / 4), y: bottom + 18, "text-anchor": "middle", fill: "var(--muted)" }, `${number((plan.duration * k) / 4, 3)}${k === 4 ? " s" : ""}`));
   for (const [time] of plan.asks) parts.push(svg("line", { x1: x(time), x2: x(time), y1: 12, y2: bottom, stroke: "var(--edge)", "stroke-dasharray": "2 3" }), svg("text", { x: x(time) + 3, y: 12, fill: "var(--muted)" }, "?"));
   const tones = ["with", "today", "unknown", "ok", "ink", "warn", "brush", "muted"], same = names.every((name) => plan.curves[name].every((v, i) => v === plan.curves[names[0]][i]));
-  (same ? names.slice(0, 1) : names).forEach((name, i) => parts.push(svg("path", { d: plan.time.map((t, k) => `${k ? "L" : "M"}${x(t).toFixed(1)} ${y(plan.curves[name][k]).toFixed(1)}`).join(""), fill: "none", stroke: `var(--${tones[i % 8]})`, "stroke-width": 1.8 }), svg("text", { x: right + 6, y: y(plan.curves[name].at(-1)) + 4 + 13 * (same ? 0 : i) * 0, fill: `var(--${tones[i % 8]})` }, same && names.length > 1 ? "all winches" : name)));
+  (same ? names.slice(0, 1) : names).forEach((name, i) => parts.push(svg("path", { d: plan.time.map((t, k) => `${k ? "L" : "M"}${x(t).toFixed(1)} ${y(plan.curves[name][k]).toFixed(1)}`).join(""), fill: "none", stroke: `var(--${tones[i % 8]})`, "stroke-width": 1.8 }), svg("text", { x: right + 6, y: same ? y(plan.curves[name].at(-1)) + 4 : 24 + 15 * i, fill: `var(--${tones[i % 8]})` }, same && names.length > 1 ? "all winches" : name)));
   return svg("svg", { viewBox: `0 0 ${width} ${height}`, width: "100%", "font-size": 12, role: "img", "aria-label": `${plan.name}: ${names.join(", ")} in m over ${number(plan.duration, 3)} s` }, parts, svg("text", { x: 0, y: 12, fill: "var(--muted)" }, "m"));
 }
 

@@ -33,8 +33,9 @@ async function read() {
       view = next;
       if (shown.row !== "live") shown.row = Math.min(shown.row, view.poses);
       await fetchPicture();
-      if (root && newest.robot) { render(newest); fetchSlice(); }
+      if (root && newest.robot) render(newest);
     } while (again);
+    if (root && newest.robot) fetchSlice();
   } catch (error) {
     alarm(`${error.message} (read again in a second)`);
     setTimeout(() => { if (root && newest.robot) read(); }, 1000);

@@ -40,7 +40,7 @@ export function pause(button) { paused = !paused; if (!paused) kept = null; butt
 
 // `read` gives the rows of the history and the predictions, now; `declared` names the winch.
 export function strips(box, read, { winch, limits, bench, profile }) {
-  drawn = [];
+  drawn = []; kept = null;
   fill(box, chosen.map((names, index) => strip(names, index)), el("div", { class: "row more" }, el("select", { "aria-label": "Add a chart", onchange: (event) => { if (event.target.value) { chosen.push([event.target.value]); again(); } } }, el("option", { value: "" }, "Add a chart…"), Object.keys(CHANNELS).map((name) => el("option", {}, name))),
     chosen.length ? exporter("strips", describe) : null));
   const hosts = [...box.querySelectorAll(".plot")];
