@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -17,16 +19,19 @@ pytest.importorskip("httpx2")
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
+from winchkit import index_library
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.write import write_addition
+from winchkit.library.partitions import Partitions
 from winchkit.runs.read import read_run
 from winchkit.runs.writer import write_run
 from winchkit.schema.read import read_profile
 from winchkit.web.application import application
 from winchkit.web.examples import example_runs
-from winchkit.web.library import Library
+from winchkit.web.library.runs import Library
 from winchkit.web.robot import RobotWork
+from winchkit.web.state import Judgement
 from winchkit.web.workspace import Workspace
 
 TOKEN = "t0ken"
@@ -112,6 +117,8 @@ def test_nothing_but_this_server_may_be_loaded(client: TestClient) -> None:
             "library.js",
             "robot.js",
             "exports.js",
+            "fleet.js",
+            "import.js",
             "figures.js",
             "sides.js",
             "ladder.js",
@@ -323,6 +330,31 @@ def test_the_library_lists_and_overlays(client: TestClient, recorded: Path) -> N
     assert min(both["y"]) == pytest.approx(change.min(), rel=1e-4)
     outside = client.get("/api/overlay?name=../../etc/passwd", headers=HEADERS)
     assert outside.status_code == 400
+
+
+def test_verdicts_are_those_of_the_page_and_of_the_tables(recorded: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    for name in ("A/one.csv", "B/two.csv"):
+        (tmp_path / name).parent.mkdir()
+        shutil.copy(recorded / "demo-fast-10kg-1.csv", tmp_path / name)
+    index_library(tmp_path)
+    tables = Partitions(tmp_path)
+    outputs = {"tension": {"heldout_rms_before": 3.0, "noise_rms": 1.5}}
+    told = {"winch": "A", "time": datetime(2026, 1, 5, tzinfo=UTC), "runs": ["A/one.csv"]}
+    told |= {"verdict": "explained", "effects": ["drum-radius"], "profile_name": "p"}
+    tables.change(
+        "diagnoses", lambda row: False, [], [told | {"result": json.dumps({"outputs": outputs})}]
+    )
+    library = Library(tmp_path)
+    judged = {tmp_path / "B/two.csv": Judgement("adequate", (), {}, "p + q")}
+    rows = {row["name"]: row["verdict"] for row in library.rows(judged)["runs"]}
+    assert rows["A/one.csv"]["cause"] == "drum radius"
+    assert rows["A/one.csv"]["ratios"] == {"tension": 2.0}
+    assert (rows["B/two.csv"]["chip"], rows["B/two.csv"]["profile"]) == ("Adequate", "p + q")
+    (tmp_path / "A/one.csv").write_text("time\nx\n")
+    changed = {row["name"]: row for row in library.rows()["runs"]}
+    assert "fault" in changed["A/one.csv"], "a changed file is read, not its row of the index"
+    assert changed["B/two.csv"]["verdict"] is None
 
 
 @pytest.mark.slow

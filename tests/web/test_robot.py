@@ -18,7 +18,7 @@ from starlette.testclient import TestClient
 from robot_poses.truth import Truth, csv, poses
 from winchkit.schema.read import read_robot
 from winchkit.web.application import application
-from winchkit.web.library import Library
+from winchkit.web.library.runs import Library
 from winchkit.web.robot import RobotWork
 from winchkit.web.workspace import Workspace
 

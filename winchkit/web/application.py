@@ -33,7 +33,8 @@ from winchkit.catalog import names
 from winchkit.errors import UsageError, WinchkitError
 from winchkit.version import __version__
 from winchkit.web.foreign import is_run, preview
-from winchkit.web.library import Library
+from winchkit.web.library.fleet import Fleet
+from winchkit.web.library.runs import Library
 from winchkit.web.robot import RobotWork, is_robot
 from winchkit.web.workspace import Workspace
 
@@ -144,6 +145,7 @@ def application(
     """
     listeners = _Listeners()
     workspace.changed = listeners.wake
+    fleet = Fleet(library, workspace.effects)
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
@@ -153,8 +155,8 @@ def application(
         workspace.close()
 
     routes = [
-        *_Work(workspace, library, robot, has_bench=bench is not None).routes(listeners),
-        *_Drawings(workspace, library).routes(),
+        *_Work(workspace, library, fleet, robot, has_bench=bench is not None).routes(listeners),
+        *_Drawings(workspace, library, fleet).routes(),
         *_RobotDrawings(robot).routes(),
         *([] if bench is None else bench.routes()),
         Route("/", _page),
@@ -197,10 +199,17 @@ class _Work:
     """Routes that change the workspace, and its view."""
 
     def __init__(
-        self, workspace: Workspace, library: Library, robot: RobotWork, *, has_bench: bool
+        self,
+        workspace: Workspace,
+        library: Library,
+        fleet: Fleet,
+        robot: RobotWork,
+        *,
+        has_bench: bool,
     ) -> None:
         self.workspace = workspace
         self.library = library
+        self.fleet = fleet
         self.robot = robot
         self.has_bench = has_bench
 
@@ -274,7 +283,10 @@ class _Work:
             "use": lambda: work.use(str(asked["name"]), used=bool(asked["used"])),
             "remove": lambda: work.remove(str(asked["name"])),
             "import": lambda: work.take(str(asked["file"]), dict(asked["answers"])),
-            "library": lambda: work.open([self.library.path(str(n)) for n in asked["names"]]),
+            "library": lambda: work.show(
+                [self.library.run(str(name)) for name in asked["names"]], asked.get("profile")
+            ),
+            "fleet": lambda: work.task("fitting the fleet", lambda: self._fit_fleet(asked)),
             "diagnose": work.diagnose,
             "add": lambda: work.add(str(asked["effect"])),
             "undo": work.undo,
@@ -288,6 +300,10 @@ class _Work:
             raise UsageError(f"there is no action '{name}'; there are {', '.join(actions)}")
         actions[name]()
         return _accepted()
+
+    def _fit_fleet(self, asked: dict[str, Any]) -> None:
+        effects = [str(effect) for effect in asked.get("effects", ())]
+        self.fleet.fit(str(asked["profile"]), effects, self.workspace.progress)
 
     def _open_profile(self, name: str) -> None:
         if is_robot(name):
@@ -317,9 +333,10 @@ class _Work:
 class _Drawings:
     """Routes that read: curves, cards, files to save, and the library."""
 
-    def __init__(self, workspace: Workspace, library: Library) -> None:
+    def __init__(self, workspace: Workspace, library: Library, fleet: Fleet) -> None:
         self.workspace = workspace
         self.library = library
+        self.fleet = fleet
 
     def routes(self) -> list[Route]:
         """The routes."""
@@ -332,6 +349,8 @@ class _Drawings:
             Route("/api/report", self._report),
             Route("/api/runs", self._runs),
             Route("/api/overlay", self._overlay),
+            Route("/api/fleet", self._fleet),
+            Route("/api/fleet/runs", self._fleet_runs),
         ]
 
     async def _curve(self, request: Request) -> Response:
@@ -364,12 +383,21 @@ class _Drawings:
         return _attachment(text, "report.html", "text/html")
 
     async def _runs(self, request: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(self.library.rows))
+        judged = dict(self.workspace.judged)
+        return JSONResponse(await asyncio.to_thread(self.library.rows, judged))
 
     async def _overlay(self, request: Request) -> Response:
         query = request.query_params
         wanted, channel = query.getlist("name"), query.get("channel", "tension")
         return JSONResponse(await asyncio.to_thread(self.library.overlay, wanted, channel))
+
+    async def _fleet(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self.fleet.view))
+
+    async def _fleet_runs(self, request: Request) -> Response:
+        query = request.query_params
+        winch, time = query["winch"], float(query["time"])
+        return JSONResponse(await asyncio.to_thread(self.fleet.runs, winch, time))
 
 
 class _RobotDrawings:

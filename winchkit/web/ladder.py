@@ -16,18 +16,19 @@ from winchkit.report.words.numbers import Scale, between, scale_for, significant
 from winchkit.report.words.sentence import capital, changes_text, sentence, where_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
 
-__all__ = ["Rung", "card", "ladder", "refitted", "verdict"]
+__all__ = ["VERDICT_WORDS", "Rung", "card", "ladder", "refitted", "verdict"]
 
 _SHOWN = 8
 """Candidates in the ladder; the others have less evidence."""
 _CHANGE = 0.01
 """Change of an error that is shown as a number; below it the ladder has a dash."""
-_WORDS = {
+VERDICT_WORDS = {
     "adequate": "Adequate",
     "explained": "Effect missing",
     "partly": "Partly explained",
     "unknown": "Unexplained",
 }
+"""Words of the four verdicts on a chip."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
     first = capital(first.removeprefix(f"{head}: "))
     return {
         "verdict": diagnosis.verdict,
-        "chip": _WORDS[diagnosis.verdict],
+        "chip": VERDICT_WORDS[diagnosis.verdict],
         "headline": head,
         "sentence": rest if diagnosis.steps else f"{first}. {rest}".strip(". ") + ".",
         "changes": changes_text(diagnosis),

@@ -69,7 +69,7 @@ def serve(
         raise UsageError(
             f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
         ) from None
-    from winchkit.web.library import Library
+    from winchkit.web.library.runs import Library
     from winchkit.web.robot import RobotWork, is_robot
     from winchkit.web.workspace import Workspace
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -12,9 +12,37 @@ from winchkit.errors import UsageError
 from winchkit.model.variables import ANGLES
 from winchkit.runs.run import Run
 from winchkit.web.curves import OutputCurves
-from winchkit.web.ladder import Rung, ladder, refitted, verdict
+from winchkit.web.ladder import VERDICT_WORDS, Rung, ladder, refitted, verdict
 
-__all__ = ["LoadedRun", "State", "Version"]
+__all__ = ["Judgement", "LoadedRun", "State", "Version"]
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """Verdict of a diagnosis with its cause, as the Library view lists it."""
+
+    verdict: str
+    effects: Sequence[str]
+    """First effect of every addition."""
+    outputs: Mapping[str, Mapping[str, Any]]
+    """Errors of every output as ``winchkit diagnose --json`` gives them."""
+    profile: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Chip, cause, and error over noise floor of every output."""
+        named = " + ".join(effect.replace("-", " ") for effect in self.effects)
+        at_floor = "at the noise floor" if self.verdict == "adequate" else ""
+        return {
+            "verdict": self.verdict,
+            "chip": VERDICT_WORDS[self.verdict],
+            "cause": named or at_floor,
+            "profile": self.profile,
+            "ratios": {
+                name: out["heldout_rms_before"] / out["noise_rms"]
+                for name, out in self.outputs.items()
+                if out["noise_rms"] and out["heldout_rms_before"] is not None
+            },
+        }
 
 
 @dataclass(frozen=True)
@@ -100,6 +128,15 @@ class State:
         if not self.versions:
             raise UsageError("no profile is open; choose one first")
         return self.versions[-1].path
+
+    @property
+    def judgement(self) -> Judgement:
+        """Verdict on the used runs; raises UsageError without a diagnosis."""
+        found = self.diagnosed.diagnosis
+        effects = [step.effects[0] for step in found.steps if step.effects]
+        outputs = {name: vars(out) for name, out in found.outputs.items()}
+        added = [version.added for version in self.versions[1:]]
+        return Judgement(found.verdict, effects, outputs, " + ".join([self.source, *added]))
 
     def order_of(self, output: str) -> tuple[str, int] | None:
         """Angle and periods per turn of the main pattern of an output's residual, if any."""

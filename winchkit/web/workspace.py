@@ -31,8 +31,9 @@ from winchkit.web.candidate import candidate_card
 from winchkit.web.curves import OutputCurves, curves_of
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
 from winchkit.web.foreign import imported
+from winchkit.web.library.runs import LibraryRun
 from winchkit.web.refit import refit
-from winchkit.web.state import LoadedRun, State, Version
+from winchkit.web.state import Judgement, LoadedRun, State, Version
 
 __all__ = ["Cancelled", "Workspace"]
 
@@ -78,6 +79,8 @@ class Workspace:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="workspace")
         self._cards: dict[str, dict[str, Any]] = {}
         self._prepared: Dataset | None = None
+        self.judged: dict[Path, Judgement] = {}
+        """Latest verdict on each run."""
 
     @property
     def state(self) -> State:
@@ -99,6 +102,10 @@ class Workspace:
     def open(self, paths: Sequence[str | Path], profile: str | None = None) -> Future[None]:
         """Load run files, and a profile by name or file."""
         return self.task("reading files", lambda: self._open(paths, profile))
+
+    def show(self, runs: Sequence[LibraryRun], profile: str | None = None) -> Future[None]:
+        """Show runs of the library in place of the loaded ones."""
+        return self.task("reading files", lambda: self._show(runs, profile))
 
     def use(self, name: str, *, used: bool) -> Future[None]:
         """Take a run into the comparison or leave it out."""
@@ -246,7 +253,8 @@ class Workspace:
             self._work = None
             self.changed()
 
-    def _progress(self, what: str, share: float) -> None:
+    def progress(self, what: str, share: float) -> None:
+        """Show how far the work is; raises Cancelled where the user ended it."""
         work = self._work
         if work is None:
             return
@@ -278,6 +286,20 @@ class Workspace:
             runs = [item for item in runs if item.path != file]
             twin = any(item.path.name == file.name for item in runs)
             runs.append(LoadedRun(file, run, folder=file.parent.name if twin else ""))
+        self._loaded(runs, faults)
+
+    def _show(self, chosen: Sequence[LibraryRun], profile: str | None) -> None:
+        if profile:
+            self._open_profile(profile)
+        runs: list[LoadedRun] = []
+        for item in chosen:
+            twin = any(run.path.name == item.path.name for run in runs)
+            folder = item.path.parent.name if twin else ""
+            runs.append(LoadedRun(item.path, item.read(), folder=folder))
+        self._set(winch="", truth=None, beside=None)
+        self._loaded(runs, [])
+
+    def _loaded(self, runs: Sequence[LoadedRun], faults: Sequence[str]) -> None:
         self._set(runs=tuple(runs), answer=None, curves={}, faults=tuple(faults))
         if runs and self._state.versions:
             self._diagnose(faults)
@@ -313,12 +335,13 @@ class Workspace:
 
     def _diagnose(self, faults: Sequence[str] = ()) -> None:
         profile = read_profile(self._state.profile)
-        self._progress("reading the signals", 0.0)
+        self.progress("reading the signals", 0.0)
         regression = TimeSeriesRegression(self._dataset(profile))
         residual = initial_residual(self.catalogue, regression)
         self._set(answer=None, curves=curves_of(regression, residual, {}), faults=tuple(faults))
         answer, curves = self._diagnosed(profile)
         self._set(answer=answer, curves=curves, faults=tuple(faults))
+        self._judge()
 
     def _dataset(self, profile: WinchProfile) -> Dataset:
         """Data set of the runs that are used; the last one is kept while these stay the same."""
@@ -336,7 +359,7 @@ class Workspace:
         return self._diagnosed_on(self._dataset(profile))
 
     def _diagnosed_on(self, dataset: Dataset) -> Diagnosed:
-        answer = diagnose_prepared(dataset, self.catalogue, progress=self._progress)
+        answer = diagnose_prepared(dataset, self.catalogue, progress=self.progress)
         initial = answer.result.initial_model
         noise = {name: out.noise_rms for name, out in answer.diagnosis.outputs.items()}
         return answer, curves_of(answer.engine.regression, initial.residual, noise)
@@ -353,6 +376,11 @@ class Workspace:
             self._cards, self._state = {}, state
             raise
         self._set(answer=answer, curves=curves, refitted=False)
+        self._judge()
+
+    def _judge(self) -> None:
+        verdict = self._state.judgement
+        self.judged |= {item.path: verdict for item in self._state.used}
 
     def _undo(self) -> None:
         state = self._state
@@ -382,7 +410,7 @@ class Workspace:
             raise UsageError(f"there is no version {profile} of the profile")
         known = self._known(state, side)
         if known is None:
-            self._progress("diagnosing beside", 0.0)
+            self.progress("diagnosing beside", 0.0)
             winch, used = side.winch_runs()
             side = replace(side, winch=winch)
             known = self._diagnosed_on(self._prepare(used, read_profile(side.profile)))

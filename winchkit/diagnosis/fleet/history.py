@@ -135,6 +135,25 @@ class FleetParameter:
     """Standard deviation between sessions of a winch, beyond the noise within a session."""
     winches: tuple[WinchHistory, ...]
 
+    def deviations(self, winch: WinchHistory) -> Array:
+        """Deviation of each session of a winch from the median winch, in standard deviations.
+
+        Parameters
+        ----------
+        winch
+            One of the winches.
+
+        Notes
+        -----
+        (y − m) / √(s² + τ²) with m the median of the winches' present values, which one odd winch
+        does not move, s² the variance of the estimate and τ² that of the sessions. The spread
+        between winches is not part of it, so that a winch that differs is seen.
+        """
+        median = float(np.median([own.value for own in self.winches]))
+        series = winch.series
+        sigma = np.sqrt(series.stds**2 + self.session_std**2)
+        return np.asarray((series.values - median) / sigma)
+
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""
         return {**vars(self), "winches": [winch.to_json() for winch in self.winches]}

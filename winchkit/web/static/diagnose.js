@@ -1,6 +1,7 @@
 // The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
 import { alarm, ask, attempt, colour, dialog, download, el, fill, icon, number, order, say, sourceOf, svg } from "./page.js";
 import { exporter } from "./figures.js";
+import { importFile } from "./import.js";
 import { counted, ladderFigure, ladderGrid, place, presentName, reach } from "./ladder.js";
 import { morph, slideRails } from "./motion.js";
 import { both, drawSides } from "./sides.js";
@@ -105,7 +106,7 @@ export async function drop(files) {
   for (const file of files) {
     await attempt(async () => {
       const answer = await ask("/api/drop", file, { "x-file-name": encodeURIComponent(file.name) });
-      if (answer.import) showImport(answer.file, answer.import, {});
+      if (answer.import) await importFile(answer.file, answer.import);
     });
   }
 }
@@ -304,34 +305,6 @@ function drawData() {
     el("div", {}, el("h2", {}, "Patterns of the residual"), items(d.unexplained)),
     el("div", {}, el("h2", {}, "Findings on the runs"), items(d.sanity.map((f) => `${f.run}: ${f.channel}: ${f.text}`))),
     el("div", {}, el("h2", {}, "Notes"), items([...d.notes, d.changes])))));
-}
-
-function showImport(file, found, answers) {
-  const given = { columns: [], ...answers };
-  const channel = (row) => el("select", { "aria-label": `Channel of ${row.source}`, onchange: (event) => again(row, event.target.value, null) }, ["", ...found.channels].map((name) => el("option", { value: name, selected: name === row.channel }, name || "not used")));
-  const unit = (row) => row.channel ? el("input", { value: row.unit, size: 8, "aria-label": `Unit of ${row.source}`, onchange: (event) => again(row, row.channel, event.target.value) }) : el("span", { class: "note" }, row.unit);
-  const again = (row, name, own) => attempt(async () => {
-    const columns = given.columns.filter((text) => !text.includes(`=${row.source} [`) && text !== `${row.channel}=`);
-    if (name) columns.push(`${name}=${row.source} [${own === null ? row.unit || "1" : own}]`); else columns.push(`${row.channel}=`);
-    await guess({ ...given, columns });
-  });
-  const guess = async (next) => { const answer = await ask("/api/guess", JSON.stringify({ file, answers: next })); showImport(file, answer.import, next); };
-  const questions = found.questions.map((q) => el("p", {}, "? ", q.text, " ", q.key ? el("input", { "aria-label": q.text, placeholder: q.key.replaceAll("_", " "), onchange: (event) => attempt(() => guess({ ...given, [q.key]: event.target.value })) }) : null));
-  const mass = el("input", { size: 8, placeholder: "10 kg", value: given.load_mass || "", "aria-label": "Mass on the cable", onchange: () => { given.load_mass = mass.value; } });
-  dialog(`Import ${file}`, el("p", { class: "note" }, `${found.layout}; ${found.columns.length} columns, ${found.rows} rows`),
-    el("div", { class: "scroll" }, el("table", {}, el("thead", {}, el("tr", {}, ["Column", "Channel", "Unit", "First values", "Plot", "Why"].map((text) => el("th", {}, text)))),
-      el("tbody", {}, found.columns.map((row) => el("tr", {}, el("td", {}, row.source), el("td", {}, channel(row)), el("td", {}, unit(row)), el("td", {}, row.first.slice(0, 3).join(" ")), el("td", {}, spark(row.plot)), el("td", { class: "note" }, [row.confidence, row.reason].filter(Boolean).join(": "))))))),
-    ...questions, found.notes.map((text) => el("p", { class: "note" }, text)),
-    el("div", { class: "row", style: { marginTop: "12px" } }, el("label", { class: "row" }, "Mass on the cable", mass),
-      el("button", { class: "primary", disabled: found.questions.length > 0, onclick: () => attempt(async () => { await order("import", { file, answers: given }); document.getElementById("dialog").close(); }) }, "Import")));
-}
-
-function spark(values) {
-  const known = values.filter((v) => v !== null);
-  if (known.length < 2) return el("span", {});
-  const low = known.reduce((a, b) => Math.min(a, b)), high = known.reduce((a, b) => Math.max(a, b));
-  const points = values.map((v, i) => v === null ? null : `${((i / (values.length - 1)) * 96 + 2).toFixed(1)},${(22 - ((v - low) / (high - low || 1)) * 18).toFixed(1)}`).filter(Boolean).join(" ");
-  return svg("svg", { width: 100, height: 26, role: "img", "aria-label": "values over the record" }, svg("polyline", { points, fill: "none", stroke: "var(--ink2)", "stroke-width": 1 }));
 }
 
 export function keys(event) {

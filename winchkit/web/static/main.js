@@ -38,7 +38,7 @@ for (const kind of ["dragover", "drop"]) addEventListener(kind, (event) => {
   if (kind === "drop" && event.dataTransfer.files.length) { if (name === "robot") robot.drop(event.dataTransfer.files); else { location.hash = "#diagnose"; diagnose.drop(event.dataTransfer.files); } }
 });
 
-const KEYS = [["1–4", "views"], ["J K", "candidate"], ["A", "add to the profile"], ["U", "undo"], ["C", "compare"], ["S", "save the profile"], ["/", "filter the library"], ["Esc", "clear the brush, close"], ["Space", "Stop, with a bench"], ["?", "this list"]];
+const KEYS = [["1–4", "views"], ["J K", "candidate"], ["A", "add to the profile"], ["B", "mark samples in a focused plot; arrows move the mark"], ["U", "undo"], ["C", "compare"], ["S", "save the profile"], ["/", "filter the library"], ["Esc", "clear the brush, close"], ["Space", "Stop, with a bench"], ["?", "this list"]];
 
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey) return;

@@ -101,6 +101,11 @@ export function dots(tone, alpha, size = 3) {
 export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, bare = false, label }) {
   const drag = { x: Boolean(select || zoom), y: false, setScale: false };
   const flat = height < 130;
+  const chosen = (u) => {
+    if (u.select.width < 3) return;
+    const low = u.posToVal(u.select.left, "x"), high = u.posToVal(u.select.left + u.select.width, "x");
+    if (select) select(low, high); else if (zoom) { u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false); zoom(low, high); }
+  };
   const options = {
     width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, 10, bare ? 8 : 0, 0],
     cursor: { drag, points: { show: false }, ...(sync ? { sync: { key: sync } } : {}), y: false },
@@ -108,11 +113,7 @@ export function plot(host, data, series, { height, xLabel = "", noise = null, ru
     axes: axes(xLabel, logarithmic, flat).map((axis, i) => (bare && i === 0 ? { ...axis, show: false } : axis)), series: [{}, ...series],
     hooks: {
       drawClear: [band(noise)], draw: [marks(runs), traced(traces)],
-      setSelect: [(u) => {
-        if (u.select.width < 3) return;
-        const low = u.posToVal(u.select.left, "x"), high = u.posToVal(u.select.left + u.select.width, "x");
-        if (select) select(low, high); else if (zoom) { u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false); zoom(low, high); }
-      }],
+      setSelect: [(u) => chosen(u)],
     },
   };
   host.setAttribute("role", "img");
@@ -120,8 +121,38 @@ export function plot(host, data, series, { height, xLabel = "", noise = null, ru
   host.replaceChildren();
   const drawn = new uPlot(options, data, host);
   if (zoom) gestures(drawn, zoom);
+  if (select || zoom) touched(drawn, chosen);
+  if (select) typed(host, drawn, chosen);
   new ResizeObserver(() => { if (host.isConnected && host.clientWidth > 0 && Math.abs(host.clientWidth - drawn.width) > 1) drawn.setSize({ width: host.clientWidth, height }); }).observe(host);
   return drawn;
+}
+
+// One finger that moves sideways selects; the page scrolls up and down as ever.
+function touched(u, chosen) {
+  const over = u.over;
+  let start = null;
+  const mark = (from, to) => u.setSelect({ left: Math.min(from, to), width: Math.abs(to - from), top: 0, height: over.clientHeight }, false);
+  const at = (event) => Math.max(0, Math.min(over.clientWidth, event.touches[0].clientX - over.getBoundingClientRect().left));
+  over.addEventListener("touchstart", (event) => { start = event.touches.length === 1 ? at(event) : null; }, { passive: true });
+  over.addEventListener("touchmove", (event) => { if (start !== null && event.touches.length === 1) mark(start, at(event)); else start = null; }, { passive: true });
+  over.addEventListener("touchend", () => { if (start !== null) chosen(u); start = null; });
+  over.addEventListener("touchcancel", () => { start = null; mark(0, 0); });
+}
+
+// B selects the middle fifth of a focused plot; arrows move the selection, with Shift its end.
+function typed(host, u, chosen) {
+  host.setAttribute("tabindex", "0");
+  host.addEventListener("keydown", (event) => {
+    const wide = u.over.clientWidth, step = { ArrowLeft: -wide / 20, ArrowRight: wide / 20 }[event.key];
+    let { left, width } = u.select;
+    if (event.key === "b") [left, width] = [0.4 * wide, 0.2 * wide];
+    else if (!step || width < 3) return;
+    else if (event.shiftKey) width = Math.max(4, Math.min(wide - left, width + step));
+    else left = Math.max(0, Math.min(wide - width, left + step));
+    event.preventDefault(); event.stopPropagation();
+    u.setSelect({ left, width, top: 0, height: u.over.clientHeight }, false);
+    chosen(u);
+  });
 }
 
 // Wheel and pinch zoom, Shift-drag and two fingers pan, double click resets.
