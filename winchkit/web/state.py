@@ -181,6 +181,7 @@ class State:
             "diagnosis": None,
             "outputs": list(self.curves),
             "can_undo": len(self.versions) > 1,
+            "simulated": self.truth is not None,
         }
         if self.versions:
             added = [version.added for version in self.versions[1:]]

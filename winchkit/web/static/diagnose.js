@@ -73,6 +73,7 @@ function context() {
     el("span", { class: "row end" },
       view.beside ? [el("button", { onclick: () => attempt(() => order("swap")) }, "Swap sides"), el("button", { onclick: () => attempt(() => order("end")) }, "End comparison")]
         : el("button", { disabled: !view.diagnosis || Boolean(view.busy), onclick: () => chooseBeside() }, "Compare…"),
+      view.simulated ? el("button", { disabled: !view.diagnosis, onclick: () => attempt(async () => dialog("What the simulated bench hides", el("p", {}, (await ask("/api/truth")).truth))) }, "Reveal…") : null,
       el("button", { disabled: !view.can_undo || Boolean(view.busy), onclick: () => attempt(() => order("undo")) }, "Undo"),
       el("button", { disabled: !view.profile, onclick: () => attempt(() => download("/api/profile")) }, "Save profile"),
       el("button", { disabled: !view.diagnosis, onclick: () => attempt(() => download("/api/report")) }, "Report"),
@@ -132,7 +133,8 @@ function chooseRuns() {
   const input = el("input", { type: "file", multiple: true, "aria-label": "Run files", onchange: () => { document.getElementById("dialog").close(); drop(input.files); } });
   dialog("Runs", el("div", { class: "runs" }, view.runs.map((run) => el("label", {},
     el("input", { type: "checkbox", checked: run.used, style: { minHeight: "auto" }, onchange: (event) => attempt(() => order("use", { name: run.name, used: event.target.checked })) }),
-    el("span", {}, run.name), el("span", { class: "note" }, `${run.load} · ${number(run.seconds, 3)} s · ${run.samples} samples`)))),
+    el("span", {}, run.name), el("span", { class: "note" }, `${run.load} · ${number(run.seconds, 3)} s · ${run.samples} samples`),
+    el("button", { class: "plain", "aria-label": `Remove ${run.name}`, onclick: () => attempt(async () => { await order("remove", { name: run.name }); document.getElementById("dialog").close(); }) }, "Remove")))),
   el("p", { class: "note", style: { margin: "12px 0 4px" } }, "Add files"), input);
 }
 
