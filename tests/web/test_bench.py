@@ -6,6 +6,7 @@ import asyncio
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("starlette")
@@ -21,7 +22,7 @@ from winchkit.schema.read import read_simbench
 from winchkit.web.browser import Inbox
 from winchkit.web.drive_objects import drive_objects, drive_settings, write_setting
 from winchkit.web.frames import FrameWords
-from winchkit.web.live_model import LiveModel
+from winchkit.web.live_model import CHANNELS, LiveModel
 from winchkit.web.programmes import Programmes
 
 
@@ -102,6 +103,29 @@ def test_turns_on_the_drum_are_those_of_its_winding_law(spec: BenchSpec) -> None
     assert drum["turns"] == pytest.approx(profile.reference.wound_turns)
     shorter = model.drums({"winch": {"A": {"cable_length": None}}})["A"]
     assert shorter == {"turns": None, "radius": None, "guide": None}
+
+
+def test_a_missing_reading_takes_its_moment_from_the_prediction_and_no_channel(
+    spec: BenchSpec,
+) -> None:
+    model, random = LiveModel(spec, "", ()), np.random.default_rng(3)
+    angle = model.profiles["A"].reference.motor_angle
+    rows: list[dict[str, float | None]] = [
+        dict.fromkeys(CHANNELS) | {"time": 0.05 * k, "motor_angle": angle, "tension": tension}
+        for k, tension in enumerate(98.0 + 0.8 * random.standard_normal(600))
+    ]
+    for row in rows[::10]:
+        row["tension"] = None
+    found = model.prediction("A", rows)
+    assert found is not None
+    assert len(found["time"]) == 540
+    assert set(found) == {"time", "tension"}
+    assert found["tension"]["noise"] == pytest.approx(0.8, rel=0.2)
+    assert found["tension"]["predicted"] == pytest.approx([98.1] * 540, abs=0.2)
+    assert max(map(abs, found["tension"]["mean"])) < 0.8
+    for row in rows:
+        row["motor_angle"] = None
+    assert model.prediction("A", rows) is None
 
 
 def test_frames_are_said_in_words_the_newest_of_each_identifier_first(spec: BenchSpec) -> None:

@@ -35,6 +35,8 @@ _MEASURED = {"cable_length": "length", "tension": "tension", "motor_torque": "mo
 """Channel that measures an output of the model."""
 _FEWEST = 20
 """Samples for a prediction."""
+_PRESENT = 0.5
+"""Share of the moments at which a channel has a value, from which it is used."""
 _DECIMALS = 6
 """Of what is sent, in SI."""
 
@@ -153,12 +155,20 @@ def _drum(profile: WinchProfile, length: float | None) -> dict[str, float | None
     return {"turns": turns, "radius": float(drum_of(profile).arm(angle)), "guide": guide}
 
 
-def _predicted(line: Line, rows: Sequence[Mapping[str, Any]], mass: float | None) -> dict[str, Any]:
+def _predicted(
+    line: Line, rows: Sequence[Mapping[str, Any]], mass: float | None
+) -> dict[str, Any] | None:
     column = {
         key: np.array([np.nan if row[key] is None else row[key] for row in rows], dtype=float)
         for key in ("time", *CHANNELS)
     }
-    known = {key: values for key, values in column.items() if np.isfinite(values).all()}
+    # A reading that is missing now and then takes its moment with it, an absent instrument nothing.
+    present = {k: np.isfinite(v) for k, v in column.items() if np.isfinite(v).mean() > _PRESENT}
+    whole = np.all(list(present.values()), axis=0)
+    if "motor_angle" not in present or np.count_nonzero(whole) < _FEWEST:
+        return None
+    column = {key: values[whole] for key, values in column.items()}
+    known = {key: column[key] for key in present}
     predicted = line.predict(
         line.motion(
             Signals(

@@ -22,7 +22,7 @@ function axes(xLabel, logarithmic, flat) {
   return [
     { stroke: ink, font: FONT, size: 26, space: flat ? 44 : 64, grid: { show: false }, ticks: { stroke: () => colour("line"), size: 4 }, gap: 4,
       ...(logarithmic ? { splits: (u, axis, low, high) => powers(low, high), filter: (u, ticks) => ticks } : {}), values: (u, ticks) => label(ticks, xLabel, logarithmic ? power : number) },
-    { stroke: ink, font: FONT, size: flat ? 34 : 44, space: flat ? 18 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
+    { stroke: ink, font: FONT, size: (u, ticks) => Math.max(flat ? 34 : 44, 12 + 7 * Math.max(0, ...(ticks || []).map((text) => text.length))), space: flat ? 18 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
       values: (u, ticks) => ticks.map((tick) => tick === null ? "" : number(tick)) },
   ];
 }
