@@ -10,7 +10,9 @@ import pytest
 
 from can_commands import Served, invoke, length, served, without_trip
 from winchkit.bench.programme import earlier_runs
+from winchkit.cli.core.dry_run import _simulated
 from winchkit.schema.programme import Programme
+from winchkit.schema.read import read_bench
 
 
 @pytest.fixture(scope="module")
@@ -260,3 +262,14 @@ def test_a_wrong_winch_is_refused_before_its_bus_is_opened(
     result = invoke(*arguments, "-b", str(file))
     assert result.exit_code == 2, result.output
     assert "no winch 'C'" in result.stderr
+
+
+def test_a_dry_run_keeps_no_trip_and_shares_the_platform_among_the_winches(
+    bench: Served,
+) -> None:
+    declared = read_bench(bench.file)
+    assert declared.latch_file
+    rehearsed = _simulated(declared, 0.4)
+    assert rehearsed.bench.latch_file == ""
+    loads = {name: one.load_mass or 0.4 for name, one in declared.winch.items()}
+    assert {name: one.load_mass for name, one in rehearsed.truth.items()} == loads

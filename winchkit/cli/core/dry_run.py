@@ -172,14 +172,19 @@ def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
     """The bench with simulated drives, in simulated time; frames of the host are collected."""
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
+    from winchkit.bench.robot.wiring import line_profiles, robot_of_bench
     from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live.bench import LiveBench
 
     click.echo(
         "dry run on simulated drives, each cable at its reference length; nothing is sent", err=True
     )
-    clock = SimulatedClock()
-    with LiveBench(_simulated(spec), simulated_time=clock) as live:
+    clock, robot = SimulatedClock(), robot_of_bench(spec)
+    profiles, mass = None, None
+    if robot is not None:
+        profiles = line_profiles(robot)
+        mass = robot.profile.platform.mass / len(profiles)
+    with LiveBench(_simulated(spec, mass), profiles=profiles, simulated_time=clock) as live:
         for name, wire in live.wire.items():
             wire.taps.append(_tap(name, clock.now(), frames))
         with open_bench(live.bench_spec, clock) as bench:
@@ -199,8 +204,11 @@ def _tap(bus: str, start: float, frames: list[Frame]) -> Callable[[Carried], Non
     return take
 
 
-def _simulated(spec: BenchSpec) -> SimBench:
-    """The bench as it is wired, without instruments, its declarations being true."""
+def _simulated(spec: BenchSpec, mass: float | None) -> SimBench:
+    """The bench as it is wired, without instruments, its declarations being true.
+
+    ``mass`` (kg) is on a winch without a declared load. A trip of the rehearsal is not kept.
+    """
     from winchkit.schema.simbench import NoiseSpec, SimBench, WinchTruth
 
     winches = {
@@ -208,9 +216,12 @@ def _simulated(spec: BenchSpec) -> SimBench:
         for name, winch in spec.winch.items()
     }
     buses = {name: bus for name, bus in spec.bus.items() if bus.kind == "can"}
-    hanging = {name: winch.load_mass for name, winch in winches.items()}
-    truth = {
-        name: WinchTruth() if mass is None else WinchTruth(load_mass=mass)
-        for name, mass in hanging.items()
+    hanging = {
+        name: mass if one.load_mass is None else one.load_mass for name, one in winches.items()
     }
-    return SimBench(spec.name, replace(spec, winch=winches, bus=buses), truth, NoiseSpec(), ())
+    truth = {
+        name: WinchTruth() if load is None else WinchTruth(load_mass=load)
+        for name, load in hanging.items()
+    }
+    bench = replace(spec, winch=winches, bus=buses, latch_file="")
+    return SimBench(spec.name, bench, truth, NoiseSpec(), ())

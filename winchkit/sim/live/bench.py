@@ -14,6 +14,7 @@ from types import TracebackType
 
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.schema.bench import BenchSpec, BusSpec
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import ALL, Step
 from winchkit.schema.simbench import FaultSpec, SimBench, WinchTruth
 from winchkit.sim.bench import hiding, profiles_of
@@ -56,6 +57,8 @@ class LiveBench:
         Modbus instruments are on TCP at 127.0.0.1, serial ones at a pseudo-terminal.
     clock : callable
         Time, s.
+    profiles : mapping, optional
+        Profiles of winches with a load each, in place of those that the bench names.
     simulated_time : SimulatedClock, optional
         Clock on which the bench runs instead of in real time; it and its user are then in one
         process, and the user opens ``bench_spec`` on the same clock.
@@ -76,11 +79,13 @@ class LiveBench:
         hidden: Sequence[str] = (),
         interface: Interface = "virtual",
         clock: Callable[[], float] = monotonic,
+        profiles: Mapping[str, WinchProfile] | None = None,
         simulated_time: SimulatedClock | None = None,
     ) -> None:
         self.sim_bench = hiding(sim_bench, hidden) if hidden else sim_bench
         self.seed = seed
         self._interface = interface
+        self._profiles = profiles
         self._simulated = simulated_time
         self._clock = clock = clock if simulated_time is None else simulated_time.now
         self._lock = threading.RLock()
@@ -283,7 +288,7 @@ class LiveBench:
         loads: Mapping[str, Load] = {}
         truth: Mapping[str, WinchTruth] = sim.truth
         if sim.platform is None:
-            profiles = profiles_of(sim)
+            profiles = profiles_of(sim) if self._profiles is None else self._profiles
         else:
             self.robot = LiveRobot(sim, sim.platform, self.seed, sends=self._simulated is None)
             profiles, loads = self.robot.profiles, self.robot.ends
