@@ -80,3 +80,15 @@ def test_a_joint_that_carries_an_arm_has_gravity_first() -> None:
     found = diagnose(runs_of("openarm-j4", "collect"), AXIS).diagnosis
     assert found.candidates[0].effect == "joint-gravity"
     assert "joint-gravity" in found.steps[0].effects
+
+
+def test_a_joint_at_three_speeds_has_offsets_presliding_and_gravity() -> None:
+    """A fifth is unexplained, so that nothing is named: the rest is located over the position."""
+    found = diagnose(runs_of("franka-q2", "case3_slow", "case3_middle", "case3_high"), AXIS)
+    diagnosis = found.diagnosis
+    assert {item.effect for item in diagnosis.closest} == {"motor-dahl", "joint-gravity"}
+    offsets = {offset.run: offset.value for offset in diagnosis.run_offsets}
+    assert offsets["case3_middle"] == pytest.approx(0.25, abs=0.1)
+    assert max(offsets["case3_slow"], offsets["case3_high"]) < -0.05
+    assert diagnosis.unexplained_share < 0.25
+    assert {"drum_angle", "motor_angle", "directed_length"} & {w.variable for w in diagnosis.where}

@@ -13,6 +13,9 @@ from winchkit.model.variables import VARIABLES
 
 __all__ = ["located"]
 
+_BELOW = 0.1
+"""Smallest extent over that of the grid."""
+
 
 def located(effect: Effect, motions: Sequence[At]) -> Effect:
     """An effect with the grids of its places in the range of the data.
@@ -28,7 +31,8 @@ def located(effect: Effect, motions: Sequence[At]) -> Effect:
     -------
     Effect
         Grids in the units of their parameters: ``low + share (high − low)`` for a place
-        (``Parameter.over``), ``share (high − low)`` for an extent (``Parameter.along``).
+        (``Parameter.over``), ``share (high − low)`` for an extent (``Parameter.along``), whose
+        lower bound is a tenth of the least: the data do not show a smaller one.
     """
     if not any(p.over or p.along for p in effect.parameters):
         return effect
@@ -46,4 +50,6 @@ def _located(parameter: Parameter, motions: Sequence[At]) -> Parameter:
     origin = low if parameter.over else 0.0
     grid = (origin + share * extent for share in parameter.grid)
     within = tuple(x for x in grid if parameter.low < x < parameter.high)
-    return replace(parameter, grid=within or (parameter.null,))
+    least = _BELOW * min(within) if parameter.along and within else parameter.low
+    low = max(parameter.low, least)
+    return replace(parameter, grid=within or (parameter.null,), low=low)
