@@ -1,13 +1,17 @@
-"""Diagnoses of a library: what is kept, repeated and removed; workers killed, two clients."""
+"""Diagnoses of a library: what is kept, repeated and removed; full disks, clusters, clients."""
 
 from __future__ import annotations
 
 import json
 import os
+import resource
+import shutil
 import signal
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +20,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit import diagnose_library, index_library, write_run
-from winchkit.library import diagnose
+from winchkit import FileError, diagnose_library, index_library, open_writer, write_run
+from winchkit.catalog import find
+from winchkit.errors import ConnectionLost
+from winchkit.library import cluster, diagnose
 from winchkit.library.cluster import cluster_outcomes
 from winchkit.library.partitions import Partitions
 from winchkit.library.sessions import WinchSession
-from winchkit.library.tasks import Outcome, Task, failed, stored_result
+from winchkit.library.tasks import Outcome, Task, failed, outcome_of, stored_result
 from winchkit.runs.run import Channel, Run
+from winchkit.schema.read import read_programme, read_simbench
+from winchkit.sim.bench import hiding, profiles_of, programme_path
+from winchkit.sim.record import simulate
 
 pytest.importorskip("pyarrow")
+ROOT = Path(__file__).parents[2]
 START = datetime(2026, 1, 5, tzinfo=UTC)
 PARTS = (
     "verdict", "outputs", "steps", "candidates", "unexplained", "caveats", "closest", "notes",
@@ -119,6 +129,57 @@ def test_diagnoses_of_a_deleted_run_leave_the_tables(
     assert rows(library, "diagnoses") == rows(library, "estimates") == left
 
 
+def test_a_run_that_is_deleted_after_the_index_is_a_failure_with_its_name(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (library / "w1" / "2026-03-01" / "a.csv").unlink()
+
+    def of_deleted(task: Task) -> Outcome:
+        return outcome_of(task) if task.session.session == "2026-03-01" else outcome(task)
+
+    monkeypatch.setattr(diagnose, "outcome_of", of_deleted)
+    reason = diagnose_library(library, "bench-spiral", jobs=1).failures["w1 2026-03-01"]
+    assert "a.csv" in reason
+
+
+def test_a_run_that_is_being_recorded_is_diagnosed_when_it_is_whole(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(diagnose, "outcome_of", outcome)
+    first, new = "w1/2026-03-01/a.csv", "w1/2026-03-01/d.csv"
+    with open_writer(library / new, [("time", "s"), ("motor_angle", "rad")]) as log:
+        log.append({"time": 0.0, "motor_angle": 0.0})
+        log.flush()
+        index_library(library)
+        assert diagnose_library(library, "bench-spiral", jobs=1).diagnosed == 3
+        log.append({"time": 0.1, "motor_angle": 0.1})
+    index_library(library)
+    report = diagnose_library(library, "bench-spiral", jobs=1)
+    assert (report.diagnosed, report.unchanged) == (1, 2)
+    assert rows(library, "diagnoses")[0] == [first, new]
+    assert len(rows(library, "diagnoses")) == 3
+
+
+def test_a_full_disk_loses_no_diagnosis_that_was_there(
+    library: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(diagnose, "outcome_of", outcome)
+    diagnose_library(library, "bench-spiral", jobs=1)
+    shutil.copytree(library / "w1" / "2026-03-08", library / "w1" / "2026-03-15")
+    index_library(library)
+    before = rows(library, "diagnoses")
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(FileError, match="cannot be written"):
+            diagnose_library(library, "bench-spiral", jobs=1)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert rows(library, "diagnoses") == before
+    report = diagnose_library(library, "bench-spiral", jobs=1)
+    assert (report.diagnosed, report.unchanged) == (1, 3)
+
+
 @given(st.dictionaries(st.sampled_from(PARTS[1:]), st.integers(0, 30_000)))
 def test_a_stored_result_has_20_kb_and_says_what_it_lost(sizes: dict[str, int]) -> None:
     found: dict[str, Any] = {name: ["x" * sizes.get(name, 0)] for name in PARTS}
@@ -138,28 +199,97 @@ def tasks(count: int, name: str) -> list[Task]:
     ]
 
 
-@pytest.mark.slow
-def test_killed_workers_and_a_second_client_lose_nothing_and_give_nothing_twice() -> None:
+@pytest.fixture(scope="module")
+def workers() -> Iterator[Any]:
+    """A cluster of two processes."""
     distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
+    ) as cluster_:
+        yield cluster_
+
+
+@pytest.mark.slow
+def test_killed_workers_and_a_second_client_lose_nothing_and_give_nothing_twice(
+    workers: Any,
+) -> None:
     due = tasks(40, "a")
     plain = {task.key: outcome(task) for task in due}
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as cluster:
-        address = cluster.scheduler_address
 
-        def collected(kills: int) -> list[Outcome]:
-            found = []
-            for one in cluster_outcomes(due, scheduler=address, work=slow_outcome):
-                found.append(one)
-                if len(found) in range(8, 8 + 8 * kills, 8):
-                    worker = list(cluster.workers.values())[len(found) // 8 % 2]
-                    if worker.process is not None and worker.process.pid is not None:
-                        os.kill(worker.process.pid, signal.SIGKILL)
-            return found
+    def collected(kills: int) -> list[Outcome]:
+        found = []
+        for one in cluster_outcomes(due, scheduler=workers.scheduler_address, work=slow_outcome):
+            found.append(one)
+            if len(found) in range(8, 8 + 8 * kills, 8):
+                worker = list(workers.workers.values())[len(found) // 8 % 2]
+                if worker.process is not None and worker.process.pid is not None:
+                    os.kill(worker.process.pid, signal.SIGKILL)
+        return found
 
-        with ThreadPoolExecutor(2) as clients:
-            first, second = clients.map(collected, (2, 0))
+    with ThreadPoolExecutor(2) as clients:
+        first, second = clients.map(collected, (2, 0))
     for found in (first, second):
         assert len(found) == len(due)
         assert {one.diagnosis["key"]: one for one in found} == plain
+
+
+@pytest.mark.slow
+def test_a_scheduler_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_PATIENCE", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as idle,
+        pytest.raises(ConnectionLost, match="has no workers"),
+    ):
+        next(cluster_outcomes(tasks(1, "a"), scheduler=idle.scheduler_address, work=outcome))
+
+
+@pytest.mark.slow
+def test_an_interruption_on_a_cluster_keeps_what_is_done_and_the_next_call_goes_on(
+    library: Path, workers: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "cluster_outcomes", partial(cluster_outcomes, work=slow_outcome))
+    seen: list[str] = []
+
+    def interrupt(text: str, _: float | None) -> None:
+        seen.append(text)
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+
+    address = workers.scheduler_address
+    with pytest.raises(KeyboardInterrupt):
+        diagnose_library(library, "bench-spiral", scheduler=address, progress=interrupt)
+    assert len(rows(library, "diagnoses")) == 2
+    report = diagnose_library(library, "bench-spiral", scheduler=address)
+    assert (report.diagnosed, report.unchanged) == (1, 2)
+
+
+@pytest.mark.slow
+def test_processes_with_a_user_effect_give_the_rows_of_the_plain_loop_byte_for_byte(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("distributed")
+    bench = hiding(read_simbench(find("sim", "demo-adequate")), ["stretched cell, gain_error=3 %"])
+    programme = read_programme(programme_path("programme-demo"))
+    for day in ("2026-03-01", "2026-03-08"):
+        place = tmp_path / "1" / "A" / day
+        place.mkdir(parents=True)
+        for number, run in enumerate(simulate(bench, profiles_of(bench), programme, rate=10.0)):
+            write_run(run, place / f"{number}.csv")
+    index_library(tmp_path / "1")
+    shutil.copytree(tmp_path / "1", tmp_path / "2")
+    # A profile with an effect that only the user's file knows: a worker without it cannot read it.
+    profile = tmp_path / "own.toml"
+    effect = '[[effect]]\nid = "drum-corners"\namplitude = "0.1 mm"\n'
+    profile.write_text(find("profiles", "bench-spiral").read_text("utf-8") + effect, "utf-8")
+    (reason, _) = diagnose_library(tmp_path / "1", profile, jobs=1).failures.values()
+    assert "drum-corners" in reason
+    found = []
+    for jobs in (1, 2):
+        folder, file = tmp_path / str(jobs), ROOT / "examples" / "my_effect.py"
+        report = diagnose_library(folder, profile, effects=[file], jobs=jobs)
+        assert (report.diagnosed, dict(report.failures)) == (2, {})
+        tables = [Partitions(folder).read(table) for table in ("diagnoses", "estimates")]
+        found.append([sorted(map(repr, table.to_pylist())) for table in tables])
+    assert found[0] == found[1]
+    assert all(found[0])

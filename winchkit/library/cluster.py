@@ -51,7 +51,7 @@ def cluster_outcomes(
     UsageError
         Without Dask; for workers with another version of winchkit.
     ConnectionLost
-        For a scheduler that does not answer.
+        For a scheduler that does not answer, or has no workers.
     """
     try:
         dask: Any = import_module("dask")
@@ -68,7 +68,7 @@ def cluster_outcomes(
                 n_workers=min(jobs or _processes(), len(due)),
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",
                 env=threads,
             )
             with local, distributed.Client(local) as client:
@@ -79,6 +79,13 @@ def cluster_outcomes(
         except (OSError, ValueError) as error:
             raise ConnectionLost(f"{scheduler}: no Dask scheduler answers ({error})") from None
         with client:
+            try:
+                client.wait_for_workers(1, timeout=_PATIENCE)
+            except TimeoutError:
+                raise ConnectionLost(
+                    f"{scheduler}: has no workers after {_PATIENCE:g} s; start one with "
+                    f"'dask worker {scheduler}'"
+                ) from None
             _require_version(client, scheduler)
             yield from _outcomes(client, due, work)
 

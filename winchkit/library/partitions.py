@@ -118,7 +118,10 @@ class Partitions:
             new[self.place(table, row)].append(row)
         for path in sorted({*touched, *new}, key=lambda path: (path in new, path)):
             old = self._read(path, None).to_pylist() if path.exists() else []
-            kept = [row for row in old if not drop(row)] + new.get(path, [])
+            kept = [row for row in old if not drop(row)]
+            if path not in new and len(kept) == len(old):
+                continue
+            kept += new.get(path, [])
             if not kept:
                 path.unlink(missing_ok=True)
                 continue
