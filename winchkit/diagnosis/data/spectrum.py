@@ -273,7 +273,7 @@ def narrow_edges(frequency: Array) -> Array:
     return np.array([-np.inf, *inner.tolist(), np.inf])
 
 
-def smoothed(power: Array, dof: Array) -> tuple[Array, Array]:
+def smoothed(power: Array, dof: Array, order: int = 2) -> tuple[Array, Array]:
     """Smooth the logarithm of a spectrum over its bands; with the degrees of freedom of the result.
 
     Parameters
@@ -282,6 +282,9 @@ def smoothed(power: Array, dof: Array) -> tuple[Array, Array]:
         Mean square per band.
     dof : (bands,) array
         Degrees of freedom of each.
+    order : int
+        Of the differences that are penalised: the spectrum continues as a line beyond bands with
+        many degrees of freedom (2), or as a constant (1).
 
     Returns
     -------
@@ -290,9 +293,9 @@ def smoothed(power: Array, dof: Array) -> tuple[Array, Array]:
 
     Notes
     -----
-    Penalised Whittle likelihood: ν power / σ² is χ²(ν), ln σ² has second differences of zero mean
-    and standard deviation 0.25. Maximised by Fisher scoring with working weights ν/2. A band of
-    many coefficients keeps its own value.
+    Penalised Whittle likelihood: ν power / σ² is χ²(ν), ln σ² has differences of the given order
+    with zero mean and standard deviation 0.25. Maximised by Fisher scoring with working weights
+    ν/2. A band of many coefficients keeps its own value.
 
     References
     ----------
@@ -302,8 +305,8 @@ def smoothed(power: Array, dof: Array) -> tuple[Array, Array]:
     count = len(power)
     if count < 3:
         return power, dof
-    second_differences = np.diff(np.eye(count), 2, axis=0)
-    penalty = second_differences.T @ second_differences / _CURVATURE_STD**2
+    differences = np.diff(np.eye(count), order, axis=0)
+    penalty = differences.T @ differences / _CURVATURE_STD**2
     weight = np.diag(np.maximum(dof, 1e-6) / 2)
     level = np.log(power)
     eta = np.linalg.solve(weight + penalty, weight @ level)

@@ -51,9 +51,7 @@ from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_s
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
-from winchkit.errors import Fault, RunError
 from winchkit.model.stages import Stage
-from winchkit.runs.poses import read_trajectory
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
@@ -324,14 +322,6 @@ def diagnose_robot(
     FileError
         For effects that do not bind.
     """
-    if read_trajectory(runs, profile) is not None:
-        raise RunError(
-            Fault(
-                "a log in motion with too few holds to be poses; 'winchkit compare' and 'winchkit "
-                "add' evaluate it, a diagnosis needs poses at rest: at least ten holds",
-                ", ".join(run.path or run.name for run in runs),
-            )
-        )
     progress("judging the noise", 0.0)
     preparation = prepare_selection(runs, profile, catalogue or load_catalogue())
     progress("searching", 0.4)

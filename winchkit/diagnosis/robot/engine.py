@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.spectrum import smoothed
 from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
@@ -103,8 +104,13 @@ class TrajectorySelection(PoseSelection):
                 for rows in tension:
                     columns[rows, candidate.columns] = 0.0
         found = noise_saturated(self.regression, residual, jacobian, columns)
+        power, dof = found.power.copy(), found.dof.copy()
         prior = self.regression.prior_band
-        return replace(found, power=np.where(prior, 1.0, found.power))
+        for output in self.regression.outputs:
+            own = np.array([band[0] == output for band in self.regression.bands]) & ~prior
+            power[own], dof[own] = smoothed(power[own], dof[own], order=1)
+        power[prior] = 1.0
+        return replace(found, power=power, dof=dof)
 
 
 def _independent(columns: Array) -> Array:

@@ -21,7 +21,13 @@ def missing_pose_excitation(preparation: Preparation) -> list[str]:
     """Sentences on missing repeats, tensions, temperatures, rotations, and on few poses."""
     dataset, measured = preparation.dataset, preparation.dataset.measured
     notes = []
-    if not preparation.noise.from_repeats:
+    if dataset.moves:
+        notes.append(
+            "a trajectory has no repeats: the noise is what neither geometry nor any known effect "
+            "explains, so an effect outside the catalogue cannot be excluded; record poses at "
+            "rest, some ten of them twice"
+        )
+    elif not preparation.noise.from_repeats:
         notes.append(
             "too few poses repeat another: the noise is what neither geometry nor any known effect "
             "explains, so an effect outside the catalogue cannot be excluded; drive to some ten "

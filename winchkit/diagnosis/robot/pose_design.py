@@ -330,7 +330,11 @@ def _words(offer: PoseOffer) -> str:
 def _with_all(
     regression: PoseRegression, simulated: Sequence[tuple[PoseCandidates, Measured, Pose]]
 ) -> PoseRegression:
-    """Regression of the poses so far and all simulated ones."""
+    """Regression of the poses so far and all simulated ones.
+
+    Samples of a trajectory count as poses at rest: what they show of inertia or a delay is no part
+    of a question about poses.
+    """
     point, dataset = regression.point, regression.dataset
     poses = [point.pose, *(pose for _, _, pose in simulated)]
     measured = joined([dataset.measured, *(own for _, own, _ in simulated)])
@@ -338,7 +342,7 @@ def _with_all(
         np.concatenate([p.position for p in poses]), np.concatenate([p.rotation for p in poses])
     )
     distinct = np.arange(len(measured), dtype=np.intp)
-    extended = replace(dataset, measured=measured, pose=distinct)
+    extended = replace(dataset, measured=measured, pose=distinct, trajectory=None)
     return PoseRegression(replace(point, dataset=extended, pose=pose))
 
 

@@ -130,8 +130,9 @@ def estimated_noise(
 def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
     """Whether the imbalance of the tensions is below 20 % of their standard deviation.
 
-    Else an unmodelled force acts on the platform, or the load cells do not measure these cables:
-    the balance is then left out, with a note.
+    The imbalance is what no payload explains, nor the effect that explains most. Else an
+    unmodelled force acts on the platform, or the load cells do not measure these cables: the
+    balance is then left out, with a note.
     """
     if not dataset.has_tension:
         return True
@@ -278,12 +279,13 @@ def prepare_selection(
     candidates = tuple(candidates_at(dataset, catalogue))
     absent = tuple(effect for effect in candidates if effect.id not in there)
     noise = estimated_noise(dataset, own, prior, absent)
-    if not balanced(dataset, noise):
-        dataset = replace(dataset, balanced=False)
-        candidates = tuple(candidates_at(dataset, catalogue))
-    return Preparation(
-        dataset, catalogue, candidates, noise, prior, registration=registration
-    ).with_guess()
+    first = Preparation(dataset, catalogue, candidates, noise, prior, registration=registration)
+    prepared = first.with_guess()
+    if balanced(dataset, prepared.noise):
+        return prepared
+    dataset = replace(dataset, balanced=False)
+    candidates = tuple(candidates_at(dataset, catalogue))
+    return replace(first, dataset=dataset, candidates=candidates).with_guess()
 
 
 def calibrated_on(profile: RobotProfile, runs: Sequence[Run]) -> bool:

@@ -14,6 +14,9 @@ from winchkit.sim.robot.rotation import quaternion, rotation, turned
 
 __all__ = ["SimTracker"]
 
+_ROUNDING = 1e-6
+"""A sum of ticks reaches an instant but for this, s; else the datagram waits for another tick."""
+
 
 class SimTracker:
     """Sends a datagram per pose; its clock starts with the simulation.
@@ -46,10 +49,10 @@ class SimTracker:
     def advance(self) -> None:
         """Measure where a period has passed, and send what its delay has passed."""
         now, truth = self._platform.time, self._truth
-        if now >= self._next:
+        if now >= self._next - _ROUNDING:
             self._waiting.append((now + truth.delay, self._measured()))
             self._next = max(self._next + 1 / truth.rate, now)
-        while self._waiting and self._waiting[0][0] <= now:
+        while self._waiting and self._waiting[0][0] <= now + _ROUNDING:
             self._send(self._waiting.popleft()[1])
 
     def _measured(self) -> bytes:
