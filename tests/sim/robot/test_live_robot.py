@@ -103,14 +103,22 @@ def test_the_load_of_one_winch_of_a_robot_cannot_be_changed(bench: Bench, live: 
 def test_the_tracker_shows_poses_in_a_frame_of_its_own() -> None:
     sim = read_simbench(find("sim", "cabtive-robot"))
     received: list[dict[str, Any]] = []
+    ages: list[float] = []
     clock = SimulatedClock()
+    started = clock.now()
+
+    def take(datagram: bytes) -> None:
+        received.append(json.loads(datagram))
+        ages.append(clock.now() - started - received[-1]["time"])
+
     bare = replace(sim.bench, winch={n: replace(w, cell=None) for n, w in sim.bench.winch.items()})
     with LiveBench(replace(sim, bench=bare), simulated_time=clock) as live:
         assert live.robot is not None
-        live.robot.on_pose = lambda datagram: received.append(json.loads(datagram))
+        live.robot.on_pose = take
         clock.sleep(0.1)
     assert sim.platform is not None
     frame = sim.platform.tracker
+    assert ages == pytest.approx([frame.delay] * len(ages), abs=1e-5), "a multiple of the tick"
     roll, pitch, yaw = frame.rotation
     turn = Rotation.from_euler("ZYX", [yaw, pitch, roll])
     expected = turn.apply([0.36, 0.558, 0.56]) + frame.position

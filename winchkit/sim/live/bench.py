@@ -290,7 +290,7 @@ class LiveBench:
         if sim.platform is None:
             profiles = profiles_of(sim) if self._profiles is None else self._profiles
         else:
-            self.robot = LiveRobot(sim, sim.platform, self.seed, sends=self._simulated is None)
+            self.robot = LiveRobot(sim, sim.platform, self.seed, now, sends=self._simulated is None)
             profiles, loads = self.robot.profiles, self.robot.ends
             truth = self.robot.truth
         for name, wiring in sim.bench.winch.items():
@@ -387,7 +387,7 @@ class LiveBench:
             for winch in winches:
                 winch.tick(now, all_heard)
             if self.robot is not None:
-                self.robot.advance()
+                self.robot.advance(now)
 
     def _go_wrong(self, fault: FaultSpec) -> None:
         winch, _, role = fault.target.partition(".")

@@ -26,11 +26,16 @@ class LiveRobot:
         Its platform.
     seed : int
         Seed of the noise.
+    started : float
+        Time at which the winches start, s.
     sends : bool
         Whether the tracker sends datagrams to the address at which the bench file listens.
     """
 
-    def __init__(self, bench: SimBench, truth: PlatformTruth, seed: int, *, sends: bool) -> None:
+    def __init__(
+        self, bench: SimBench, truth: PlatformTruth, seed: int, started: float, *, sends: bool
+    ) -> None:
+        self._started = started
         self.platform, self.profiles, self.ends, self.truth = build_robot(bench, truth)
         self.on_pose: Callable[[bytes], None] | None = None
         """Called with each datagram of the tracker, also in simulated time."""
@@ -42,9 +47,9 @@ class LiveRobot:
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._tracker = SimTracker(self.platform, truth.tracker, seed, self._send)
 
-    def advance(self) -> None:
-        """Let the tracker measure and send."""
-        self._tracker.advance()
+    def advance(self, now: float) -> None:
+        """Let the tracker measure and send at a time (s)."""
+        self._tracker.advance(now - self._started)
 
     def close(self) -> None:
         """Close the socket."""

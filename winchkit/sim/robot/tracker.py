@@ -46,12 +46,18 @@ class SimTracker:
         self._next = 0.0
         self._waiting: deque[tuple[float, bytes]] = deque()
 
-    def advance(self) -> None:
-        """Measure where a period has passed, and send what its delay has passed."""
-        now, truth = self._platform.time, self._truth
-        if now >= self._next - _ROUNDING:
-            self._waiting.append((now + truth.delay, self._measured()))
-            self._next = max(self._next + 1 / truth.rate, now)
+    def advance(self, now: float) -> None:
+        """Measure where a period has passed, and send what its delay has passed.
+
+        Parameters
+        ----------
+        now : float
+            Since the start, s; the platform may be behind by a few ms, less than the delay.
+        """
+        measured, truth = self._platform.time, self._truth
+        if measured >= self._next - _ROUNDING:
+            self._waiting.append((measured + truth.delay, self._measured()))
+            self._next = max(self._next + 1 / truth.rate, measured)
         while self._waiting and self._waiting[0][0] <= now + _ROUNDING:
             self._send(self._waiting.popleft()[1])
 
