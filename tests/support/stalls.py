@@ -55,11 +55,6 @@ class StallWatch:
         self._thread.join()
         self.sample()
 
-    def total(self) -> float:
-        """Time for which the threads of these processes have waited for a processor so far, s."""
-        self.sample()
-        return sum(self._before.values())
-
     def _run(self) -> None:
         count, before, used = 0, time.monotonic(), time.process_time()
         while not self._stopping.wait(_PERIOD):

@@ -1,4 +1,4 @@
-"""The page in Debian's Chromium: the whole story, accessibility, and a bench that stops."""
+"""The page in Debian's Chromium: the whole story, accessibility, a robot."""
 
 from __future__ import annotations
 
