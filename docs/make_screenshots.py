@@ -73,10 +73,12 @@ def robot(page: Any, url: str) -> None:
 
 
 def library(page: Any, url: str) -> None:
-    """Library view with two runs laid over each other."""
-    page.goto(f"{url}#library")
-    page.wait_for_selector("main input[type=checkbox]", timeout=60_000)
-    for row in (0, 2):
+    """Library view with a verdict and two runs laid over each other."""
+    page.goto(url)
+    page.wait_for_selector("#card .primary", timeout=120_000)
+    page.keyboard.press("4")
+    page.wait_for_selector("main .chip", timeout=120_000)
+    for row in (1, 3):  # the first box chooses the whole set
         page.locator("main input[type=checkbox]").nth(row).check()
     page.wait_for_timeout(2000)
 
@@ -93,12 +95,16 @@ def main() -> None:
             write_run(run, runs / f"{run.name}.csv")
         recorded = Path(folder) / "poses.csv"
         recorded.write_text(csv(poses(Truth(), 60, 7), angles=True))
+        profile = ["-p", "bench-spiral"]
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         views = {
             "diagnose": (diagnose, ["--mystery", "1"]),
             "bench": (bench, ["--sim", "demo-adequate", "--allow-motion"]),
             "robot": (robot, [str(recorded), "-p", "cabtive"]),
-            "library": (library, ["--folder", str(runs)]),
+            "library": (
+                library,
+                [*map(str, sorted(runs.iterdir())), *profile, "--folder", str(runs)],
+            ),
         }
         for name in sys.argv[1:] or views:
             show, arguments = views[name]

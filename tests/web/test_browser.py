@@ -16,6 +16,7 @@ pytest.importorskip("playwright.sync_api")
 
 from browsing import Served, opened, texts, until
 from chromium import NEEDS_CHROMIUM, chromium
+from recordings_of_others import lay_out
 from robot_poses.truth import Truth, csv, poses
 from winchkit.runs.writer import write_run
 from winchkit.web.examples import example_runs
@@ -88,6 +89,80 @@ def test_drop_see_add_the_ladder_falls_save_and_reload(
     page.context.close()
 
 
+EMPS = """\
+schema = 1
+kind = "axis"
+name = "emps"
+
+[gearbox]
+ratio = 1
+
+[reference]
+motor_angle = "0 rad"
+
+[[effect]]
+id = "rotor-inertia"
+inertia = "95.11 kg m^2"
+
+[[effect]]
+id = "motor-viscous"
+viscosity = "203.5 N m s"
+"""
+
+
+def test_emps_from_its_authors_file_and_a_log_of_another_program(
+    browser: Any, tmp_path: Path
+) -> None:
+    lay_out("emps", tmp_path)
+    profile, log = tmp_path / "emps.toml", tmp_path / "log.csv"
+    profile.write_text(EMPS)
+    rows = "\n".join(f"{i * 0.02:.2f};{57.3 * (i % 100):.3f};{9 + i % 3}" for i in range(300))
+    log.write_text(f"Zeit [s];Pos [deg];Kraft\n{rows}\n")
+    served = Served("--folder", str(tmp_path))
+    page, complaints = opened(browser, served.url, accept_downloads=True)
+    page.set_input_files("#files", str(log))
+    until(page, lambda: page.locator("#dialog .primary").count() == 1)
+    assert page.locator("#dialog .primary").is_disabled(), "the unit of Kraft is not known"
+    page.select_option("[aria-label='Channel of Kraft']", "tension")
+    until(page, lambda: page.locator("[aria-label='Unit of Kraft']").count() == 1)
+    page.fill("[aria-label='Unit of Kraft']", "N")
+    page.keyboard.press("Tab")
+    until(page, lambda: page.locator("#dialog .primary").is_enabled())
+    page.click("#dialog .primary")
+    until(page, lambda: "1 run" in page.inner_text("main"))
+    page.click("text=1 run")
+    page.click("[aria-label^='Remove log']")
+    until(page, lambda: page.locator("#files").count() == 1)
+
+    page.click("text=choose…")
+    page.set_input_files("#dialog input[type=file]", str(profile))
+    until(page, lambda: "emps" in page.inner_text("main"))
+    page.set_input_files("#files", str(tmp_path / "DATA_EMPS.mat"))
+    until(page, lambda: page.locator("[aria-label='Channel of vir']").count() == 1)
+    page.select_option("[aria-label='Channel of vir']", "motor_torque")
+    until(page, lambda: page.locator("[aria-label='Factor of vir']").count() == 1)
+    page.fill("[aria-label='Factor of vir']", "gtau")
+    page.keyboard.press("Tab")
+    until(page, lambda: page.input_value("[aria-label='Unit of vir']") == "N m")
+    page.click("#dialog .primary")
+    until(page, lambda: page.locator("#time canvas").count() == 2)
+    until(page, lambda: page.locator("#card .primary").count() == 1, 120.0)
+    effect = page.inner_text("#card header code")
+    before = float(texts(page, ".ladder .cell.today .value")[0])
+    page.keyboard.press("a")
+    until(page, lambda: page.locator(".name.history").count() == 1)
+    assert float(texts(page, ".ladder .cell.today .value")[0]) < 0.5 * before
+    with page.expect_download() as saved:
+        page.click("text=Save profile")
+    saved.value.save_as(tmp_path / "better.toml")
+    assert effect in (tmp_path / "better.toml").read_text()
+    page.reload()
+    until(page, lambda: page.locator(".name.history").count() == 1)
+    assert complaints == []
+    page.context.close()
+    served.end()
+
+
 def saved_as(page: Any, name: str, kind: str, folder: Path) -> Path:
     """A file that a plot's button saves."""
     with page.expect_download() as waiting:
@@ -108,6 +183,34 @@ def example() -> Iterator[Served]:
     found = Served("--mystery", "1")
     yield found
     found.end()
+
+
+def test_samples_are_marked_by_a_finger_and_by_keys(browser: Any, example: Served) -> None:
+    page, complaints = opened(browser, example.url, has_touch=True)
+    page.set_viewport_size({"width": 390, "height": 844})
+    until(page, lambda: page.locator("#over .u-over").count() == 6)
+    plot = page.locator("#over .u-over").first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    touch = page.context.new_cdp_session(page)
+    for kind, shares in (
+        ("touchStart", [0.2]),
+        ("touchMove", [0.4]),
+        ("touchMove", [0.7]),
+        ("touchEnd", []),
+    ):
+        points = [{"x": box["x"] + at * box["width"], "y": box["y"] + 20} for at in shares]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+    until(page, lambda: " samples, " in page.inner_text("#brush"))
+    by_finger = page.inner_text("#brush")
+    page.locator("#over .plot").first.focus()
+    page.keyboard.press("b")
+    until(page, lambda: page.inner_text("#brush") != by_finger)
+    assert " samples, " in page.inner_text("#brush")
+    page.keyboard.press("Escape")
+    until(page, lambda: "samples" not in page.inner_text("#brush"))
+    assert complaints == []
+    page.context.close()
 
 
 @pytest.mark.parametrize("motion", ["no-preference", "reduce"])
@@ -224,6 +327,10 @@ def test_a_robot_is_calibrated_turned_and_saved(
     assert [text for text in complaints if "ERR_FAILED" not in text] == []
 
 
+DRAWN = "#over canvas, main .drop, #details svg, table.library"
+"""What each view shows last, where no bench is attached."""
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_no_view_has_a_violation_of_axe_or_scrolls_sideways(
     browser: Any, served: Served, robot: Served, scheme: str, tmp_path: Path
@@ -245,8 +352,8 @@ def test_no_view_has_a_violation_of_axe_or_scrolls_sideways(
             url = robot.url if view == "robot" else f"{served.url}#{view}"
             page.goto(url)
             page.reload()
-            until(page, lambda: page.locator("main > *").count() > 0)
-            page.wait_for_timeout(1500)
+            until(page, lambda: page.locator(DRAWN).count() > 0)
+            page.wait_for_timeout(200)
             page.evaluate(axe)
             found = page.evaluate("async () => (await axe.run()).violations")
             said = [(v["id"], [node["html"][:120] for node in v["nodes"]][:3]) for v in found]

@@ -7,7 +7,10 @@ let last = {};
 // taken for the next one where they fit it.
 export async function importFile(file, found) {
   let given = {}, shown = found;
-  if (Object.keys(last).length) try { shown = await guess(file, last); given = last; } catch { shown = found; }
+  if (Object.keys(last).length) try {
+    const next = await guess(file, last);
+    if (next.questions.length <= found.questions.length) { shown = next; given = last; }
+  } catch { shown = found; }
   await new Promise((done) => { show(file, shown, given); document.getElementById("dialog").addEventListener("close", done, { once: true }); });
 }
 

@@ -33,7 +33,7 @@ function render() {
   const judged = verdicts.length ? el("select", { "aria-label": "Verdict", onchange: () => { verdict = judged.value; again(); } }, [["", "any verdict"], ...verdicts].map(([value, words]) => el("option", { value, selected: value === verdict }, words))) : null;
   const pick = el("select", { "aria-label": "Channel", onchange: () => { channel = pick.value; overlay(); } }, channels.map((name) => el("option", { selected: name === channel }, name)));
   const outputs = [...new Set(found.runs.flatMap((run) => (run.verdict ? Object.keys(run.verdict.ratios) : [])))];
-  fill(root, el("h1", { class: "visually-hidden" }, "Library"), el("div", { class: "row context" }, tabs, el("span", { class: "label" }, `Folder ${found.folder}: ${found.runs.length} run${found.runs.length === 1 ? "" : "s"} in ${sets().length} sets`), search, judged,
+  fill(root, el("h1", { class: "visually-hidden" }, "Library"), el("div", { class: "row context" }, tabs, el("span", { class: "label" }, `Folder ${found.folder}: ${found.runs.length} run${found.runs.length === 1 ? "" : "s"} in ${sets().length} set${sets().length === 1 ? "" : "s"}`), search, judged,
     el("span", { class: "row end" }, el("button", { class: "primary", id: "open", disabled: !chosen.size, onclick: () => attempt(async () => { await order("library", { names: [...chosen] }); location.hash = "#diagnose"; }) }, openWords()))),
   el("div", { class: "grid" }, el("section", { class: "panel w8 scroll", "aria-label": "Runs" },
     el("table", { class: "rows library" }, el("thead", {}, el("tr", {}, ["", "Set, run", "Programme", "Load", "Duration", "Error ÷ noise", "Verdict"].map((text, i) => el("th", { class: i === 4 ? "number" : "" }, text || el("span", { class: "visually-hidden" }, "Choose"))))), body),
@@ -78,7 +78,7 @@ function setRow(key, runs, open) {
   const toggle = () => { for (const run of runs) if (whole) chosen.delete(run.name); else chosen.add(run.name); redraw(); };
   return el("tr", { class: "set" }, el("td", {}, el("input", { type: "checkbox", style: { minHeight: "auto" }, checked: whole, "aria-label": `Choose all runs of ${first.winch || "the folder"}, ${first.session}`, onchange: toggle })),
     el("td", {}, el("button", { class: "plain fold", "aria-expanded": String(open), onclick: () => { if (opened.has(key)) opened.delete(key); else opened.add(key); redraw(); } }, el("span", { "aria-hidden": "true" }, open ? "▾" : "▸"), el("b", {}, first.winch || "No winch named")), el("span", { class: "note" }, `${first.session} · ${runs.length} run${runs.length === 1 ? "" : "s"}`)),
-    el("td", {}, several(runs.map((run) => run.programme)) || "–"), el("td", {}, several(runs.map((run) => run.load)) || "–"), el("td", { class: "tight number" }, `${number(runs.reduce((sum, run) => sum + run.seconds, 0), 3)} s`),
+    el("td", {}, several(runs.map((run) => run.programme)) || "–"), el("td", {}, several(runs.map((run) => run.load).sort((a, b) => parseFloat(a) - parseFloat(b))).replaceAll(" kg", "\u00a0kg") || "–"), el("td", { class: "tight number" }, `${number(runs.reduce((sum, run) => sum + run.seconds, 0), 3)} s`),
     alike ? judged(first.verdict) : [el("td", {}), el("td", { class: "note" }, "see the runs")]);
 }
 
