@@ -17,6 +17,9 @@ __all__ = ["SimTracker"]
 _ROUNDING = 1e-6
 """A sum of ticks reaches an instant but for this, s; else the datagram waits for another tick."""
 
+_LONGEST = 0.01
+"""Time before the end of the last step at which the platform can be measured, s."""
+
 
 class SimTracker:
     """Sends a datagram per pose; its clock starts with the simulation.
@@ -55,22 +58,28 @@ class SimTracker:
             Since the start, s; the platform may be behind by a few ms, less than the delay.
         """
         measured, truth = self._platform.time, self._truth
-        if measured >= self._next - _ROUNDING:
-            self._waiting.append((measured + truth.delay, self._measured()))
-            self._next = max(self._next + 1 / truth.rate, measured)
+        while measured >= self._next - _ROUNDING:
+            instant = max(self._next, measured - _LONGEST)
+            self._waiting.append((instant + truth.delay, self._measured(instant)))
+            self._next = instant + 1 / truth.rate
         while self._waiting and self._waiting[0][0] <= now + _ROUNDING:
             self._send(self._waiting.popleft()[1])
 
-    def _measured(self) -> bytes:
+    def _measured(self, instant: float) -> bytes:
+        """The pose at an instant before the end of the platform's last step, by its velocity."""
         truth, platform = self._truth, self._platform
-        position = self._rotation @ platform.position + truth.position
+        change = platform.velocity * (instant - platform.time)
+        x, y, z = change[3:].tolist()
+        attitude = turned((x, y, z)) @ platform.rotation
+        place = platform.center + change[:3] - attitude @ platform.body.center_of_mass
+        position = self._rotation @ place + truth.position
         position = position + truth.position_noise * self._random.standard_normal(3)
         x, y, z = (truth.rotation_noise * self._random.standard_normal(3)).tolist()
-        seen = turned((x, y, z)) @ self._rotation @ platform.rotation
+        seen = turned((x, y, z)) @ self._rotation @ attitude
         told = {
             "schema": 1,
             "body": "platform",
-            "time": round(platform.time, 6),
+            "time": round(instant, 6),
             "position": position.tolist(),
             "quaternion": list(quaternion(seen)),
         }
