@@ -7,7 +7,7 @@ import pytest
 from campaign.case import Plan
 from campaign.logger_case import LoggerPlan, answer, make_logger_case
 from campaign.run import run_case
-from campaign.sizes import CATALOGUE
+from campaign.sizes import CATALOGUE, RECENT
 
 NOTHING = (101, 102, 103, 104, 105, 106)
 ONE = {
@@ -121,9 +121,15 @@ def test_what_searches_once_missed(
     ],
 )
 def test_runs_of_a_logger_with_a_fault(
-    fault: str, seed: int, snr: float, hidden: str, tmp_path: Path
+    fault: str,
+    seed: int,
+    snr: float,
+    hidden: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    # Fault and effect are drawn.
+    # Fault and effect are drawn, from as many effects as when the seed was first drawn.
+    monkeypatch.setattr("campaign.logger_case.RECENT", RECENT[:8])
     case = make_logger_case(seed, LoggerPlan(snr, small=True), tmp_path)
     assert case is not None
     score = answer(case)
