@@ -16,7 +16,7 @@ from winchkit.errors import MotionError, UsageError
 @pytest.mark.slow
 def test_the_benchmark_calibrates_a_hidden_geometry() -> None:
     found = robot_self_calibrated.measure(
-        5, poses=10, validation=3, cycle=0.04, volume=PoseVolume(0.04, 0.08, 0.15, 0.15)
+        5, poses=10, validation=3, cycle=0.04, volume=PoseVolume(0.07, 0.12, 0.15, 0.15)
     )
     assert found["refused"] is None
     assert found["held_out_before_mm"] > 0.2
