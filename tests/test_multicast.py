@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 
@@ -41,6 +43,17 @@ def test_a_frame_reaches_all_but_its_sender(ports: Ports) -> None:
         0x181, b"12345678", False,
     )  # fmt: skip
     assert mine.receive(0.01) is None
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel's time stamps are those of Linux")
+def test_a_frame_has_the_time_of_its_arrival_however_late_it_is_taken(ports: Ports) -> None:
+    mine, other, _ = ports
+    before = time.time()
+    mine.send(0x181, b"")
+    after = time.time()
+    time.sleep(0.05)
+    assert other.receive(1.0) == (0x181, b"")
+    assert before - 1e-3 <= other.arrived <= after + 1e-3
 
 
 def test_frames_of_the_library_are_received_but_for_extended_ones(ports: Ports) -> None:

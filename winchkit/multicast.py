@@ -11,6 +11,7 @@ import ctypes
 import socket
 import struct
 import sys
+from collections.abc import Sequence
 from contextlib import ExitStack
 from ipaddress import ip_address
 from typing import Any
@@ -20,7 +21,9 @@ __all__ = ["MulticastPort"]
 _QUEUE = 1 << 20
 """Bytes of the socket's queue."""
 _LONGEST = 4096
-_SO_ATTACH_FILTER = 26
+_SO_ATTACH_FILTER, _SO_TIMESTAMPNS = 26, 35
+_STAMP = struct.Struct("@ll")
+_ANCILLARY = 64
 _INSTRUCTION = struct.Struct("=HBBI")
 _LOAD_WORD, _LOAD_HALF, _JUMP_EQUAL, _RETURN = 0x20, 0x28, 0x15, 0x06
 """Classic BPF; a datagram begins with the sender's port."""
@@ -68,7 +71,11 @@ class MulticastPort:
             else:
                 member = address.packed + struct.pack("@I", 0)
                 self._input.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_JOIN_GROUP, member)
+            if sys.platform == "linux":
+                self._input.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
             self._opened = opened.pop_all()
+        self.arrived = 0.0
+        """Arrival of the last frame by the kernel, s since the epoch; 0 where it does not say."""
 
     def send(self, identifier: int, data: bytes, *, remote: bool = False) -> None:
         """Send a data frame of 11 bits, or a remote frame for one byte; raises OSError."""
@@ -94,11 +101,12 @@ class MulticastPort:
         """
         self._input.settimeout(timeout)
         try:
-            datagram, sender = self._input.recvfrom(_LONGEST)
+            datagram, ancillary, _, sender = self._input.recvmsg(_LONGEST, _ANCILLARY)
         except (BlockingIOError, TimeoutError):
             return None
         if sender[:2] == self._own:
             return self.receive(0.0)
+        self.arrived = _stamp(ancillary)
         frame: Any = self._unpack(datagram)
         try:
             other = frame["is_extended_id"] or frame["is_remote_frame"] or frame["is_error_frame"]
@@ -109,6 +117,15 @@ class MulticastPort:
     def close(self) -> None:
         """Leave the group."""
         self._opened.close()
+
+
+def _stamp(ancillary: Sequence[tuple[int, int, bytes]]) -> float:
+    """Time stamp of the kernel, s since the epoch; 0 without one."""
+    for level, kind, content in ancillary:
+        if (level, kind) == (socket.SOL_SOCKET, _SO_TIMESTAMPNS) and len(content) >= _STAMP.size:
+            seconds, nanoseconds = _STAMP.unpack_from(content)
+            return float(seconds + nanoseconds * 1e-9)
+    return 0.0
 
 
 def _drop_from(taker: socket.socket, address: str, port: int) -> None:

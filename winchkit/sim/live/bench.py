@@ -105,7 +105,7 @@ class LiveBench:
         self.worst_lateness = 0.0
         """s."""
         self._skipped = 0.0
-        self._started_at = self._last = clock()
+        self._started_at = self._last = self._reached = clock()
         self._faults = sorted(self.sim_bench.fault, key=lambda fault: fault.time)
 
     def __enter__(self) -> LiveBench:
@@ -229,7 +229,7 @@ class LiveBench:
         """Advance the simulation to the present time and lock it; a robot's is at its last tick."""
         with self._lock:
             if self.robot is None:
-                now = self._now()
+                now = self._instant(0.0)
                 for winch in self.winches.values():
                     winch.advance(now)
             yield
@@ -359,6 +359,11 @@ class LiveBench:
         self._last = max(self._last, now)
         return self._last
 
+    def _instant(self, ago: float) -> float:
+        """Simulated time so long ago (s), but no earlier than what the drives have come to."""
+        self._reached = max(self._reached, self._now() - ago)
+        return self._reached
+
     def _serve(self, bus: str, port: CanPort) -> None:
         winches = self._on_bus(bus)
         serve(
@@ -370,18 +375,20 @@ class LiveBench:
             late=self._note_lateness,
         )
 
-    def _deliver(self, winches: list[LiveWinch], identifier: int, data: bytes) -> None:
+    def _deliver(
+        self, winches: list[LiveWinch], identifier: int, data: bytes, ago: float = 0.0
+    ) -> None:
         with self._lock:
-            now = self._now()
+            now = self._instant(ago)
             concerned = winches
             if identifier in _RPDOS:
                 concerned = [one for one in winches if one.listens(identifier)]
             for winch in concerned:
                 winch.receive(identifier, data, now)
 
-    def _tick(self, winches: list[LiveWinch], all_heard: bool = True) -> None:
+    def _tick(self, winches: list[LiveWinch], all_heard: bool = True, ago: float = 0.0) -> None:
         with self._lock:
-            now = self._now()
+            now = self._instant(ago)
             while self._faults and now - self._started_at >= self._faults[0].time:
                 self._go_wrong(self._faults.pop(0))
             for winch in winches:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from itertools import count
 from random import Random
+from time import time as wall_clock
 from typing import Any, Literal
 
 import can
@@ -184,6 +185,8 @@ class CanPort:
 
     def __init__(self, spec: BusSpec, wire: Wire) -> None:
         self.wire = wire
+        self.waited = 0.0
+        """How long the last frame waited for being received, s; 0 where nobody says."""
         self._name = f"{spec.interface} channel '{spec.channel}'"
         try:
             if spec.interface == "udp_multicast":
@@ -223,6 +226,7 @@ class CanPort:
         """Take the next frame, waiting at most ``timeout`` s; raises ConnectionLost."""
         while (late := self.wire.due(from_drive=True)) is not None:
             self._put(*late)
+        self.waited = 0.0
         arrived = self.wire.due(from_drive=False)
         if arrived is not None:
             return arrived
@@ -232,6 +236,8 @@ class CanPort:
             raise ConnectionLost(f"{self._name}: cannot receive: {error}") from error
         if frame is None:
             return None
+        if isinstance(self._bus, MulticastPort) and self._bus.arrived:
+            self.waited = max(0.0, wall_clock() - self._bus.arrived)
         return frame if self.wire.carry(*frame, from_drive=False) else None
 
     def close(self) -> None:
