@@ -87,7 +87,11 @@ class IndependentDrive:
         self.advance(now)
         self._say(self.slave.receive(Frame(identifier, data)))
 
-    def tick(self, now: float) -> None:
+    def listens(self, identifier: int) -> bool:
+        """Whether it is one of its RPDOs."""
+        return identifier in self.slave.pdos.identifiers(0x1400)
+
+    def tick(self, now: float, _all_heard: bool = True) -> None:
         """Let time pass until ``now``."""
         self.advance(now)
 

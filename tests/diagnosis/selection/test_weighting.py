@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_channel
+from diagnosis_runs import CATALOGUE as EVERY
+from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import selection_engine
@@ -15,8 +16,11 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.selection.weighting import reweighted
+from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
 
+CATALOGUE = Catalogue(effect for effect in EVERY if effect.id != "motor-dahl")
+"""Without presliding friction, which takes part of a friction that fades."""
 RIDE = Ride(samples=3000, rate=50.0, period=12.0)
 FRICTION = 0.05
 RATE = np.gradient(RIDE.angle, RIDE.time)

@@ -19,7 +19,12 @@ const guess = async (file, answers) => (await ask("/api/guess", JSON.stringify({
 // `given` are the answers so far: `columns` as the command line takes them, and constants by name.
 function show(file, found, given) {
   const columns = given.columns || [], factors = given.factors || {};
-  const again = (next) => attempt(async () => show(file, await guess(file, next), next));
+  // What is typed while the answer is awaited would be lost with the old table.
+  const again = (next) => attempt(async () => {
+    const open = [...document.querySelectorAll("#dialog :is(input, select, .primary):enabled")];
+    open.forEach((node) => { node.disabled = true; });
+    try { show(file, await guess(file, next), next); } finally { open.forEach((node) => { node.disabled = false; }); }
+  });
   const column = (row, name, unit, factor) => again({ ...given, factors: { ...factors, [row.source]: factor },
     columns: [...columns.filter((text) => text.split("=")[0] !== row.channel && text.split("=")[0] !== name && !new RegExp(`^[^=]*=${escaped(row.source)}( |\\*|$)`).test(text)), name ? `${name}=${row.source}${factor ? ` *${factor}` : ""}${unit ? ` [${unit}]` : ""}` : `${row.channel}=`] });
   const cells = (row) => {
