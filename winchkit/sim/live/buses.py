@@ -186,7 +186,7 @@ class CanPort:
     def __init__(self, spec: BusSpec, wire: Wire) -> None:
         self.wire = wire
         self.waited = 0.0
-        """How long the last frame waited for being received, s; 0 where the bus has no time stamps."""
+        """How long the last frame waited for being received, s; 0 without time stamps."""
         self._name = f"{spec.interface} channel '{spec.channel}'"
         try:
             if spec.interface == "udp_multicast":
