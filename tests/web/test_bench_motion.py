@@ -45,8 +45,7 @@ def commanding(browser: Any, url: str) -> Any:
 
 def hold(page: Any, button: int = 0) -> None:
     """Press a jog button until the winch moves."""
-    box = page.locator(".controls .jog").nth(button).bounding_box()
-    page.mouse.move(box["x"] + 20, box["y"] + 20)
+    page.locator(".controls .jog").nth(button).hover(position={"x": 20, "y": 20})
     page.mouse.down()
     until(page, lambda: state(page) in {"winding in", "paying out"}, 10.0)
 
