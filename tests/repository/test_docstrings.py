@@ -27,7 +27,9 @@ def callables() -> Iterator[tuple[str, Callable[..., Any]]]:
     """Public functions and the public methods of public classes, by name."""
     yield from ((item.__name__, item) for item in PUBLIC if inspect.isfunction(item))
     for owner in CLASSES:
-        for name, member in vars(owner).items():
+        bases = [base for base in owner.__mro__ if base.__module__.startswith("winchkit")]
+        members = {name: item for base in reversed(bases) for name, item in vars(base).items()}
+        for name, member in members.items():
             function = getattr(member, "__func__", member)
             if inspect.isfunction(function) and not name.startswith("_"):
                 yield f"{owner.__name__}.{name}", function

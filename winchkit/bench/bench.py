@@ -1,47 +1,34 @@
-"""An open bench: its winches and instruments wired up, supervised, and stopped at its close."""
+"""An open bench: who may move its winches, its motions and its stops."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Collection, Generator, Iterable, Iterator, Mapping
-from contextlib import ExitStack, suppress
-from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Protocol, Self
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Protocol
 
 from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.commissioning.validity import require_commissioned, trust_record
 from winchkit.bench.common_move import begin_together, wait_together
+from winchkit.bench.connection import BenchConnection
 from winchkit.bench.control.dead_man import LIFE_SIGN
 from winchkit.bench.control.homing_motion import HomingRequest
-from winchkit.bench.control.latch import LatchFile
-from winchkit.bench.control.loop import Callback, ControlLoop
-from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
+from winchkit.bench.control.realtime import Request
 from winchkit.bench.control.release import NotReleased, ReleaseGuard
-from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Trip
-from winchkit.bench.hardware import Wired, wire
+from winchkit.bench.control.snapshot import Direction, Trip
 from winchkit.bench.homing import homing
 from winchkit.bench.lifecycle import (
     await_cycles,
-    await_feedback,
     await_rest,
-    await_sensors,
     reset,
 )
 from winchkit.bench.ownership import Ownership
-from winchkit.bench.recording.provenance import origin
-from winchkit.bench.recording.recorder import Recorder
-from winchkit.bench.recording.trip_history import TripHistory
 from winchkit.bench.remote.commander import Commanders, NotCommander
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.life_sign import LifeSigns
 from winchkit.bench.robot.wiring import no_robot
 from winchkit.bench.winch import Winch
-from winchkit.drivers.can.bus.frame_tap import FrameTap
-from winchkit.drivers.can.bus.health import BusHealth
-from winchkit.drivers.can.cia402.axis import Cia402Axis
-from winchkit.drivers.can.tools.scan import Found, named_after, scan
 from winchkit.drivers.clock import Clock
 from winchkit.errors import (
     ConnectionLost,
@@ -50,19 +37,12 @@ from winchkit.errors import (
     MotionError,
     NotPermitted,
 )
-from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
     from winchkit.bench.robot.platform import Platform
-    from winchkit.bench.robot.tracker import Tracker
 
 __all__ = ["Bench", "Stations"]
-
-_WATCHED = 2.0
-"""Frames are collected for so long after somebody asked for them, s."""
-_LISTEN = 1.1
-"""For heartbeats of nodes that are no winch, s."""
 
 
 class Stations(Protocol):
@@ -85,7 +65,7 @@ class Stations(Protocol):
         """Disconnect every client."""
 
 
-class Bench:
+class Bench(BenchConnection):
     """An open bench; this process owns it until it is closed.
 
     Made by :func:`winchkit.open_bench`. ``bench.winch["A"]`` is one of its winches.
@@ -120,24 +100,12 @@ class Bench:
         commissioning: bool = False,
     ) -> None:
         """Open it; raises every error of opening, with nothing left open."""
-        self.spec = spec
-        self.clock = clock
+        super().__init__(spec, clock, ownership or own(spec, name or client_name()))
         self.not_commissioned = ""
         """Why nothing may move before it is commissioned; empty where it is."""
-        self._recorders: list[Recorder] = []
-        self._tracker: Tracker | None = None
-        self._tracker_lock = threading.Lock()
         self._release = ReleaseGuard()
         self._commissioner = threading.get_ident() if commissioning else None
-        with ExitStack() as stack:
-            stack.callback((ownership or own(spec, name or client_name())).close)
-            latch = LatchFile(spec.latch_file)
-            stack.callback(latch.close)
-            trips = latch.open()
-            self._wired: Wired = wire(spec, clock, stack, latch)
-            self.loop: ControlLoop = self._wired.loop
-            self.loop.restore(trips)
-            self.axes: Mapping[str, Cia402Axis] = self._wired.axes
+        with self._stack:
             self._look_at_record()
             self.winch: dict[str, Winch] = {
                 name: Winch(self, name, spec.winch[name], parts, dict(self._wired.sensors[name]))
@@ -157,24 +125,12 @@ class Bench:
             """Quick stops that were given."""
             self.cells = self._cell_desk()
             """Its instruments by name, for commands and whoever looks at them one by one."""
-            self.trip_history = TripHistory(self.loop.cycle)
-            """The cycles around the newest trip."""
-            self.loop.samplers.append(self.trip_history)
             self.loop.on_jog = self._jog_from_callback
             self.loop.callbacks.append(LifeSigns(self._going_on, self._end_silent))
-            self.realtime: RealTime = acquire(realtime, self._urgent_threads())
-            """What the control loop was granted of real-time settings, and what was refused."""
-            stack.callback(self.realtime.close)
-            if realtime:
-                self.loop.samplers.append(RestCollector())
-            stack.callback(self.loop.close)
-            self.loop.start()
-            await_feedback(self.loop, self.axes, clock)
-            self.realtime.cover(self._urgent_threads())
-            await_sensors((s for one in self.winch.values() for s in one.sensors.values()), clock)
+            self._start(realtime)
             self.stations = serve(self)
             """Where other processes take part."""
-            self._stack = stack.pop_all()
+            self._stack = self._stack.pop_all()
 
     def _cell_desk(self) -> CellDesk:
         wired, permit = self._wired, self._require_rest
@@ -196,89 +152,6 @@ class Bench:
         if self._platform is None:
             raise no_robot(self.spec)
         return self._platform
-
-    @property
-    def tracker(self) -> Tracker | None:
-        """The tracker of its robot, received from the first use on; None where none is declared.
-
-        Raises ConnectionLost where its address is in use.
-        """
-        wiring = None if self.spec.robot is None else self.spec.robot.tracker
-        if wiring is None:
-            return None
-        from winchkit.bench.robot.tracker import Tracker
-
-        with self._tracker_lock:
-            if self._tracker is None:
-                tracker = Tracker(self.clock.now)
-                tracker.listen(wiring.listen)
-                self._tracker = tracker
-            return self._tracker
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-        if error is None and self.loop.failure is not None:
-            raise self.loop.failure
-
-    @property
-    def snapshot(self) -> BenchSnapshot:
-        """Newest picture of the whole bench."""
-        assert self.loop.snapshot is not None, "an open bench has had a cycle"
-        return self.loop.snapshot
-
-    @property
-    def bus_health(self) -> dict[str, BusHealth]:
-        """What happened on each CAN bus since it was opened, by name."""
-        return {name: bus.health for name, bus in self._wired.buses.items()}
-
-    def frames(self) -> dict[str, FrameTap]:
-        """Frames of each CAN bus by name, collected from the first call on while it is called.
-
-        Returns
-        -------
-        dict of str to FrameTap
-            The newest frame of each identifier, and the last ones.
-        """
-        expires = self.clock.now() + _WATCHED
-        found = {}
-        for name, bus in self._wired.buses.items():
-            tap = bus.tap or FrameTap(expires)
-            tap.expires = expires
-            bus.tap = found[name] = tap
-        return found
-
-    def on_cycle(self, callback: Callback) -> Callable[[], None]:
-        """Call a function with every cycle's snapshot, on the control thread.
-
-        It may return a ``winding_speed`` (m/s, positive winds in) by winch, which moves it for
-        as long as it keeps returning one. Should it raise, everything stops and the exception
-        comes out of the ``with`` block. Returns a function that takes it off again.
-
-        Parameters
-        ----------
-        callback : callable
-            Takes a BenchSnapshot; returns None or winding speeds by winch.
-
-        Returns
-        -------
-        callable
-            Removes the callback.
-        """
-        self.loop.callbacks.append(callback)
-
-        def remove() -> None:
-            with suppress(ValueError):
-                self.loop.callbacks.remove(callback)
-
-        return remove
 
     def stop(self, *, wait: bool = True) -> None:
         """Ramp every winch to rest, then disable. Always allowed.
@@ -385,60 +258,6 @@ class Bench:
         self._look_at_record()
         return cleared
 
-    def scan(self) -> list[Found]:
-        """Who is on the CAN buses; reads only. Raises ConnectionLost."""
-        wiring = {name: one.servo for name, one in self.spec.winch.items()}
-        found = []
-        for name, bus in self._wired.buses.items():
-            own = {ref.node or 1: self.axes[w] for w, ref in wiring.items() if ref.bus == name}
-            found += scan(bus, self.spec.bus[name], self.clock, _LISTEN, own)
-        return named_after(self.spec, found)
-
-    def log(
-        self,
-        path: str | Path,
-        metadata: Mapping[str, str] | None = None,
-        rotate: str | None = None,
-        *,
-        replace: bool = False,
-    ) -> Recorder:
-        """Start logging to a file; ``with bench.log("lift.csv"):`` ends it.
-
-        With ``rotate`` (``"100MB"`` or ``"10min"``) it goes on in ``lift.002.csv`` and so on. An
-        earlier log of that name is removed with ``replace`` only. Raises UsageError for one that is
-        there without ``replace``, or that is being written; FileError; ConnectionLost where the
-        robot's tracker cannot be received.
-
-        Parameters
-        ----------
-        path : str or Path
-            File, ``.csv`` or ``.mcap``.
-        metadata : mapping, optional
-            Further metadata, keys and texts.
-        rotate : str, optional
-            Size or duration of a part.
-        replace : bool
-            Remove an earlier log of that name.
-
-        Returns
-        -------
-        Recorder
-            The log; its ``close``, or the end of its ``with`` block, ends it.
-        """
-        recorder = Recorder(
-            path,
-            {name: winch.sensors for name, winch in self.winch.items()},
-            self.clock,
-            {**self._wired.metadata, **origin(self.spec), **(metadata or {})},
-            self._stop_feeding,
-            tracker=self.tracker,
-            rotation=None if rotate is None else Rotation.parse(rotate),
-            replace=replace,
-        )
-        self._recorders.append(recorder)
-        self.loop.samplers.append(recorder.feed)
-        return recorder
-
     def close(self) -> None:
         """Stop every winch in a controlled way and let the buses go. Twice does no harm."""
         with self._stack:
@@ -448,10 +267,7 @@ class Bench:
                 self.loop.on_jog = lambda _name, _speed: None
                 self._come_to_rest()
                 self._wired.disarm()
-            for recorder in tuple(self._recorders):
-                recorder.close()
-            if self._tracker is not None:
-                self._tracker.close()
+            self._close_logs()
         self._stack = ExitStack()
 
     def permit(self, winch: str, direction: Direction, *, held: bool = False) -> None:
@@ -577,11 +393,6 @@ class Bench:
         """
         return self.winch[self.spec.winch_named(name)]
 
-    def _urgent_threads(self) -> list[int]:
-        """Native ids of the control thread and the receive threads, as far as they run."""
-        ids = [self.loop.thread_id, *(bus.thread_id for bus in self._wired.buses.values())]
-        return [number for number in ids if number]
-
     def _run_down(self, names: Iterable[str], *, wait: bool) -> None:
         with self.loop.ordering:
             for name in names:
@@ -614,12 +425,6 @@ class Bench:
         self.stopped_by = f"the dead-man ({client.name} was silent for {LIFE_SIGN:g} s)"
         self.stop_commanded(names, wait=False)
         self.loop.warn(Trip("client", ", ".join(names), reason, Direction.NONE))
-
-    def _stop_feeding(self, recorder: Recorder) -> None:
-        if recorder in self._recorders:
-            self._recorders.remove(recorder)
-            with suppress(ValueError):  # the loop has dropped one that failed
-                self.loop.samplers.remove(recorder.feed)
 
     def _come_to_rest(self) -> None:
         """Ramp down; what does not come to rest gets a quick stop."""
