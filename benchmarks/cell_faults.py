@@ -7,7 +7,6 @@ JSON object on stdout, a table on stderr. See benchmarks/README.md.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections import Counter
@@ -16,6 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 
 from cell_campaign.case import Outcome, Plan, modbus_devices, play
+from summaries import print_summary
 
 
 def plans(cases: int, seed: int) -> list[Plan]:
@@ -56,10 +56,7 @@ def main() -> int:
     begin = time.perf_counter()
     outcomes = [play(plan) for plan in plans(arguments.cases, arguments.seed)]
     found = summary(outcomes, time.perf_counter() - begin)
-    if arguments.json:
-        print(json.dumps(found))
-    for key, value in found.items():
-        print(f"{key:16} {value}", file=sys.stderr)
+    print_summary(found, as_json=arguments.json)
     return 1 if found["wrong_numbers"] else 0
 
 

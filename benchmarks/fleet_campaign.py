@@ -30,6 +30,7 @@ from typing import Any
 
 import numpy as np
 
+from summaries import print_summary
 from winchkit.catalog import find
 from winchkit.diagnosis.fleet.history import FleetHistory, fleet_history
 from winchkit.diagnosis.fleet.sessions import SessionEstimate, fit_session, null_term
@@ -393,10 +394,7 @@ def main() -> int:
     if result is None:
         print(f"not complete; repeat the command to go on from {args.log}", file=sys.stderr)
         return 3
-    for key, value in result.items():
-        print(f"{key:20} {value}", file=sys.stderr)
-    if args.json:
-        print(json.dumps(result))
+    print_summary(result, as_json=args.json)
     return 0
 
 

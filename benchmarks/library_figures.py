@@ -14,7 +14,6 @@ well; ``load`` is that of this computer before and after. About a CPU minute eac
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import statistics
 import sys
@@ -31,6 +30,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from summaries import print_summary
 from winchkit import diagnose_library, index_library, query_library, write_run
 from winchkit.catalog import find
 from winchkit.library import cluster
@@ -225,10 +225,7 @@ def main() -> int:
     if "query" in args.parts:
         found |= query()
     found["load"].append(os.getloadavg()[0])
-    for key, value in found.items():
-        print(f"{key:20} {value}", file=sys.stderr)
-    if args.json:
-        print(json.dumps(found))
+    print_summary(found, as_json=args.json)
     return 0
 
 

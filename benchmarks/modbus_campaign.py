@@ -23,6 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from summaries import print_summary
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.drivers.modbus.instrument import Instrument
@@ -215,10 +216,7 @@ def main() -> int:
     except (FileNotFoundError, subprocess.CalledProcessError) as error:
         print(error, file=sys.stderr)
         return 4
-    if arguments.json:
-        print(json.dumps(found))
-    for key, value in found.items():
-        print(f"{key:14} {value}", file=sys.stderr)
+    print_summary(found, as_json=arguments.json)
     return 1 if found["wrong_numbers"] else 0
 
 

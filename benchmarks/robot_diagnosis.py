@@ -27,6 +27,7 @@ from click.testing import CliRunner
 
 from robot_poses.cases import CASES
 from robot_poses.hidden import Case, profile_text, record
+from summaries import print_cases
 from winchkit.cli import main
 
 __all__ = ["answer", "calibrated", "covered", "named", "summary", "wrong"]
@@ -155,11 +156,7 @@ def main_of(arguments: list[str]) -> None:
                 rows.append(_row(case, flow.__name__, seed, found, process_time() - start))
                 if not options.json:
                     print(_text(rows[-1]), flush=True)
-    told = summary(rows)
-    if options.json:
-        print(json.dumps({"schema": 1, "summary": told, "cases": rows}, indent=1))
-    else:
-        print("\n".join(f"{name}: {value}" for name, value in told.items()))
+    print_cases(summary(rows), rows, as_json=options.json)
 
 
 def _alone(case: Case) -> bool:

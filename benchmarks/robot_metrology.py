@@ -30,6 +30,7 @@ from robot_poses.cases import CASES
 from robot_poses.hidden import BASE, Case, profile_text
 from robot_poses.station import Station, about, observed
 from robot_poses.truth import Noise, Vector, csv, poses
+from summaries import print_cases
 from winchkit.cli import main
 
 __all__ = ["Hidden", "drawn", "judged"]
@@ -202,11 +203,7 @@ def main_of(arguments: list[str]) -> None:
             rows.append(judged(hidden, Path(folder)))
         if not options.json:
             print(_text(rows[-1]), flush=True)
-    told = summary(rows)
-    if options.json:
-        print(json.dumps({"schema": 1, "summary": told, "cases": rows}, indent=1))
-    else:
-        print("\n".join(f"{name}: {value}" for name, value in told.items()))
+    print_cases(summary(rows), rows, as_json=options.json)
 
 
 def _text(row: dict[str, Any]) -> str:

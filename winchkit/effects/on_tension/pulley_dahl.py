@@ -4,30 +4,26 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.friction import coulomb_ratio, dahl
+from winchkit.effects.presliding import START, Presliding
+from winchkit.model.friction import coulomb_ratio
 from winchkit.model.stages import At, Stage
 
 
-def apply(tension: Array, at: At, values: Values) -> Array:
-    """Tension after a pulley with Dahl friction whose limit is the Coulomb friction there."""
-    friction = values["friction"]
-    if friction == 0.0:
-        return tension
-    limit = _limit(tension, friction, at)
-    wound_in = -at.free_length
-    return tension + dahl(wound_in, limit, values["stiffness"], values["shape"], values["start"])
+def _limit(tension: Array, at: At, values: Values) -> Array:
+    """F_c = μ N, the Coulomb friction of this pulley, N."""
+    ratio = float(coulomb_ratio(np.asarray(values["friction"]), at.wrap))
+    return np.abs(tension) * (ratio - 1.0)
 
 
-def _limit(tension: Array, friction: float, at: At) -> Array:
-    """F_c = μ N on this pulley, N."""
-    return np.abs(tension) * (float(coulomb_ratio(np.asarray(friction), at.wrap)) - 1.0)
+def _wound_in(at: At) -> Array:
+    return -at.free_length
 
 
-def carried(after: Array, before: Array, at: At, values: Values) -> float:
-    """F/F_c at the last sample."""
-    limit = float(_limit(before[-1:], values["friction"], at)[0])
-    return float((after[-1] - before[-1]) / limit) if limit else 0.0
+def _stiffness(values: Values) -> float:
+    return values["stiffness"]
 
+
+FRICTION = Presliding("friction", _limit, _wound_in, _stiffness)
 
 EFFECT = Effect(
     id="pulley-dahl",
@@ -45,9 +41,9 @@ EFFECT = Effect(
             grid=(300.0, 1e3, 3e3, 1e4),
         ),
         Parameter("shape", "1", null=1.0, typical=1.0, low=0.0, high=3.0, role="fixed"),
-        Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed"),
+        START,
     ),
-    apply=apply,
+    apply=FRICTION.apply,
     outputs=("tension", "motor_torque"),
     what="Cable and bearing deform elastically before they slide, equally on all pulleys.",
     formula="dF/dx = σ |1 − s F/F_c|^β sgn(1 − s F/F_c), F_c = μ N; start: F/F_c at the start",
@@ -59,5 +55,5 @@ EFFECT = Effect(
     contains=("pulley-coulomb", "pulley-capstan"),
     needs=("pulley", "load"),
     memory=True,
-    carry=carried,
+    carry=FRICTION.carried,
 )

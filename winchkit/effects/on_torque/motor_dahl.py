@@ -4,26 +4,25 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
-from winchkit.model.friction import dahl
+from winchkit.effects.presliding import START, Presliding
 from winchkit.model.stages import At, Stage
 
 
-def apply(torque: Array, at: At, values: Values) -> Array:
-    """Torque plus Dahl friction over the motor angle."""
-    limit = values["torque"]
-    if limit == 0.0:
-        return torque
-    stiffness = limit / values["distance"]
-    return torque + dahl(
-        at.motor_angle, np.full_like(torque, limit), stiffness, 1.0, values["start"]
-    )
+def _limit(torque: Array, at: At, values: Values) -> Array:
+    """F_c = c at every sample, N m."""
+    return np.full_like(torque, values["torque"])
 
 
-def carried(after: Array, before: Array, at: At, values: Values) -> float:
-    """F/c at the last sample."""
-    limit = values["torque"]
-    return float((after[-1] - before[-1]) / limit) if limit else 0.0
+def _motor_angle(at: At) -> Array:
+    return at.motor_angle
 
+
+def _stiffness(values: Values) -> float:
+    """σ = c/δ, N m/rad."""
+    return values["torque"] / values["distance"]
+
+
+FRICTION = Presliding("torque", _limit, _motor_angle, _stiffness)
 
 EFFECT = Effect(
     id="motor-dahl",
@@ -42,9 +41,9 @@ EFFECT = Effect(
             along="motor_angle",
             plausible=Plausible(0.0, 6.3, "teeth, seals and bearings slide within a motor turn"),
         ),
-        Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed"),
+        START,
     ),
-    apply=apply,
+    apply=FRICTION.apply,
     outputs=("motor_torque",),
     what="Teeth, seals and bearings deform elastically before they slide.",
     formula="τ + F, dF/dθ = (c − s F)/δ, δ the distance; start: F/c at the start",
@@ -55,5 +54,5 @@ EFFECT = Effect(
     family="motor friction",
     contains=("motor-coulomb",),
     memory=True,
-    carry=carried,
+    carry=FRICTION.carried,
 )

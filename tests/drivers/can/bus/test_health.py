@@ -24,6 +24,7 @@ from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost
 
 CLOCK = MonotonicClock()
+Commissioned = tuple[DriveOnBus, CanBus, Cia402Axis]
 
 
 def until(condition: Callable[[], bool]) -> None:
@@ -234,6 +235,20 @@ def test_everything_that_goes_wrong_is_counted(bus: CanBus, interfaces: list[Int
     assert BusHealth().lossless
 
 
+@pytest.fixture
+def commissioned() -> Iterator[Commissioned]:
+    """A drive, the bus to it, and its axis."""
+    spec = bus_spec()
+    with DriveOnBus(spec) as drive:
+        bus = CanBus(spec, "can", CLOCK)
+        try:
+            axis = Cia402Axis(bus, 1, device(), WatchSpec(127, 0.05, 0.004, True), CLOCK)
+            axis.commission()
+            yield drive, bus, axis
+        finally:
+            bus.close()
+
+
 CYCLE = [(0x201, b"a"), (0x202, b"b"), (0x203, b"c")]
 
 
@@ -260,27 +275,20 @@ def test_the_frames_of_a_cycle_are_sent_together_and_in_their_order(
     assert port.sent[5:] == [CYCLE[1]], "once sent, nothing is gathered"
 
 
-def test_an_emergency_stop_takes_back_the_command_that_waits() -> None:
+def test_an_emergency_stop_takes_back_the_command_that_waits(commissioned: Commissioned) -> None:
     """Nothing of the cycle follows its quick stop; by what the drive receives."""
-    spec = bus_spec()
-    with DriveOnBus(spec) as drive:
-        bus = CanBus(spec, "can", CLOCK)
-        axis = Cia402Axis(bus, 1, device(), WatchSpec(127, 0.05, 0.004, True), CLOCK)
-        try:
-            axis.commission()
-            cycle(bus, axis, Wish.ENABLE, 25, velocity=0.0)
-            axis.begin_cycle(25, CLOCK.now())
-            bus.gather()
-            axis.send(Wish.ENABLE, velocity=3.0)
-            bus.post(0x202, b"other")
-            axis.emergency_stop(sdo=False)
-            until(lambda: (0x201, axis._stop_frames[0][1]) in drive.frames)
-            bus.send_gathered()
-            until(lambda: (0x202, b"other") in drive.frames)
-            mine = [data for identifier, data in drive.frames if identifier == 0x201]
-            assert mine[-1] == axis._stop_frames[0][1]
-        finally:
-            bus.close()
+    drive, bus, axis = commissioned
+    cycle(bus, axis, Wish.ENABLE, 25, velocity=0.0)
+    axis.begin_cycle(25, CLOCK.now())
+    bus.gather()
+    axis.send(Wish.ENABLE, velocity=3.0)
+    bus.post(0x202, b"other")
+    axis.emergency_stop(sdo=False)
+    until(lambda: (0x201, axis._stop_frames[0][1]) in drive.frames)
+    bus.send_gathered()
+    until(lambda: (0x202, b"other") in drive.frames)
+    mine = [data for identifier, data in drive.frames if identifier == 0x201]
+    assert mine[-1] == axis._stop_frames[0][1]
 
 
 def test_a_full_queue_leaves_out_what_it_does_not_take(
@@ -373,29 +381,22 @@ def test_an_interface_that_stays_away_is_reported_each_time(
     assert bus.fault is None
 
 
-def test_a_drive_is_found_again_after_its_bus_was_reopened() -> None:
+def test_a_drive_is_found_again_after_its_bus_was_reopened(commissioned: Commissioned) -> None:
     """Axis and handlers stay; nothing is enabled by it; the drive has stopped by itself."""
-    spec = bus_spec()
-    with DriveOnBus(spec) as drive:
-        bus = CanBus(spec, "can", CLOCK)
-        axis = Cia402Axis(bus, 1, device(), WatchSpec(127, 0.05, 0.004, True), CLOCK)
-        try:
-            axis.commission()
-            cycle(bus, axis, Wish.ENABLE, 25, velocity=3.0)
-            assert axis.state is State.OPERATION_ENABLED
-            last = bus.sent
-            until(lambda: drive.frames[-1][0] == 0x201)
-            before = len(drive.frames)
-            bus.reopen()
-            assert bus.sent == last
-            until(lambda: abs(drive.shaft.motor_velocity) < 0.05)
-            until(lambda: drive.drive.state.name == "SWITCH_ON_DISABLED")
-            assert drive.frames[before:] == []
-            axis.commission()
-            cycle(bus, axis, Wish.ENABLE, 25, velocity=-3.0)
-            assert drive.shaft.motor_velocity == pytest.approx(-3.0, rel=0.05)
-        finally:
-            bus.close()
+    drive, bus, axis = commissioned
+    cycle(bus, axis, Wish.ENABLE, 25, velocity=3.0)
+    assert axis.state is State.OPERATION_ENABLED
+    last = bus.sent
+    until(lambda: drive.frames[-1][0] == 0x201)
+    before = len(drive.frames)
+    bus.reopen()
+    assert bus.sent == last
+    until(lambda: abs(drive.shaft.motor_velocity) < 0.05)
+    until(lambda: drive.drive.state.name == "SWITCH_ON_DISABLED")
+    assert drive.frames[before:] == []
+    axis.commission()
+    cycle(bus, axis, Wish.ENABLE, 25, velocity=-3.0)
+    assert drive.shaft.motor_velocity == pytest.approx(-3.0, rel=0.05)
 
 
 def cycle(bus: CanBus, axis: Cia402Axis, wish: Wish, count: int, velocity: float) -> None:

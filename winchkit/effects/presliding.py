@@ -1,0 +1,47 @@
+"""Presliding: Dahl friction at a stage, whose state continues over runs and control cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from winchkit.arrays import Array
+from winchkit.effects.effect import Parameter, Values
+from winchkit.model.friction import dahl
+from winchkit.model.stages import At
+
+__all__ = ["START", "Presliding"]
+
+START = Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed")
+"""F/F_c at the first sample."""
+
+
+@dataclass(frozen=True)
+class Presliding:
+    """Dahl friction over a displacement, added to the value of a stage."""
+
+    size: str
+    """Parameter at whose zero the friction vanishes."""
+    limit: Callable[[Array, At, Values], Array]
+    """F_c at each sample, from the value before the friction; in the unit of the stage."""
+    displacement: Callable[[At], Array]
+    """x at each sample, positive in the direction that the friction makes the value larger."""
+    stiffness: Callable[[Values], float]
+    """σ at F = 0, unit of the stage per unit of the displacement."""
+
+    def apply(self, value: Array, at: At, values: Values) -> Array:
+        """Value plus the friction; exponent β of the parameter ``shape``, 1 without it."""
+        if values[self.size] == 0.0:
+            return value
+        return value + dahl(
+            self.displacement(at),
+            self.limit(value, at, values),
+            self.stiffness(values),
+            values.get("shape", 1.0),
+            values["start"],
+        )
+
+    def carried(self, after: Array, before: Array, at: At, values: Values) -> float:
+        """F/F_c at the last sample, the ``start`` of the next ones."""
+        limit = float(self.limit(before[-1:], at, values)[0])
+        return float((after[-1] - before[-1]) / limit) if limit else 0.0
