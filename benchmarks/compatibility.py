@@ -86,7 +86,7 @@ def tested(label: str, interpreter: str, requirements: Sequence[str], tests: Seq
         )
     lines = done.stdout.strip().splitlines()
     for line in lines:
-        if line.startswith(("FAILED", "ERROR")):
+        if line.startswith(("FAILED ", "ERROR tests")):
             print(f"{label}: {line}")
     print(f"{label}: {lines[-1] if lines else done.stderr[-400:]}", flush=True)
     return done.returncode == 0

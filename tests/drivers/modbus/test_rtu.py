@@ -76,14 +76,16 @@ def device(behave: Behaviour) -> Iterator[str]:
         os.close(slave)
 
 
-def poll(behave: Behaviour, until: Callable[[Instrument], bool]) -> tuple[Instrument, set[float]]:
+def poll(
+    behave: Behaviour, until: Callable[[Instrument], bool], timeout: float = 0.2
+) -> tuple[Instrument, set[float]]:
     """Poll until a condition holds; returns the instrument and all its published counts."""
     seen: set[float] = set()
     cell = read_device(catalog.find("devices", "laumas-tlb"))
-    instrument = Instrument("cell", cell, 1, CLOCK, rate=100.0, timeout=0.06)
+    instrument = Instrument("cell", cell, 1, CLOCK, rate=100.0, timeout=timeout)
     instrument.listeners.append(lambda reading: seen.add(reading.raw))
     with device(behave) as port:
-        spec = BusSpec("modbus-rtu", port=port, timeout=0.06)
+        spec = BusSpec("modbus-rtu", port=port, timeout=timeout)
         slow = SlowDevices([ModbusLine("cells", spec, (instrument,), CLOCK)])
         try:
             deadline = time.monotonic() + 8
@@ -119,7 +121,9 @@ def late(number: int, reply: bytes) -> tuple[float, bytes]:
 
 
 def test_a_late_frame_never_becomes_a_number() -> None:
-    instrument, seen = poll(late, lambda i: i.counters.readings >= 3 and i.counters.late >= 3)
+    instrument, seen = poll(
+        late, lambda i: i.counters.readings >= 3 and i.counters.late >= 3, timeout=0.06
+    )
     assert seen == {12345}
     assert instrument.counters.timeouts >= 3
 
