@@ -49,7 +49,7 @@ SECTIONS = {
     "Cable robots": (
         *("robot_of", "Robot", "Pose", "RobotCycle", "ForceLimits"),
         *("calibrate", "next_poses", "write_calibrated"),
-        *("self_calibrated", "Tracker", "PoseVolume", "SelfCalibration"),
+        *("self_calibrated", "ComputationProcess", "Tracker", "PoseVolume", "SelfCalibration"),
         *("compare_robot", "diagnose_robot", "plan_poses", "add_to_robot", "remove_from_robot"),
     ),
     "Estimators": ("DahlEstimator", "identify_dahl", "ElongationCorrection"),

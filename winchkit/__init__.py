@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from winchkit.bench.programme import run_programme
     from winchkit.bench.recording.replay import open_replay
     from winchkit.bench.remote.session import attach
+    from winchkit.bench.robot.computation import ComputationProcess
     from winchkit.bench.robot.self_calibration import PoseVolume, SelfCalibration, self_calibrated
     from winchkit.bench.robot.tracker import Tracker
     from winchkit.calibration.cell.files import read_points
@@ -123,6 +124,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Bench",
     "BenchSnapshot",
+    "ComputationProcess",
     "ConnectionLost",
     "DahlEstimator",
     "DeviceRefused",
@@ -244,6 +246,7 @@ _NAMES = {
         "cell_zero",
     ),
     "winchkit.bench.commissioning.calls": ("commission",),
+    "winchkit.bench.robot.computation": ("ComputationProcess",),
     "winchkit.bench.robot.self_calibration": ("PoseVolume", "SelfCalibration", "self_calibrated"),
     "winchkit.bench.robot.tracker": ("Tracker",),
     "winchkit.bench.control.snapshot": ("BenchSnapshot",),

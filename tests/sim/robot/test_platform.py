@@ -86,7 +86,7 @@ def test_a_pendulum_swings_with_its_frequency() -> None:
     ball = point_mass(np.array([[0.0, 0, 2]]), at, 1.0, damping_time=0.002)
     stiffness = np.array([1e6])
     free = np.array([1.5 - GRAVITY / 1e6])
-    ball.tension[:] = GRAVITY
+    ball.tension = np.array([GRAVITY])
     angles = []
     for n in range(5000):
         ball.advance((n + 1) * 1e-3, free, free, stiffness)
@@ -147,3 +147,27 @@ def test_a_free_body_keeps_its_momentum() -> None:
     assert turn @ platform.velocity[3:] == pytest.approx(momentum, rel=0.01)
     assert platform.velocity[2] == pytest.approx(-GRAVITY)
     assert platform.position[2] == pytest.approx(-GRAVITY / 2, rel=1e-3)
+
+
+def test_the_compiled_step_moves_as_the_plain_one() -> None:
+    pytest.importorskip("numba")
+    exits = np.array([[s, t, h] for s in (-1.0, 1) for t in (-1.0, 1) for h in (0.0, 2)])
+    anchors = exits * [0.1, 0.12, 0.05] + [0.0, 0, -0.05]
+    body = Body(5.0, np.array([0.01, 0, 0.02]), np.diag([0.1, 0.15, 0.2]), anchors)
+    pulleys = plain(exits, UP, 0.02)
+    both = [
+        CablePlatform(body, pulleys, UP * 1.0, np.eye(3), 0.003, compiled=compiled)
+        for compiled in (False, True)
+    ]
+    stiffness = np.full(8, 2e4)
+    for platform in both:
+        platform.tension = platform.equilibrium(80.0)
+        free = platform.length - platform.tension / stiffness
+        for n in range(200):
+            new = free + 1e-3 * np.sin(0.1 * n + np.arange(8))
+            platform.advance((n + 1) * 2.5e-3, free, new, stiffness)
+            free = new
+    assert both[1].position == pytest.approx(both[0].position, rel=1e-9)
+    assert both[1].velocity == pytest.approx(both[0].velocity, abs=1e-9)
+    assert both[1].tension == pytest.approx(both[0].tension, rel=1e-7)
+    assert both[0].velocity @ both[0].velocity > 1e-6

@@ -7,6 +7,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy.optimize  # loaded with the robot: in motion an import delays the loop
+import scipy.spatial.transform  # noqa: F401
+from scipy.interpolate import CubicSpline
 
 from winchkit.arrays import Array
 from winchkit.bench.common_move import wait_together
@@ -165,8 +168,6 @@ class Platform:
         NotPermitted
             For a winch that may not move.
         """
-        from scipy.interpolate import CubicSpline
-
         present = self._angles()[0] - planned.motor_angle[0]
         kept = present if preload is None else preload
         share = planned.distance[:, None] / planned.path.length

@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.bench.robot.computation import Computation, at_once
 from winchkit.bench.robot.path import Waypoint
-from winchkit.bench.robot.planner import moved
+from winchkit.bench.robot.planner import Planner, moved
 from winchkit.bench.robot.tracker import Tracker, mean_pose
+from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate
 from winchkit.calibration.robot.pose_design import next_poses
 from winchkit.calibration.robot.prediction import rms
@@ -25,6 +27,7 @@ from winchkit.errors import NotPermitted, RunError, UsageError
 from winchkit.model.robot import Pose, angles_of, robot_of, rotation_of
 from winchkit.runs.poses import read_poses
 from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.robot import RobotProfile
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
@@ -83,6 +86,7 @@ def self_calibrated(
     options: Options | None = None,
     accuracy: float | None = None,
     seed: int = 0,
+    compute: Computation = at_once,
     progress: Callable[[str, float | None], None] = lambda _text, _share: None,
     keep: Callable[[Run], None] = lambda _run: None,
 ) -> SelfCalibration:
@@ -105,6 +109,10 @@ def self_calibrated(
         time, until it is reached, six times at most.
     seed : int
         Of the drawn poses.
+    compute : Computation, optional
+        Where motions are planned and poses fitted; in real time a
+        :class:`~winchkit.bench.robot.computation.ComputationProcess`, so that the control loop has
+        its interpreter for itself.
     progress : callable, optional
         Called with what is done and the share of the poses.
     keep : callable, optional
@@ -132,7 +140,7 @@ def self_calibrated(
         )
     volume = volume or PoseVolume()
     random = np.random.default_rng(seed)
-    driver = _Driver(bench, tracker, volume)
+    driver = _Driver(bench, tracker, volume, compute)
     total = poses + validation
     try:
         fit = recorded_poses(
@@ -145,7 +153,7 @@ def self_calibrated(
         )  # fmt: skip
         keep(fit)
         keep(held)
-        found = _fitted(bench, fit, held, options)
+        found = driver.fitted(fit, held, options)
         for _ in range(_ROUNDS if accuracy else 0):
             if rms(found.validation_after.distance) <= (accuracy or 0.0):
                 break
@@ -154,7 +162,7 @@ def self_calibrated(
             extra = recorded_poses(more, bench, "fit", lambda _done: None)
             fit = _joined(fit, extra)
             keep(fit)
-            found = _fitted(bench, fit, held, options)
+            found = driver.fitted(fit, held, options)
     finally:
         bench.stop()
     return SelfCalibration(found, fit, held)
@@ -204,8 +212,11 @@ def recorded_poses(
 class _Driver:
     """Moves the platform from pose to pose and measures each at rest."""
 
-    def __init__(self, bench: Bench, tracker: Tracker, volume: PoseVolume) -> None:
+    def __init__(
+        self, bench: Bench, tracker: Tracker, volume: PoseVolume, compute: Computation
+    ) -> None:
         self.bench, self.tracker, self.volume = bench, tracker, volume
+        self._compute = compute
         self._here = bench.robot.pose
         self._preload: Array | None = None
         self._stops = bench.stops
@@ -228,7 +239,7 @@ class _Driver:
 
     def proposed(self, found: Calibrated, count: int) -> Iterator[Array]:
         """Rows of the poses of most information that are within the limits."""
-        for pose in next_poses(found, count):
+        for pose in self._compute(self._look, next_poses, found, count):
             turned = rotation_of(*pose.angles)[None]
             if self._go(Pose(np.array([pose.position]), turned)):
                 yield self._measured()
@@ -236,13 +247,11 @@ class _Driver:
     def _go(self, goal: Pose) -> bool:
         """Move on a line; False where a limit forbids it."""
         platform = self.bench.robot
-        waypoint = Waypoint(goal.position[0], goal.rotation[0])
-        try:
-            planned = platform.planner.plan([waypoint], self._here)
-        except (NotPermitted, UsageError):
+        planned = self._compute(self._look, _planned, platform.planner, goal, self._here)
+        if planned is None:
             return False
         for motion in planned:
-            self.bench.raise_stop(self._stops)
+            self._look()
             self._preload = platform.begin(motion, hold=True, preload=self._preload)
             platform.wait()
         self._here = goal
@@ -270,14 +279,29 @@ class _Driver:
         bench = self.bench
         end = bench.clock.now() + duration
         while (left := end - bench.clock.now()) > 0:
-            bench.raise_stop(self._stops)
+            self._look()
             bench.clock.sleep(min(_POLL, left))
 
+    def fitted(self, fit: Run, held: Run, options: Options | None) -> Calibrated:
+        """Fit the measured poses."""
+        profile = self.bench.robot.robot.profile
+        return self._compute(self._look, _fitted, profile, fit, held, options)
 
-def _fitted(bench: Bench, fit: Run, held: Run, options: Options | None) -> Calibrated:
+    def _look(self) -> None:
+        """Raise what has stopped the bench since the beginning."""
+        self.bench.raise_stop(self._stops)
+
+
+def _planned(planner: Planner, goal: Pose, start: Pose) -> list[PlatformTrajectory] | None:
+    """Motions on a line to a pose; None where a limit forbids it."""
+    try:
+        return planner.plan([Waypoint(goal.position[0], goal.rotation[0])], start)
+    except (NotPermitted, UsageError):
+        return None
+
+
+def _fitted(profile: RobotProfile, fit: Run, held: Run, options: Options | None) -> Calibrated:
     """Fit with the tracker's frame unknown, unless the profile declares it."""
-    robot = bench.robot.robot
-    profile = robot.profile
     tracker = profile.instrument.tracker
     unknown = replace(tracker, frame="unknown")
     profile = replace(profile, instrument=replace(profile.instrument, tracker=unknown))

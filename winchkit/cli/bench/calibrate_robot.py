@@ -37,6 +37,7 @@ def calibrated_by_bench(
     """Open the bench as its owner, and calibrate; the poses are written as they are measured."""
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.identity import client_name
+    from winchkit.bench.robot.computation import ComputationProcess
     from winchkit.bench.robot.self_calibration import self_calibrated
     from winchkit.catalog import find
     from winchkit.runs.writer import write_run
@@ -63,7 +64,10 @@ def calibrated_by_bench(
         write_run(run, files[run.name])
         note(f"written: {files[run.name]} ({len(run.time)} poses)")
 
-    with open_bench(bench, name=client_name("calibrate"), realtime="try") as opened:
+    with (
+        ComputationProcess() as compute,
+        open_bench(bench, name=client_name("calibrate"), realtime="try") as opened,
+    ):
         tracker = opened.tracker
         assert tracker is not None, "the bench file declares it"
         return self_calibrated(
@@ -74,6 +78,7 @@ def calibrated_by_bench(
             volume=volume,
             options=options,
             accuracy=accuracy,
+            compute=compute,
             progress=progress,
             keep=keep,
         )

@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -82,6 +82,7 @@ def command(
     BENCH-bench.toml.sim beside it. With --json the first line on stdout says that others can
     connect now: {"schema": 1, "bench": FILE, "ready": true}.
     """
+    from winchkit.bench.control.realtime import acquire
     from winchkit.catalog import find
     from winchkit.schema.read import read_simbench
     from winchkit.sim.live.bench import LiveBench
@@ -95,7 +96,12 @@ def command(
     ended = threading.Event()
     with LiveBench(declared, seed=seed, hidden=hidden, interface=interface) as live:
         live.write_bench_file(path)
-        with ControlServer(live, path, ended.set), _ended_by_signals(ended):
+        with (
+            ControlServer(live, path, ended.set),
+            _ended_by_signals(ended),
+            # As the bench process: ordinary threads would wait for those of a bench in real time.
+            closing(acquire("try", live.bus_threads)),
+        ):
             _introduce(live, path, as_json=as_json)
             _listen(live, ended, end_with_input=end_with_input, as_json=as_json)
             while not ended.wait(_CHECK_EVERY):

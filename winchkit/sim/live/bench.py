@@ -92,6 +92,7 @@ class LiveBench:
         self._stopping = threading.Event()
         self._pool: ThreadPoolExecutor | None = None
         self._loops: list[Future[None]] = []
+        self._threads: list[int] = []
         self._ports: dict[str, CanPort | SimulatedCanBus] = {}
         self._lines: dict[str, Line] = {}
         self.wire: dict[str, Wire] = {}
@@ -224,6 +225,11 @@ class LiveBench:
             if loop.done():
                 loop.result()
 
+    @property
+    def bus_threads(self) -> list[int]:
+        """Native ids of the threads that serve the CAN buses; empty in simulated time."""
+        return list(self._threads)
+
     @contextmanager
     def up_to_date(self) -> Iterator[None]:
         """Advance the simulation to the present time and lock it; a robot's is at its last tick."""
@@ -269,8 +275,15 @@ class LiveBench:
             self._tick_simulated(self._simulated)
             return
         ports = {name: port for name, port in self._ports.items() if isinstance(port, CanPort)}
-        self._pool = ThreadPoolExecutor(max(1, len(ports)), "sim-can")
+        begun = threading.Barrier(len(ports) + 1)
+
+        def note_thread() -> None:
+            self._threads.append(threading.get_native_id())
+            begun.wait()
+
+        self._pool = ThreadPoolExecutor(max(1, len(ports)), "sim-can", note_thread)
         self._loops = [self._pool.submit(self._serve, name, port) for name, port in ports.items()]
+        begun.wait()
 
     def _can_port(self, name: str, spec: BusSpec) -> CanPort | SimulatedCanBus:
         if self._simulated is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable
 from contextlib import suppress
+from importlib.util import find_spec
 from urllib.parse import urlsplit
 
 from winchkit.schema.sim_platform import PlatformTruth
@@ -29,14 +30,19 @@ class LiveRobot:
     started : float
         Time at which the winches start, s.
     sends : bool
-        Whether the tracker sends datagrams to the address at which the bench file listens.
+        Whether the tracker sends datagrams to the address at which the bench file listens, as it
+        does in real time; the mechanics are then compiled where numba is installed.
     """
 
     def __init__(
         self, bench: SimBench, truth: PlatformTruth, seed: int, started: float, *, sends: bool
     ) -> None:
         self._started = started
-        self.platform, self.profiles, self.ends, self.truth = build_robot(bench, truth)
+        # Of use only where the time of the computer counts: it takes a second or two.
+        compiled = sends and find_spec("numba") is not None
+        self.platform, self.profiles, self.ends, self.truth = build_robot(
+            bench, truth, compiled=compiled
+        )
         self.on_pose: Callable[[bytes], None] | None = None
         """Called with each datagram of the tracker, also in simulated time."""
         self._socket: socket.socket | None = None

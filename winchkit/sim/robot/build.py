@@ -34,8 +34,11 @@ class BuiltRobot(NamedTuple):
     """With the true radii of the drums."""
 
 
-def build_robot(bench: SimBench, truth: PlatformTruth) -> BuiltRobot:
-    """Build a declared robot; FileError where its cables do not hold the platform at home."""
+def build_robot(bench: SimBench, truth: PlatformTruth, *, compiled: bool = False) -> BuiltRobot:
+    """Build a declared robot; FileError where its cables do not hold the platform at home.
+
+    ``compiled`` has numba compile the mechanics; ImportError where it is not installed.
+    """
     from winchkit.schema.read import read_robot
 
     wiring = bench.bench.robot
@@ -60,7 +63,7 @@ def build_robot(bench: SimBench, truth: PlatformTruth) -> BuiltRobot:
     home = rotation(*profile.home.rotation)
     position = np.array(profile.home.position, dtype=float)
     pulleys = Pulleys(exits, axes, radii)
-    platform = CablePlatform(body, pulleys, position, home, truth.damping_time)
+    platform = CablePlatform(body, pulleys, position, home, truth.damping_time, compiled=compiled)
     tension = platform.equilibrium(truth.pretension)
     left = float(np.abs(platform.unbalanced(tension)).max())
     if tension.min() <= 0 or left > _BALANCED * body.mass * 9.8:

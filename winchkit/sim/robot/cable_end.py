@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from winchkit.arrays import Array
 from winchkit.sim.robot.platform import CablePlatform
 
@@ -42,7 +40,7 @@ class Coupling:
         dead_length: Sequence[float],
     ) -> None:
         self.platform = platform
-        platform.tension = np.array(tension, dtype=float)
+        platform.tension = tension
         self.ends = [
             CableEnd(self, index, axial_stiffness, dead) for index, dead in enumerate(dead_length)
         ]
@@ -54,11 +52,13 @@ class Coupling:
         passed = to - platform.time
         if passed < _LEAST_STEP:
             return
-        start = np.array([end.passed for end in ends])
-        ahead = np.array([passed / (end.time - platform.time) for end in ends])
-        goal = start + ahead * (np.array([end.unstrained for end in ends]) - start)
-        platform.advance(to, start, goal, 1 / np.array([end.flexibility for end in ends]))
-        for end, value in zip(ends, goal.tolist(), strict=True):
+        start = [end.passed for end in ends]
+        goal = [
+            end.passed + passed / (end.time - platform.time) * (end.unstrained - end.passed)
+            for end in ends
+        ]
+        platform.advance(to, start, goal, [1.0 / end.flexibility for end in ends])
+        for end, value in zip(ends, goal, strict=True):
             end.passed = value
 
 
@@ -71,12 +71,11 @@ class CableEnd:
         platform = coupling.platform
         self._coupling, self._index = coupling, index
         self._axial_stiffness, self._dead_length = axial_stiffness, dead_length
-        self._home_wrap = float(platform.wrap[index])
-        self.mass = platform.body.mass / len(platform.tension)
+        self.position, _, self._home_wrap = platform.cable(index)
+        self.mass = platform.body.mass / platform.count
         """Share of the platform, kg, which the motor accelerates beside its own rotor."""
         self.time = platform.time
         self.tension = float(platform.tension[index])
-        self.position = float(platform.length[index])
         self.wrap_change = 0.0
         self.unstrained = self.passed = self.home_length
         """Unstrained cable now, and at the platform's time, m."""
@@ -108,12 +107,12 @@ class CableEnd:
         platform, index = self._coupling.platform, self._index
         self.unstrained = cable_end
         self.flexibility = self._flexibility(compliance)
-        speed = float(platform.speed[index])
-        self.position = float(platform.length[index]) + speed * (self.time - platform.time)
+        length, speed, wrap = platform.cable(index)
+        self.position = length + speed * (self.time - platform.time)
         stretch = self.position - cable_end
         pull = (stretch + platform.damping_time * (speed - end_speed)) / self.flexibility
         self.tension = max(0.0, pull) if stretch > 0 else 0.0
-        self.wrap_change = float(platform.wrap[index]) - self._home_wrap
+        self.wrap_change = wrap - self._home_wrap
 
     def _flexibility(self, compliance: float) -> float:
         """Elongation per force, m/N."""

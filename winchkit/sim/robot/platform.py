@@ -1,4 +1,4 @@
-"""Newton-Euler mechanics of a rigid platform on elastic cables, integrated in time.
+"""A rigid platform on elastic cables, integrated in time.
 
 A cable is a Kelvin-Voigt spring of the unstrained length that its drum has paid out. Steps use the
 implicit midpoint rule, linearised in the cable lengths: it is stable for the rotation of a light
@@ -9,15 +9,17 @@ grow.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import ceil
+from typing import Any
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.sim.physics.state import GRAVITY
+from winchkit.sim.robot.mechanics import CABLE, ROW, WORK, cables, compiled_step, step
 from winchkit.sim.robot.pulleys import Pulleys
-from winchkit.sim.robot.rotation import turned
 
 __all__ = ["Body", "CablePlatform"]
 
@@ -53,29 +55,56 @@ class CablePlatform:
         Platform to base.
     damping_time : float
         Ratio of damping to stiffness, s.
+    compiled : bool
+        Compile the step by numba, which takes seconds; ImportError where it is not installed.
     """
 
     def __init__(
-        self, body: Body, pulleys: Pulleys, position: Array, attitude: Array, damping_time: float
+        self,
+        body: Body,
+        pulleys: Pulleys,
+        position: Array,
+        attitude: Array,
+        damping_time: float,
+        *,
+        compiled: bool = False,
     ) -> None:
         self.body, self.pulleys = body, pulleys
         self.time = 0.0
-        self.rotation = np.array(attitude, dtype=float)
-        self.center = position + self.rotation @ body.center_of_mass
-        self.velocity = np.zeros(6)
-        """Of the centre of mass, and angular in the base frame, m/s and rad/s."""
+        self.damping_time = damping_time
+        """Ratio of damping to stiffness of the cables, s."""
         self.wrench = np.zeros(6)
         """External force and moment about the centre of mass beside the weight, N and N m."""
-        self._arms = body.anchor_point - body.center_of_mass
-        self._damping_time = damping_time
-        self._inertia = np.zeros((6, 6))
-        self._inertia[:3, :3] = body.mass * np.eye(3)
         self._weight = np.array([0.0, 0.0, -body.mass * GRAVITY, 0.0, 0.0, 0.0])
-        self._locate()
-        self.tension = np.zeros(len(body.anchor_point))
-        """Cable forces at the platform, (n,), N."""
-        self.speed = np.zeros(len(body.anchor_point))
-        """Rates of the cable lengths, (n,), m/s."""
+        count = len(body.anchor_point)
+        arms = body.anchor_point - body.center_of_mass
+        lines = np.column_stack([pulleys.exit_point, pulleys.axis, pulleys.radius, arms])
+        self._step: Callable[..., None] = compiled_step() if compiled else step
+        floats = self._floats = np.array if compiled else _plain
+        self._lines, self._body = floats(lines.ravel()), floats([body.mass, *body.inertia.flat])
+        self._center = floats(position + attitude @ body.center_of_mass)
+        self._rotation = floats(np.asarray(attitude, dtype=float).ravel())
+        self._velocity = floats(np.zeros(6))
+        self._rows, self._forces = floats(np.zeros(ROW * count)), floats(np.zeros(2 * count))
+        self._springs, self._work = floats(np.zeros(3 * count)), floats(np.zeros(WORK))
+        cables(self._lines, self._center, self._rotation, self._rows)
+        if compiled:
+            self._advance(0.0, self._floats(self._weight))  # compiles it
+
+    @property
+    def count(self) -> int:
+        """Number of cables."""
+        return len(self._lines) // CABLE
+
+    @property
+    def center(self) -> Array:
+        """Centre of mass, (3,), m."""
+        return np.array(self._center)
+
+    @property
+    def rotation(self) -> Array:
+        """Platform to base, (3, 3)."""
+        return np.array(self._rotation).reshape(3, 3)
 
     @property
     def position(self) -> Array:
@@ -83,75 +112,105 @@ class CablePlatform:
         return np.asarray(self.center - self.rotation @ self.body.center_of_mass)
 
     @property
-    def damping_time(self) -> float:
-        """Ratio of damping to stiffness of the cables, s."""
-        return self._damping_time
+    def velocity(self) -> Array:
+        """Of the centre of mass, and angular in the base frame, (6,), m/s and rad/s."""
+        return np.array(self._velocity)
+
+    @velocity.setter
+    def velocity(self, velocity: Array) -> None:
+        self._velocity = self._floats(velocity)
+
+    @property
+    def length(self) -> Array:
+        """Of the cables from pulley to anchor, arc included, (n,), m."""
+        return np.array(self._rows[0::ROW])
+
+    @property
+    def wrap(self) -> Array:
+        """Of the cables on their pulleys, (n,), rad."""
+        return np.array(self._rows[7::ROW])
+
+    @property
+    def tension(self) -> Array:
+        """Cable forces at the platform, (n,), N."""
+        return np.array(self._forces[0::2])
+
+    @tension.setter
+    def tension(self, tension: Array) -> None:
+        self._forces[0::2] = self._floats(tension)
+
+    @property
+    def speed(self) -> Array:
+        """Rates of the cable lengths, (n,), m/s."""
+        return np.array(self._forces[1::2])
+
+    def cable(self, index: int) -> tuple[float, float, float]:
+        """Length (m), its rate (m/s) and wrap (rad) of one cable."""
+        row = ROW * index
+        return self._rows[row], self._forces[2 * index + 1], self._rows[row + 7]
 
     def equilibrium(self, pretension: float) -> Array:
         """Cable forces at rest nearest to ``pretension``, (n,), N; negative where none exist."""
-        wanted = np.full(len(self.tension), pretension)
-        short = self._weight - self._jacobian.T @ wanted
-        return np.asarray(wanted + np.linalg.lstsq(self._jacobian.T, short, rcond=None)[0])
+        wanted = np.full(self.count, pretension)
+        return np.asarray(
+            wanted + np.linalg.lstsq(self._jacobian.T, self.unbalanced(wanted), rcond=None)[0]
+        )
 
     def unbalanced(self, tension: Array) -> Array:
         """Sum of weight and cable forces, (6,), N and N m."""
         return np.asarray(self._weight - self._jacobian.T @ tension)
 
-    def advance(self, to: float, start: Array, end: Array, stiffness: Array) -> None:
+    @property
+    def _jacobian(self) -> Array:
+        """Gradient of the cable lengths by the pose of the centre of mass, (n, 6)."""
+        return np.array(self._rows).reshape(-1, ROW)[:, 1:7]
+
+    def advance(
+        self, to: float, start: Sequence[float], end: Sequence[float], stiffness: Sequence[float]
+    ) -> None:
         """Integrate until ``to``.
 
         Parameters
         ----------
         to : float
             s.
-        start, end : (n,) arrays
-            Unstrained cable lengths now and then, between which they change linearly, m.
-        stiffness : (n,) array
-            Of the cables, N/m.
+        start, end : sequence of float
+            Unstrained cable lengths now and then, between which they change linearly, (n,), m.
+        stiffness : sequence of float
+            Of the cables, (n,), N/m.
         """
         duration = to - self.time
         if duration < _LEAST_STEP:
             return
         count = ceil(duration / _STEP - 1e-6)
-        rate, dt = (end - start) / duration, duration / count
+        dt, springs = duration / count, self._springs
+        springs[1::3] = [(b - a) / duration for a, b in zip(start, end, strict=True)]
+        springs[2::3] = self._floats(stiffness)
+        load = self._floats(self._weight + self.wrench)
         for index in range(count):
-            self._step(dt, start + rate * (dt * (index + 1)), rate, stiffness)
+            share = (index + 1) / count
+            springs[0::3] = [a + (b - a) * share for a, b in zip(start, end, strict=True)]
+            self._advance(dt, load)
         self.time = to
 
-    def _step(self, dt: float, unstrained: Array, rate: Array, stiffness: Array) -> None:
-        velocity, center, rotation = self.velocity, self.center, self.rotation
-        damping = stiffness * self._damping_time
-        self._move(center, rotation, velocity * (dt / 2))
-        jacobian, inertia = self._jacobian, self._inertia
-        stretch = self.length - (unstrained - rate * (dt / 2))
-        expected = stiffness * stretch + damping * (jacobian @ velocity - rate)
-        taut = (stretch > 0) & (expected > 0)
-        change = np.where(taut, dt / 4 * stiffness + damping / 2, 0.0)
-        load = self._weight + self.wrench - jacobian.T @ np.where(taut, expected, 0.0)
-        spin = velocity[None, 3:]
-        load[3:] -= _cross(spin, spin @ inertia[3:, 3:])[0]
-        matrix = inertia + dt * (jacobian.T * change) @ jacobian
-        self.velocity = velocity + np.linalg.solve(matrix, dt * load)
-        self._move(center, rotation, (velocity + self.velocity) * (dt / 2))
-        self.speed = self._jacobian @ self.velocity
-        stretch = self.length - unstrained
-        pull = stiffness * stretch + damping * (self.speed - rate)
-        self.tension = np.where(stretch > 0, np.maximum(pull, 0.0), 0.0)
-
-    def _move(self, center: Array, rotation: Array, by: Array) -> None:
-        """Pose at a displacement and a small rotation vector from another one."""
-        self.center = center + by[:3]
-        self.rotation = turned((float(by[3]), float(by[4]), float(by[5]))) @ rotation
-        self._locate()
-
-    def _locate(self) -> None:
-        """Cables and inertia at the present pose."""
-        arms = self._arms @ self.rotation.T
-        self.length, direction, self.wrap = self.pulleys.cables(self.center + arms)
-        self._jacobian = np.concatenate([direction, _cross(arms, direction)], axis=1)
-        self._inertia[3:, 3:] = self.rotation @ self.body.inertia @ self.rotation.T
+    def _advance(self, dt: float, load: Any) -> None:
+        """Make one step of ``dt`` s under an external load (6,)."""
+        self._step(
+            dt,
+            self.damping_time,
+            self._lines,
+            self._body,
+            load,
+            self._springs,
+            self._center,
+            self._rotation,
+            self._velocity,
+            self._rows,
+            self._forces,
+            self._work,
+        )
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Cross products of rows; a third of the time of ``numpy.cross`` for few of them."""
-    return np.asarray(a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]])
+def _plain(values: Any) -> list[float]:
+    """Floats of a sequence or an array of one dimension."""
+    return [float(value) for value in values]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
-
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.sim.robot.mechanics import rotated
 
 __all__ = ["quaternion", "rotation", "turned"]
 
-_SMALL = 1e-8
+_UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def rotation(roll: float, pitch: float, yaw: float) -> Array:
@@ -20,14 +19,10 @@ def rotation(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def turned(vector: tuple[float, float, float]) -> Array:
-    """Matrix exponential of a rotation vector, rad, by Rodrigues' formula."""
-    x, y, z = vector
-    square = x * x + y * y + z * z
-    angle = sqrt(square)
-    first = sin(angle) / angle if angle > _SMALL else 1.0 - square / 6
-    second = (1.0 - cos(angle)) / square if angle > _SMALL else 0.5
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+    """Matrix exponential of a rotation vector, rad."""
+    out = [0.0] * 9
+    rotated(*vector, _UNTURNED, out)
+    return np.array(out).reshape(3, 3)
 
 
 def quaternion(matrix: Array) -> tuple[float, float, float, float]:
