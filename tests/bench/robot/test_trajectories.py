@@ -21,6 +21,8 @@ def test_random_trajectories_stay_on_their_paths_within_the_limits_of_force(
     found = json.loads(capsys.readouterr().out)
     assert code == 0
     assert found["trajectories"] == 3
+    assert found["slack"] == found["above_limit"] == 0
+    assert 5.0 < found["least_force_N"] < found["largest_force_N"] < 200.0
     assert found["forces_beyond_limits"] == 0
     assert found["least_margin_N"] > 0
     assert found["largest_path_error_mm"] < found["stated_path_error_mm"]
