@@ -38,8 +38,8 @@ BOX = np.array([0.075, 0.075, 0.075, 0.131, 0.131, 0.131])
 PLACES = 20
 """Of a trajectory at which the forces are tested."""
 STATED = 2e-3
-"""Stated path error, m. The plan takes the cables as stiff; one of 1.6 m and 20 kN lengthens by 2 mm
-where its force changes by 25 N on the way."""
+"""Stated path error, m. The plan takes the cables as stiff; one of 1.6 m and 20 kN lengthens by
+2 mm where its force changes by 25 N on the way."""
 NAMES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
