@@ -67,7 +67,7 @@ def test_what_stops_the_bench_ends_the_wait() -> None:
     assert time.monotonic() - begin < 30
 
 
-def test_its_death_is_told(process: ComputationProcess) -> None:
+def test_its_end_is_an_error(process: ComputationProcess) -> None:
     with ComputationProcess() as other, pytest.raises(WinchkitError, match=r"has ended \(exit -9"):
         other(nothing, _kill_own_process)
     assert process(nothing, abs, -3) == 3
