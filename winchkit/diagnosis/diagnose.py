@@ -14,7 +14,9 @@ from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
+from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
+from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import attributions, harmonics
@@ -31,6 +33,7 @@ from winchkit.diagnosis.selection.stepwise import (
     SelectionResult,
     initial_result,
     stepwise_selection,
+    without_term,
 )
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.steps import candidates_of, steps_of
@@ -40,6 +43,7 @@ from winchkit.diagnosis.verdict.decision import (
     reweighted_judgement,
     withheld,
 )
+from winchkit.diagnosis.verdict.determination import region_holds_null
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.plausibility import implausible
@@ -313,10 +317,15 @@ def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
     return WinchAnswer(engine, judgement.reported, diagnosis)
 
 
-def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
-    """Verdict, equivalence sets, intervals and next programmes of a selection."""
+def _answer(
+    engine: TimeSeriesSelection, result: SelectionResult, notes: tuple[str, ...] = ()
+) -> WinchAnswer:
+    """Verdict, equivalence sets, intervals and next programmes of a selection.
+
+    ``notes`` are the reasons why effects of the search's result are not named.
+    """
     judgement = judge_with_specification_test(engine, result)
-    reported = judgement.reported
+    reported, reasons = judgement.reported, judgement.notes
     added = range(engine.n_initial_terms, len(reported.final.hypothesis.terms))
     sets = [equivalence_set(engine, reported.final, reported.noise, index) for index in added]
     withheld_sets = () if sets else _closest(engine, result, judgement)
@@ -325,6 +334,11 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
         judgement = reweighted_judgement(engine, judgement)
         reported = judgement.reported
     found, spread = reported, _spread(engine, reported)
+    if (index := _undetermined(engine, reported, spread, sets)) is not None:
+        fewer = without_term(engine, reported, index)
+        if judge_with_specification_test(engine, fewer).reported is fewer:
+            note = _undetermined_note(sets[index - added.start])
+            return _answer(engine, fewer, tuple(dict.fromkeys((*notes, *reasons, note))))
     sets, steps, closest = _plausible(engine, reported, sets, spread)
     if closest:
         names = ", ".join(dict.fromkeys(f"{each.effect}: {each.reason}" for each in closest))
@@ -342,11 +356,14 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer
             result.scores, DetectionThreshold(engine.penalty_per_parameter, result.threshold)
         ),
         unexplained_share=judgement.share,
-        where=_where(engine.regression, result) if judgement.verdict in _LOCATED else (),
+        where=_where(engine.regression, reported if steps else result)
+        if judgement.verdict in _LOCATED
+        else (),
         next_runs=next_runs(engine.regression, pairs, result.noise.rms),
         notes=(
             *engine.regression.dataset.notes,
             *missing_excitation(engine.regression),
+            *notes,
             *judgement.notes,
         ),
         sanity=engine.regression.dataset.sanity,
@@ -379,7 +396,40 @@ def _traces(
 
 def _spread(engine: SelectionEngine, result: SelectionResult) -> Spread:
     """Uncertainty of the unknowns of the final model."""
-    return spread_of(engine.regression, result.final, result.noise, engine.regression.blocks)
+    return _spread_of_fit(engine, result.final, result.noise)
+
+
+def _spread_of_fit(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Spread:
+    return spread_of(engine.regression, fitted, noise, engine.regression.blocks)
+
+
+def _undetermined(
+    engine: TimeSeriesSelection,
+    result: SelectionResult,
+    spread: Spread,
+    sets: Sequence[EquivalenceSet],
+) -> int | None:
+    """The last addition beside others of which no member is determined; None for none."""
+    regression, noise, final = engine.regression, result.noise, result.final
+    first = engine.n_initial_terms
+    for index in reversed(range(first, first + len(sets))) if len(sets) > 1 else ():
+        if not region_holds_null(regression, final, noise, spread, index):
+            continue
+        rivals = [fitted for fitted in sets[index - first].fits if fitted is not final]
+        last = len(final.hypothesis.terms) - 1
+        if all(
+            region_holds_null(
+                regression, fitted, noise, _spread_of_fit(engine, fitted, noise), last
+            )
+            for fitted in rivals
+        ):
+            return index
+    return None
+
+
+def _undetermined_note(equivalence: EquivalenceSet) -> str:
+    names = ", ".join(equivalence.effects)
+    return f"not named: {names}; the 95 % interval of its size holds zero"
 
 
 def _plausible(

@@ -73,20 +73,18 @@ def test_unknown() -> None:
 
 
 def test_partly() -> None:
-    """A large drag is found beside a wobble that no effect explains: neither is named for both."""
+    """A large drag keeps its name beside a wobble of another output that no effect explains."""
     strange = {"cable_length": strange_length(1e-3)}
     found = verdict_of(diagnose(runs((DRAG,), beside=strange), GROOVED).diagnosis, "partly")
-    assert found.steps == ()
-    (note,) = (note for note in found.notes if note.startswith("closest"))
-    assert "motor-coulomb" in note
-    nearest = {each.effect: each for each in found.closest}
-    assert "motor-coulomb" in nearest
-    torque = nearest["motor-coulomb"].parameters["torque"]
+    (step,) = found.steps
+    assert step.effects == ("motor-coulomb",)
+    torque = step.parameters["motor-coulomb"]["torque"]
     assert torque.value == pytest.approx(0.02, abs=5 * torque.std)
-    assert "imitate" in nearest["motor-coulomb"].reason
+    assert found.closest == ()
+    assert found.where[0].output == "cable_length"
     text = sentence(found)
-    assert "a part is explained by these effects" in text.lower()
-    assert "the motor side has Coulomb friction" in text
+    assert "The motor side has Coulomb friction" in text
+    assert "Partly unexplained" in text
     assert 0 < found.unexplained_share <= 0.5
 
 

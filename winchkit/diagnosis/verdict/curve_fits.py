@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.verdict.spline_alternatives import Columns, CurveFamily, curves
+from winchkit.diagnosis.verdict.spline_alternatives import PLACES, Columns, CurveFamily, curves
 
-__all__ = ["BasisProducts", "Curve", "PartialRegression", "basis_products", "ranked_curves"]
+__all__ = [
+    "BasisProducts",
+    "Curve",
+    "PartialRegression",
+    "basis_products",
+    "explained_by",
+    "ranked_curves",
+]
 
 UNIDENTIFIABLE = 1e-7
 _LEAST_SQUARED_LENGTH = 1e-300
@@ -27,6 +34,10 @@ class Curve:
     variable: str
     net_gain: float
     """Decrease of χ² less the penalty of its parameters."""
+    explained_ss: float
+    """Decrease of χ²."""
+    law: Array = field(repr=False, compare=False)
+    """Values at the knots of its basis, shape (knots, k)."""
 
 
 class PartialRegression:
@@ -127,10 +138,22 @@ def _fitted(
     penalty_per_parameter: float,
 ) -> Iterator[Curve]:
     for family in families:
-        count = len(family.knots)
-        grams, products = basis_products(partial, family.columns(regression), count)
-        net_gain = max(
-            grams.explained_ss(coefficients, products) - penalty_per_parameter * n_parameters
+        columns = family.columns(regression)
+        grams, products = basis_products(partial, columns, len(family.knots))
+        fitted = [
+            (grams.explained_ss(coefficients, products), n_parameters, coefficients)
             for coefficients, n_parameters in family.laws
-        )
-        yield Curve(family.place, family.variable, net_gain)
+        ]
+        gain, count, law = max(fitted, key=lambda fit: fit[0] - penalty_per_parameter * fit[1])
+        net_gain = gain - penalty_per_parameter * count
+        yield Curve(family.place, family.variable, net_gain, gain, law)
+
+
+def explained_by(
+    regression: TimeSeriesRegression, partial: PartialRegression, curve: Curve
+) -> float:
+    """Decrease of χ² by a curve of the same law on another residual, refitted."""
+    place = curve.place, curve.variable
+    (family,) = curves(regression, list(PLACES[curve.place]), {place})
+    basis, products = basis_products(partial, family.columns(regression), len(family.knots))
+    return basis.explained_ss(curve.law, products)

@@ -18,7 +18,7 @@ from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.model.stages import OUTPUT_UNITS
 
-__all__ = ["Judgement", "judge", "output_fits", "reweighted_judgement", "withheld"]
+__all__ = ["Judgement", "judge", "named", "output_fits", "reweighted_judgement", "withheld"]
 
 _UNKNOWN_SHARE = 0.5
 _HELD_OUT_SHARE = 0.15
@@ -58,7 +58,7 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     Judgement
         Effects are named where the verdict is ``explained``, or where repeats show that less than
         1/40 of the excess is unexplained. Otherwise they are withheld, and a note lists them: an
-        effect outside the catalogue is often imitated by one inside it.
+        effect outside the catalogue is often imitated by one inside it. See :func:`named`.
 
     Notes
     -----
@@ -89,6 +89,13 @@ def withheld(
     reported = replace(result, final=result.initial_model, noise=result.initial_noise)
     before = (result.initial_model, result.initial_noise)
     return Judgement(verdict, share, output_fits(engine, before, before), reported, (note,))
+
+
+def named(engine: SelectionEngine, result: SelectionResult, judgement: Judgement) -> Judgement:
+    """The same verdict with the names of all additions, which explain a part."""
+    before, after = (result.initial_model, result.initial_noise), (result.final, result.noise)
+    outputs = output_fits(engine, before, after, _folds(engine, result))
+    return Judgement(judgement.verdict, judgement.share, outputs, result, ())
 
 
 def reweighted_judgement(engine: SelectionEngine, judgement: Judgement) -> Judgement:

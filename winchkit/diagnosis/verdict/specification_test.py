@@ -27,8 +27,13 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, with_pair, without_term
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.verdict.curve_fits import Curve, PartialRegression, ranked_curves
-from winchkit.diagnosis.verdict.decision import Judgement, judge, withheld
+from winchkit.diagnosis.verdict.curve_fits import (
+    Curve,
+    PartialRegression,
+    explained_by,
+    ranked_curves,
+)
+from winchkit.diagnosis.verdict.decision import Judgement, judge, named, withheld
 from winchkit.diagnosis.verdict.specification_null import Named, null_excess
 from winchkit.diagnosis.verdict.spline_alternatives import curves
 from winchkit.effects.parametrization import Coordinates
@@ -40,6 +45,8 @@ _LEVEL = 0.005
 """Probability that noise takes away the name of a right effect, over all tests of one result."""
 _LEAST_SHARE = 0.5
 """Share of the named effects' decrease of χ² that a curve must reach on the coarse regression."""
+_LEAST_REPLACED = 0.5
+"""Share of the named effects' decrease of χ² that they lose beside a curve that is a rival."""
 _COMPARED = 12
 """Places and variables whose curves are in the null distribution, those of largest gain."""
 _MARGIN = 1e-3
@@ -56,31 +63,35 @@ def judge_with_specification_test(
     Notes
     -----
     All additions are tested together, then each beside the others. One that a curve outperforms is
-    dropped or exchanged for a pair; where too much is left without it, no effect is named. Without
-    repeats an outperformed single effect only gets a note.
+    dropped or exchanged for a pair; where too much is left without it, no effect is named. Where
+    the additions explain all, without repeats, an outperformed single effect only gets a note.
+    Where a part is unexplained (verdict ``partly``), effects that no curve outperforms are named.
     """
     judgement = judge(engine, result)
     test = SpecificationTest(engine, result)
-    if judgement.reported is not result or not test.added:
+    if not test.added or judgement.verdict == "unknown":
         return judgement
-    terms = test.terms
+    in_part, terms = judgement.reported is not result, test.terms
     if curve := test.outperforming_curve(test.added):
-        pair = with_pair(engine, result)
+        pair = None if in_part else with_pair(engine, result)
         if pair is not None:
             return judge_with_specification_test(engine, pair)
-        return withheld(engine, result, 1.0, _withheld_note(terms, terms, curve))
+        note = _withheld_note(terms, terms, curve)
+        return judgement if in_part else withheld(engine, result, 1.0, note)
     for index in reversed(test.added) if len(terms) > 1 else ():
         curve = test.outperforming_curve([index])
-        if curve and result.noise.from_repeats:
-            return _without_outperformed(test, index, curve)
+        if curve and (in_part or result.noise.from_repeats):
+            return _without_outperformed(test, index, curve, judgement)
         if curve:
             label = terms[index - engine.n_initial_terms].label
             note = f"{_curve_name(curve)} would explain more than {label}"
             judgement = replace(judgement, notes=(*judgement.notes, note))
-    return judgement
+    return named(engine, result, judgement) if in_part else judgement
 
 
-def _without_outperformed(test: SpecificationTest, index: int, curve: Curve) -> Judgement:
+def _without_outperformed(
+    test: SpecificationTest, index: int, curve: Curve, judgement: Judgement
+) -> Judgement:
     """Verdict without an outperformed effect, or without any name where that effect is needed."""
     engine, result = test.engine, test.result
     outperformed = result.final.hypothesis.terms[index : index + 1]
@@ -89,6 +100,8 @@ def _without_outperformed(test: SpecificationTest, index: int, curve: Curve) -> 
         return replace(
             without, notes=(*without.notes, _withheld_note(outperformed, outperformed, curve))
         )
+    if judgement.reported is not result:
+        return judgement
     share = test.explained_ss([index]) / test.explained_ss(test.added)
     return withheld(
         engine, result, min(1.0, share), _withheld_note(test.terms, outperformed, curve)
@@ -164,10 +177,8 @@ class SpecificationTest:
         None where that is not positive.
         """
         engine = self.engine
-        partial = self.partial(indices, discretization=discretization)
-        explained_ss = (
-            partial.chi_square - self.partial((), discretization=discretization).chi_square
-        )
+        partial, beside = (self.partial(i, discretization=discretization) for i in (indices, ()))
+        explained_ss = partial.chi_square - beside.chi_square
         ranked = ranked_curves(
             engine.regression,
             partial,
@@ -179,8 +190,15 @@ class SpecificationTest:
         net_gain = explained_ss - engine.penalty_per_parameter * self._n_parameters(indices)
         # A certain lack of fit is no chance deviation from the right formula.
         share = _MARGIN_WITH_LACK_OF_FIT if self.result.lack_of_fit else _MARGIN
-        beyond = ranked[0].net_gain - net_gain - share * explained_ss if ranked else 0.0
-        return (ranked[0], beyond) if beyond > 0.0 else None
+        for curve in ranked:
+            beyond = curve.net_gain - net_gain - share * explained_ss
+            if beyond <= 0.0:
+                break
+            # A curve that gains as much beside the terms explains another part of the residual.
+            replaced = curve.explained_ss - explained_by(engine.regression, beside, curve)
+            if replaced > _LEAST_REPLACED * explained_ss:
+                return curve, beyond
+        return None
 
     def _critical_excess(self, indices: Sequence[int]) -> float:
         """Quantile of the excess where the terms are right, for one of all tests of a result."""
