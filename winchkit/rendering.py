@@ -9,11 +9,8 @@ neither of the two; the package that contains both names the module with the ren
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-from winchkit.errors import UsageError
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -21,9 +18,8 @@ if TYPE_CHECKING:
 __all__ = ["Plotted", "Renderer", "Renderers", "Shown", "renderers"]
 
 
-@dataclass(frozen=True)
-class Renderer:
-    """How results of one type are shown."""
+class Renderer(NamedTuple):
+    """How results of one type are shown; no dataclass, whose import takes as long as winchkit's."""
 
     text: Callable[[Any], str]
     """One screen of plain text."""
@@ -94,6 +90,8 @@ class Plotted(Shown):
         UsageError
             Without matplotlib (``pip install 'winchkit[plot]'``), or for an unknown name.
         """
+        from winchkit.errors import UsageError
+
         found = renderers.of(type(self))
         if found is None or found.plot is None:
             raise UsageError(f"{type(self).__name__}: there is no figure of it")

@@ -191,7 +191,7 @@ class _Notes:
     def whole(self, lines: Iterator[str], width: int) -> Iterator[str]:
         """The complete lines; the note on an incomplete last one is in ``notes``."""
         for line in lines:
-            if not _is_ended(line) and line.strip():
+            if not line.endswith("\n") and line.strip():
                 if self._is_own:
                     self.notes.append(cut_off(self._path, "rows before its last line"))
                     return
@@ -366,7 +366,8 @@ def _blocks(
     reader = csv.reader(lines)
     try:
         for row in reader:
-            if _is_row(row, width):
+            # A row of full width, the usual case, is one unless it is an event.
+            if (len(row) == width > 1 and not row[0].startswith(EVENT_MARK)) or _is_row(row, width):
                 rows.append(row)
                 numbers.append(start + reader.line_num)
             if len(rows) == _BLOCK:
@@ -385,7 +386,7 @@ def _numbers(cells: Sequence[str]) -> tuple[Array, list[int]]:
     except ValueError:
         pass
     else:
-        if not any("_" in cell for cell in cells):
+        if "_" not in "".join(cells):
             return values, []
     read = [_number(cell) for cell in cells]
     wrong = [row for row, value in enumerate(read) if value is None]
