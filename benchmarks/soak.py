@@ -35,8 +35,8 @@ from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.open import open_bench
 from winchkit.drivers.clock import MonotonicClock
 
-_WINCHES = "ABCDEFGH"
-_CYCLE = 0.004
+WINCHES = "ABCDEFGH"
+CYCLE = 0.004
 _SAMPLED = 5.0
 _WARM_UP = 0.2
 """Share of the time, at least 30 s."""
@@ -66,7 +66,7 @@ class Watch:
         self._before = snapshot.time
         self.cycles += 1
         if math.isfinite(gap):
-            missed = gap > _MISSED * _CYCLE
+            missed = gap > _MISSED * CYCLE
             self.gaps += missed
             self.unreported += missed and snapshot.overruns == self._overruns
             self.longest = max(self.longest, gap)
@@ -77,7 +77,7 @@ class Watch:
         return dict.fromkeys(snapshot.winch, _SPEED * math.sin(phase))
 
 
-class _Clock(MonotonicClock):
+class DeviceClock(MonotonicClock):
     """The machine's clock, with the wire to the drives for a CAN bus."""
 
     def __init__(self, own: str, other: str) -> None:
@@ -113,29 +113,34 @@ def resident() -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
 
 
-def bench_file(folder: Path, cells: int) -> Path:
-    """A bench of eight winches, each with a load cell."""
+def bench_file(folder: Path, cells: int | None) -> Path:
+    """A bench of eight winches, each with a load cell at the port ``cells``, or without any."""
     lines = [
         "schema = 1",
         'kind = "bench"',
         'name = "soak"',
-        f'cycle = "{_CYCLE * 1e3:g} ms"',
+        f'cycle = "{CYCLE * 1e3:g} ms"',
         "[bus.can]",
         'kind = "can"',
         'interface = "virtual"',
         f'channel = "soak-{os.getpid()}"',
         'heartbeat = "200 ms"',
-        "[bus.cells]",
-        'kind = "modbus-tcp"',
-        'host = "127.0.0.1"',
-        f"port = {cells}",
     ]
-    for number, name in enumerate(_WINCHES, start=1):
+    if cells is not None:
+        lines += [
+            "[bus.cells]",
+            'kind = "modbus-tcp"',
+            'host = "127.0.0.1"',
+            f"port = {cells}",
+        ]
+    for number, name in enumerate(WINCHES, start=1):
         lines += [
             f"[winch.{name}]",
             'profile = "bench-spiral"',
             f'servo = {{ device = "generic-cia402", bus = "can", node = {number} }}',
-            f'cell = {{ device = "laumas-tlb", bus = "cells", unit = {number}, rate = "25 Hz" }}',
+            f'cell = {{ device = "laumas-tlb", bus = "cells", unit = {number}, rate = "25 Hz" }}'
+            if cells is not None
+            else "",
             "brake = true",
             f"[winch.{name}.limits]",
             'speed = "0.3 m/s"',
@@ -179,8 +184,8 @@ def measured(bench: Bench, folder: Path, duration: float) -> dict[str, Any]:
         "growth_mb_h": round(slope, 2),
         "samples_lost": int(drops["log"]["drops"]),
         "feedback_missed": sum(health[n].missed - before[n].missed for n in health),
-        "cell_readings": sum(drops[f"{n}.cell"]["readings"] for n in _WINCHES),
-        "cell_drops": sum(drops[f"{n}.cell"]["drops"] for n in _WINCHES),
+        "cell_readings": sum(drops[f"{n}.cell"]["readings"] for n in WINCHES),
+        "cell_drops": sum(drops[f"{n}.cell"]["drops"] for n in WINCHES),
         "trips": trips,
         "realtime": [item.name for item in bench.realtime.items if item.granted],
     }
@@ -193,12 +198,12 @@ def run(duration: float, *, realtime: bool = False) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         drives, host = str(folder / "drives"), str(folder / "host")
-        arguments = (theirs, len(_WINCHES), drives, host, realtime)
+        arguments = (theirs, len(WINCHES), drives, host, realtime)
         devices = context.Process(target=serve, args=arguments, daemon=True)
         devices.start()
         try:
-            cells = _received(ours)
-            file, clock = bench_file(folder, cells), _Clock(host, drives)
+            cells = received(ours)
+            file, clock = bench_file(folder, cells), DeviceClock(host, drives)
             with open_bench(file, clock, realtime="try" if realtime else False) as bench:
                 return measured(bench, folder, duration)
         finally:
@@ -206,7 +211,8 @@ def run(duration: float, *, realtime: bool = False) -> dict[str, Any]:
             devices.join(10.0)
 
 
-def _received(connection: Connection) -> int:
+def received(connection: Connection) -> int:
+    """Port of the cells, once the devices are ready."""
     if not connection.poll(30.0):
         raise SystemExit("the devices did not start")
     return int(connection.recv())

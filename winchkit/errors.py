@@ -36,6 +36,8 @@ __all__ = [
     "RunError",
     "UsageError",
     "WinchkitError",
+    "class_name",
+    "error_of",
     "one_line",
     "printable",
     "suggest",
@@ -132,6 +134,19 @@ class LimitTripped(MotionError):
 
 class NotPermitted(MotionError):
     """A condition for motion is not met, e.g. no drive-side watchdog."""
+
+
+def class_name(error: WinchkitError) -> str:
+    """Name of the public class of an error, which another process has too."""
+    return next(c.__name__ for c in type(error).__mro__ if c.__module__ == __name__)
+
+
+def error_of(name: str, message: str) -> WinchkitError:
+    """An error of another process, by the name of its class and its message."""
+    kind = globals().get(name)
+    if isinstance(kind, type) and issubclass(kind, WinchkitError):
+        return kind(message)
+    return WinchkitError(message)
 
 
 def printable(text: str) -> str:

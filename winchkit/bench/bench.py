@@ -100,7 +100,12 @@ class Bench(BenchConnection):
         commissioning: bool = False,
     ) -> None:
         """Open it; raises every error of opening, with nothing left open."""
-        super().__init__(spec, clock, ownership or own(spec, name or client_name()))
+        super().__init__(
+            spec,
+            clock,
+            ownership or own(spec, name or client_name()),
+            separate=bool(realtime),
+        )
         self.not_commissioned = ""
         """Why nothing may move before it is commissioned; empty where it is."""
         self._release = ReleaseGuard()
@@ -254,7 +259,7 @@ class Bench(BenchConnection):
         finally:
             self._release.resume(start, self.clock.now())
             # A bus that was opened again has a new receive thread.
-            self.realtime.cover(self._urgent_threads())
+            self.realtime.cover(self._urgent_threads(), self._wired.companions)
         self._look_at_record()
         return cleared
 

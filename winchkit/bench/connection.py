@@ -54,9 +54,13 @@ class BenchConnection(ABC):
         Clock of the control loop.
     ownership
         Of the bench, by this process; released at the close.
+    separate
+        Whether a process of its own reads the instruments that are not on CAN.
     """
 
-    def __init__(self, spec: BenchSpec, clock: Clock, ownership: Ownership) -> None:
+    def __init__(
+        self, spec: BenchSpec, clock: Clock, ownership: Ownership, *, separate: bool = False
+    ) -> None:
         """Open buses and devices; nothing is left open by an error. No cycle runs yet."""
         self.spec = spec
         self.clock = clock
@@ -68,7 +72,7 @@ class BenchConnection(ABC):
             latch = LatchFile(spec.latch_file)
             stack.callback(latch.close)
             trips = latch.open()
-            self._wired: Wired = wire(spec, clock, stack, latch)
+            self._wired: Wired = wire(spec, clock, stack, latch, separate=separate)
             self.loop: ControlLoop = self._wired.loop
             self.loop.restore(trips)
             self.axes: Mapping[str, Cia402Axis] = self._wired.axes
@@ -87,7 +91,7 @@ class BenchConnection(ABC):
         self._stack.callback(self.loop.close)
         self.loop.start()
         await_feedback(self.loop, self.axes, self.clock)
-        self.realtime.cover(self._urgent_threads())
+        self.realtime.cover(self._urgent_threads(), self._wired.companions)
         sensors = self._wired.sensors
         await_sensors((s for one in self.loop.winches for s in sensors[one].values()), self.clock)
 

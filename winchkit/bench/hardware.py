@@ -29,7 +29,8 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.can.cia402.limits import LimitsAtShaft
-from winchkit.drivers.clock import Clock
+from winchkit.drivers.clock import Clock, MonotonicClock
+from winchkit.drivers.instrument_process.process import InstrumentProcess
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import ConnectionLost, Fault, FileError
@@ -71,6 +72,14 @@ class Wired:
     metadata: Mapping[str, str]
     robot: Robot | None = None
     """The robot that the winches move."""
+    process: InstrumentProcess | None = None
+    """The process that serves the lines that are not CAN; None where threads of this one do."""
+
+    @property
+    def companions(self) -> tuple[int, ...]:
+        """Numbers of the processes that belong to this one."""
+        pid = None if self.process is None else self.process.pid
+        return () if pid is None else (pid,)
 
     def disarm(self) -> None:
         """Switch off the host watchdog of the drives that are at rest.
@@ -83,8 +92,14 @@ class Wired:
                     axis.disarm()
 
 
-def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> Wired:
-    """Open everything; what is open is closed by ``stack``."""
+def wire(
+    spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile, *, separate: bool = False
+) -> Wired:
+    """Open everything; what is open is closed by ``stack``.
+
+    ``separate`` has the lines that are not CAN served by a process of their own, where the clock is
+    the machine's.
+    """
     from winchkit.effects import load_catalogue, terms_of
     from winchkit.estimation.cable_state import RopeNow
 
@@ -101,9 +116,11 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> W
     axes = {
         name: _axis(spec, winch, cables[name], buses, clock) for name, winch in spec.winch.items()
     }
-    sensors, lines = instruments(
-        spec, clock, buses, {name: _moving(axes[name], cables[name]) for name in spec.winch}
-    )
+    moving = {name: _moving(axes[name], cables[name]) for name in spec.winch}
+    process = _instrument_process(clock, stack) if separate else None
+    sensors, lines = instruments(spec, clock, buses, moving, process)
+    if process is not None:
+        process.start()
     slow = SlowDevices(lines, clock)
     stack.callback(slow.close)
     for name in latch.lost & axes.keys():
@@ -126,7 +143,18 @@ def wire(spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile) -> W
         longest_gap=max(stale, _LEAST_GAP * spec.cycle),
     )
     _warn_of_sync(buses, loop)
-    return Wired(loop, axes, buses, sensors, lines, slow, _metadata(spec, profiles), robot)
+    if process is not None:
+        process.await_start()
+    return Wired(loop, axes, buses, sensors, lines, slow, _metadata(spec, profiles), robot, process)
+
+
+def _instrument_process(clock: Clock, stack: ExitStack) -> InstrumentProcess | None:
+    """The process for slow instruments; None where it would have another clock."""
+    if not isinstance(clock, MonotonicClock):
+        return None
+    process = InstrumentProcess(clock)
+    stack.callback(process.close)
+    return process
 
 
 def _supervisor(

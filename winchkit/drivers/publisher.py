@@ -41,7 +41,8 @@ class Publisher:
         """Whether the winch moves now, so that the counts should move as well."""
         self.latest: Reading | None = None
         self.listeners: list[Callable[[Reading], None]] = []
-        self._rate = rate
+        self.rate = rate
+        """Of the device, conversions a second."""
         self._stillness = Stillness()
 
     def publish(
@@ -81,7 +82,7 @@ class Publisher:
     def _frozen(self, counts: float, before: Reading | None, when: Sampled) -> bool:
         if before is None or not math.isfinite(counts):
             return False
-        conversions = (when.t_receive - before.t_receive) * self._rate
+        conversions = (when.t_receive - before.t_receive) * self.rate
         return self._stillness.frozen(counts, conversions, self.moving())
 
 
@@ -107,6 +108,11 @@ class Publishing:
         return self.publisher.scale.tare
 
     @property
+    def tally(self) -> Tally:
+        """What was counted, up to date."""
+        return self.publisher.tally
+
+    @property
     def counters(self) -> Counters:
         """What happened since the start."""
-        return self.publisher.tally.counters(self._clock.now())
+        return self.tally.counters(self._clock.now())

@@ -13,7 +13,6 @@ from winchkit.drivers.host_scale import HostScale
 from winchkit.drivers.publisher import Publisher, Publishing
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
-from winchkit.drivers.stream.line import StreamLine
 from winchkit.errors import NoReply, NotPermitted, UsageError
 from winchkit.schema.bench import BenchSpec, DeviceRef
 from winchkit.schema.devices.device import DeviceSpec
@@ -45,6 +44,15 @@ class Shared(Protocol):
 
     def time_of(self, sensor: Sensor) -> float:
         """How long a reading keeps the line busy, s."""
+
+
+@runtime_checkable
+class Noting(Protocol):
+    """A line that may have a note about its port."""
+
+    @property
+    def note(self) -> str:
+        """What is to be said about the port; empty where nothing is."""
 
 
 @runtime_checkable
@@ -120,7 +128,7 @@ class CellDesk:
     def line_note(self, name: str) -> str:
         """What is to be said of its port, e.g. of an adapter that holds bytes back."""
         line = self._line_of(name)
-        return line.note if isinstance(line, StreamLine) else ""
+        return line.note if isinstance(line, Noting) else ""
 
     def _line_of(self, name: str) -> SlowLine:
         sensor = self.sensors[name]

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from winchkit import catalog
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.modbus.instrument import Instrument
-from winchkit.drivers.modbus.line import ModbusLine
+from winchkit.drivers.instrument_process.lines import InstrumentSpec, LineSpec, line_of
 from winchkit.drivers.publisher import Publisher
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.slow import SlowLine
-from winchkit.drivers.stream.instrument import StreamInstrument
-from winchkit.drivers.stream.line import StreamLine
 from winchkit.errors import Fault, FileError
-from winchkit.schema.bench import BenchSpec, BusSpec, DeviceRef
+from winchkit.schema.bench import BenchSpec, DeviceRef
 from winchkit.schema.calibration import CellCalibration, TareBook, tare_book_path
 from winchkit.schema.devices.device import DeviceSpec
 
 if TYPE_CHECKING:
     from winchkit.drivers.can.bus.bus import CanBus
     from winchkit.drivers.can.process_value import ProcessInstrument
+    from winchkit.drivers.instrument_process.process import InstrumentProcess
 
 __all__ = [
     "ROLES",
@@ -107,11 +104,13 @@ def instruments(
     clock: Clock,
     buses: Mapping[str, CanBus] | None = None,
     moving: Mapping[str, Callable[[], bool]] | None = None,
+    process: InstrumentProcess | None = None,
 ) -> tuple[dict[str, dict[str, Sensor]], list[SlowLine]]:
     """Instruments by winch and role; two roles on one device share the instrument.
 
     ``buses`` are the open CAN buses, for instruments on one of them; ``moving`` says of a winch
-    whether it moves, so that counts that stand still meanwhile are seen to be frozen.
+    whether it moves, so that counts that stand still meanwhile are seen to be frozen. ``process``,
+    not started yet, is to serve the lines that are not CAN.
     """
     wired: dict[tuple[str, int | None], _Wired] = {}
     placed: dict[str, dict[str, tuple[str, int | None]]] = {name: {} for name in spec.winch}
@@ -127,12 +126,18 @@ def instruments(
         moves = (moving or {}).get(name, _never) if role != "temperature" else _never
         wired.setdefault(key, _Wired(label, ref, scale, moves))
     found: dict[tuple[str, int | None], Sensor] = {}
-    lines = []
+    lines: list[SlowLine] = []
     for bus in dict.fromkeys(key[0] for key in wired):
         mine = {key: one for key, one in wired.items() if key[0] == bus}
-        line = _line(spec, bus, list(mine.values()), clock, buses or {})
-        found.update(zip(mine, line.sensors, strict=True))
-        lines.append(line)
+        if spec.bus[bus].kind == "can":
+            lines.append(_can_line(spec, bus, list(mine.values()), clock, buses or {}))
+        else:
+            declared = _declared(spec, bus, list(mine.values()))
+            made = line_of(declared, clock)
+            for one, sensor in zip(mine.values(), made.sensors, strict=True):
+                one.prepare(sensor.publisher)
+            lines.append(made if process is None else process.adopt(declared, made))
+        found.update(zip(mine, lines[-1].sensors, strict=True))
     sensors = {
         name: {role: found[key] for role, key in roles.items()} for name, roles in placed.items()
     }
@@ -159,46 +164,14 @@ def _spoken(ref: DeviceRef) -> str:
     return "" if ref.unit is None else f" unit {ref.unit}"
 
 
-def _line(
-    spec: BenchSpec, bus: str, wired: list[_Wired], clock: Clock, buses: Mapping[str, CanBus]
-) -> SlowLine:
-    """The line of a bus with its instruments, in the order of ``wired``."""
-    bus_spec = spec.bus[bus]
-    if bus_spec.kind == "can":
-        return _can_line(spec, bus, wired, clock, buses)
-    if bus_spec.kind == "serial":
-        streams = tuple(_stream(spec, one, bus_spec, clock) for one in wired)
-        return StreamLine(bus, bus_spec, streams, clock)
-    registers = tuple(_modbus(spec, one, bus_spec, clock) for one in wired)
-    return ModbusLine(bus, bus_spec, registers, clock)
-
-
-def _modbus(spec: BenchSpec, one: _Wired, bus: BusSpec, clock: Clock) -> Instrument:
-    device = _of_kind(spec, one, "modbus")
-    found = Instrument(
-        one.label,
-        device,
-        one.ref.unit or 1,
-        clock,
-        rate=one.ref.rate or inf,
-        timeout=bus.timeout,
+def _declared(spec: BenchSpec, bus: str, wired: list[_Wired]) -> LineSpec:
+    """The Modbus or serial line of a bus with its instruments, in the order of ``wired``."""
+    table = "stream" if spec.bus[bus].kind == "serial" else "modbus"
+    instruments = tuple(
+        InstrumentSpec(one.label, _of_kind(spec, one, table), one.ref.unit, one.ref.rate)
+        for one in wired
     )
-    one.prepare(found.publisher)
-    return found
-
-
-def _stream(spec: BenchSpec, one: _Wired, bus: BusSpec, clock: Clock) -> StreamInstrument:
-    device = _of_kind(spec, one, "stream")
-    found = StreamInstrument(
-        one.label,
-        device,
-        one.ref.unit,
-        clock,
-        rate=one.ref.rate or inf,
-        timeout=bus.timeout,
-    )
-    one.prepare(found.publisher)
-    return found
+    return LineSpec(bus, spec.bus[bus], instruments)
 
 
 def _can_line(

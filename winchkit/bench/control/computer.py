@@ -81,9 +81,12 @@ def memory_remedy() -> str:
     )
 
 
-def threads() -> list[int]:
-    """Native ids of the threads of this process."""
-    return [int(name) for name in os.listdir("/proc/self/task")]
+def threads(process: int | None = None) -> list[int]:
+    """Native ids of the threads of a process, by default this one; none where it has ended."""
+    try:
+        return [int(name) for name in os.listdir(f"/proc/{process or 'self'}/task")]
+    except (FileNotFoundError, ProcessLookupError):
+        return []
 
 
 def locks_without_limit(hard: int) -> bool:

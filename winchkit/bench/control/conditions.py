@@ -63,11 +63,17 @@ class Condition:
     debounce: float = 0.0
     """How long it has to hold, s."""
     by_facts: bool = False
-    """Whether it looks at nothing but ``observation.FACTS``, and at boot-ups dealt with."""
+    """Whether it looks at nothing but ``observation.FACTS``, and at boot-ups dealt with. Such a
+    condition has no ``when``: the supervisor leaves it out while the facts are those under which it
+    did not hold, whatever the winch does."""
     when: When = ""
     """What the winch is to be, for the condition to be tested."""
     needs: str = ""
     """The key of ``[winch.A.limits]`` or the instrument without which it is not tested."""
+
+    def __post_init__(self) -> None:
+        if self.by_facts and self.when:
+            raise ValueError(f"condition '{self.kind}' has both by_facts and when: leave one out")
 
 
 def _cell(item: WinchInput) -> Instrumented:

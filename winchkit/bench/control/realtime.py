@@ -73,10 +73,14 @@ class RealTime:
         """Whether the threads have real-time priority."""
         return any(item.name == "scheduling" and item.granted for item in self.items)
 
-    def cover(self, urgent: Iterable[int]) -> None:
-        """Set priorities again, after threads were started; ``urgent`` are native thread ids."""
+    def cover(self, urgent: Iterable[int], companions: Iterable[int] = ()) -> None:
+        """Set priorities again, after threads were started.
+
+        ``urgent`` are native thread ids of this process; ``companions`` are processes that belong
+        to it and end with the bench: all their threads get the low priority.
+        """
         if self.scheduled:
-            _prioritise(frozenset(urgent), self._before)
+            _prioritise(frozenset(urgent), self._before, companions)
 
     def close(self) -> None:
         """Give everything back. Twice does no harm."""
@@ -161,9 +165,13 @@ def _schedule(urgent: frozenset[int], before: dict[int, _Scheduling], stack: Exi
     return Item("scheduling", True, detail)
 
 
-def _prioritise(urgent: frozenset[int], before: dict[int, _Scheduling]) -> None:
+def _prioritise(
+    urgent: frozenset[int], before: dict[int, _Scheduling], companions: Iterable[int] = ()
+) -> None:
     """Give every thread of the process its priority; one set by somebody else is kept."""
-    for thread in sorted(urgent) + [one for one in threads() if one not in urgent]:
+    others = [one for one in threads() if one not in urgent]
+    others += [one for process in companions for one in threads(process)]
+    for thread in sorted(urgent) + others:
         with suppress(ProcessLookupError):
             found = _scheduling_of(thread)
             ours = found in ((os.SCHED_FIFO, PRIORITY), (os.SCHED_FIFO, LOW_PRIORITY))

@@ -10,11 +10,10 @@ from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
-from winchkit import errors
 from winchkit.bench.ownership import connect_to_owner
 from winchkit.bench.remote.identity import client_name
 from winchkit.drivers.clock import Clock, MonotonicClock
-from winchkit.errors import ConnectionLost, WinchkitError
+from winchkit.errors import ConnectionLost, error_of
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
@@ -442,7 +441,7 @@ class RemoteStation:
                 raise OwnerGone("this station at the bench was left; attach again")
             answer = self._exchange(request)
         if "error" in answer:
-            raise _error(answer["error"], answer["message"])
+            raise error_of(answer["error"], answer["message"])
         return answer["ok"]
 
     def _exchange(self, request: bytes) -> dict[str, Any]:
@@ -478,11 +477,3 @@ class RemoteCells:
     def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
         """One of :data:`~winchkit.bench.cells.tasks.TASKS`, done by the owner."""
         return self._station.cell(task, name, *arguments)
-
-
-def _error(name: str, message: str) -> WinchkitError:
-    """The owner's error as the same class here."""
-    kind = getattr(errors, name, WinchkitError)
-    if isinstance(kind, type) and issubclass(kind, WinchkitError):
-        return kind(message)
-    return WinchkitError(message)

@@ -17,12 +17,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TextIO
 
-from winchkit import errors
 from winchkit.bench.ownership import log_path
 from winchkit.bench.remote.handover import own_or_find
 from winchkit.bench.remote.identity import client_name
 from winchkit.bench.remote.interruption import interrupted_by_signals
-from winchkit.errors import ConnectionLost, WinchkitError
+from winchkit.errors import ConnectionLost, WinchkitError, class_name, error_of
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
@@ -84,7 +83,7 @@ def _spawned(spec: BenchSpec, line: bytes) -> Spawned:
         return Spawned(error=ConnectionLost(message))
     reply = json.loads(line)
     if "error" in reply:
-        return Spawned(error=getattr(errors, reply["error"], WinchkitError)(reply["message"]))
+        return Spawned(error=error_of(reply["error"], reply["message"]))
     return Spawned(owned=reply.get(_OWNED, False))
 
 
@@ -99,7 +98,7 @@ def main() -> None:
         try:
             _own(bench_file, effects, report)
         except WinchkitError as error:
-            _report(report, _words_of(error))
+            _report(report, {"error": class_name(error), "message": str(error)})
             sys.stderr.write(f"{client_name('bench')}: {error}\n")
             sys.exit(error.exit_code)
         except KeyboardInterrupt:
@@ -142,12 +141,6 @@ def _detach() -> None:
     """Leave the client's process tree, so that it has no child to wait for."""
     if hasattr(os, "fork") and os.fork():
         os._exit(0)
-
-
-def _words_of(error: WinchkitError) -> dict[str, object]:
-    """An error as its public class and message."""
-    known = (cls.__name__ for cls in type(error).__mro__ if cls.__module__ == errors.__name__)
-    return {"error": next(known), "message": str(error)}
 
 
 def _report(report: TextIO, reply: dict[str, object]) -> None:

@@ -14,7 +14,14 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.ownership import digest_of, listen
 from winchkit.bench.remote.identity import Client, LifeSign
 from winchkit.bench.remote.station import LocalStation
-from winchkit.errors import ConnectionLost, FileError, NotPermitted, UsageError, WinchkitError
+from winchkit.errors import (
+    ConnectionLost,
+    FileError,
+    NotPermitted,
+    UsageError,
+    WinchkitError,
+    class_name,
+)
 
 __all__ = ["OPERATIONS", "StationServer"]
 
@@ -153,7 +160,7 @@ class StationServer:
                 raise UsageError(f"no operation '{operation}'")
             return {"ok": getattr(seat.station, operation)(*arguments)}, False
         except WinchkitError as error:
-            return {"error": _kind(error), "message": str(error)}, left
+            return {"error": class_name(error), "message": str(error)}, left
         except (ValueError, KeyError, TypeError) as error:
             words = f"a request that cannot be read: {error}"
             return {"error": "UsageError", "message": words}, left
@@ -197,11 +204,6 @@ def _end(station: LocalStation) -> None:
     except WinchkitError as error:
         _LOGGER.error("a station did not end as it should: %s", error)  # noqa: TRY400
         raise
-
-
-def _kind(error: WinchkitError) -> str:
-    """The public class of an error, of which a client has one too."""
-    return next(c.__name__ for c in type(error).__mro__ if c.__module__ == "winchkit.errors")
 
 
 def _shut(item: socket.socket) -> None:

@@ -6,8 +6,9 @@ from math import inf, nan
 from typing import Protocol
 
 from winchkit.drivers.clock import Clock
+from winchkit.drivers.counters import Tally
 from winchkit.drivers.publisher import Publisher, Publishing, Sampled
-from winchkit.drivers.reading import REPLY_HORIZON, Counters, Quality
+from winchkit.drivers.reading import REPLY_HORIZON, Quality
 from winchkit.drivers.stream.decoder import Decoded
 from winchkit.drivers.stream.parser import (
     Item,
@@ -92,15 +93,15 @@ class StreamInstrument(Publishing):
         """A reading older than this is stale, s."""
 
     @property
-    def counters(self) -> Counters:
-        """What happened since the start."""
+    def tally(self) -> Tally:
+        """What was counted, with what its parsers have counted."""
         tally = self.publisher.tally
         parsers = [self.parser, self.talk, *([self.fresh] if self.fresh else [])]
         counts = [parser.counts for parser in parsers]
         tally.crc = sum(one.bad_checksums for one in counts)
         tally.malformed = sum(one.malformed for one in counts)
         tally.resynchronised = sum(one.resynchronised for one in counts)
-        return super().counters
+        return tally
 
     @property
     def tared(self) -> bool | None:

@@ -1,0 +1,236 @@
+"""The bench's side of the instrument process: starts it, takes its messages, sends requests.
+
+What a device says is judged here: calibration, tare and the test for frozen counts stay in the
+bench, and only the lines are in the other process. When that process ends or stands still, no
+reading comes, and the supervisor trips by the age of the last one; ``trouble`` names the reason.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from concurrent.futures import Future
+from contextlib import suppress
+from typing import Any
+
+from winchkit.drivers.clock import MonotonicClock
+from winchkit.drivers.instrument_process.lines import Line, LineSpec
+from winchkit.drivers.instrument_process.messages import (
+    Kind,
+    Messages,
+    State,
+    json_message,
+    message,
+    said_by,
+)
+from winchkit.drivers.instrument_process.separate import SeparateInstrument, SeparateLine
+from winchkit.errors import ConnectionLost, WinchkitError, error_of
+
+__all__ = ["InstrumentProcess"]
+
+_MODULE = "winchkit.drivers.instrument_process.child"
+_CHUNK = 1 << 16
+_START = 30.0
+"""The interpreter and its imports take 1 s, on a computer under load several times as long, s."""
+_END = 5.0
+"""It closes its lines within 4 s, s."""
+_STOPPED = 1.0
+"""A process that was silent for so long is not waited for at the end, s."""
+
+
+class InstrumentProcess:
+    """Lines that another process serves; with the machine's clock only."""
+
+    def __init__(self, clock: MonotonicClock) -> None:
+        """Take lines by :meth:`adopt`, then :meth:`start`."""
+        self._clock = clock
+        self._specs: list[LineSpec] = []
+        self._instruments: list[SeparateInstrument] = []
+        self._process: subprocess.Popen[bytes] | None = None
+        self._reader: threading.Thread | None = None
+        self._lock = threading.Lock()
+        self._waiting: dict[int, Future[Any]] = {}
+        self._count = 0
+        self._heard = clock.now()
+        self._started = threading.Event()
+        self._ended: ConnectionLost | None = None
+        self._silent = ConnectionLost("")
+        self._failure: WinchkitError | None = None
+
+    @property
+    def pid(self) -> int | None:
+        """Number of the process; None before its start, or where there is no line to serve."""
+        return None if self._process is None else self._process.pid
+
+    def adopt(self, spec: LineSpec, line: Line) -> SeparateLine:
+        """Serve a line that was made here from ``spec``, and is not served here.
+
+        Returns the line with the instruments as the bench sees them; they take over names,
+        publishers and periods.
+        """
+        instruments = tuple(SeparateInstrument(item, self, self._clock) for item in line.sensors)
+        found = SeparateLine(spec.bus, instruments, self, len(self._specs))
+        self._specs.append(spec)
+        self._instruments += instruments
+        return found
+
+    def start(self) -> None:
+        """Start the process, where it has a line; raises ConnectionLost where it cannot be."""
+        if not self._specs:
+            return
+        command = [sys.executable, "-P", "-m", _MODULE]
+        try:
+            # A session of its own: what ends the bench from a terminal lets it ramp down first.
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                bufsize=0,
+                start_new_session=True,
+            )
+        except OSError as error:
+            raise ConnectionLost(
+                f"the instrument process cannot be started: {' '.join(command)}: {error}; "
+                "open_bench(..., realtime=False) reads the instruments without it"
+            ) from error
+        self._silent = ConnectionLost(
+            f"{self._name} does not respond: it should send something every 0.04 s; "
+            "close the bench and open it again"
+        )
+        self._reader = threading.Thread(target=self._receive, name="instruments", daemon=True)
+        self._reader.start()
+        self._send(message(Kind.REQUEST, pickle.dumps(tuple(self._specs))))
+
+    def await_start(self) -> None:
+        """Return when the lines are being served; raises what kept the process from it."""
+        if self._process is None:
+            return
+        if not self._started.wait(_START):
+            raise ConnectionLost(f"{self._name} did not start within {_START:g} s")
+        if self._failure is not None:
+            failure, self._failure = self._failure, None
+            raise failure
+        if self._ended is not None:
+            raise self._ended
+
+    def trouble(self, silence: float) -> ConnectionLost | None:
+        """Why nothing can come: it has ended, or has sent nothing for more than ``silence`` s."""
+        if self._ended is not None:
+            return self._ended
+        if self._clock.now() - self._heard <= silence or not self._started.is_set():
+            return None
+        return self._silent
+
+    def request(self, place: tuple[int, int], operation: str, *given: Any) -> Future[Any]:
+        """Ask for something; the answer, or the error, comes in the future.
+
+        ``place`` are the numbers of the line and of the instrument on it.
+        """
+        future: Future[Any] = Future()
+        with self._lock:
+            self._count += 1
+            number = self._count
+            self._waiting[number] = future
+        if self._ended is not None:
+            future.set_exception(self._ended)
+            return future
+        content = (number, place, operation, *given)
+        self._send(json_message(Kind.REQUEST, content))
+        return future
+
+    def close(self) -> None:
+        """End the process; raises what ended its serving before, if anything."""
+        process, self._process = self._process, None
+        if process is None:
+            return
+        assert process.stdin is not None, "it is a pipe"
+        assert process.stdout is not None, "it is a pipe"
+        stopped = self._clock.now() - self._heard > _STOPPED
+        with suppress(OSError):
+            process.stdin.close()
+        try:
+            process.wait(0.0 if stopped else _END)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+        if self._reader is not None:
+            self._reader.join(_END)
+        process.stdout.close()
+        if self._failure is not None:
+            raise self._failure
+
+    @property
+    def _name(self) -> str:
+        return f"the instrument process (number {self.pid})"
+
+    def _send(self, data: bytes) -> None:
+        process = self._process
+        if process is None or process.stdin is None:
+            return
+        with self._lock, suppress(OSError):  # it has ended: the reader says so
+            while data:
+                data = data[process.stdin.write(data) or 0 :]
+
+    def _receive(self) -> None:
+        """Take what the process sends until it ends."""
+        process, messages = self._process, Messages()
+        assert process is not None, "it was started"
+        assert process.stdout is not None, "it is a pipe"
+        name = self._name
+        while data := os.read(process.stdout.fileno(), _CHUNK):
+            self._heard = self._clock.now()
+            for kind, content in messages.feed(data):
+                self._take(kind, content)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(_END)
+        self._ended = ConnectionLost(
+            f"{name} has ended ({_end_of(process.returncode)}): no instrument on a Modbus or "
+            "serial line is read; close the bench and open it again"
+        )
+        self._started.set()
+        with self._lock:
+            waiting, self._waiting = self._waiting, {}
+        for future in waiting.values():
+            _settle(future, self._ended)
+
+    def _take(self, kind: Kind, content: bytes) -> None:
+        if kind is Kind.READING:
+            said = said_by(content)
+            self._instruments[said.instrument].publisher.publish(*said[1:])
+        elif kind is Kind.STATE:
+            number, *state = json.loads(content)
+            self._instruments[number].show(State(*state))
+        elif kind is Kind.REPLY:
+            number, value, words = json.loads(content)
+            with self._lock:
+                future = self._waiting.pop(number, None)
+            if future is not None:
+                _settle(future, error_of(*words) if words else None, value)
+        elif kind is Kind.FAILURE:
+            self._failure = error_of(*json.loads(content))
+        elif kind is Kind.READY:
+            self._started.set()
+
+
+def _settle(future: Future[Any], error: WinchkitError | None, value: Any = None) -> None:
+    """Give a future its result, unless whoever waited has gone."""
+    if not future.set_running_or_notify_cancel():
+        return
+    if error is not None:
+        future.set_exception(error)
+    else:
+        future.set_result(value)
+
+
+def _end_of(code: int | None) -> str:
+    """How a process ended, in words."""
+    if code is None:
+        return "it closed its pipe"
+    if code < 0:
+        return f"signal {signal.Signals(-code).name}"
+    return f"exit code {code}"
