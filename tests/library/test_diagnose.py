@@ -25,6 +25,7 @@ from winchkit.catalog import find
 from winchkit.errors import ConnectionLost
 from winchkit.library import cluster, diagnose
 from winchkit.library.cluster import cluster_outcomes
+from winchkit.library.history import library_history
 from winchkit.library.partitions import Partitions
 from winchkit.library.sessions import WinchSession
 from winchkit.library.tasks import Outcome, Task, failed, outcome_of, stored_result
@@ -96,6 +97,30 @@ def test_an_interruption_keeps_what_is_done_and_the_next_call_goes_on(
     assert (report.diagnosed, report.unchanged) == (1, 2)
     assert len(seen) == 4
     assert rows(library, "estimates") == rows(library, "diagnoses")
+
+
+def test_a_fleet_of_axes_is_diagnosed_and_its_history_fitted(tmp_path: Path) -> None:
+    (tmp_path / "elbow.toml").write_text('schema = 1\nkind = "axis"\n')
+    library, viscosity, ticks = tmp_path / "runs", 0.04, np.arange(0.0, 6.0, 0.01)
+    for seed, (winch, day) in enumerate((w, d) for w in ("e1", "e2") for d in (1, 1, 8, 8)):
+        speed = 2.0 * np.sin(2.0 * ticks) + np.cos(5.0 * ticks)
+        torque = viscosity * speed + np.random.default_rng(seed).normal(0.0, 1e-3, ticks.size)
+        path = library / winch / f"2026-03-{day:02d}" / f"{seed}.csv"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        angle = 1.0 - np.cos(2.0 * ticks) + 0.2 * np.sin(5.0 * ticks)
+        channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+        write_run(Run("x", ticks, channels, {}), path)
+    index_library(library)
+    profile = tmp_path / "elbow.toml"
+    report = diagnose_library(library, profile, jobs=1)
+    assert (report.diagnosed, report.failures) == (4, {})
+    estimates = Partitions(library).read("estimates", ("effect", "value", "kind")).to_pylist()
+    named = [row["value"] for row in estimates if row["effect"] == "motor-viscous"]
+    assert named == pytest.approx([viscosity] * 4, rel=0.02)
+    history = library_history(library, profile, effects=["motor-viscous"])
+    (found,) = history.history.parameters
+    assert found.common == pytest.approx(viscosity, rel=0.02)
+    assert history.failures == {}
 
 
 def test_a_failure_is_tried_again_and_kept_with_its_reason(

@@ -47,6 +47,7 @@ __all__ = [
     "read_simbench",
     "read_size",
     "read_tares",
+    "read_winch_or_axis",
 ]
 
 Declared = (
@@ -116,6 +117,28 @@ def read_axis(path: PathLike) -> AxisProfile:
         With every fault of the file, each with its line.
     """
     return _read(path, "axis", AxisProfile)
+
+
+def read_winch_or_axis(path: PathLike) -> WinchProfile:
+    """Read the profile of a winch or of an axis.
+
+    Parameters
+    ----------
+    path : str or Path
+        File in TOML of the kind ``winch`` or ``axis``.
+
+    Returns
+    -------
+    WinchProfile
+        In SI; an AxisProfile of the kind ``axis``.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file; for another kind, in the words of the reader of winches.
+    """
+    value = read_any(path)
+    return value if isinstance(value, WinchProfile) else read_profile(path)
 
 
 def read_robot(path: PathLike) -> RobotProfile:

@@ -131,6 +131,9 @@ class Browser:
             "move": lambda: station.move(
                 winch, _number(asked["to"]), None, _number(asked["speed"])
             ),
+            "move_pose": lambda: station.move_pose(
+                {str(asked["axis"]): _number(asked["change"])}, True, _number(asked["speed"])
+            ),
             "reset": station.reset,
             "tare": lambda: station.tare(winch),
             "take_over": lambda: station.take_over(winch),

@@ -127,7 +127,7 @@ class RobotWork:
         state = self._state
         if state.profile is None:
             return None
-        return {"name": state.source, "number": state.number}
+        return {"name": Path(state.source).stem, "number": state.number}
 
     def view(self) -> dict[str, Any]:
         """Geometry, poses and the calibration, as the page shows them."""
@@ -136,7 +136,7 @@ class RobotWork:
         poses = 0 if state.measured is None else len(state.measured)
         held = 0 if state.measured is None else len(split(state.measured)[1])
         return {
-            "name": state.source,
+            "name": Path(state.source).stem,
             "lines": list(robot.names),
             "mass": robot.platform.mass,
             "files": [path.name for path in state.files],

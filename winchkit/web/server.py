@@ -104,7 +104,7 @@ def serve(
         listening = stack.enter_context(_listening(port))
         config = uvicorn.Config(
             app,
-            log_level="error",
+            log_level="critical",
             ws_max_size=64_000,
             timeout_graceful_shutdown=_SHUTDOWN,
             lifespan="on",

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.programme import Programme
 
-__all__ = ["check_exists", "check_folder", "check_output", "check_winches"]
+__all__ = ["check_exists", "check_file", "check_folder", "check_output", "check_winches"]
 
 
 def check_output(path: str | Path, suffixes: tuple[str, ...]) -> None:
@@ -38,6 +38,13 @@ def check_exists(path: str | Path) -> None:
     """Raise FileError where there is no such file."""
     if not Path(path).exists():
         raise FileError(Fault("there is no such file", str(path)))
+
+
+def check_file(path: str | Path) -> None:
+    """Raise FileError where there is no such file, or where it is a folder."""
+    check_exists(path)
+    if Path(path).is_dir():
+        raise FileError(Fault("is a folder; name the files in it", str(path)))
 
 
 def check_winches(programme: Programme, bench: BenchSpec) -> None:

@@ -93,11 +93,9 @@ class Asked:
     @property
     def declared(self) -> WinchProfile:
         """The profile of a winch or an axis. Raises FileError with its faults."""
-        from winchkit.schema.profiles.axis import AxisProfile
-        from winchkit.schema.read import read_any, read_profile
+        from winchkit.schema.read import read_winch_or_axis
 
-        value = read_any(self.source)
-        return value if isinstance(value, AxisProfile) else read_profile(self.source)
+        return read_winch_or_axis(self.source)
 
     @property
     def catalogue(self) -> Catalogue:

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import click
 
+from winchkit.catalog import find
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.completion import complete_bench, complete_sim_bench
+from winchkit.cli.core.early_checks import check_file
 from winchkit.cli.core.options import PROFILE, RUN
+from winchkit.cli.model.options import declared_profile
 from winchkit.errors import UsageError
 
 __all__ = ["command"]
@@ -70,6 +73,9 @@ def command(
         raise UsageError(f"--port {port}: choose 0 to 65535")
     if not Path(folder).is_dir():
         raise UsageError(f"--folder {folder}: is no folder")
+    if mystery is not None and (runs or profile):
+        raise UsageError("--mystery: opens runs and a profile of its own; leave RUN and -p out")
+    _check_files(runs, profile, bench, simulated)
     from winchkit.web.server import serve
 
     serve(
@@ -84,6 +90,25 @@ def command(
         mystery=mystery,
         ready=lambda url: _ready(url, browser=not no_browser),
     )
+
+
+def _check_files(
+    runs: Sequence[str], profile: str | None, bench: str | None, simulated: str | None
+) -> None:
+    """Raise FileError for a file that was named and is none, before the page loads its packages.
+
+    What a run file contains is the page's subject: it names its faults, and opens the others.
+    """
+    from winchkit.schema.read import read_bench, read_simbench
+
+    for run in runs:
+        check_file(run)
+    if profile is not None:
+        declared_profile(find("profiles", profile))
+    if bench is not None:
+        read_bench(bench)
+    if simulated is not None:
+        read_simbench(find("sim", simulated))
 
 
 def _ready(url: str, *, browser: bool) -> None:

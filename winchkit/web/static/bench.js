@@ -3,14 +3,13 @@ import { alarm, ask, attempt, el, fill, icon, number, say, socket, svg } from ".
 import { cycles } from "./cycle.js";
 import { frames } from "./frames.js";
 import { objects } from "./objects.js";
-import { legend } from "./plots.js";
 import { choose, progress, refused } from "./programme.js";
 import { live } from "./robot.js";
 import * as strips from "./strips.js";
-import { consequences, trip } from "./trip.js";
+import { consequences, together, trip } from "./trip.js";
 import { card, picture as drawn, words as said } from "./winch.js";
 
-const PERIOD = 50, MOVING = new Set(["moving", "running down"]);
+const PERIOD = 50, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
 let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, cardsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null;
 
 // A request that fails is repeated: without it there is no Stop.
@@ -36,7 +35,7 @@ export function enter(main) {
   if (!declared) { fill(root, el("div", { class: "drop" }, el("h1", {}, "No bench"), el("p", { class: "note" }, "Start with winchkit serve --bench BENCH.toml, or --sim NAME; with --allow-motion the page may move it."))); return; }
   build();
 }
-export function leave() { release(); root = null; }
+export function leave() { release(); root = null; if (declared) fill(document.getElementById("stopbar"), stopButton()); }
 const plain = (text) => { try { return decodeURIComponent(text); } catch { return text; } };
 export function restore(parts) {
   if (!declared) { wanted = parts; return; }
@@ -49,7 +48,7 @@ export function update() {}
 
 function receive(message) {
   if (message.predicted) Object.assign(predictions, message.predicted);
-  if (message.robot !== undefined) live(message.robot, declared.robot);
+  if (message.robot !== undefined) live(message.robot, declared.robot && platform);
   const before = picture;
   if (!before) send("show", { winch });
   picture = message;
@@ -105,7 +104,7 @@ const stopButton = () => el("button", { class: "stop", onclick: stop, "aria-keys
 
 function header() {
   const box = document.getElementById("station");
-  if (!box.firstChild) box.append(el("span", { id: "where" }), el("span", { id: "role" }), stopButton());
+  if (!box.firstChild) { box.append(el("span", { id: "where" }), el("span", { id: "role" }), stopButton()); if (!root) fill(document.getElementById("stopbar"), stopButton()); }
   const state = now();
   box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${number(state.cable_length)} m` : ""}`;
   const role = box.querySelector("#role"), kind = commands() ? "command" : "watch";
@@ -131,7 +130,7 @@ function banner() {
   if (!text) { fill(box); return; }
   const margin = { margin: "12px 24px 0" };
   if (lost) fill(box, el("div", { class: "alert", style: margin }, el("div", {}, lost)));
-  else fill(box, el("div", { class: "alert trip", style: margin }, el("b", { class: "row" }, icon("trip"), "Tripped"), el("div", {}, trips.map((words) => el("p", {}, el("b", {}, words))), el("p", { class: "note" }, lastTrip ? consequences(lastTrip) : "Everything stopped. After the reset nothing moves before a new command."), lastTrip && !root ? el("a", { href: "#bench" }, "Show the last two seconds") : null), el("button", { onclick: () => { if (confirm("Clear the trips and drive faults? Nothing moves before a new command.")) send("reset"); }, disabled: !commands() }, "Reset ", el("kbd", {}, "R"))));
+  else fill(box, el("div", { class: "alert trip", style: margin }, el("b", { class: "row title" }, icon("trip"), "Tripped"), el("div", {}, together(trips).map((words) => el("p", {}, el("b", { class: "title" }, words))), lastTrip ? consequences(lastTrip) : el("p", {}, "Everything stopped. After the reset nothing moves before a new command."), lastTrip && !root ? el("a", { href: "#bench" }, "Show the last two seconds") : null), el("button", { onclick: () => { if (confirm("Clear the trips and drive faults? Nothing moves before a new command.")) send("reset"); }, disabled: !commands() }, "Reset ", el("kbd", {}, "R"))));
 }
 
 function build() {
@@ -139,7 +138,7 @@ function build() {
   const speeds = [0.02, 0.05, 0.15, 0.3].filter((v) => v <= limits.speed);
   if (!speeds.includes(speed)) speed = speeds[0] || limits.speed;
   const jogButton = (sign) => {
-    const button = el("button", { class: "jog", data: { sign } }, el("span", {}, sign > 0 ? "↑ Wind in" : "↓ Pay out"), el("small", {}, "hold to move"));
+    const button = el("button", { class: "jog", data: { sign } }, el("span", {}, sign > 0 ? "↑ Wind in" : "↓ Pay out"), el("span", {}, el("small", {}, "hold to move"), " ", el("kbd", {}, sign > 0 ? "↑" : "↓")));
     button.addEventListener("pointerdown", (event) => { if (event.button === 0 && event.isPrimary) { button.setPointerCapture(event.pointerId); hold(sign); } else release(); });
     for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) button.addEventListener(kind, release);
     button.addEventListener("pointermove", (event) => { const r = button.getBoundingClientRect(); if (held && (event.clientX < r.left || event.clientX > r.right || event.clientY < r.top || event.clientY > r.bottom)) release(); });
@@ -156,7 +155,7 @@ function build() {
       el("span", { class: "row end" }, el("span", { id: "recording", class: "note" }), el("span", { id: "says", class: "note" }),
         declared.allow_motion ? [file, el("button", { id: "record", onclick: () => (picture && picture.recording ? send("end_record") : send("record", { file: file.value })) }, "Record"), el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command")] : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),
     el("div", { id: "programme" }),
-    el("div", { class: "bench-grid" },
+    el("div", { class: `bench-grid${names.length > 1 ? " several" : ""}` },
       el("div", { class: "column" }, el("section", { class: "panel", "aria-label": `Winch ${winch}` }, el("header", {}, el("h2", {}, `Winch ${winch}`), el("span", { class: "note" }, `profile ${declared.winch[winch].profile}${declared.winch[winch].effects.length ? ` + ${declared.winch[winch].effects.length} effect${declared.winch[winch].effects.length === 1 ? "" : "s"}` : ""}`)), el("div", { id: "drawing" })),
         names.length > 1 ? el("section", { class: "panel", "aria-label": "All winches" }, el("div", { id: "cards" })) : null),
       el("div", { class: "column" },
@@ -165,11 +164,11 @@ function build() {
     el("section", { class: "panel controls", style: { marginTop: "16px" }, "aria-label": "Controls" },
       el("fieldset", { class: "jogs" }, el("legend", {}, "Jog"), el("div", { class: "row" }, jogButton(1), jogButton(-1))),
       el("fieldset", {}, el("legend", {}, "Jog speed, m/s"), el("div", { class: "segments", id: "speeds" }, speeds.map((v) => el("button", { "aria-pressed": String(v === speed), onclick: () => { speed = v; build(); } }, String(v))))),
-      el("fieldset", {}, el("legend", {}, "Inch, mm (+ winds in)"), el("div", { class: "segments" }, [-10, -1, 1, 10].map(step))),
-      el("fieldset", {}, el("legend", {}, "Move to, m"), el("div", { class: "row" }, target, el("button", { onclick: () => { send("move", { winch, to: Number(target.value.replace(",", ".")), speed }); watchMotion(); } }, "Move"))),
-      el("fieldset", {}, el("legend", {}, "Load cell"), el("button", { onclick: () => send("tare", { winch }) }, "Tare ", el("kbd", {}, "T"))),
-      el("fieldset", {}, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused(commands(), tripped().length > 0)) choose((name, folder) => send("run_programme", { name, folder })); } }, "Run…"))),
-    el("div", { class: "stopbar" }, jogButton(1), stopButton(), jogButton(-1)));
+      el("fieldset", { class: "orders" }, el("legend", {}, "Inch, mm (+ winds in)"), el("div", { class: "segments" }, [-10, -1, 1, 10].map(step))),
+      el("fieldset", { class: "orders" }, el("legend", {}, "Move to, m"), el("div", { class: "row" }, target, el("button", { onclick: () => { send("move", { winch, to: Number(target.value.replace(",", ".")), speed }); watchMotion(); } }, "Move"))),
+      el("fieldset", { class: "orders" }, el("legend", {}, "Load cell"), el("button", { onclick: () => send("tare", { winch }) }, "Tare ", el("kbd", {}, "T"))),
+      el("fieldset", { class: "orders" }, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused(commands(), tripped().length > 0)) choose((name, folder) => send("run_programme", { name, folder })); } }, "Run…"))));
+  fill(document.getElementById("stopbar"), jogButton(1), jogButton(-1), stopButton());
   if (tab === "Charts") strips.strips(document.getElementById("strips"), () => ({ rows: [...(history[winch] || [])], predicted: predictions[winch] }), { winch, limits, bench: declared.name, profile: declared.winch[winch].profile });
   if (tab === "Trip") trip(document.getElementById("trip"), lastTrip, winch, declared);
   if (tab === "Bus frames") frames(document.getElementById("frames"));
@@ -185,8 +184,8 @@ function panel() {
   if (tab === "Bus frames") return own("frames", "Frames of the CAN buses");
   if (tab === "Drive objects") return own("objects", `Objects of the drive of winch ${winch}`);
   if (tab === "Cycle time") return own("cycles", "Time between cycles of the control");
-  return el("section", { class: "panel", "aria-label": "Last 60 s" }, el("header", {}, el("h2", {}, "Last 60 s"), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise ±1σ", true]),
-    el("span", { class: "note" }, el("button", { id: "pause", onclick: (event) => strips.pause(event.currentTarget) }, strips.isPaused() ? "Go on " : "Pause ", el("kbd", {}, "P")))), el("div", { id: "strips" }));
+  return el("section", { class: "panel", "aria-label": "Last 60 s" }, el("header", {}, el("h2", {}, "Last 60 s"), el("span", { class: "row more" }, ),
+    el("span", {}, el("button", { id: "pause", onclick: (event) => strips.pause(event.currentTarget) }, strips.isPaused() ? "Go on " : "Pause ", el("kbd", {}, "P")))), el("div", { id: "strips" }));
 }
 
 const tabs = () => [...(lastTrip ? ["Trip"] : []), "Charts", "Bus frames", "Drive objects", "Cycle time"];
@@ -199,6 +198,13 @@ function hold(sign) {
   timer = setInterval(beat, PERIOD);
   mark();
 }
+
+// What the Robot view may order of a robot's bench.
+const platform = {
+  allowed: () => declared.allow_motion, commands, tripped: () => tripped().length > 0,
+  command: () => send(commands() ? "leave" : "command"), taken: () => Boolean(picture && picture.commander && !commands()),
+  step: (axis, change, speed) => { if (refused(commands(), tripped().length > 0)) return; send("move_pose", { axis, change, speed }); watchMotion("all"); },
+};
 
 function beat() { if (held && picture) send("jog", { winch, speed: held * speed, seen: picture.status.time }); }
 
@@ -215,13 +221,14 @@ document.addEventListener("visibilitychange", () => { if (document.hidden) relea
 addEventListener("touchstart", (event) => { if (event.touches.length > 1) release(); }, { passive: true });
 
 // Signs of life of a move: while something moves that this page ordered.
-function watchMotion() {
+function watchMotion(moved = winch) {
   clearInterval(alive);
   const until = Date.now() + 600;
   alive = setInterval(() => {
     const state = now();
-    if (!state || (Date.now() > until && state.phase === "disabled")) { clearInterval(alive); return; }
-    if (!document.hidden) send("alive", { winch });
+    const all = moved === "all" && picture ? Object.values(picture.status.winch) : [state];
+    if (!state || (Date.now() > until && all.every((one) => one.phase === "disabled"))) { clearInterval(alive); return; }
+    if (!document.hidden) send("alive", { winch: moved });
   }, 100);
 }
 
@@ -244,14 +251,23 @@ function mark() {
     const own = held === Number(button.dataset.sign), moving = state && MOVING.has(state.phase) && Math.abs(state.cable_speed) > 0.0005;
     button.className = `jog ${own ? (moving ? "held" : "pressed") : !held && state && state.phase === "running down" ? "ramping" : ""}`;
     button.disabled = !commands() || tripped().length > 0;
+    button.querySelector("kbd").hidden = button.disabled;
     button.querySelector("small").textContent = own ? (moving ? "held: moving" : "pressed") : button.disabled ? (tripped().length ? "tripped" : "watching") : "hold to move";
   }
+}
+
+// Orders without effect are off while the page watches, and after a trip until the reset.
+function offer() {
+  const off = !commands() || tripped().length > 0;
+  for (const node of document.querySelectorAll(".controls .orders button, .controls .orders input")) node.disabled = off;
+  const target = document.querySelector(".orders input"), state = now();
+  if (target && state && target.value === "" && document.activeElement !== target && state.cable_length !== null) target.value = state.cable_length.toFixed(3);
 }
 
 function gauge(value, low, high, limits, unit) {
   const span = high - low || 1, x = (v) => Math.max(0, Math.min(100, ((v - low) / span) * 100));
   const parts = [svg("rect", { x: 0, y: 4, width: "100%", height: 8, fill: "var(--band)" })];
-  const zone = (a, b) => parts.push(svg("rect", { x: `${x(a)}%`, y: 4, width: `${Math.max(0, x(b) - x(a))}%`, height: 8, fill: "var(--stop)", opacity: 0.35 }));
+  const zone = (a, b) => parts.push(svg("rect", { x: `${x(a)}%`, y: 4, width: `${Math.max(0, x(b) - x(a))}%`, height: 8, fill: "url(#hatch)" }));
   if (limits[0] !== null) { zone(low, limits[0]); parts.push(svg("text", { x: `${x(limits[0])}%`, y: 28, "font-size": 12, fill: "var(--ink2)" }, number(limits[0], 3))); }
   if (limits[1] !== null) { zone(limits[1], high); parts.push(svg("text", { x: `${x(limits[1])}%`, y: 28, "font-size": 12, "text-anchor": "end", fill: "var(--ink2)" }, number(limits[1], 3))); }
   if (value !== null) parts.push(svg("rect", { x: `calc(${x(value)}% - 1.5px)`, y: 0, width: 3, height: 16, fill: "var(--ink)" }));
@@ -263,22 +279,26 @@ function refresh() {
   if (!values) return;
   const own = declared.winch[winch].limits, at = performance.now();
   mark();
+  offer();
   const take = document.getElementById("take");
   if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
   document.getElementById("says").textContent = picture && picture.commander && !commands() ? `${picture.commander} commands` : "";
   progress(document.getElementById("programme"), picture && picture.programme, send);
   const log = picture && picture.recording;
   document.getElementById("recording").textContent = log ? `● Recording ${log.file} · ${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "";
-  const record = document.getElementById("record");
+  const record = document.getElementById("record"), mine = commands() || Boolean(log);
+  const named = document.querySelector(".context input.file");
+  if (record) { record.hidden = !mine; named.hidden = !mine || Boolean(log); }
   if (record) { record.textContent = log ? "End" : "Record"; record.disabled = !commands(); }
-  if (!state || at - drawnAt < 90) return;
+  if (!state) { fill(values, el("p", { class: "note" }, "No values of the bench yet.")); return; }
+  if (at - drawnAt < 90) return;
   drawnAt = at;
   const cell = (name, value, digits, unit, low, high, limits) => el("div", {}, el("span", { class: "note" }, name), el("div", { class: "value" }, value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, unit)), gauge(value, low, high, limits, unit));
   const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, winding = state.cable_speed === null ? null : -state.cable_speed;
   const kind = tripped().length ? "tripped" : MOVING.has(state.phase) ? "moving" : state.phase === "stopping" ? "stopping" : "";
   fill(values, cell("Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell("Tension", state.tension, 1, "N", 0, top * 1.05, tension),
     cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
-    el("div", {}, el("span", { class: "note" }, "State"), el("div", { class: `state ${kind}` }, words(state)), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
+    el("div", {}, el("span", { class: "note" }, "State"), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
   fill(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));
   const host = document.getElementById("cycles");
   if (host && picture.status.cycle_time) cycles(host, picture.status.cycle_time, picture.status.overruns);

@@ -17,13 +17,20 @@ function powers(low, high) {
 }
 const power = (tick) => tick >= 0.01 && tick <= 1000 ? number(tick) : `10${String(Math.round(Math.log10(tick))).replace(/./g, (c) => ({ "-": "⁻" })[c] || "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])}`;
 
-function axes(xLabel, logarithmic, flat) {
+// Ticks with the decimals of their step; steps below 0.001 as powers of ten, which stay short.
+function steps(ticks) {
+  const known = ticks.filter((tick) => tick !== null), step = known.length > 1 ? Math.abs(known[1] - known[0]) : 1, exponent = Math.floor(Math.log10(step) + 1e-9);
+  const least = exponent < -3 && Math.max(...known.map(Math.abs)) < 0.01, of = (tick) => (least && tick ? `${number(tick / 10 ** exponent, 3)}·${power(10 ** exponent)}` : String(Number(tick.toFixed(Math.max(0, -exponent)))).replace("-", "−"));
+  return ticks.map((tick) => (tick === null ? "" : of(tick)));
+}
+
+function axes(xLabel, logarithmic, flat, left) {
   const ink = () => colour("muted");
   return [
     { stroke: ink, font: FONT, size: 26, space: flat ? 44 : 64, grid: { show: false }, ticks: { stroke: () => colour("line"), size: 4 }, gap: 4,
       ...(logarithmic ? { splits: (u, axis, low, high) => powers(low, high), filter: (u, ticks) => ticks } : {}), values: (u, ticks) => label(ticks, xLabel, logarithmic ? power : number) },
-    { stroke: ink, font: FONT, size: (u, ticks) => Math.max(flat ? 34 : 44, 12 + 7 * Math.max(0, ...(ticks || []).map((text) => text.length))), space: flat ? 18 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
-      values: (u, ticks) => ticks.map((tick) => tick === null ? "" : number(tick)) },
+    { stroke: ink, font: FONT, size: left || ((u, ticks) => Math.max(flat ? 34 : 44, 14 + 7.5 * Math.max(0, ...(ticks || []).map((text) => text.length)))), space: flat ? 13 : 34, grid: { stroke: () => colour("line"), width: 1 }, ticks: { show: false }, gap: 6,
+      values: (u, ticks) => steps(ticks) },
   ];
 }
 
@@ -98,7 +105,7 @@ export function dots(tone, alpha, size = 3) {
 }
 
 // One plot; `more` are options of uPlot that replace these.
-export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, bare = false, label }) {
+export function plot(host, data, series, { height, xLabel = "", noise = null, runs = [], traces = [], top = 8, select = null, zoom = null, sync = null, range = null, xRange = null, logarithmic = false, bare = false, left = 0, label }) {
   const drag = { x: Boolean(select || zoom), y: false, setScale: false };
   const flat = height < 130;
   const chosen = (u) => {
@@ -110,7 +117,7 @@ export function plot(host, data, series, { height, xLabel = "", noise = null, ru
     width: Math.max(120, host.clientWidth), height, legend: { show: false }, padding: [top, 10, bare ? 8 : 0, 0],
     cursor: { drag, points: { show: false }, ...(sync ? { sync: { key: sync } } : {}), y: false },
     scales: { x: { time: false, ...(xRange ? { range: () => xRange } : {}), ...(logarithmic ? { distr: 3 } : {}) }, y: range ? { range } : {} },
-    axes: axes(xLabel, logarithmic, flat).map((axis, i) => (bare && i === 0 ? { ...axis, show: false } : axis)), series: [{}, ...series],
+    axes: axes(xLabel, logarithmic, flat, left).map((axis, i) => (bare && i === 0 ? { ...axis, show: false } : axis)), series: [{}, ...series],
     hooks: {
       drawClear: [band(noise)], draw: [marks(runs), traced(traces)],
       setSelect: [(u) => chosen(u)],

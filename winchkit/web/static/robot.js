@@ -2,7 +2,7 @@
 import { alarm, ask, attempt, dialog, download, el, fill, icon, number, order, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
 
-let root = null, view = null, now = null, newest = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
+let bench = null, drawnAt = 0, root = null, view = null, now = null, newest = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
 
 export function enter(main, state) { root = main; signature = null; update(state); }
 export function leave() { root = null; }
@@ -43,11 +43,13 @@ async function read() {
 }
 
 // The platform of the bench as its motor angles have it: drawn while it is chosen and nothing else is.
-export function live(found, profile) {
+export function live(found, station) {
   const first = !now;
-  now = found && profile ? found : null;
+  bench = station;
+  now = found && station ? found : null;
   if (!root || !view || !picture) return;
-  if (first && now && shown.row === 0 && !view.poses) { shown.row = "live"; picture = now; drawPicture(); return; }
+  if (first && now && shown.row === 0 && !view.poses) { shown.row = "live"; picture = now; render(newest); return; }
+  drawPlatform();
   if (shown.row !== "live") return;
   picture = now || picture;
   const old = root.querySelector("#picture > svg"), head = root.querySelector("#picture h2");
@@ -102,11 +104,12 @@ export { drop };
 function render(state) {
   const found = view.calibration;
   fill(root, context(state), state.busy ? el("div", { class: "row", style: { paddingBottom: "12px" } }, el("progress", { "aria-label": "Progress" }), el("span", { class: "label" }, state.busy.what)) : null,
-    faults(state), found ? head(found) : el("h1", { style: { padding: "4px 0 16px" } }, view.poses ? `${view.poses} poses` : "No poses yet: drop a recording of the robot's poses"),
+    faults(state), found ? head(found) : el("div", { class: "verdict" }, el("h1", {}, view.poses ? `${view.poses} poses` : now ? "Platform and cables now" : "No poses yet"), view.poses ? null : el("p", {}, "Drop a recording of poses to calibrate the robot.")),
     el("div", { class: "grid" },
       el("section", { class: "panel w7", id: "picture", "aria-label": "Cables and platform" }),
-      el("div", { class: "w5 stack" }, found ? [error(found), el("section", { class: "panel", id: "details", "aria-label": "Errors of poses and cables" }), warnings(found)] : null, proposals())));
+      el("div", { class: "w5 stack" }, found ? [error(found), el("section", { class: "panel", id: "details", "aria-label": "Errors of poses and cables" }), warnings(found)] : null, platform(), proposals())));
   drawPicture();
+  drawnAt = 0; drawPlatform();
   if (found) drawDetails(found);
 }
 
@@ -199,6 +202,30 @@ function proposals() {
   if (!view.proposed.length) return null;
   return el("section", { class: "panel", "aria-label": "Poses to measure next" }, el("h2", {}, "Measure next"), el("table", {}, el("thead", {}, el("tr", {}, ["x", "y", "z", "roll", "pitch", "yaw"].map((t, i) => el("th", { class: "number" }, `${t} ${i < 3 ? "mm" : "°"}`)))),
     el("tbody", {}, view.proposed.map((p) => el("tr", {}, [...p.position.map((v) => number(v * 1e3, 4)), ...p.angles.map((v) => number((v * 180) / Math.PI, 3))].map((t) => el("td", { class: "number" }, t)))))));
+}
+
+const AXES = ["x", "y", "z"], CHANGES = [-50, -10, -1, 1, 10, 50], SPEED = 0.05;
+
+// The platform of the bench: where it is, the force of each cable, and steps along an axis.
+function platform() {
+  if (!now || !bench) return null;
+  const step = (axis, mm) => el("button", { onclick: () => bench.step(axis, mm / 1000, SPEED), "aria-label": `${axis} ${mm > 0 ? "+" : "−"}${Math.abs(mm)} mm` }, `${mm > 0 ? "+" : "−"}${Math.abs(mm)}`);
+  return el("section", { class: "panel", id: "platform", "aria-label": "Platform" }, el("header", {}, el("h2", {}, "Platform"), bench.allowed() ? el("span", { class: "note" }, el("button", { id: "take", onclick: () => bench.command() }, "Request command")) : el("span", { class: "note" }, "watching: start with --allow-motion to move")),
+    el("div", { class: "live three", id: "position" }), el("h2", {}, "Force of each cable"), el("div", { id: "forces" }),
+    el("fieldset", { class: "steps" }, el("legend", { class: "note" }, `Step the platform, mm, at ${number(SPEED)} m/s`), AXES.map((axis) => el("div", { class: "row" }, el("b", {}, axis), el("span", { class: "segments" }, CHANGES.map((mm) => step(axis, mm)))))));
+}
+
+function drawPlatform() {
+  const box = root && root.querySelector("#platform"), at = performance.now();
+  if (!box || !now || at - drawnAt < 240) return;
+  drawnAt = at;
+  const off = !bench.commands() || bench.tripped(), take = box.querySelector("#take");
+  if (take) { take.textContent = bench.commands() ? "Release command" : "Request command"; take.disabled = bench.taken(); }
+  for (const button of box.querySelectorAll(".steps button")) button.disabled = off;
+  fill(box.querySelector("#position"), AXES.map((axis, i) => el("div", {}, el("span", { class: "note" }, axis), el("div", { class: "value" }, (now.position[i] * 1e3).toFixed(1).replace("-", "−"), el("small", {}, "mm")))));
+  const most = Math.max(shown.limits[1] * 1.1, ...now.tension.map((v) => v ?? 0)), share = (v) => `${Math.max(0, Math.min(100, (v / most) * 100))}%`;
+  fill(box.querySelector("#forces"), view.lines.map((name, i) => el("div", { class: "force" }, el("span", {}, name), svg("svg", { width: "100%", height: 12, "aria-hidden": "true" }, svg("rect", { y: 2, width: "100%", height: 8, fill: "var(--band)" }), svg("rect", { y: 2, width: share(shown.limits[0]), height: 8, fill: "url(#hatch)" }), svg("rect", { x: share(shown.limits[1]), y: 2, width: `${100 - parseFloat(share(shown.limits[1]))}%`, height: 8, fill: "url(#hatch)" }),
+    now.tension[i] === null ? null : svg("rect", { x: `calc(${share(now.tension[i])} - 1.5px)`, width: 3, height: 12, fill: "var(--ink)" })), el("b", {}, now.tension[i] === null ? "–" : `${now.tension[i].toFixed(1)} N`))));
 }
 
 const SIDES = { Iso: [0.38, 0.32], Top: [0, Math.PI / 2], Front: [0, 0], Side: [Math.PI / 2, 0] };

@@ -4,7 +4,7 @@ import { el, fill, number, sourceOf } from "./page.js";
 import { exporter } from "./figures.js";
 import { line, plot } from "./plots.js";
 
-const WHOLE = [-60, 0], DEFAULT = [["tension", "tension predicted"], ["tension residual"], ["cable length"], ["speed", "commanded speed"]];
+const LEFT = 58, WHOLE = [-60, 0], DEFAULT = [["tension", "tension predicted"], ["tension residual"], ["cable length"], ["speed", "commanded speed"]];
 const measured = (key, sign = 1) => ({ rows }) => rows.map((row) => (row[key] === null || row[key] === undefined ? null : sign * row[key]));
 const modelled = (output, part) => ({ rows, predicted }) => { const own = predicted && predicted[output], at = new Map(own ? predicted.time.map((t, i) => [t, own[part][i]]) : []); return rows.map((row) => at.get(row.time) ?? null); };
 const CHANNELS = {
@@ -41,8 +41,9 @@ export function pause(button) { paused = !paused; if (!paused) kept = null; butt
 // `read` gives the rows of the history and the predictions, now; `declared` names the winch.
 export function strips(box, read, { winch, limits, bench, profile }) {
   drawn = []; kept = null;
-  fill(box, chosen.map((names, index) => strip(names, index)), el("div", { class: "row more" }, el("select", { "aria-label": "Add a chart", onchange: (event) => { if (event.target.value) { chosen.push([event.target.value]); again(); } } }, el("option", { value: "" }, "Add a chart…"), Object.keys(CHANNELS).map((name) => el("option", {}, name))),
-    chosen.length ? exporter("strips", describe) : null));
+  fill(box, chosen.map((names, index) => strip(names, index)));
+  fill(box.parentElement.querySelector(".more"), el("select", { "aria-label": "Add a chart", onchange: (event) => { if (event.target.value) { chosen.push([event.target.value]); again(); } } }, el("option", { value: "" }, "Add a chart…"), Object.keys(CHANNELS).map((name) => el("option", {}, name))),
+    chosen.length ? exporter("strips", describe) : null);
   const hosts = [...box.querySelectorAll(".plot")];
   chosen.forEach((names, i) => draw(names, hosts[i], box.querySelectorAll(".last")[i], i === chosen.length - 1));
 
@@ -51,7 +52,7 @@ export function strips(box, read, { winch, limits, bench, profile }) {
   function strip(names, index) {
     const unit = CHANNELS[names[0]].unit, more = Object.keys(CHANNELS).filter((name) => CHANNELS[name].unit === unit && !names.includes(name));
     return el("div", { class: "strip" }, el("h3", {}, names.map((name) => el("span", { class: "channel" }, el("i", { style: { background: `var(--${CHANNELS[name].style[0]})` } }), name, el("button", { class: "plain", "aria-label": `Remove ${name}`, onclick: () => { chosen[index] = names.filter((other) => other !== name); chosen = chosen.filter((list) => list.length); again(); } }, "×"))),
-      el("span", { class: "note" }, unit), more.length ? el("select", { "aria-label": `Add a channel to ${names.join(", ")}`, onchange: (event) => { if (event.target.value) { names.push(event.target.value); again(); } } }, el("option", { value: "" }, "+"), more.map((name) => el("option", {}, name))) : null, el("span", { class: "note beyond" }), el("span", { class: "last" })), el("div", { class: "plot" }));
+      el("span", { class: "note" }, names.some((name) => CHANNELS[name].noise) ? `${unit}, dashed: noise ±1σ, strong: mean of 1 s` : unit), more.length ? el("select", { "aria-label": `Add a channel to ${names.join(", ")}`, onchange: (event) => { if (event.target.value) { names.push(event.target.value); again(); } } }, el("option", { value: "" }, "+"), more.map((name) => el("option", {}, name))) : null, el("span", { class: "note beyond" }), el("span", { class: "last" })), el("div", { class: "plot" }));
   }
 
   function draw(names, host, last, axis) {
@@ -63,7 +64,7 @@ export function strips(box, read, { winch, limits, bench, profile }) {
       if (residual) columns.push(now.rows.map(() => noise), now.rows.map(() => (noise === null ? null : -noise)));
       return [now.rows.map((row) => row.time - end), ...columns];
     };
-    const own = plot(host, data(), series, { height: axis ? 110 : 84, label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", bare: !axis, range: (u, low, high) => spread(low, high, CHANNELS[names[0]].least), zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
+    const own = plot(host, data(), series, { height: axis ? 96 : 72, left: LEFT, label: `${names.join(", ")} over the last 60 s`, xLabel: axis ? "s" : "", bare: !axis, range: (u, low, high) => spread(low, high, CHANNELS[names[0]].least), zoom: (low, high) => { span = low === null || high - low > 60 ? [...WHOLE] : [Math.max(-60, low), Math.min(0, high)]; refresh(true); } });
     const top = names[0] === "tension" ? limits.tension : names[0] === "speed" ? [-limits.speed, limits.speed] : names[0] === "cable length" ? limits.length || [] : [];
     const beyond = last.parentElement.querySelector(".beyond");
     drawn.push(() => {

@@ -23,7 +23,7 @@ export function picture(name, own, state, drum, tripped) {
   const scale = Math.min(72 / Math.max(rim, drum.radius || 0), ...own.pulleys.map((p) => 36 / p.radius)), r0 = own.drum_radius * scale, wound = Math.max(r0, (drum.radius || own.drum_radius) * scale);
   const most = limits[1] * 1.06, y = (length) => 60 + (Math.max(0, Math.min(most, length)) / most) * 350, at = y(state.cable_length || 0), centre = [100, 260];
   const places = own.pulleys.length > 1 ? [[150, 92], [252, 122]] : [[212, 92]], wheels = own.pulleys.slice(0, 2).map((p, i) => ({ at: places[i], r: p.radius * scale, wrap: p.wrap }));
-  const parts = [svg("defs", {}, svg("pattern", { id: "hatch", width: 6, height: 6, patternUnits: "userSpaceOnUse", patternTransform: "rotate(45)" }, svg("rect", { width: 2, height: 6, fill: "var(--stop)", opacity: 0.5 })))];
+  const narrow = matchMedia("(max-width: 699px)").matches, size = narrow ? 16 : 12, parts = [];
   const text = (x, top, content, more = {}) => svg("text", { x, y: top, fill: "var(--muted)", ...more }, content);
   for (const wheel of wheels) parts.push(svg("circle", { cx: wheel.at[0], cy: wheel.at[1], r: wheel.r, fill: "var(--sunk)", stroke: "var(--edge)" }), svg("circle", { cx: wheel.at[0], cy: wheel.at[1], r: 3.5, fill: "var(--ink2)" }),
     text(wheel.at[0] + (wheel === wheels.at(-1) && wheels.length > 1 ? 24 : 0), wheel.at[1] - wheel.r - 10, `wrap ${number((wheel.wrap * 180) / Math.PI, 3)}°`, { "text-anchor": "middle" }));
@@ -43,40 +43,40 @@ export function picture(name, own, state, drum, tripped) {
   const cut = last.at[1] + 22;
   parts.push(svg("path", { d: path, fill: "none", stroke: "var(--with)", "stroke-width": width, "data-tension": String(state.tension) }), svg("path", { d: `M${xLoad - 8} ${cut}l16 -5v7l-16 5z`, fill: "var(--surface)" }), svg("path", { d: `M${xLoad - 9} ${cut}l18 -6M${xLoad - 9} ${cut + 8}l18 -6`, stroke: "var(--ink2)", fill: "none" }));
   parts.push(svg("rect", { x: xLoad - 24, y: load, width: 48, height: 36, rx: 3, fill: "var(--ink2)" }), own.load_mass ? text(xLoad, load + 23, `${number(own.load_mass, 3)} kg`, { "text-anchor": "middle", fill: "var(--surface)", "font-weight": 600 }) : null,
-    state.tension !== null ? text(xLoad - 12, load - 12, `${state.tension.toFixed(1)} N`, { "text-anchor": "end", fill: "var(--with)", "font-weight": 600, "font-size": 14 }) : null);
+    state.tension !== null ? text(xLoad - 12, load - 12, `${state.tension.toFixed(1)} N`, { "text-anchor": "end", fill: "var(--with)", "font-weight": 600, "font-size": size + 2 }) : null);
   const run = arrow(state.cable_speed);
   if (run) parts.push(svg("path", { d: `M${xLoad - 40} ${load + 18 - run * 14}v${run * 28}m-5 ${-run * 6}l5 ${run * 6}l5 ${-run * 6}`, fill: "none", stroke: "var(--ink)", "stroke-width": 1.6 }));
   // The drum from the side: its turns beside each other, or the layers of one turn; the guide.
-  const under = cy + Math.max(rim * scale, wound) + 18;
-  parts.push(text(cx, under, `Drum ${name}`, { "text-anchor": "middle", "font-weight": 600, fill: "var(--ink)" }), text(cx, under + 16, drum.turns === null ? "turns not known" : `${drum.turns.toFixed(1)} turns wound${layers > 1 ? `, layer ${layers}` : ""}`, { "text-anchor": "middle", fill: "var(--ink2)" }),
-    text(cx, under + 32, `winding radius ${number((drum.radius || own.drum_radius) * 1000, 3)} mm`, { "text-anchor": "middle" }));
+  const under = cy + Math.max(rim * scale, wound) + 6 + size, row = size + 4;
+  parts.push(text(cx, under, `Drum ${name}`, { "text-anchor": "middle", "font-weight": 600, fill: "var(--ink)" }), text(cx, under + row, drum.turns === null ? "turns not known" : `${drum.turns.toFixed(1)} turns wound${layers > 1 ? `, layer ${layers}` : ""}`, { "text-anchor": "middle", fill: "var(--ink2)" }),
+    text(cx, under + 2 * row, `winding radius ${number((drum.radius || own.drum_radius) * 1000, 3)} mm`, { "text-anchor": "middle" }));
   if (own.drum.kind === "grooved" && drum.turns !== null) {
-    const whole = own.drum.turns || Math.max(1, Math.ceil(drum.turns * 1.2)), w = own.drum.width ? Math.min(180, own.drum.width * scale) : 120, x0 = cx - w / 2, top = under + 42;
+    const whole = own.drum.turns || Math.max(1, Math.ceil(drum.turns * 1.2)), w = own.drum.width ? Math.min(180, own.drum.width * scale) : 120, x0 = cx - w / 2, top = under + 2 * row + 10;
     parts.push(svg("rect", { x: x0, y: top, width: w, height: 14, fill: "var(--sunk)", stroke: "var(--edge)" }), svg("rect", { x: x0, y: top, width: w * Math.min(1, drum.turns / whole), height: 14, fill: "var(--with)", opacity: 0.75 }));
     for (let k = 1; k < Math.min(60, whole); k++) parts.push(svg("line", { x1: x0 + (w * k) / whole, x2: x0 + (w * k) / whole, y1: top, y2: top + 14, stroke: "var(--surface)" }));
     if (drum.guide !== null && own.drum.width) parts.push(svg("path", { d: `M${x0 + w * Math.max(0, Math.min(1, drum.guide / own.drum.width))} ${top - 1}l-5 -8h10z`, fill: "var(--ink)" }), text(x0 + w + 6, top + 11, "guide"));
-  } else if (own.guide) parts.push(text(cx, under + 48, `guide ${drum.guide === null ? "" : `at ${number(drum.guide * 1000, 3)} mm`}`, { "text-anchor": "middle" }));
+  } else if (own.guide) parts.push(text(cx, under + 3 * row, `guide ${drum.guide === null ? "" : `at ${number(drum.guide * 1000, 3)} mm`}`, { "text-anchor": "middle" }));
   // The axis of the length.
   const gx = 352;
   parts.push(svg("rect", { x: gx, y: y(0), width: 12, height: y(most) - y(0), fill: "var(--band)" }), svg("rect", { x: gx, y: y(0), width: 12, height: y(limits[0]) - y(0), fill: "url(#hatch)" }), svg("rect", { x: gx, y: y(limits[1]), width: 12, height: y(most) - y(limits[1]), fill: "url(#hatch)" }));
   const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50].find((s) => most / s <= 7) || 100;
-  for (let k = 0; k * step <= most; k++) parts.push(svg("line", { x1: gx + 12, x2: gx + 17, y1: y(k * step), y2: y(k * step), stroke: "var(--edge)" }), text(gx + 21, y(k * step) + 4, k ? number(k * step) : "0 m"));
-  for (const limit of limits) parts.push(text(gx + 48, y(limit) + 4, `limit ${number(limit, 3)}`, { fill: "var(--ink2)" }));
+  for (let k = 0; k * step <= most; k++) parts.push(svg("line", { x1: gx + 12, x2: gx + 17, y1: y(k * step), y2: y(k * step), stroke: "var(--edge)" }), limits.every((limit) => Math.abs(y(limit) - y(k * step)) > size + 2) ? text(gx + 21, y(k * step) + 4, k ? number(k * step) : "0 m") : null);
+  for (const limit of limits) parts.push(text(narrow ? 458 : gx + 48, y(limit) + 4, `limit ${number(limit, 3)}`, { fill: "var(--ink2)", "text-anchor": narrow ? "end" : "start" }));
   parts.push(svg("path", { d: `M${gx - 12} ${at - 6}l9 6l-9 6z`, fill: "var(--ink)" }), svg("line", { x1: gx - 3, x2: gx + 14, y1: at, y2: at, stroke: "var(--ink)", "stroke-width": 2 }));
-  parts.push(svg("path", { d: `M20 450v-5m0 2.5h${0.1 * scale}m0 -2.5v5`, stroke: "var(--ink2)", fill: "none" }), text(28 + 0.1 * scale, 452, "100 mm, drum and pulleys; distances schematic"));
-  return svg("svg", { viewBox: "0 0 460 460", width: "100%", "font-size": 12, role: "img", "aria-label": `Winch ${name}: ${words(state, tripped)}, ${number(state.cable_length)} m, ${state.tension === null ? "no tension" : `${number(state.tension, 4)} N`}` }, parts.filter(Boolean));
+  parts.push(svg("path", { d: `M20 450v-5m0 2.5h${0.1 * scale}m0 -2.5v5`, stroke: "var(--ink2)", fill: "none" }), text(28 + 0.1 * scale, 452, narrow ? "100 mm at drum and pulleys" : "100 mm, drum and pulleys; distances schematic"));
+  return svg("svg", { viewBox: "0 0 460 460", width: "100%", "font-size": size, role: "img", "aria-label": `Winch ${name}: ${words(state, tripped)}, ${number(state.cable_length)} m, ${state.tension === null ? "no tension" : `${number(state.tension, 4)} N`}` }, parts.filter(Boolean));
 }
 
 // A card of one winch among several: a small picture, state and values; a click enlarges it.
 export function card(name, own, state, drum, tripped, chosen, choose) {
   const limits = own.limits.length || [0, 5], most = limits[1] * 1.06, x = (v, top) => `${Math.max(0, Math.min(100, (v / top) * 100))}%`, high = own.limits.tension[1] || 500;
   const bar = (value, top, [low, up], unit, digits) => el("span", { class: "bar" }, svg("svg", { width: "100%", height: 10, "aria-hidden": "true" }, svg("rect", { y: 3, width: "100%", height: 5, fill: "var(--band)" }),
-    low ? svg("rect", { y: 3, width: x(low, top), height: 5, fill: "var(--stop)", opacity: 0.35 }) : null, up ? svg("rect", { x: x(up, top), y: 3, width: `${100 - parseFloat(x(up, top))}%`, height: 5, fill: "var(--stop)", opacity: 0.35 }) : null,
+    low ? svg("rect", { y: 2, width: x(low, top), height: 7, fill: "url(#hatch)" }) : null, up ? svg("rect", { x: x(up, top), y: 2, width: `${100 - parseFloat(x(up, top))}%`, height: 7, fill: "url(#hatch)" }) : null,
     value === null ? null : svg("rect", { x: `calc(${x(value, top)} - 1px)`, width: 2, height: 10, fill: "var(--ink)" })), el("b", {}, value === null ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, ` ${unit}`)));
   const full = own.drum.turns || Math.max(1, drum.turns || 1), share = Math.max(0, Math.min(1, (drum.turns || 0) / full));
   return el("button", { class: `winch ${chosen ? "chosen" : ""}`, "aria-pressed": String(chosen), onclick: choose, "aria-label": `Winch ${name}: ${words(state, tripped)}` },
     svg("svg", { viewBox: "0 0 40 40", width: 40, height: 40, "aria-hidden": "true" }, svg("circle", { cx: 20, cy: 20, r: 18, fill: "var(--sunk)", stroke: "var(--edge)" }), svg("circle", { cx: 20, cy: 20, r: 10 + 7 * share, fill: "none", stroke: "var(--with)", "stroke-width": 2 }),
       svg("line", { x1: 20, y1: 20, x2: 20 + 10 * Math.cos((state.motor_angle || 0) / (own.ratio || 1)), y2: 20 - 10 * Math.sin((state.motor_angle || 0) / (own.ratio || 1)), stroke: "var(--ink2)", "stroke-width": 3 })),
-    el("span", { class: "name" }, el("b", {}, name), el("span", { class: tripped ? "state tripped" : arrow(state.cable_speed) ? "state moving" : "state" }, words(state, tripped)), el("small", {}, state.commander ? `${state.commander} commands` : "no commander")),
+    el("span", { class: "name" }, el("b", {}, name), el("span", { class: tripped ? "state tripped" : arrow(state.cable_speed) ? "state moving" : "state" }, words(state, tripped)), state.commander ? el("small", {}, `by ${state.commander}`) : null),
     el("span", { class: "bars" }, bar(state.cable_length, most, limits, "m", 3), bar(state.tension, high * 1.05, own.limits.tension, "N", 0), el("small", {}, `${state.cable_speed === null ? "–" : (-state.cable_speed).toFixed(3).replace("-", "−")} m/s`)));
 }
