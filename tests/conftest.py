@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from stalls import StallWatch
+from stalls import LATE_CYCLES, StallWatch
 
 # No test is judged by the clock: machines are shared and noisy.
 settings.register_profile("winchkit", deadline=None)
@@ -124,11 +124,18 @@ def pytest_runtest_makereport(
     watch = item.stash.get(_WATCH, None)
     if watch is None or not report.failed or call.excinfo is None:
         return report
+    path, line, _ = item.location
+    if (cycles := item.stash.get(LATE_CYCLES, None)) is not None:
+        if late := cycles():
+            words = f"{late} cycles of the control began three periods or more late"
+            report.outcome = "skipped"
+            said = f"Skipped: decides nothing: {words}, and then: {call.excinfo.exconly()[:500]}"
+            report.longrepr = (path, (line or 0) + 1, said)
+        return report
     watch.sample()
     stall = watch.largest
     if stall <= TOLERATED or "from pytest-timeout" in str(call.excinfo.value):
         return report
-    path, line, _ = item.location
     reason = (
         f"Skipped: decides nothing: this computer did not run the test's processes for "
         f"{stall:.3f} s (tolerated {TOLERATED:g} s), and then: {call.excinfo.exconly()[:500]}"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 __all__ = [
@@ -23,12 +25,21 @@ STARTS = 60.0
 class Served:
     """``winchkit serve`` in a process of its own."""
 
-    def __init__(self, *arguments: str) -> None:
+    def __init__(self, *arguments: str, folder: Path | None = None) -> None:
         command = [sys.executable, "-m", "winchkit", "serve", "--no-browser", *arguments]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=folder)
         assert self.process.stdout is not None
         self.url = self.process.stdout.readline().strip()
         assert self.url.startswith("http://127.0.0.1:"), self.url
+
+    def late_cycles(self) -> int:
+        """Cycles of the control that began three periods or more after the one before, so far."""
+        from websockets.sync.client import connect
+
+        server, token = self.url.removeprefix("http://").split("/?token=")
+        with connect(f"ws://{server}/live/bench?token={token}") as live:
+            status = json.loads(live.recv(STARTS))["status"]
+        return int(status["cycle_time"]["counts"][-1]) if "cycle_time" in status else 0
 
     def end(self) -> None:
         """End it like Ctrl-C does."""

@@ -13,11 +13,18 @@ from __future__ import annotations
 import os
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-__all__ = ["StallWatch", "waited"]
+import pytest
+
+__all__ = ["LATE_CYCLES", "StallWatch", "waited"]
+
+LATE_CYCLES = pytest.StashKey[Callable[[], int]]()
+"""Of a test of a page: late cycles of its bench's control. The threads of a browser wait for a
+processor at any time; only lateness of the bench decides whether a failure decides nothing."""
 
 _PERIOD = 0.02
 _SEARCH = 25

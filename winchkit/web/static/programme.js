@@ -2,7 +2,7 @@
 import { alarm, ask, attempt, dialog, el, fill, number, svg } from "./page.js";
 
 const HOLD = 800, SIGN = 100;
-let signs = null;
+let signs = null, asked = 0;
 
 // `start` orders it; the dialog leaves Stop free.
 export function choose(start) {
@@ -19,13 +19,16 @@ export function choose(start) {
     dialog("Programme", el("div", { class: "row", style: { marginBottom: "12px" } }, list, file, el("button", { onclick: () => file.click() }, "Choose a file…"), el("label", { class: "label" }, "Runs into ", folder)), shown);
     if (programmes.length) preview(programmes[0]); else fill(shown, el("p", {}, "There is no programme beside this page's work: choose a file."));
 
+    // Plans may be answered in another order than they were asked for; the last one counts.
     async function preview(name) {
+      const mine = ++asked;
       fill(shown, el("p", { class: "note" }, "Planning"));
       try {
         const plan = await ask(`/api/bench/programme?name=${encodeURIComponent(name)}`);
+        if (mine !== asked) return;
         fill(shown, el("p", {}, plan.description || plan.name), curves(plan), el("p", { class: "note" }, `${plan.repeats} repeat${plan.repeats === 1 ? "" : "s"} of ${number(plan.duration, 3)} s${plan.asks.length ? `, ${plan.asks.length} question${plan.asks.length === 1 ? "" : "s"}` : ""}; all within the limits. It ends where this page is hidden or closed.`),
           el("details", {}, el("summary", {}, `${plan.steps.length} step${plan.steps.length === 1 ? "" : "s"}`), el("ol", {}, plan.steps.map((words) => el("li", {}, words)))), held("Hold to start", () => { document.getElementById("dialog").close(); start(name, folder.value); }));
-      } catch (error) { fill(shown, el("p", {}, error.message)); }
+      } catch (error) { if (mine === asked) fill(shown, el("p", {}, error.message)); }
     }
   });
 }

@@ -1,0 +1,185 @@
+"""Programmes and platform steps that a page starts: how they begin, are followed, and end."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("starlette")
+pytest.importorskip("playwright.sync_api")
+
+from browsing import Served, opened, until
+from chromium import NEEDS_CHROMIUM, chromium
+from stalls import LATE_CYCLES
+
+pytestmark = [pytest.mark.slow, pytest.mark.realtime, NEEDS_CHROMIUM]
+
+MOVING = {"winding in", "paying out"}
+PROGRAMME = """\
+schema = 1
+kind = "programme"
+name = "stroke"
+
+[[step]]
+winch = "A"
+by = "{change}"
+speed = "{speed}"
+acceleration = "0.5 m/s^2"
+"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("work")
+    found = Served("--sim", "demo-adequate", "--allow-motion", folder=folder)
+    yield found
+    found.end()
+
+
+@pytest.fixture(scope="module")
+def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("work")
+    found = Served("--sim", "hanging-robot", "--allow-motion", folder=folder)
+    yield found
+    found.end()
+
+
+def judged(served: Served, request: pytest.FixtureRequest) -> Served:
+    before = served.late_cycles()
+    request.node.stash[LATE_CYCLES] = lambda: served.late_cycles() - before
+    return served
+
+
+@pytest.fixture
+def page(browser: Any, served: Served, request: pytest.FixtureRequest) -> Iterator[Any]:
+    """A page of the Bench view that commands a winch at rest."""
+    found, complaints = opened(browser, f"{judged(served, request).url}#bench")
+    until(found, lambda: found.locator("#values .value").count() == 3)
+    found.click("#take")
+    until(found, lambda: "You command" in found.inner_text("#role"))
+    yield found
+    assert complaints == []
+    found.context.close()
+
+
+def state(page: Any) -> str:
+    """State of the winch; its first letter is a capital, before it is an arrow."""
+    return str(page.inner_text("#values .state span")).lower()
+
+
+def number(text: str) -> float:
+    """Number before a unit."""
+    found = re.match(r"−?[\d.]+", text)
+    assert found, text
+    return float(found[0].replace("−", "-"))
+
+
+def length(page: Any) -> float:
+    return number(page.inner_text("#values .value >> nth=0"))
+
+
+def choose(page: Any, folder: Path, change: str, speed: str) -> None:
+    """Open the dialog of the programmes with a file of one move."""
+    path = folder / "stroke.toml"
+    path.write_text(PROGRAMME.format(change=change, speed=speed))
+    page.click("#programmes")
+    until(page, lambda: page.locator("#dialog .hold").count() == 1, 10.0)
+    page.set_input_files("#dialog input[type=file]", str(path))
+    until(page, lambda: page.locator("#dialog select").input_value() == "stroke.toml", 10.0)
+    until(page, lambda: "stroke" in page.inner_text("#preview"), 10.0)
+    until(page, lambda: page.locator("#dialog .hold").is_visible(), 10.0)
+
+
+def press(page: Any, seconds: float) -> None:
+    """Hold the button that starts the programme."""
+    page.locator("#dialog .hold").hover()
+    page.mouse.down()
+    page.wait_for_timeout(1000 * seconds)
+    page.mouse.up()
+
+
+def test_a_programme_starts_after_its_button_was_held_and_its_end_is_reported(
+    page: Any, tmp_path: Path
+) -> None:
+    choose(page, tmp_path, "-60 mm", "0.2 m/s")
+    before = length(page)
+    press(page, 1.0)
+    until(page, lambda: "stroke is done" in page.inner_text("#programme"), 15.0)
+    until(page, lambda: state(page) == "at rest", 5.0)
+    assert length(page) == pytest.approx(before - 0.06, abs=0.002)
+    assert not page.locator("#dialog").is_visible()
+    page.click("#programme button")
+
+
+@pytest.mark.parametrize("way", ["released", "left"])
+def test_a_button_that_is_not_held_long_enough_starts_nothing(
+    page: Any, tmp_path: Path, way: str
+) -> None:
+    choose(page, tmp_path, "-60 mm", "0.2 m/s")
+    before = length(page)
+    if way == "released":
+        press(page, 0.3)
+    else:
+        page.locator("#dialog .hold").hover()
+        page.mouse.down()
+        page.wait_for_timeout(200)
+        page.mouse.move(10, 300)
+    page.wait_for_timeout(1500)
+    page.mouse.up()
+    assert page.inner_text("#programme") == ""
+    assert length(page) == pytest.approx(before, abs=0.001)
+    assert state(page) == "at rest"
+
+
+@pytest.mark.parametrize("way", ["Space", "button", "End programme"])
+def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way: str) -> None:
+    choose(page, tmp_path, "0.3 m" if way == "button" else "-0.3 m", "0.1 m/s")
+    before = length(page)
+    press(page, 1.0)
+    until(page, lambda: state(page) in MOVING, 10.0)
+    if way == "Space":
+        page.keyboard.press("Space")
+    elif way == "button":
+        page.click("header .stop")
+    else:
+        page.click("text=End programme")
+    until(page, lambda: state(page) not in MOVING, 2.0)
+    until(page, lambda: "stroke ended early" in page.inner_text("#programme"), 5.0)
+    stopped = length(page)
+    page.wait_for_timeout(800)
+    assert length(page) == pytest.approx(stopped, abs=0.02), "the ramp at the most"
+    assert abs(length(page) - before) < 0.25
+    if page.locator("#trips .trip button").count():
+        page.once("dialog", lambda shown: shown.accept())
+        page.click("#trips .trip button")
+        until(page, lambda: page.locator("#trips .trip").count() == 0, 10.0)
+
+
+def test_a_step_of_the_platform_from_the_robot_view(
+    browser: Any, robot: Served, request: pytest.FixtureRequest
+) -> None:
+    page, complaints = opened(browser, f"{judged(robot, request).url}#robot")
+
+    def height() -> float:
+        return number(page.inner_text("#position .value >> nth=2"))
+
+    until(page, lambda: page.locator("#position .value").count() == 3)
+    assert page.locator("[aria-label='z +10 mm']").is_disabled(), "it only watches"
+    page.click("#take")
+    until(page, lambda: page.locator("[aria-label='z +10 mm']").is_enabled())
+    before = height()
+    page.click("[aria-label='z +10 mm']")
+    until(page, lambda: abs(height() - before - 10.0) < 1.0, 10.0)
+    assert page.inner_text("#banner") == ""
+    assert complaints == []
+    page.context.close()
