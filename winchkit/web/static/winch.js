@@ -74,7 +74,7 @@ export function card(name, own, state, drum, tripped, chosen, choose) {
     low ? svg("rect", { y: 2, width: x(low, top), height: 7, fill: "url(#hatch)" }) : null, up ? svg("rect", { x: x(up, top), y: 2, width: `${100 - parseFloat(x(up, top))}%`, height: 7, fill: "url(#hatch)" }) : null,
     value === null ? null : svg("rect", { x: `calc(${x(value, top)} - 1px)`, width: 2, height: 10, fill: "var(--ink)" })), el("b", {}, value === null ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, ` ${unit}`)));
   const full = own.drum.turns || Math.max(1, drum.turns || 1), share = Math.max(0, Math.min(1, (drum.turns || 0) / full));
-  return el("button", { class: `winch ${chosen ? "chosen" : ""}`, "aria-pressed": String(chosen), onclick: choose, "aria-label": `Winch ${name}: ${words(state, tripped)}` },
+  return el("button", { class: `winch ${chosen ? "chosen" : ""}`, "aria-pressed": String(chosen), onclick: choose },
     svg("svg", { viewBox: "0 0 40 40", width: 40, height: 40, "aria-hidden": "true" }, svg("circle", { cx: 20, cy: 20, r: 18, fill: "var(--sunk)", stroke: "var(--edge)" }), svg("circle", { cx: 20, cy: 20, r: 10 + 7 * share, fill: "none", stroke: "var(--with)", "stroke-width": 2 }),
       svg("line", { x1: 20, y1: 20, x2: 20 + 10 * Math.cos((state.motor_angle || 0) / (own.ratio || 1)), y2: 20 - 10 * Math.sin((state.motor_angle || 0) / (own.ratio || 1)), stroke: "var(--ink2)", "stroke-width": 3 })),
     el("span", { class: "name" }, el("b", {}, name), el("span", { class: tripped ? "state tripped" : arrow(state.cable_speed) ? "state moving" : "state" }, words(state, tripped)), state.commander ? el("small", {}, `by ${state.commander}`) : null),
