@@ -229,9 +229,9 @@ def key_press(page: Any, bench: Path, presses: int) -> dict[str, Any]:
     found, trips = [], 0
     for number in range(presses):
         page.wait_for_timeout(1500)
-        if page.locator("#banner .trip button").count():
+        if page.locator("#trips .trip button").count():
             trips += 1
-            page.click("#banner .trip button")
+            page.click("#trips .trip button")
             page.wait_for_timeout(2000)
         changes.clear()
         key = "ArrowDown" if number % 2 else "ArrowUp"
@@ -313,6 +313,7 @@ def figures(browser: Any, size: Size, folder: Path) -> dict[str, Any]:
                 out["visible_s"] = visible(browser, url)
                 out["brush"] = brushed(page)
                 out["add"] = added(page, process.pid)
+            out[name]["load"] = os.getloadavg()[0]
             page.close()
     for winches in (size.winches, 1):
         declared, bench = bench_of(winches, folder), folder / f"bench-{winches}.toml"
@@ -322,9 +323,10 @@ def figures(browser: Any, size: Size, folder: Path) -> dict[str, Any]:
             command("serve", "--no-browser", "-b", str(bench), "--allow-motion") as (process, url),
         ):
             page = browser.new_page(**new)
-            share = live(page, url, process.pid, size.seconds)
+            share = live(page, url, process.pid, size.seconds) | {"load": os.getloadavg()[0]}
             if winches == 1:
                 out["key_to_rpdo"] = key_press(page, bench, size.presses)
+                out["key_to_rpdo"]["load"] = os.getloadavg()[0]
             if winches == size.winches:
                 out["live"] = share
             page.close()
