@@ -96,6 +96,7 @@ def choose(page: Any, folder: Path, change: str, speed: str) -> None:
     until(page, lambda: page.locator("#dialog .hold").count() == 1, 10.0)
     page.set_input_files("#dialog input[type=file]", str(path))
     until(page, lambda: page.locator("#dialog select").input_value() == "stroke.toml", 10.0)
+    page.fill("[aria-label='Folder of the runs']", folder.name)
     until(page, lambda: "stroke" in page.inner_text("#preview"), 10.0)
     until(page, lambda: page.locator("#dialog .hold").is_visible(), 10.0)
 
