@@ -134,10 +134,11 @@ class InstrumentProcess:
         future: Future[Any] = Future()
         with self._lock:
             self._count += 1
-            number = self._count
-            self._waiting[number] = future
-        if self._ended is not None:
-            future.set_exception(self._ended)
+            number, ended = self._count, self._ended
+            if ended is None:
+                self._waiting[number] = future
+        if ended is not None:
+            future.set_exception(ended)
             return future
         content = (number, place, operation, *given)
         self._send(json_message(Kind.REQUEST, content))
