@@ -221,12 +221,16 @@ def test_a_coarse_cell_that_does_not_saturate(seed: int, step: float) -> None:
     assert not found(run_of(step * np.round(tension(seed) / step)), "saturated")
 
 
-@given(SEEDS, st.floats(1.5, 10.0), st.floats(0.3, 1.5))
+@given(SEEDS, st.floats(1.5, 10.0), st.floats(0.6, 1.5))
 @settings(max_examples=40, deadline=None)
 def test_a_channel_of_a_few_levels_is_quantised_and_nothing_else(
     seed: int, levels: float, ratio: float
 ) -> None:
-    """A resolution of many times the noise, and a slow signal of a few steps."""
+    """A resolution of up to 13 times the noise, and a slow signal of a few steps.
+
+    With less noise (1/16 of a step in 1 of 200 channels of 2.5 steps, 1/32 in 121) it changes the
+    level too rarely to tell such a channel from a commanded one of two or three levels.
+    """
     random = np.random.default_rng(seed)
     noise, step = ratio * 0.25, 2.0
     signal = 150 + step * levels / 2 * np.sin(np.arange(COUNT) / 100)
