@@ -228,8 +228,8 @@ def test_a_channel_of_a_few_levels_is_quantised_and_nothing_else(
 ) -> None:
     """A resolution of up to 13 times the noise, and a slow signal of a few steps.
 
-    With less noise (1/16 of a step in 1 of 200 channels of 2.5 steps, 1/32 in 121) it changes the
-    level too rarely to tell such a channel from a commanded one of two or three levels.
+    Less noise changes the level too rarely to distinguish such a channel from a commanded one of
+    two or three levels: of 200 channels of 2.5 steps 1 with noise of 1/20 of a step, 121 with 1/32.
     """
     random = np.random.default_rng(seed)
     noise, step = ratio * 0.25, 2.0
