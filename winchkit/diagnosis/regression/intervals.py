@@ -39,6 +39,7 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
 __all__ = [
+    "HALF_WIDTH",
     "BetweenParts",
     "Spread",
     "between_parts",
@@ -46,6 +47,7 @@ __all__ = [
     "estimates",
     "profile_ends",
     "spread_of",
+    "whitened_jacobian",
 ]
 
 _LINEAR = 0.15
@@ -144,7 +146,8 @@ class _Profile:
         )
 
 
-_95 = 1.959964
+HALF_WIDTH = 1.959964
+"""Standard deviations from a value to the end of its 95 % interval."""
 _MANY_PARTS = 3.0
 """Effective number of parts from which a variance between parts is estimated."""
 _NO_INFORMATION = 1e-9
@@ -170,6 +173,11 @@ class Spread:
     high: Array
 
 
+def whitened_jacobian(regression: Regression, fit: Fit, noise: Noise) -> Array:
+    """Jacobian of a fit, (n_rows, n_unknowns), over the standard deviations of the noise."""
+    return np.asarray(fit.jacobian * noise.inverse_sigma(regression)[:, None])
+
+
 def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
     """Standard deviations and 95 % intervals of every unknown.
 
@@ -185,7 +193,7 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
         Blocks of time for the jackknife.
     """
     inverse_sigma = noise.inverse_sigma(regression)
-    whitened = fit.jacobian * inverse_sigma[:, None]
+    whitened = whitened_jacobian(regression, fit, noise)
     normal = whitened.T @ whitened
     covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -203,15 +211,15 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
     ]
     between = sum((kind.variance for kind in kinds), np.zeros_like(own))
     variance = own + shift_by_discretization**2 + between
-    stretch = stdtrit(effective_dof(variance, kinds), 0.975) / _95
+    stretch = stdtrit(effective_dof(variance, kinds), 0.975) / HALF_WIDTH
     wider = np.divide(
         statistical, likelihood, out=np.ones_like(statistical), where=likelihood > 0.0
     )
-    low, high = profile_ends(regression, fit, inverse_sigma, covariance, _95 * wider)
+    low, high = profile_ends(regression, fit, inverse_sigma, covariance, HALF_WIDTH * wider)
     below, above = (
         np.where(unknown, _UNDETERMINED, way) for way in (fit.vector - low, high - fit.vector)
     )
-    systematic = _95 * np.sqrt(variance - own)
+    systematic = HALF_WIDTH * np.sqrt(variance - own)
     return Spread(
         np.sqrt(variance),
         fit.vector - stretch * np.hypot(below, systematic),
@@ -404,5 +412,5 @@ def _estimate(
     std = deviation.get(parameter.name, 0.0)
     if std >= parameter.high - parameter.low:
         return Estimate(value, float("nan"), parameter.unit)
-    low, high = ends or (value - _95 * std, value + _95 * std)
+    low, high = ends or (value - HALF_WIDTH * std, value + HALF_WIDTH * std)
     return Estimate(value, std, parameter.unit, (low, high))

@@ -19,6 +19,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Coarse, Folds, Regression
 from winchkit.diagnosis.regression.gls import CoarseProblem, Fit, Target, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
@@ -467,7 +468,7 @@ class SelectionEngine(ABC):
         series = [i for i, term in enumerate(hypothesis.terms) if term.effect.single is not None]
         if not series:
             return fitted
-        whitened = fitted.jacobian * noise.inverse_sigma(self.regression)[:, None]
+        whitened = whitened_jacobian(self.regression, fitted, noise)
         covariance = np.linalg.pinv(whitened.T @ whitened, hermitian=True)
         dropped = False
         for index in series:

@@ -12,15 +12,13 @@ from scipy.special import chdtri
 
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.intervals import Spread
+from winchkit.diagnosis.regression.intervals import HALF_WIDTH, Spread, whitened_jacobian
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.effects.parametrization import Coordinates
 
 __all__ = ["region_holds_null"]
 
 _OUTSIDE = 0.05
-_HALF_WIDTH = 1.959964
-"""Standard deviations from a value to the end of its 95 % interval."""
 
 
 def region_holds_null(
@@ -53,18 +51,17 @@ def region_holds_null(
     the correlations of the linearised fit, so that amplitudes of which only a combination is
     determined are judged by that.
     """
-    terms = fit.hypothesis.terms
-    at = regression.nuisance_columns.shape[1]
-    at += sum(len(Coordinates(term.effect)) for term in terms[:index])
-    own = slice(at, at + len(Coordinates(terms[index].effect).amplitudes))
+    amplitudes = Coordinates(fit.hypothesis.terms[index].effect).amplitudes
+    own = np.flatnonzero(regression.unknowns_of(index, fit.hypothesis))[: len(amplitudes)]
     value = fit.vector[own]
     if not value.size:
         return False
     end = np.where(value > 0.0, value - spread.low[own], spread.high[own] - value)
-    z = value * _HALF_WIDTH / np.maximum(end, 1e-300)
-    whitened = fit.jacobian * noise.inverse_sigma(regression)[:, None]
-    normal = whitened.T @ whitened
-    covariance = np.linalg.pinv(normal, rcond=1e-12, hermitian=True)[own, own]
+    z = value * HALF_WIDTH / np.maximum(end, 1e-300)
+    whitened = whitened_jacobian(regression, fit, noise)
+    covariance = np.linalg.pinv(whitened.T @ whitened, rcond=1e-12, hermitian=True)[
+        np.ix_(own, own)
+    ]
     length = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(length, length)
     wald = float(z @ np.linalg.pinv(correlation, rcond=1e-9, hermitian=True) @ z)
