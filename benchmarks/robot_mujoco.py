@@ -29,8 +29,7 @@ from winchkit.model.robot.integration import ElasticCables, integrate
 from winchkit.model.robot.kinematics import Geometry, Pose, geometry_of, home_of, lengths
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.schema.read import read_robot
-from winchkit.sim.robot.platform import Body, CablePlatform
-from winchkit.sim.robot.pulleys import Pulleys
+from winchkit.sim.robot.platform import Body, CablePlatform, Pulleys
 
 DURATION = 4.0
 CYCLE = 2e-3

@@ -14,8 +14,7 @@ from winchkit.arrays import Array
 from winchkit.model.robot import Pose, rotation_of
 from winchkit.model.robot.kinematics import Geometry, lengths, structure_matrix, wrap_angle
 from winchkit.sim.physics.state import GRAVITY
-from winchkit.sim.robot.platform import Body, CablePlatform
-from winchkit.sim.robot.pulleys import Pulleys
+from winchkit.sim.robot.platform import Body, CablePlatform, Pulleys
 from winchkit.sim.robot.rotation import quaternion, rotation, turned
 
 angle = st.floats(-1.5, 1.5)

@@ -13,8 +13,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.sim_platform import PlatformTruth
 from winchkit.schema.simbench import SimBench, WinchTruth
 from winchkit.sim.robot.cable_end import CableEnd, Coupling
-from winchkit.sim.robot.platform import Body, CablePlatform
-from winchkit.sim.robot.pulleys import Pulleys
+from winchkit.sim.robot.platform import Body, CablePlatform, Pulleys
 from winchkit.sim.robot.rotation import rotation
 
 __all__ = ["BuiltRobot", "build_robot"]

@@ -19,9 +19,8 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.sim.physics.state import GRAVITY
 from winchkit.sim.robot.mechanics import CABLE, ROW, WORK, cables, compiled_step, step
-from winchkit.sim.robot.pulleys import Pulleys
 
-__all__ = ["Body", "CablePlatform"]
+__all__ = ["Body", "CablePlatform", "Pulleys"]
 
 _STEP = 2.5e-3
 _LEAST_STEP = 5e-5
@@ -38,6 +37,18 @@ class Body:
     """About the centre of mass, body axes, (3, 3), kg m²."""
     anchor_point: Array
     """(n, 3), m."""
+
+
+@dataclass(frozen=True)
+class Pulleys:
+    """Exit points and swivelling pulleys of n cables."""
+
+    exit_point: Array
+    """(n, 3), m."""
+    axis: Array
+    """Unit vectors, (n, 3)."""
+    radius: Array
+    """(n,), m; zero for a fixed exit point."""
 
 
 class CablePlatform:
