@@ -1,9 +1,9 @@
 """Computations for a bench in motion, at once or in a process of their own.
 
-Plans and fits take seconds of Python. In the process of the control loop they hold the interpreter
-lock and a processor at the priority of the bench: with real-time settings they delay the loop and
-every other program, the simulator of a served robot included. :class:`ComputationProcess` computes
-them in a second interpreter with ordinary priority.
+A plan takes some 50 ms of Python, a fit seconds to minutes. In the process of the control loop they
+hold the interpreter lock and a processor at the priority of the bench: with real-time settings they
+delay the loop and every other program, the simulator of a served robot included.
+:class:`ComputationProcess` computes them in a second interpreter with ordinary priority.
 """
 
 from __future__ import annotations

@@ -109,7 +109,7 @@ class _Reporter:
         self._instruments, self._out = instruments, out
         self._serving = threading.Event()
         self._loop: asyncio.AbstractEventLoop
-        self._known: list[tuple[Any, ...]] = [()] * len(instruments)
+        self._known: list[State | None] = [None] * len(instruments)
         self._bench = os.getppid()
         for number, instrument in enumerate(instruments):
             instrument.publisher = _Forwarding(
@@ -159,26 +159,17 @@ class _Reporter:
         return forward
 
     def _state(self, number: int, instrument: Instrument | StreamInstrument) -> None:
-        tally = instrument.tally
-        known = (
-            instrument.problem,
-            instrument.tared,
-            instrument.period,
-            instrument.max_age,
-            *(getattr(tally, name) for name in COUNTS),
-        )
-        if known == self._known[number]:
-            return
-        self._known[number] = known
         problem = instrument.problem
-        words = None if problem is None else (class_name(problem), str(problem))
         state = State(
-            words,
+            None if problem is None else _words(problem),
             instrument.tared,
             instrument.period,
             instrument.max_age,
-            tuple(getattr(tally, name) for name in COUNTS),
+            tuple(getattr(instrument.tally, name) for name in COUNTS),
         )
+        if state == self._known[number]:
+            return
+        self._known[number] = state
         self._out.add(json_message(Kind.STATE, (number, *state)))
 
 
