@@ -127,7 +127,7 @@ def pytest_runtest_makereport(
     path, line, _ = item.location
     if (cycles := item.stash.get(LATE_CYCLES, None)) is not None:
         if late := cycles():
-            words = f"{late} cycles of the control began three periods or more late"
+            words = f"the bench tripped, {late} cycles of its control began three periods late"
             report.outcome = "skipped"
             said = f"Skipped: decides nothing: {words}, and then: {call.excinfo.exconly()[:500]}"
             report.longrepr = (path, (line or 0) + 1, said)

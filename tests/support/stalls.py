@@ -23,8 +23,8 @@ import pytest
 __all__ = ["LATE_CYCLES", "StallWatch", "waited"]
 
 LATE_CYCLES = pytest.StashKey[Callable[[], int]]()
-"""Of a test of a page: late cycles of its bench's control. The threads of a browser wait for a
-processor at any time; only lateness of the bench decides whether a failure decides nothing."""
+"""Of a test of a page: late cycles of its bench's control, where it tripped. The threads of a
+browser wait for a processor at any time; their lateness excuses no failure."""
 
 _PERIOD = 0.02
 _SEARCH = 25

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,36 +11,13 @@ pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
 from browsing import Served, opened, until
-from chromium import NEEDS_CHROMIUM, chromium
-from stalls import LATE_CYCLES
+from chromium import NEEDS_CHROMIUM
 
 STOPS = 2.0
 """Bound for a jog to end after its release, s: dead-man 0.2 s, ramp 0.05 / 1 s, pictures 0.1 s,
 and stalls of this computer."""
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime, NEEDS_CHROMIUM]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    folder = tmp_path_factory.mktemp("work")
-    found = Served("--sim", "demo-adequate", "--allow-motion", folder=folder)
-    yield found
-    found.end()
-
-
-@pytest.fixture
-def bench(served: Served, request: pytest.FixtureRequest) -> Served:
-    """The bench; a failure of the test beside late cycles of its control decides nothing."""
-    before = served.late_cycles()
-    request.node.stash[LATE_CYCLES] = lambda: served.late_cycles() - before
-    return served
 
 
 def commanding(browser: Any, url: str) -> Any:

@@ -15,7 +15,7 @@ pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
 from browsing import Served, opened, texts, until
-from chromium import NEEDS_CHROMIUM, chromium
+from chromium import NEEDS_CHROMIUM
 from recordings_of_others import lay_out
 from robot_poses.truth import Truth, csv, poses
 from winchkit.runs.writer import write_run
@@ -25,12 +25,6 @@ pytestmark = [
     pytest.mark.slow,
     NEEDS_CHROMIUM,
 ]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,7 @@ pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
 from browsing import Served, opened, until
-from chromium import NEEDS_CHROMIUM, chromium
-from stalls import LATE_CYCLES
+from chromium import NEEDS_CHROMIUM
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime, NEEDS_CHROMIUM]
 
@@ -32,38 +31,10 @@ acceleration = "0.5 m/s^2"
 """
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with chromium() as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
-def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    folder = tmp_path_factory.mktemp("work")
-    found = Served("--sim", "demo-adequate", "--allow-motion", folder=folder)
-    yield found
-    found.end()
-
-
-@pytest.fixture(scope="module")
-def robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    folder = tmp_path_factory.mktemp("work")
-    found = Served("--sim", "hanging-robot", "--allow-motion", folder=folder)
-    yield found
-    found.end()
-
-
-def judged(served: Served, request: pytest.FixtureRequest) -> Served:
-    before = served.late_cycles()
-    request.node.stash[LATE_CYCLES] = lambda: served.late_cycles() - before
-    return served
-
-
 @pytest.fixture
-def page(browser: Any, served: Served, request: pytest.FixtureRequest) -> Iterator[Any]:
+def page(browser: Any, bench: Served) -> Iterator[Any]:
     """A page of the Bench view that commands a winch at rest."""
-    found, complaints = opened(browser, f"{judged(served, request).url}#bench")
+    found, complaints = opened(browser, f"{bench.url}#bench")
     until(found, lambda: found.locator("#values .value").count() == 3)
     found.click("#take")
     until(found, lambda: "You command" in found.inner_text("#role"))
@@ -166,10 +137,8 @@ def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way
         until(page, lambda: page.locator("#trips .trip").count() == 0, 10.0)
 
 
-def test_a_step_of_the_platform_from_the_robot_view(
-    browser: Any, robot: Served, request: pytest.FixtureRequest
-) -> None:
-    page, complaints = opened(browser, f"{judged(robot, request).url}#robot")
+def test_a_step_of_the_platform_from_the_robot_view(browser: Any, robot: Served) -> None:
+    page, complaints = opened(browser, f"{robot.url}#robot")
 
     def height() -> float:
         return number(page.inner_text("#position .value >> nth=2"))
@@ -182,5 +151,14 @@ def test_a_step_of_the_platform_from_the_robot_view(
     page.click("[aria-label='z +10 mm']")
     until(page, lambda: abs(height() - before - 10.0) < 1.0, 10.0)
     assert page.inner_text("#banner") == ""
+    assert complaints == []
+    page.context.close()
+
+
+def test_four_cables_have_no_steps_and_say_why(browser: Any, hanging_robot: Served) -> None:
+    page, complaints = opened(browser, f"{hanging_robot.url}#robot")
+    until(page, lambda: page.locator("#position .value").count() == 3)
+    assert page.locator("[aria-label='z +10 mm']").count() == 0
+    assert "at least 6" in page.inner_text("#platform")
     assert complaints == []
     page.context.close()

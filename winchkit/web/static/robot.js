@@ -212,7 +212,7 @@ function platform() {
   const step = (axis, mm) => el("button", { onclick: () => bench.step(axis, mm / 1000, SPEED), "aria-label": `${axis} ${mm > 0 ? "+" : "−"}${Math.abs(mm)} mm` }, `${mm > 0 ? "+" : "−"}${Math.abs(mm)}`);
   return el("section", { class: "panel", id: "platform", "aria-label": "Platform" }, el("header", {}, el("h2", {}, "Platform"), bench.allowed() ? el("span", { class: "note" }, el("button", { id: "take", onclick: () => bench.command() }, "Request command")) : el("span", { class: "note" }, "watching: start with --allow-motion to move")),
     el("div", { class: "live three", id: "position" }), el("h2", {}, "Force of each cable"), el("div", { id: "forces" }),
-    el("fieldset", { class: "steps" }, el("legend", { class: "note" }, `Step the platform, mm, at ${number(SPEED)} m/s`), AXES.map((axis) => el("div", { class: "row" }, el("b", {}, axis), el("span", { class: "segments" }, CHANGES.map((mm) => step(axis, mm)))))));
+    view.lines.length < 6 ? el("p", { class: "note" }, `No steps: ${view.lines.length} cables do not determine the rotation of the platform; a move along a path needs at least 6.`) : el("fieldset", { class: "steps" }, el("legend", { class: "note" }, `Step the platform, mm, at ${number(SPEED)} m/s`), AXES.map((axis) => el("div", { class: "row" }, el("b", {}, axis), el("span", { class: "segments" }, CHANGES.map((mm) => step(axis, mm)))))));
 }
 
 function drawPlatform() {

@@ -1,0 +1,78 @@
+"""A browser, and served simulated benches that pages move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from browsing import Served
+from chromium import chromium
+from stalls import LATE_CYCLES
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with chromium() as found:
+        yield found
+
+
+@contextmanager
+def moving(name: str, folders: pytest.TempPathFactory) -> Iterator[Served]:
+    """A simulated bench that pages may move, in a folder of its own."""
+    found = Served("--sim", name, "--allow-motion", folder=folders.mktemp("work"))
+    yield found
+    found.end()
+
+
+def judged(served: Served, request: pytest.FixtureRequest) -> Served:
+    """The bench; a failure of the test decides nothing where late cycles of its control tripped it.
+
+    Late cycles without a trip change nothing that a page shows, and excuse no failure.
+    """
+    before = late_cycles(served.status())
+
+    def late() -> int:
+        status = served.status()
+        return late_cycles(status) - before if status["tripped"] else 0
+
+    request.node.stash[LATE_CYCLES] = late
+    return served
+
+
+def late_cycles(status: dict[str, Any]) -> int:
+    """Cycles of the control that began three periods or more after the one before, so far."""
+    return int(status["cycle_time"]["counts"][-1])
+
+
+@pytest.fixture(scope="module")
+def winch_served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with moving("demo-adequate", tmp_path_factory) as found:
+        yield found
+
+
+@pytest.fixture
+def bench(winch_served: Served, request: pytest.FixtureRequest) -> Served:
+    """A bench of one winch."""
+    return judged(winch_served, request)
+
+
+@pytest.fixture(scope="module")
+def robot_served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    with moving("cabtive-robot", tmp_path_factory) as found:
+        yield found
+
+
+@pytest.fixture
+def robot(robot_served: Served, request: pytest.FixtureRequest) -> Served:
+    """A bench of a robot of eight cables."""
+    return judged(robot_served, request)
+
+
+@pytest.fixture
+def hanging_robot(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """A bench of a robot of four cables, which do not determine its rotation."""
+    with moving("hanging-robot", tmp_path_factory) as found:
+        yield found
