@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import time
@@ -13,6 +14,7 @@ from typing import Any
 __all__ = [
     "STARTS",
     "Served",
+    "number",
     "opened",
     "texts",
     "until",
@@ -75,6 +77,13 @@ def until(page: Any, condition: Callable[[], bool], seconds: float = STARTS) -> 
         assert time.monotonic() - start < seconds, "it did not happen"
         page.wait_for_timeout(20)
     return time.monotonic() - start
+
+
+def number(text: str) -> float:
+    """Number before a unit."""
+    found = re.match(r"−?[\d.]+", text)
+    assert found, text
+    return float(found[0].replace("−", "-"))
 
 
 def texts(page: Any, selector: str) -> list[str]:

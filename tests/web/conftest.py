@@ -36,15 +36,18 @@ def judged(served: Served, request: pytest.FixtureRequest) -> Served:
 
     def late() -> int:
         status = served.status()
-        return late_cycles(status) - before if status["tripped"] else 0
+        return late_cycles(status) - before if status.get("tripped") else 0
 
     request.node.stash[LATE_CYCLES] = late
     return served
 
 
 def late_cycles(status: dict[str, Any]) -> int:
-    """Cycles of the control that began three periods or more after the one before, so far."""
-    return int(status["cycle_time"]["counts"][-1])
+    """Cycles of the control that began three periods or more after the one before, so far.
+
+    None before the bench is open, when its status is empty.
+    """
+    return int(status["cycle_time"]["counts"][-1]) if status else 0
 
 
 @pytest.fixture(scope="module")
@@ -59,16 +62,13 @@ def bench(winch_served: Served, request: pytest.FixtureRequest) -> Served:
     return judged(winch_served, request)
 
 
-@pytest.fixture(scope="module")
-def robot_served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
-    with moving("cabtive-robot", tmp_path_factory) as found:
-        yield found
-
-
 @pytest.fixture
-def robot(robot_served: Served, request: pytest.FixtureRequest) -> Served:
-    """A bench of a robot of eight cables."""
-    return judged(robot_served, request)
+def robot(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Served]:
+    """A bench of a robot of eight cables; it needs a core, and ends with its test."""
+    with moving("cabtive-robot", tmp_path_factory) as found:
+        yield judged(found, request)
 
 
 @pytest.fixture

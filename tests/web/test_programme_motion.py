@@ -1,8 +1,7 @@
-"""Programmes and platform steps that a page starts: how they begin, are followed, and end."""
+"""Programmes that a page starts: how they begin, are followed, and end."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
-from browsing import Served, opened, until
+from browsing import Served, number, opened, until
 from chromium import NEEDS_CHROMIUM
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime, NEEDS_CHROMIUM]
@@ -46,13 +45,6 @@ def page(browser: Any, bench: Served) -> Iterator[Any]:
 def state(page: Any) -> str:
     """State of the winch; its first letter is a capital, before it is an arrow."""
     return str(page.inner_text("#values .state span")).lower()
-
-
-def number(text: str) -> float:
-    """Number before a unit."""
-    found = re.match(r"−?[\d.]+", text)
-    assert found, text
-    return float(found[0].replace("−", "-"))
 
 
 def length(page: Any) -> float:
@@ -135,30 +127,3 @@ def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way
         page.once("dialog", lambda shown: shown.accept())
         page.click("#trips .trip button")
         until(page, lambda: page.locator("#trips .trip").count() == 0, 10.0)
-
-
-def test_a_step_of_the_platform_from_the_robot_view(browser: Any, robot: Served) -> None:
-    page, complaints = opened(browser, f"{robot.url}#robot")
-
-    def height() -> float:
-        return number(page.inner_text("#position .value >> nth=2"))
-
-    until(page, lambda: page.locator("#position .value").count() == 3)
-    assert page.locator("[aria-label='z +10 mm']").is_disabled(), "it only watches"
-    page.click("#take")
-    until(page, lambda: page.locator("[aria-label='z +10 mm']").is_enabled())
-    before = height()
-    page.click("[aria-label='z +10 mm']")
-    until(page, lambda: abs(height() - before - 10.0) < 1.0, 10.0)
-    assert page.inner_text("#banner") == ""
-    assert complaints == []
-    page.context.close()
-
-
-def test_four_cables_have_no_steps_and_say_why(browser: Any, hanging_robot: Served) -> None:
-    page, complaints = opened(browser, f"{hanging_robot.url}#robot")
-    until(page, lambda: page.locator("#position .value").count() == 3)
-    assert page.locator("[aria-label='z +10 mm']").count() == 0
-    assert "at least 6" in page.inner_text("#platform")
-    assert complaints == []
-    page.context.close()
