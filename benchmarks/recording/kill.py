@@ -128,7 +128,14 @@ def _rows_are_recovered(path: Path, folder: Path, angles: np.ndarray) -> bool:
     """Recover every part, and compare."""
     saved = _emptied(folder / "saved")
     for file in _files(path):
-        recover(file, saved / file.name)
+        if _whole_lines(file):
+            recover(file, saved / file.name)
+            continue
+        try:  # killed before a row of this part was whole: there is nothing to recover
+            recover(file, saved / file.name)
+        except RunError:
+            continue
+        return False
     if not len(angles):
         return True
     return np.array_equal(read_run(saved / path.name)["W1.motor_angle"], angles)
