@@ -147,7 +147,7 @@ def _of_winch(run: Run, prefix: str, path: str) -> dict[str, Any]:
         "load_mass": _mass(load) if load else own.load_mass,
         "temperature": _mean(own, "temperature"),
         "channels": sorted(own),
-        "sanity": sorted({finding.code for finding in inspect_run(own)}),
+        "sanity": sorted({finding.code for finding in inspect_run(own).findings}),
     }
 
 

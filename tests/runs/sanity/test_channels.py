@@ -17,9 +17,9 @@ from scipy.stats import binom
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
-from winchkit.runs.sanity.local_noise import local_noise
-from winchkit.runs.sanity.outliers import _chance, outlier_mask, outlier_masks
-from winchkit.runs.sanity.quantisation import resolution
+from winchkit.runs.sanity.local_noise import local_noise, sorted_quantile
+from winchkit.runs.sanity.outliers import _chance, outlier_mask
+from winchkit.runs.sanity.quantisation import _BINS, _PADDED, _SEARCHED, _cosine_sums, resolution
 from winchkit.runs.sanity.sampling import increasing_rows
 
 Array = NDArray[np.float64]
@@ -45,13 +45,27 @@ def run_of(values: Array, name: str = "tension", unit: str = "N") -> Run:
 
 
 def found(run: Run, code: str) -> list[Finding]:
-    return [finding for finding in inspect_run(run) if finding.code == code]
+    return [finding for finding in inspect_run(run).findings if finding.code == code]
 
 
 @given(SEEDS)
 @settings(max_examples=60, deadline=None)
 def test_a_clean_channel_has_no_finding(seed: int) -> None:
-    assert inspect_run(run_of(tension(seed))) == []
+    assert inspect_run(run_of(tension(seed))).findings == ()
+
+
+@given(SEEDS, st.integers(1, 300), st.floats(0, 1))
+def test_the_quantile_of_sorted_values_is_that_of_numpy(
+    seed: int, count: int, share: float
+) -> None:
+    values = np.random.default_rng(seed).normal(size=count)
+    assert sorted_quantile(np.sort(values), share) == pytest.approx(np.quantile(values, share))
+
+
+def test_the_transform_of_a_histogram_is_the_sum_of_its_cosines() -> None:
+    counts = np.random.default_rng(1).poisson(0.2, _BINS)
+    phase = 2 * np.pi * np.outer(np.arange(0, _SEARCHED, 50), np.arange(_BINS) + 0.5) / _PADDED
+    assert _cosine_sums(counts)[::50] == pytest.approx(np.cos(phase) @ counts, abs=1e-8)
 
 
 @given(SEEDS, st.floats(0.1, 10.0))
@@ -147,7 +161,7 @@ def test_spikes_that_coincide_by_chance_are_outliers_and_peaks_are_not(peaks: bo
     names = ("tension", "motor_torque")
     for name, rows in zip(names, places, strict=True):
         run[name][rows] += 300.0 * random.choice([-1, 1], len(rows))
-    masks = outlier_masks(run)
+    masks = inspect_run(run).outliers
     if peaks:
         assert not masks
     else:
@@ -170,7 +184,7 @@ def test_one_peak_is_physical_where_more_channels_show_it_than_by_chance(shared:
         others[name] = Channel(values, {"motor_torque": "N m", "motor_angle": "rad"}.get(name, "N"))
     run = replace(run, channels={**run.channels, **others})
     run["tension"][COUNT - 20] += 300.0
-    assert ("tension" in outlier_masks(run)) == (shared == 1)
+    assert ("tension" in inspect_run(run).outliers) == (shared == 1)
 
 
 @pytest.mark.parametrize("shares", [(0.02,), (0.01, 0.03, 0.2)])
@@ -236,7 +250,7 @@ def test_a_channel_of_a_few_levels_is_quantised_and_nothing_else(
     signal = 150 + step * levels / 2 * np.sin(np.arange(COUNT) / 100)
     values = step * np.round((signal + random.normal(0, noise, COUNT)) / step)
     assert resolution(values) == pytest.approx(step, rel=1e-9)
-    codes = {finding.code for finding in inspect_run(run_of(values))}
+    codes = {finding.code for finding in inspect_run(run_of(values)).findings}
     assert codes <= {"quantised"}
 
 
@@ -303,7 +317,7 @@ def test_lost_samples_are_gaps_and_no_jitter_nor_resolution() -> None:
     # A motion of two speeds, without noise.
     angle = np.interp(time, [0, time[-1] / 2, time[-1]], [0, 3.0 * time[-1], 4.0 * time[-1]])
     run = Run("r", time, {"motor_angle": Channel(angle, "rad")})
-    codes = {f.code: f for f in inspect_run(run)}
+    codes = {f.code: f for f in inspect_run(run).findings}
     assert set(codes) == {"gap"}
     lost = np.count_nonzero(~kept[np.flatnonzero(kept)[0] : np.flatnonzero(kept)[-1]])
     assert codes["gap"].value == pytest.approx(lost / RATE)
@@ -338,7 +352,9 @@ def test_velocity_against_angle(change: Callable[[Array], Array], code: str, wor
         "motor_angle": Channel(angle, "rad"),
         "motor_velocity": Channel(change(velocity), "rad/s"),
     }
-    findings = [f for f in inspect_run(Run("r", time, channels)) if f.channel == "motor_velocity"]
+    findings = [
+        f for f in inspect_run(Run("r", time, channels)).findings if f.channel == "motor_velocity"
+    ]
     assert [f.code for f in findings] == ([code] if code else [])
     assert all(word in f.text for f in findings)
 

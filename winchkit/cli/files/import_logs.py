@@ -436,7 +436,7 @@ def _inspected(runs: Sequence[Run]) -> list[dict[str, Any]]:
     from winchkit.runs.sanity.inspection import inspect_run
 
     timed = [run for run in runs if run.metadata.get("time") != "row number"]
-    return [finding.to_json() for run in timed for finding in inspect_run(run)]
+    return [finding.to_json() for run in timed for finding in inspect_run(run).findings]
 
 
 def _written(

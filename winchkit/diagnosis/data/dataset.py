@@ -33,6 +33,7 @@ from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS, At, Signals
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.inspection import inspect_run
 from winchkit.runs.sanity.quantisation import quantisation_noise
 from winchkit.runs.sanity.text import size
 from winchkit.schema.profiles.axis import AxisProfile
@@ -182,9 +183,10 @@ def prepare(
     runs, at_rest = prepared_statics(with_torques(runs, profile), profile)
     notes = [*at_rest, *validate_runs(runs, profile)]
     runs, copied = without_copies(runs, profile)
-    sanity = findings(runs, profile, catalogue)
-    resolution = resolutions(runs)
-    runs, mended = evenly_stamped([without_outliers(run) for run in runs])
+    inspected = [inspect_run(run) for run in runs]
+    sanity = findings(inspected, profile, catalogue)
+    resolution = resolutions(inspected)
+    runs, mended = evenly_stamped([without_outliers(one) for one in inspected])
     notes += mended
     decimation = decimation_for(runs) if decimate else None
     if decimation is not None:

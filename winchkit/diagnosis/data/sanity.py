@@ -12,10 +12,7 @@ from winchkit.effects.catalogue import Catalogue
 from winchkit.model.stages import OUTPUTS
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.inspection import inspect_run
-from winchkit.runs.sanity.outliers import outlier_masks
-from winchkit.runs.sanity.quantisation import resolution
-from winchkit.runs.sanity.sampling import with_lost_samples
+from winchkit.runs.sanity.inspection import Inspection
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["ALARMING", "caveats", "findings", "resolutions", "without_outliers"]
@@ -25,11 +22,11 @@ ALARMING = frozenset({"inverted-sign", "wrong-factor"})
 
 
 def findings(
-    runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue | None = None
+    inspected: Sequence[Inspection], profile: WinchProfile, catalogue: Catalogue | None = None
 ) -> tuple[Finding, ...]:
     """Findings on runs: sign and scale against the profile first, then of every channel."""
-    found = sign_and_scale(runs, profile, catalogue)
-    found += [f for run in runs for f in inspect_run(run)]
+    found = sign_and_scale([one.run for one in inspected], profile, catalogue)
+    found += [f for one in inspected for f in one.findings]
     # A constant angle is that of a run at rest, which has a note.
     return tuple(f for f in found if (f.code, f.channel) != ("constant", "motor_angle"))
 
@@ -39,26 +36,22 @@ def caveats(found: Sequence[Finding]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(f.code for f in found if f.code in ALARMING))
 
 
-def resolutions(runs: Sequence[Run]) -> dict[str, float]:
+def resolutions(inspected: Sequence[Inspection]) -> dict[str, float]:
     """Resolution of every output, rms over the runs that have it, SI."""
     out = {}
     for output in OUTPUTS:
-        squares = [
-            resolution(with_lost_samples(run.time, run[output])) ** 2
-            for run in runs
-            if output in run
-        ]
+        squares = [one.resolutions[output] ** 2 for one in inspected if output in one.run]
         if squares:
             out[output] = float(np.sqrt(np.mean(squares)))
     return out
 
 
-def without_outliers(run: Run) -> Run:
+def without_outliers(inspected: Inspection) -> Run:
     """The run with NaN in place of single spikes, so that these are not compared."""
-    hit = outlier_masks(run)
-    if not hit:
+    run = inspected.run
+    if not inspected.outliers:
         return run
     channels: dict[str, Channel] = dict(run.channels)
-    for name, mask in hit.items():
+    for name, mask in inspected.outliers.items():
         channels[name] = replace(channels[name], values=np.where(mask, np.nan, run[name]))
     return replace(run, channels=channels)

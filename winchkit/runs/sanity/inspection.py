@@ -2,28 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.consistency import velocity_consistency
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.low_pass import low_pass
-from winchkit.runs.sanity.outliers import outliers
-from winchkit.runs.sanity.quantisation import quantised
+from winchkit.runs.sanity.outliers import outlier_masks, outliers
+from winchkit.runs.sanity.quantisation import quantised, resolutions
 from winchkit.runs.sanity.repeated_values import constant, repeated_values
 from winchkit.runs.sanity.sampling import sampling
 from winchkit.runs.sanity.saturation import saturated
 
-__all__ = ["inspect_run"]
+__all__ = ["Inspection", "inspect_run"]
 
 _INSTRUMENTS = {"tension", "tension_gross", "load", "load_gross", "motor_torque", "cable_length"}
 """Channels that no trajectory generator sets, so that a limit is one of the instrument."""
 
 
-def inspect_run(run: Run) -> list[Finding]:
-    """Findings on a run, without a model of the winch.
+@dataclass(frozen=True)
+class Inspection:
+    """What is found on a run without a model of the winch."""
+
+    run: Run
+    """The run as it was read."""
+    findings: tuple[Finding, ...]
+    """On the time stamps first, then by channel."""
+    resolutions: Mapping[str, float]
+    """Resolution of every channel of the model, in its unit; 0 where none is found."""
+    outliers: Mapping[str, NDArray[np.bool_]]
+    """Spikes of the channels that have some, (n,)."""
+
+
+def inspect_run(run: Run) -> Inspection:
+    """Inspect a run, without a model of the winch.
 
     Parameters
     ----------
@@ -32,27 +48,29 @@ def inspect_run(run: Run) -> list[Finding]:
 
     Returns
     -------
-    list of Finding
-        On the time stamps first, then by channel.
+    Inspection
+        Its findings, and the resolutions and outliers of its channels.
     """
+    steps = resolutions(run)
+    masks = outlier_masks(run, steps)
     out = list(sampling(run))
     for name in run:
         kind = name.rpartition(".")[2]
         if kind in CHANNEL_DIMENSIONS and np.isfinite(run[name]).any():
-            out += _channel(run, name, is_instrument=kind in _INSTRUMENTS)
-    out += outliers(run)
+            out += _channel(run, name, steps[name], is_instrument=kind in _INSTRUMENTS)
+    out += outliers(run, masks)
     for winch in run.winches():
         out += velocity_consistency(run, winch)
-    return out
+    return Inspection(run, tuple(out), steps, masks)
 
 
-def _channel(run: Run, name: str, *, is_instrument: bool) -> Iterator[Finding]:
+def _channel(run: Run, name: str, step: float, *, is_instrument: bool) -> Iterator[Finding]:
     alone = list(constant(run, name))
     yield from alone
     if alone:
         return
-    yield from quantised(run, name)
-    yield from repeated_values(run, name)
+    yield from quantised(run, name, step)
+    yield from repeated_values(run, name, step)
     if is_instrument:
-        yield from saturated(run, name)
-        yield from low_pass(run, name)
+        yield from saturated(run, name, step)
+        yield from low_pass(run, name, step)

@@ -17,7 +17,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["local_noise", "smallest_differences"]
+__all__ = ["local_noise", "smallest_differences", "sorted_quantile"]
 
 _ORDERS = (1, 2, 3)
 _ROUNDING = 16.0
@@ -62,7 +62,15 @@ def local_noise(values: Array) -> float:
     return float(np.sqrt(np.mean(_trimmed(differences) ** 2))) / gain
 
 
+def sorted_quantile(values: Array, share: float) -> float:
+    """Quantile of sorted values by linear interpolation, as :func:`numpy.quantile` of any."""
+    position = (len(values) - 1) * share
+    below = int(position)
+    above = min(below + 1, len(values) - 1)
+    return float(values[below] + (position - below) * (values[above] - values[below]))
+
+
 def _trimmed(differences: Array) -> Array:
     """Differences limited to their 99 % quantile, so that spikes have no weight."""
-    high = float(np.quantile(np.abs(differences), 0.99))
+    high = sorted_quantile(np.sort(np.abs(differences)), 0.99)
     return np.clip(differences, -high, high) if high > 0 else differences

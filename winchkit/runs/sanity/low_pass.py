@@ -19,7 +19,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.quantisation import quantisation_noise, resolution
+from winchkit.runs.sanity.quantisation import quantisation_noise
 
 __all__ = ["low_pass"]
 
@@ -34,8 +34,11 @@ _LOWEST = 4
 _LEAST_BLOCKS = 6
 
 
-def low_pass(run: Run, name: str) -> Iterator[Finding]:
-    """A cut-off below half the sampling rate; value: from which the noise falls, Hz."""
+def low_pass(run: Run, name: str, step: float) -> Iterator[Finding]:
+    """A cut-off below half the sampling rate, of a channel of resolution ``step``.
+
+    Value: frequency from which the noise falls, Hz.
+    """
     values = run[name]
     if np.mean(np.diff(values) == 0) > _REPEATED:
         return  # the spectrum at high frequencies is that of the few changes
@@ -43,7 +46,7 @@ def low_pass(run: Run, name: str) -> Iterator[Finding]:
     if power is None:
         return
     middle, top = float(np.median(power[25:33])), float(np.median(power[50:62]))
-    rounding = _ROUNDING * quantisation_noise(resolution(values)) ** 2
+    rounding = _ROUNDING * quantisation_noise(step) ** 2
     at_rounding = top <= max(rounding, _NUMERICAL * float(power.max()))
     if not at_rounding and middle < _FALL * top:
         return

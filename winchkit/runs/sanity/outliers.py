@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.local_noise import sorted_quantile
 from winchkit.runs.sanity.quantisation import quantisation_noise, resolution
 from winchkit.runs.sanity.text import size
 
@@ -47,16 +48,18 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
     out: of two spikes with one sample between them, neither hides the other. A peak that lasts two
     samples, a step, or an oscillation is none.
     """
-    return _spikes(values)[0]
+    return _spikes(values, resolution(values))[0]
 
 
-def outlier_masks(run: Run) -> dict[str, NDArray[np.bool_]]:
+def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArray[np.bool_]]:
     """Spikes of every channel of a run that no other channel of the same winch shares.
 
     Parameters
     ----------
     run : Run
         The run.
+    resolutions : mapping of float
+        Resolution of every channel of the model (:func:`~.quantisation.resolutions`).
 
     Returns
     -------
@@ -72,7 +75,7 @@ def outlier_masks(run: Run) -> dict[str, NDArray[np.bool_]]:
     counts, level 1 %).
     """
     names = [name for name in run if name.rpartition(".")[2] in CHANNEL_DIMENSIONS]
-    found = {name: _spikes(run[name]) for name in names}
+    found = {name: _spikes(run[name], resolutions[name]) for name in names}
     out = {}
     for name, (spikes, _) in found.items():
         winch = name.rpartition(".")[0]
@@ -89,9 +92,9 @@ def outlier_masks(run: Run) -> dict[str, NDArray[np.bool_]]:
     return out
 
 
-def outliers(run: Run) -> Iterator[Finding]:
+def outliers(run: Run, masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Finding]:
     """Spikes of the channels; value: largest deviation."""
-    for name, spikes in outlier_masks(run).items():
+    for name, spikes in masks.items():
         values = run[name]
         good = ~spikes & np.isfinite(values)
         between = np.interp(np.flatnonzero(spikes), np.flatnonzero(good), values[good])
@@ -106,7 +109,7 @@ def outliers(run: Run) -> Iterator[Finding]:
         )
 
 
-def _spikes(values: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _spikes(values: Array, step: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Spikes, and samples whose deviation is large enough to be the same event."""
     out, event = np.zeros(len(values), dtype=bool), np.zeros(len(values), dtype=bool)
     rows = np.flatnonzero(np.isfinite(values))
@@ -114,12 +117,11 @@ def _spikes(values: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     if len(known) < _WINDOW:
         return out, event
     around = np.stack([known[:-4], known[1:-3], known[3:-1], known[4:]])
-    deviation = np.abs(known[2:-2] - np.median(around, axis=0))
+    deviation = np.abs(known[2:-2] - _median_of_four(*around))
     # Neighbours that are equal in a quantised or held channel have a local deviation of zero.
-    floor = float(np.sqrt(np.mean(np.minimum(deviation, np.quantile(deviation, 0.95)) ** 2)))
-    scale = np.maximum(_local(deviation), floor)
-    if np.any(deviation > _LIMIT * scale):  # else the resolution need not be known
-        scale = np.maximum(scale, quantisation_noise(resolution(values)))
+    usual = np.minimum(deviation, sorted_quantile(np.sort(deviation), 0.95))
+    floor = float(np.sqrt(np.mean(usual**2)))
+    scale = np.maximum(_local(deviation), max(floor, quantisation_noise(step)))
     large = deviation > _LIMIT * scale
     before, after = np.append([False, False], large[:-2]), np.append(large[2:], [False, False])
     around[0] = np.where(before & ~after, around[1], around[0])
@@ -128,6 +130,12 @@ def _spikes(values: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     out[rows[2:-2][large & agree]] = True
     event[rows[2:-2][deviation > _SAME_EVENT * scale]] = True
     return out, event
+
+
+def _median_of_four(a: Array, b: Array, c: Array, d: Array) -> Array:
+    largest_of_low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    smallest_of_high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return (largest_of_low + smallest_of_high) / 2
 
 
 def _physical(spikes: NDArray[np.bool_], beside: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:

@@ -18,21 +18,26 @@ from collections.abc import Iterator
 from math import sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.runs.run import Run
+from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.local_noise import local_noise, smallest_differences
+from winchkit.runs.sanity.local_noise import local_noise, smallest_differences, sorted_quantile
 from winchkit.runs.sanity.sampling import with_lost_samples
 from winchkit.runs.sanity.text import size
 
-__all__ = ["quantisation_noise", "quantised", "resolution"]
+__all__ = ["quantisation_noise", "quantised", "resolution", "resolutions"]
 
 _BINS = 8192
 _BINS_PER_STEP = 16
 """Bins of the histogram within the smallest step that is looked for."""
-_SEARCHED = 4 * _BINS // _BINS_PER_STEP + 2
-"""Coefficients of the FFT of 4 _BINS values up to that step, and those beside them."""
+_PADDED = 4 * _BINS
+"""Values of the transform: a maximum lies within an eighth of a period of the largest difference
+from a coefficient, where its mean cosine is still above _SCREENED."""
+_SEARCHED = _PADDED // _BINS_PER_STEP + 2
+"""Coefficients up to that step, and those beside them."""
+_ROTATION = np.exp(-1j * np.pi * np.arange(_SEARCHED) / _PADDED)
 _COHERENCE = 0.99
 _EXACT = 1 - 2e-5
 """Mean cosine of deviations of a thousandth of a step: multiples, not close to multiples."""
@@ -79,11 +84,11 @@ def resolution(values: Array) -> float:
     few = values[:_MOST]
     differences, _ = smallest_differences(few)
     sizes = np.abs(differences)
-    sizes = sizes[sizes > 0]
+    sizes = np.sort(sizes[sizes > 0])
     if len(sizes) < _LEAST_DIFFERENCES:
         return 0.0
     for scale in _SCALES:
-        own = sizes[sizes <= np.quantile(sizes, scale)]
+        own = sizes[: np.searchsorted(sizes, sorted_quantile(sizes, scale), side="right")]
         step, score = _largest_step(own)
         levels = _levels(few, step) if step and _steps_are_multiples(few, step) else 0
         least = _LEAST_LEVELS
@@ -94,12 +99,19 @@ def resolution(values: Array) -> float:
     return 0.0
 
 
-def quantised(run: Run, name: str) -> Iterator[Finding]:
-    """A channel whose resolution is not small against its noise; value: the step."""
+def resolutions(run: Run) -> dict[str, float]:
+    """Resolution of every channel of the model, in its unit, from differences without a gap."""
+    return {
+        name: resolution(with_lost_samples(run.time, run[name]))
+        for name in run
+        if name.rpartition(".")[2] in CHANNEL_DIMENSIONS
+    }
+
+
+def quantised(run: Run, name: str, step: float) -> Iterator[Finding]:
+    """A channel whose resolution ``step`` is not small against its noise; value: the step."""
     channel = run.channels[name]
-    values = with_lost_samples(run.time, channel.values)
-    step = resolution(values)
-    if step and step >= local_noise(values):
+    if step and step >= local_noise(with_lost_samples(run.time, channel.values)):
         floor = quantisation_noise(step)
         yield Finding(
             "quantised",
@@ -112,15 +124,13 @@ def quantised(run: Run, name: str) -> Iterator[Finding]:
 
 
 def _largest_step(sizes: Array) -> tuple[float, float]:
-    """Largest step of which absolute differences are multiples, 0 without one, and its score."""
+    """Largest step of which sorted sizes are multiples, 0 without one, and its score."""
     if len(sizes) < _LEAST_DIFFERENCES:
         return 0.0, 0.0
-    high = float(sizes.max())
-    counts, _ = np.histogram(sizes, bins=_BINS, range=(0.0, high))
-    spectrum = np.fft.rfft(counts, 4 * _BINS)[:_SEARCHED]
-    frequency = np.arange(len(spectrum)) * _BINS / (4 * _BINS * high)
-    # Bins are represented by their middle: half a bin of phase.
-    coherence = np.real(spectrum * np.exp(-1j * np.pi * frequency * high / _BINS)) / len(sizes)
+    high = float(sizes[-1])
+    counts = np.bincount((sizes * (_BINS / high)).astype(int).clip(max=_BINS - 1), minlength=_BINS)
+    frequency = np.arange(_SEARCHED) * _BINS / (_PADDED * high)
+    coherence = _cosine_sums(counts) / len(sizes)
     inside = (frequency > 0.75 / high) & (frequency < _BINS / (_BINS_PER_STEP * high))
     peaks = np.flatnonzero(
         inside[1:-1]
@@ -136,20 +146,41 @@ def _largest_step(sizes: Array) -> tuple[float, float]:
     return max((step, score) for step, score in good if score >= best - _TIE)
 
 
+def _cosine_sums(counts: NDArray[np.intp]) -> Array:
+    """Cosine transform of a histogram at its first frequencies, (_SEARCHED,).
+
+    Notes
+    -----
+    Coefficient k is Σ counts[n] cos(2πk(n + ½)/_PADDED): a bin is represented by its middle. This
+    is a DCT-II of half as many values, by a real FFT of the same length.
+
+    References
+    ----------
+    Makhoul, J. (1980). A fast cosine transform in one and two dimensions. IEEE Trans. Acoust.
+    Speech Signal Process. 28, 27-34.
+    """
+    ordered = np.zeros(_PADDED // 2)
+    ordered[: _BINS // 2], ordered[-_BINS // 2 :] = counts[::2], counts[::-2]
+    spectrum = np.fft.rfft(ordered)[:_SEARCHED]
+    return np.asarray(np.real(spectrum * _ROTATION))
+
+
 def _refined(sizes: Array, step: float) -> tuple[float, float]:
-    """Step by least squares, and the mean cosine of the deviations from its multiples."""
+    """Step by least squares of sorted sizes, and mean cosine of their deviations from multiples."""
     multiples = np.zeros(len(sizes))
     for _ in range(_REFINEMENTS):
-        multiples = np.round(sizes / step)
-        if not np.any(multiples):
+        before, multiples = multiples, np.round(sizes / step)
+        if not multiples[-1]:
             return step, 0.0
+        if np.array_equal(before, multiples):
+            break
         step = float(sizes @ multiples / (multiples @ multiples))
-    beyond = sizes[multiples >= 1]
+    beyond = sizes[np.searchsorted(multiples, 1) :]
     if len(beyond) < max(_LEAST_DIFFERENCES, _LEAST_SHARE * len(sizes)):
         return step, 0.0  # equal jumps of a continuous signal, such as a command's
     # Few different multiples far apart are those of a periodic signal with few samples a period.
-    different = len(np.unique(multiples[multiples >= 1]))
-    if different < min(_MANY_MULTIPLES, np.quantile(multiples, _USUAL) / 2):
+    different = np.count_nonzero(np.diff(multiples, prepend=0.0))
+    if different < _MANY_MULTIPLES and different < sorted_quantile(multiples, _USUAL) / 2:
         return step, 0.0
     return step, float(np.mean(np.cos(2 * np.pi * beyond / step)))
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.quantisation import resolution
 from winchkit.runs.sanity.text import share, size
 
 __all__ = ["constant", "repeated_values"]
@@ -33,8 +32,8 @@ def constant(run: Run, name: str) -> Iterator[Finding]:
         yield Finding("constant", run.name, name, float(values[0]), text)
 
 
-def repeated_values(run: Run, name: str) -> Iterator[Finding]:
-    """A channel whose values are held over several samples; value: share of repetitions."""
+def repeated_values(run: Run, name: str, step: float) -> Iterator[Finding]:
+    """A channel of resolution ``step`` with values held over several samples; value: share."""
     values = run[name]
     values = values[np.isfinite(values)]
     changes = np.flatnonzero(np.diff(values) != 0)
@@ -45,7 +44,6 @@ def repeated_values(run: Run, name: str) -> Iterator[Finding]:
     repeated = 1 - len(moving) / float(np.sum(moving))
     if repeated < _LEAST_SHARE:
         return
-    step = resolution(values)
     if step and float(np.median(np.abs(np.diff(values)[changes]))) < _STEPS * step:
         return
     rate = 1 / (run.interval * float(np.mean(moving)))

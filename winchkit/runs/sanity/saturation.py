@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.quantisation import resolution
 from winchkit.runs.sanity.text import share, size
 
 __all__ = ["saturated"]
@@ -31,8 +30,8 @@ _OVERSHOOT = 3.0
 _BEFORE = 6
 
 
-def saturated(run: Run, name: str) -> Iterator[Finding]:
-    """An extreme at which values are cut off; value: share of the samples there.
+def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
+    """An extreme at which values of resolution ``step`` are cut off; value: share of samples there.
 
     Notes
     -----
@@ -54,7 +53,7 @@ def saturated(run: Run, name: str) -> Iterator[Finding]:
         count = int(np.count_nonzero(at))
         if count < _LEAST_SAMPLES or level == 0 or not _is_cut_off(signal, at, level):
             continue
-        if np.ptp(values) < _LEAST_LEVELS * resolution(values):
+        if np.ptp(values) < _LEAST_LEVELS * step:
             return
         limit = size(sign * level, run.channels[name].unit)
         text = (
