@@ -1,4 +1,4 @@
-"""A robot calibrates itself: CABTIVE's procedure on its bench, in one call.
+"""A robot calibrates itself: CABTIVE's procedure on its bench, by one command.
 
 ``python benchmarks/robot_self_calibrated.py [--seed 1] [--poses 60] [--json]``: the simulated robot
 ``cabtive-robot`` has exit and anchor points that differ from the profile's by 5 mm per coordinate,
@@ -14,67 +14,57 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from dataclasses import replace
+import tempfile
+from pathlib import Path
 from time import process_time
 from typing import Any
 
-from winchkit import open_bench
-from winchkit.bench.robot.self_calibration import PoseVolume, self_calibrated
-from winchkit.bench.robot.tracker import Tracker
-from winchkit.calibration.robot.calibrate import Options
+from click.testing import CliRunner
+
 from winchkit.catalog import find
-from winchkit.schema.read import read_simbench
-from winchkit.sim.clock.simulated_clock import SimulatedClock
-from winchkit.sim.live.bench import LiveBench
+from winchkit.cli import main as winchkit
+from winchkit.runs.read import read_run
 
 ROBOT = "cabtive-robot"
 AIM = 0.04
-EFFECTS = ("cable-elongation-linear",)
+EFFECT = "cable-elongation-linear"
 PAPER = {"held_out_before_mm": 1.1, "held_out_after_mm": 0.47}
 
 
 def measure(
-    seed: int,
-    poses: int = 60,
-    validation: int = 20,
-    cycle: float = 0.004,
-    volume: PoseVolume | None = None,
+    seed: int, poses: int = 60, validation: int = 20, cycle: str = "4 ms", *options: str
 ) -> dict[str, Any]:
-    """Calibrate a robot whose hidden geometry the seed determines."""
-    sim = read_simbench(find("sim", ROBOT))
-    assert sim.platform is not None
-    truth = replace(sim.platform, geometry_seed=seed)
-    sim = replace(sim, platform=truth, bench=replace(sim.bench, cycle=cycle))
-    clock, started = SimulatedClock(), process_time()
-    with LiveBench(sim, seed=seed, simulated_time=clock) as live:
-        assert live.robot is not None
-        tracker = Tracker(clock.now)
-        live.robot.on_pose = tracker.receive
-        with open_bench(live.bench_spec, clock) as bench:
-            clock.sleep(0.5)
-            begin = clock.now()
-            found = self_calibrated(
-                bench,
-                tracker,
-                poses=poses,
-                validation=validation,
-                volume=volume,
-                options=Options(effects=EFFECTS),
-                seed=seed,
-            )
-            seconds = clock.now() - begin
-    before, after = found.held_out
+    """Calibrate a robot whose hidden geometry the seed determines, by the command."""
+    text = find("sim", ROBOT).read_text()
+    declared = {"geometry_seed = 7": f"geometry_seed = {seed}", '"8 ms"': f'"{cycle}"'}
+    for old, new in declared.items():
+        assert text.count(old) == 1, f"{ROBOT} declares {old} once"
+        text = text.replace(old, new)
+    started = process_time()
+    with tempfile.TemporaryDirectory() as folder:
+        sim, profile = Path(folder) / "robot.toml", Path(folder) / "new.toml"
+        sim.write_text(text)
+        command = [
+            *("calibrate", "cabtive", "--sim", str(sim), "--effect", EFFECT, "-o", str(profile)),
+            *("--poses", str(poses), "--held-out", str(validation), "--json", *options),
+        ]
+        result = CliRunner().invoke(winchkit, command)
+        if result.exit_code not in (0, 1) or not result.stdout:
+            raise RuntimeError(result.output)
+        found = json.loads(result.stdout)
+        times = [read_run(file).time for file in sorted(Path(folder).glob("new-*.csv"))]
+        written = profile.exists()
     return {
         "schema": 1,
         "seed": seed,
         "poses": poses,
         "validation": validation,
-        "held_out_before_mm": before * 1e3,
-        "held_out_after_mm": after * 1e3,
-        "seconds": seconds,
+        "held_out_before_mm": found["validation"]["rms_before"] * 1e3,
+        "held_out_after_mm": found["validation"]["rms_after"] * 1e3,
+        "seconds": max(time[-1] for time in times) - min(time[0] for time in times),
         "cpu_s": process_time() - started,
-        "warnings": list(found.calibrated.warnings),
-        "refused": found.calibrated.refusal or None,
+        "refused": found["refused"],
+        "written": written,
         "paper": PAPER,
     }
 

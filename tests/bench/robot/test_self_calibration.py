@@ -15,10 +15,9 @@ from winchkit.errors import MotionError, UsageError
 
 @pytest.mark.slow
 def test_the_benchmark_calibrates_a_hidden_geometry() -> None:
-    found = robot_self_calibrated.measure(
-        5, poses=10, validation=3, cycle=0.04, volume=PoseVolume(0.07, 0.12, 0.15, 0.15)
-    )
-    assert found["refused"] is None
+    found = robot_self_calibrated.measure(5, 10, 2, "40 ms", "--box", "40 mm", "--turn", "4 deg")
+    assert found["written"]
+    assert not found["refused"]
     assert found["held_out_before_mm"] > 0.2
     assert found["held_out_after_mm"] < 0.25 * found["held_out_before_mm"]
 

@@ -261,3 +261,18 @@ def test_too_few_poses_and_files_that_are_not_there(tmp_path: Path) -> None:
     assert "bench-spiral" in refused(3, "bench-spiral", few, "-o", out)
     run = file(tmp_path / "poses.csv", rows())
     assert "cannot be written" in refused(3, "cabtive", run, "-o", tmp_path / "no" / "new.toml")
+
+
+def test_poses_come_from_runs_or_a_bench_or_a_simulated_robot(run: Path, tmp_path: Path) -> None:
+    new = tmp_path / "new.toml"
+    for given in (
+        [],
+        [run, "--sim", "cabtive-robot"],
+        ["-b", "robot.toml", "--sim", "cabtive-robot"],
+    ):
+        refused = invoke("cabtive", *given, "-o", new)
+        assert refused.exit_code == 2
+        assert "or --sim for a simulated robot" in refused.output
+    other = invoke("cabtive", "--sim", "winding-device-robot", "-o", new)
+    assert other.exit_code == 2
+    assert not new.exists()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -11,7 +10,7 @@ import click
 
 from winchkit.cli.bench.calibrate_robot import pose_names
 from winchkit.cli.core.command import Example
-from winchkit.cli.core.completion import complete_bench, complete_effect
+from winchkit.cli.core.completion import complete_bench, complete_effect, complete_sim_bench
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE, RUN, output_option
 from winchkit.cli.core.output import echo_json
@@ -30,6 +29,7 @@ from winchkit.errors import UsageError, suggest
 if TYPE_CHECKING:
     from winchkit.calibration.robot.calibrate import Calibrated, Options
     from winchkit.calibration.robot.pose_design import NextPose
+    from winchkit.cli.bench.calibrate_robot import PoseSeries
     from winchkit.cli.core.terminal import ProgressCallback
 
 __all__ = ["command"]
@@ -53,6 +53,10 @@ _NOISE_DIMENSIONS = {
         "winchkit calibrate cabtive poses.csv -o calibrated.toml",
         "winchkit calibrate cabtive poses.csv --validate more.csv --next 5 -o calibrated.toml",
         Example(
+            "winchkit calibrate cabtive --sim cabtive-robot -o calibrated.toml",
+            "takes minutes; a test executes it with fewer poses",
+        ),
+        Example(
             "winchkit calibrate cabtive -b robot.toml --poses 60 -o calibrated.toml",
             "needs a bench with a robot",
         ),
@@ -66,6 +70,12 @@ _NOISE_DIMENSIONS = {
     metavar="FILE",
     shell_complete=complete_bench,
     help="Let this bench drive to the poses and measure them.",
+)
+@click.option(
+    "--sim",
+    metavar="NAME",
+    shell_complete=complete_sim_bench,
+    help="Let this simulated robot do so, in simulated time.",
 )
 @click.option(
     "--poses", type=click.IntRange(10), default=60, show_default=True, help="To drive to."
@@ -112,6 +122,7 @@ def command(
     robot: str,
     runs: Sequence[str],
     bench: str | None,
+    sim: str | None,
     poses: int,
     held_out: int,
     box: str,
@@ -138,20 +149,33 @@ def command(
 
     With --bench there are no RUNs: the bench moves its robot to random poses about home, waits for
     rest, averages the tracker and the load cells, fits, and judges other poses. Ctrl-C stops it.
+    With --sim a simulated robot does the same on a simulated clock, as fast as this computer can.
     """
     from winchkit.calibration.robot.pose_design import next_poses
     from winchkit.catalog import find
 
     source = find("profiles", robot)
     options = _options(effects, noise, loss, middle_force)
-    if bool(runs) == bool(bench):
-        raise UsageError("give the RUNs to fit, or --bench to drive to poses and measure them")
+    if bool(runs) + bool(bench) + bool(sim) != 1:
+        raise UsageError(
+            "give the RUNs to fit, or --bench to drive to poses and measure them, or --sim for a "
+            "simulated robot"
+        )
     with progress_bar() as progress:
-        if bench:
-            drive = _Drive(bench, poses, held_out, box, turn, accuracy)
-            found = drive.calibrated(robot, Path(output), options, progress)
-            files = pose_names(Path(output))
-            runs = [str(files["fit"])]
+        if not runs:
+            series = _series(
+                robot,
+                Path(output),
+                options,
+                poses=poses,
+                held_out=held_out,
+                box=box,
+                turn=turn,
+                accuracy=accuracy,
+                progress=progress,
+            )
+            found = (series.on_bench(bench) if bench else series.simulated(str(sim))).calibrated
+            runs = [str(pose_names(Path(output))["fit"])]
         else:
             found = _calibrated(source, runs, validate, options, progress)
         progress("proposing poses", None)
@@ -178,38 +202,25 @@ def command(
     suggest_next("diagnose", runs, "-p", output)
 
 
-@dataclass(frozen=True)
-class _Drive:
-    """Options of a calibration by a bench."""
+def _series(
+    robot: str,
+    output: Path,
+    options: Options,
+    *,
+    poses: int,
+    held_out: int,
+    box: str,
+    turn: str,
+    accuracy: str | None,
+    progress: ProgressCallback,
+) -> PoseSeries:
+    from winchkit.bench.robot.self_calibration import PoseVolume
+    from winchkit.cli.bench.calibrate_robot import PoseSeries
+    from winchkit.units import parse
 
-    bench: str
-    poses: int
-    held_out: int
-    box: str
-    turn: str
-    accuracy: str | None
-
-    def calibrated(
-        self, robot: str, output: Path, options: Options, progress: ProgressCallback
-    ) -> Calibrated:
-        """Drive, measure and fit."""
-        from winchkit.bench.robot.self_calibration import PoseVolume
-        from winchkit.cli.bench.calibrate_robot import calibrated_by_bench
-        from winchkit.units import parse
-
-        volume = PoseVolume(parse(self.box, "length"), parse(self.turn, "angle"))
-        accuracy = None if self.accuracy is None else parse(self.accuracy, "length")
-        return calibrated_by_bench(
-            self.bench,
-            robot,
-            output,
-            poses=self.poses,
-            validation=self.held_out,
-            volume=volume,
-            options=options,
-            accuracy=accuracy,
-            progress=progress,
-        ).calibrated
+    volume = PoseVolume(parse(box, "length"), parse(turn, "angle"))
+    wanted = None if accuracy is None else parse(accuracy, "length")
+    return PoseSeries(robot, output, poses, held_out, volume, options, wanted, progress)
 
 
 def _source(robot: str, runs: Sequence[str]) -> str:

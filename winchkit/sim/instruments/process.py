@@ -59,12 +59,15 @@ class ProcessInstrument(SimulatedInstrument):
             self.objects, self._send_heartbeat, lambda _node: None, lambda: None
         )
         self.nmt = NmtState.BOOTING
+        self._write()
 
     # Time.
 
-    def show(self, now: float) -> None:
-        """Write the conversions that have passed the filter by ``now`` to the objects."""
-        super().show(now)
+    def _showing(self) -> None:
+        self._write()
+
+    def _write(self) -> None:
+        """Write value and status to the objects."""
         self.objects.put(*self._value, self._raw((self.gross - self._tare) / self.spec.scale))
         if self._status is not None:
             self.objects.put(*self._status, self._status_bits())
@@ -72,8 +75,7 @@ class ProcessInstrument(SimulatedInstrument):
     # Network.
 
     def tick(self, now: float) -> None:
-        """Evaluate the network's timers."""
-        self.show(now)
+        """Evaluate the network's timers; conversions are shown by :meth:`show` before."""
         if self.nmt is NmtState.BOOTING:
             self._send(0x700 + self.node, b"\0")
             self.nmt = NmtState.PRE_OPERATIONAL
@@ -115,6 +117,7 @@ class ProcessInstrument(SimulatedInstrument):
         self.objects.reset()
         self._sdo.reset()
         self._pdos.rebuild()
+        self._write()
         self.nmt = NmtState.BOOTING
 
     def _send(self, identifier: int, data: bytes) -> None:
@@ -134,6 +137,7 @@ class ProcessInstrument(SimulatedInstrument):
         name = next(key for key, item in self.spec.command.items() if item.value == value)
         self.stored += self.spec.command[name].permanent
         self._obey(name)
+        self._write()
 
     def _raw(self, counts: float) -> int:
         if self.spec.type != "f32":
