@@ -18,14 +18,14 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import can
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import Error, sync_playwright
 
 from winchkit import write_run
 from winchkit.catalog import find
@@ -36,6 +36,7 @@ from winchkit.sim.record import simulate
 
 EXAMPLE = "demo-fat-drum"
 NAMES = "ABCDEFGH"
+PARTS = ("refit", "draw", "live", "keys")
 PATIENCE = 300_000
 """ms, for a diagnosis."""
 LOADS = (10.0, 20.0)
@@ -229,9 +230,9 @@ def key_press(page: Any, bench: Path, presses: int) -> dict[str, Any]:
     found, trips = [], 0
     for number in range(presses):
         page.wait_for_timeout(1500)
-        if page.locator("#trips .trip button").count():
+        if page.locator("#reset").count():
             trips += 1
-            page.click("#trips .trip button")
+            page.click("#reset")
             page.wait_for_timeout(2000)
         changes.clear()
         key = "ArrowDown" if number % 2 else "ArrowUp"
@@ -293,43 +294,65 @@ def added(page: Any, pid: int) -> dict[str, float]:
     return {"cpu_s": used(pid) - before, "seconds": time.monotonic() - start}
 
 
-def figures(browser: Any, size: Size, folder: Path) -> dict[str, Any]:
-    """All of them."""
-    out: dict[str, Any] = {"schema": 1, "load": os.getloadavg(), "size": size.__dict__}
+NEW = {"viewport": {"width": 1280, "height": 900}}
+
+
+def of_runs(browser: Any, samples: int, folder: Path, *, refit: bool) -> dict[str, Any]:
+    """Drawing of runs with that many samples; with ``refit`` brushing and adding too."""
     profile = next(iter(profiles_of(read_simbench(find("sim", EXAMPLE))).values())).name
-    new = {"viewport": {"width": 1280, "height": 900}}
-    for name, samples in (("refit", size.diagnosed), ("draw", size.samples)):
+    paths = recorded(samples, folder)
+    with command("serve", "--no-browser", *paths, "-p", profile) as (process, url):
+        page = browser.new_page(**NEW)
+        out: dict[str, Any] = drawn(page, url)
+        out["samples"] = page.evaluate(
+            "fetch('/api/view' + location.search).then((r) => r.json())"
+            ".then((v) => v.runs.reduce((sum, run) => sum + run.samples, 0))"
+        )
+        if refit:
+            out["visible_s"] = visible(browser, url)
+            out["brush"] = brushed(page)
+            out["add"] = added(page, process.pid)
+        page.close()
+    return out
+
+
+def of_bench(
+    browser: Any, winches: int, folder: Path, seconds: float, presses: int
+) -> dict[str, Any]:
+    """Processor time of a live bench, and times from a key press to the drive."""
+    declared, bench = bench_of(winches, folder), folder / f"bench-{winches}.toml"
+    simulated = ("sim", "serve", str(declared), "--json", "-o", str(bench))
+    with (
+        command(*simulated, pipe=True),
+        command("serve", "--no-browser", "-b", str(bench), "--allow-motion") as (process, url),
+    ):
+        page = browser.new_page(**NEW)
+        out: dict[str, Any] = dict(live(page, url, process.pid, seconds))
+        if presses:
+            out |= key_press(page, bench, presses)
+        page.close()
+    return out
+
+
+def figures(browser: Any, size: Size, folder: Path, parts: Sequence[str]) -> dict[str, Any]:
+    """Each part with the load of the computer; what fails is reported and the others go on."""
+    measure: dict[str, Callable[[Path], dict[str, Any]]] = {
+        "refit": lambda own: of_runs(browser, size.diagnosed, own, refit=True),
+        "draw": lambda own: of_runs(browser, size.samples, own, refit=False),
+        "live": lambda own: of_bench(browser, size.winches, own, size.seconds, 0),
+        "keys": lambda own: of_bench(browser, 1, own, size.seconds, size.presses),
+    }
+    out: dict[str, Any] = {"schema": 1, "size": size.__dict__}
+    for name in parts or measure:
         own = folder / name
         own.mkdir()
-        paths = recorded(samples, own)
-        with command("serve", "--no-browser", *paths, "-p", profile) as (process, url):
-            page = browser.new_page(**new)
-            out[name] = drawn(page, url)
-            out[name]["samples"] = page.evaluate(
-                "fetch('/api/view' + location.search).then((r) => r.json())"
-                ".then((v) => v.runs.reduce((sum, run) => sum + run.samples, 0))"
-            )
-            if name == "refit":
-                out["visible_s"] = visible(browser, url)
-                out["brush"] = brushed(page)
-                out["add"] = added(page, process.pid)
-            out[name]["load"] = os.getloadavg()[0]
-            page.close()
-    for winches in (size.winches, 1):
-        declared, bench = bench_of(winches, folder), folder / f"bench-{winches}.toml"
-        simulated = ("sim", "serve", str(declared), "--json", "-o", str(bench))
-        with (
-            command(*simulated, pipe=True),
-            command("serve", "--no-browser", "-b", str(bench), "--allow-motion") as (process, url),
-        ):
-            page = browser.new_page(**new)
-            share = live(page, url, process.pid, size.seconds) | {"load": os.getloadavg()[0]}
-            if winches == 1:
-                out["key_to_rpdo"] = key_press(page, bench, size.presses)
-                out["key_to_rpdo"]["load"] = os.getloadavg()[0]
-            if winches == size.winches:
-                out["live"] = share
-            page.close()
+        load = os.getloadavg()[0]
+        try:
+            out[name] = measure[name](own)
+        except (Error, AssertionError) as error:
+            out[name] = {"error": str(error).partition("\n")[0]}
+        out[name]["load"] = [load, os.getloadavg()[0]]
+        print(name, json.dumps(out[name]), file=sys.stderr, flush=True)
     return out
 
 
@@ -337,6 +360,7 @@ def main() -> int:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--small", action="store_true", help="few samples, one winch, seconds")
+    parser.add_argument("--only", nargs="*", default=(), choices=PARTS, help="parts to measure")
     parser.add_argument("--json", action="store_true", help="it always prints JSON")
     args = parser.parse_args()
     chromium = shutil.which("chromium")
@@ -344,7 +368,7 @@ def main() -> int:
         sys.exit("no Chromium: apt-get install chromium")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        found = figures(browser, SMALL if args.small else FULL, Path(folder))
+        found = figures(browser, SMALL if args.small else FULL, Path(folder), args.only)
         browser.close()
     print(json.dumps(found))
     return 0

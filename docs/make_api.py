@@ -43,7 +43,7 @@ SECTIONS = {
     ),
     "Diagnosis": (
         *("compare", "diagnose", "diagnose_each", "plan", "add", "remove"),
-        *("write_addition", "write_removal", "undo", "ladder"),
+        *("write_addition", "write_removal", "extended_name", "undo", "ladder"),
         *("load_catalogue", "new_effect", "Effect", "Parameter", "sized"),
     ),
     "Cable robots": (

@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     from winchkit.model.sizing.sizing import sized
     from winchkit.profile_edit.history import ladder
     from winchkit.profile_edit.ledger import undo
+    from winchkit.profile_edit.naming import extended_name
     from winchkit.runs.export import export
     from winchkit.runs.info import info_of
     from winchkit.runs.poses import read_poses
@@ -180,6 +181,7 @@ __all__ = [
     "diagnose_robot",
     "drive_info",
     "export",
+    "extended_name",
     "find",
     "fit_cell",
     "identify_dahl",
@@ -337,6 +339,7 @@ _NAMES = {
     "winchkit.model.sizing.sizing": ("sized",),
     "winchkit.profile_edit.history": ("ladder",),
     "winchkit.profile_edit.ledger": ("undo",),
+    "winchkit.profile_edit.naming": ("extended_name",),
     "winchkit.runs.export": ("export",),
     "winchkit.runs.info": ("info_of",),
     "winchkit.runs.poses": ("read_poses",),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 
 from winchkit.catalog import find
 from winchkit.errors import FileError, NotPermitted, UsageError
+from winchkit.runs.read import read_run
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.programme import Programme, Step, write_programme
 from winchkit.schema.read import read_simbench
@@ -24,6 +26,7 @@ from winchkit.web.drive_objects import drive_objects, drive_settings, write_sett
 from winchkit.web.frames import FrameWords
 from winchkit.web.live_model import CHANNELS, LiveModel
 from winchkit.web.programmes import Programmes
+from winchkit.web.trip_file import trip_file
 
 
 def taken(inbox: Inbox) -> list[dict[str, Any]]:
@@ -170,3 +173,38 @@ def test_settings_are_listed_with_types_and_limits_of_the_eds(spec: BenchSpec) -
         "high": 8.0,
     }
     assert "6040h" not in known
+
+
+def test_the_cycles_of_a_trip_are_a_run_that_commands_read(tmp_path: Path) -> None:
+    time = [-0.02, -0.01, 0.0, 0.01]
+    own = {
+        "motor_angle": [1.0, 1.1, 1.2, 1.2],
+        "motor_velocity": [10.0, 10.0, 5.0, 0.0],
+        "motor_torque": [0.1, 0.1, None, 0.1],
+        "tension": [98.0, 105.0, 113.5, 90.0],
+        "load": [None] * 4,
+        "length": [None] * 4,
+        "cable_length": [3.0] * 4,
+        "cable_speed": [-0.1, -0.1, -0.05, 0.0],
+        "commanded_speed": [-0.1, -0.1, 0.0, 0.0],
+    }
+    message = "winch A: tension 113.5 N is above the limit 112 N"
+    found = {
+        "at": 7.0,
+        "tripped": [{"message": message, "forbids": "winding in"}],
+        "blocked": [],
+        "time": time,
+        "winch": {"A": own, "B": own},
+        "events": [],
+    }
+    name, text = trip_file(found, "spiral-bench", tmp_path)
+    assert re.fullmatch(r"trip-\d{8}-\d{6}\.csv", name)
+    (tmp_path / name).write_text(text)
+    run = read_run(tmp_path / name)
+    assert run.winches() == ["A", "B"]
+    assert run.metadata["tripped"] == message
+    assert run.time == pytest.approx(time)
+    assert run["B.tension"] == pytest.approx(own["tension"])
+    assert np.isnan(run["A.motor_torque"]).tolist() == [False, False, True, False]
+    assert "A.load" not in run
+    assert "A.cable_length" not in run, "a run's cable length is that of the length instrument"

@@ -123,7 +123,7 @@ def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way
     page.wait_for_timeout(800)
     assert length(page) == pytest.approx(stopped, abs=0.02), "the ramp at the most"
     assert abs(length(page) - before) < 0.25
-    if page.locator("#trips .trip button").count():
+    if page.locator("#reset").count():
         page.once("dialog", lambda shown: shown.accept())
-        page.click("#trips .trip button")
+        page.click("#reset")
         until(page, lambda: page.locator("#trips .trip").count() == 0, 10.0)

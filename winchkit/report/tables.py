@@ -35,10 +35,10 @@ from winchkit.report.words.vocabulary import (
 __all__ = [
     "bar",
     "candidates",
-    "correlations",
     "detectable",
     "equivalence",
     "figures",
+    "fit_of",
     "named",
     "output_scale",
     "waterfall",
@@ -220,11 +220,12 @@ def equivalence(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
     return join(out)
 
 
-def correlations(diagnosis: Diagnosis) -> Markup:
-    """Correlations of fitted values above 0.5, and what the data determine of them."""
+def fit_of(diagnosis: Diagnosis) -> Markup:
+    """Fit report of the reported model, correlations above 0.5, and determined combinations."""
     fit, out = diagnosis.fit, []
-    if fit is None or not diagnosis.steps:
+    if fit is None:
         return Markup("")
+    out.append(element("pre", fit.text(), tabindex="0"))
     if fit.correlations:
         rows = [
             [element("code", pair.a), element("code", pair.b), significant(pair.value, 2)]

@@ -11,9 +11,10 @@ from __future__ import annotations
 import asyncio
 import json
 import threading
+import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -36,6 +37,7 @@ from winchkit.web.frames import FrameWords
 from winchkit.web.live_model import CHANNELS, LiveModel
 from winchkit.web.live_robot import LiveRobot
 from winchkit.web.programmes import Programmes
+from winchkit.web.trip_file import trip_file
 
 __all__ = ["BenchView"]
 
@@ -49,6 +51,10 @@ _POSES = 0.1
 """Period of the pose of a robot's platform, s."""
 _LATEST_PICTURE = 0.4
 """Age of the picture that a browser had when it ordered a jog, s: eight periods."""
+_AT_REST = 10.0
+"""For what a page moved to come to rest at the end, s: the longest ramp."""
+_ENDING = 0.3
+"""For the threads that watch to end, s: a call of a station takes milliseconds."""
 _ORDERS = 8
 """Browsers whose orders are carried out at once."""
 _LARGEST_PROGRAMME = 1_000_000
@@ -67,7 +73,7 @@ class BenchView:
     allow_motion : bool
         Whether a browser may command.
     folder : Path
-        Of the server's own, for programmes of a browser.
+        Of the server's own, for programmes of a browser and files that it saves.
     """
 
     def __init__(
@@ -77,6 +83,7 @@ class BenchView:
         self.file = bench
         self.effects = tuple(effects)
         self.allow_motion = allow_motion
+        self.folder = folder
         self._history: dict[str, deque[dict[str, Any]]] = {}
         self._newest: dict[str, Any] = {}
         self._predicted: dict[str, dict[str, Any]] = {}
@@ -101,6 +108,8 @@ class BenchView:
         self._commander: Browser | None = None
         self._browsers = 0
         self._open: set[Browser] = set()
+        self._leaving: set[Future[None]] = set()
+        """Stations of closed pages, until what they moved stands still."""
 
     def __enter__(self) -> Self:
         for thread in self._threads:
@@ -116,8 +125,11 @@ class BenchView:
         self._ended.set()
         if self._commander is not None:
             self._commander.leave()
+        wait(tuple(self._leaving), _AT_REST)
+        # What attaches to the bench just now waits for its owner; nothing needs it any more.
+        end = time.monotonic() + _ENDING
         for thread in self._threads:
-            thread.join(5.0)
+            thread.join(max(0.0, end - time.monotonic()))
         for pool in (self._stops, self._orders):
             pool.shutdown(wait=False, cancel_futures=True)
 
@@ -133,6 +145,7 @@ class BenchView:
             Route("/api/bench", self._declared),
             Route("/api/bench/history", self._past),
             Route("/api/bench/trip", self._trip),
+            Route("/api/bench/trip.csv", self._trip_file),
             Route("/api/bench/frames", self._frames),
             Route("/api/bench/programmes", self._listed),
             Route("/api/bench/programme", self._preview),
@@ -162,6 +175,14 @@ class BenchView:
 
     async def _trip(self, request: Request) -> Response:
         return JSONResponse(await asyncio.to_thread(self._watched().trip_history))
+
+    async def _trip_file(self, request: Request) -> Response:
+        found = await asyncio.to_thread(self._watched().trip_history)
+        if found is None:
+            raise UsageError("nothing is tripped: the cycles of a trip are kept until its reset")
+        name, text = await asyncio.to_thread(trip_file, found, self.spec.name, self.folder)
+        headers = {"content-disposition": f'attachment; filename="{name}"'}
+        return Response(text, media_type="text/csv", headers=headers)
 
     def _watched(self) -> RemoteStation:
         """The station that watches; raises ConnectionLost where there is none."""
@@ -324,7 +345,9 @@ class BenchView:
                 task.cancel()
             if self._commander is browser:
                 self._commander = None
-            await self._in(self._orders, browser.leave)
+            leaving = self._orders.submit(browser.leave)
+            self._leaving.add(leaving)
+            leaving.add_done_callback(self._leaving.discard)
 
     async def _obeying(self, browser: Browser) -> None:
         """Carry out the messages of a browser in their order, one after another."""

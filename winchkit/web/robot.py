@@ -31,6 +31,7 @@ from winchkit.model.robot import (
     wrench_feasibility,
 )
 from winchkit.plain_json import finite_or_none, significant
+from winchkit.profile_edit.naming import extended_name
 from winchkit.report.pages.robot_calibration import calibration_html, headline, largest_changes
 from winchkit.runs.poses import Measured, read_poses
 from winchkit.runs.read import read_run
@@ -148,7 +149,7 @@ class RobotWork:
             "proposed": list(state.proposed),
             "command": f"winchkit calibrate {state.source} "
             + " ".join(path.name for path in state.files)
-            + f" -o {Path(declared.name).stem}-calibrated.toml",
+            + f" -o {extended_name(declared.name, 'calibrated')}",
         }
 
     def picture(self, row: int, limits: tuple[float, float] | None = None) -> dict[str, Any]:
@@ -210,11 +211,11 @@ class RobotWork:
         found = self._found()
         if found.refusal:
             raise UsageError(found.refusal)
-        out = self.folder / "calibrated.toml"
+        out = self.folder / extended_name(self._state.source, "calibrated")
         names = [path.name for path in self._state.files]
         source = find("profiles", self._state.source)
         write_calibrated(source, found, out, Provenance(names, datetime.now(UTC).date()))
-        return f"{Path(self._state.source).stem}-calibrated.toml", out.read_text(encoding="utf-8")
+        return out.name, out.read_text(encoding="utf-8")
 
     def report(self) -> str:
         """The report of the calibration as one page."""

@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
 import socket
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
 
 from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    import uvicorn
 
 __all__ = ["serve"]
 
 _HOST = "127.0.0.1"
-_SHUTDOWN = 2
-"""For open sockets at the end, s."""
+_SHUTDOWN = 1
+"""For open sockets to close at the end, s; a browser that does not answer is left."""
+_CANCELLED = 0.3
+"""For cancelled requests to end, s."""
 
 
 def serve(
@@ -111,7 +118,21 @@ def serve(
         )
         at = "#robot" if of_robot else ""
         ready(f"http://{_HOST}:{listening.getsockname()[1]}/?token={token}{at}")
-        uvicorn.Server(config).run(sockets=[listening])
+        _run(uvicorn.Server(config), listening)
+
+
+def _run(server: uvicorn.Server, listening: socket.socket) -> None:
+    """Serve until a signal; computations under way in threads are not waited for at the end."""
+    loop = asyncio.new_event_loop()
+    try:
+        loop.run_until_complete(server.serve(sockets=[listening]))
+    finally:
+        pending = asyncio.all_tasks(loop)
+        for task in pending:
+            task.cancel()
+        if pending:
+            loop.run_until_complete(asyncio.wait(pending, timeout=_CANCELLED))
+        loop.close()
 
 
 def _listening(port: int) -> socket.socket:

@@ -16,6 +16,8 @@ __all__ = ["simulated_bench"]
 
 _PATIENCE = 30.0
 """For a simulated bench to start, s."""
+_ENDING = 0.5
+"""For a simulated bench to end, s; after that it ends by itself."""
 
 
 class simulated_bench:
@@ -62,7 +64,12 @@ class simulated_bench:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        if self._process is not None:
-            self._process.terminate()
-            with suppress(subprocess.TimeoutExpired):
-                self._process.communicate(timeout=_PATIENCE)
+        process = self._process
+        if process is None:
+            return
+        process.terminate()
+        with suppress(subprocess.TimeoutExpired):
+            process.communicate(timeout=_ENDING)
+        for stream in (process.stdin, process.stdout):
+            if stream is not None:
+                stream.close()

@@ -10,6 +10,7 @@ from typing import Any
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.errors import UsageError
 from winchkit.model.variables import ANGLES
+from winchkit.profile_edit.naming import extended_name
 from winchkit.runs.run import Run
 from winchkit.web.curves import OutputCurves
 from winchkit.web.ladder import VERDICT_WORDS, Rung, ladder, refitted, verdict
@@ -130,6 +131,12 @@ class State:
         return self.versions[-1].path
 
     @property
+    def names(self) -> list[str]:
+        """Proposed file name of every version, the present one last."""
+        added = [version.added for version in self.versions[1:]]
+        return [extended_name(self.source, *added[:count]) for count in range(len(added) + 1)]
+
+    @property
     def judgement(self) -> Judgement:
         """Verdict on the used runs; raises UsageError without a diagnosis."""
         found = self.diagnosed.diagnosis
@@ -151,11 +158,10 @@ class State:
         runs = " ".join(item.name for item in self.used)
         lines = [f"winchkit diagnose {runs} -p {self.source}"]
         profile = self.source
-        for number, version in enumerate(self.versions[1:], start=1):
-            better = f"better-{number}.toml"
-            lines.append(f"winchkit add {version.added} --fit {runs} -p {profile} -o {better}")
-            lines.append(f"winchkit diagnose {runs} -p {better}")
-            profile = better
+        for version, name in zip(self.versions[1:], self.names[1:], strict=True):
+            lines.append(f"winchkit add {version.added} --fit {runs} -p {profile} -o {name}")
+            lines.append(f"winchkit diagnose {runs} -p {name}")
+            profile = name
         return lines
 
     def winch_runs(self) -> tuple[str, list[Run]]:

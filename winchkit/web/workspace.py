@@ -197,7 +197,7 @@ class Workspace:
     def profile_text(self) -> tuple[str, str]:
         """File name and text of the present profile."""
         text = self._state.profile.read_text(encoding="utf-8")
-        return f"{Path(self._state.source).stem}-better.toml", text
+        return self._state.names[-1], text
 
     def report(self) -> str:
         """The report of the present diagnosis as one page."""

@@ -74,6 +74,26 @@ def test_the_variable_of_a_profile() -> None:
     assert "bench-spiral" in result.stdout
 
 
+@pytest.mark.parametrize(
+    ("arguments", "variable"),
+    [(["ledger"], "WINCHKIT_PROFILE"), (["compare", "a.csv"], "WINCHKIT_PROFILE"),
+     (["stop"], "WINCHKIT_BENCH"), (["scan"], "WINCHKIT_BENCH")],
+)  # fmt: skip
+def test_a_missing_profile_or_bench_names_its_variable(
+    folder: Path, arguments: list[str], variable: str
+) -> None:
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 2
+    said = result.stderr or str(result.exception)
+    assert f"set {variable}" in said
+
+
+def test_an_option_without_a_variable_of_all_commands_names_none() -> None:
+    result = CliRunner().invoke(main, ["add", "drum-radius"])
+    assert result.exit_code == 2
+    assert "WINCHKIT" not in result.stderr
+
+
 def test_help_groups_commands_by_subject() -> None:
     lines = CliRunner().invoke(main, ["--help"]).stdout.splitlines()
     at = [lines.index(f"{title}:") for title in SECTIONS]

@@ -13,7 +13,10 @@ __all__ = ["AFTER", "BEFORE", "TripHistory"]
 
 BEFORE, AFTER = 2.0, 0.5
 """Time kept before and after the cycle of the trip, s."""
-_CHANNELS = ("tension", "cable_length", "cable_speed", "commanded_speed")
+_CHANNELS = (
+    *("motor_angle", "motor_velocity", "motor_torque", "tension", "load", "length"),
+    *("cable_length", "cable_speed", "commanded_speed"),
+)
 _DIGITS = 6
 _WORDS = {
     Direction.NONE: "nothing",

@@ -336,8 +336,9 @@ class RemoteStation:
         -------
         dict or None
             ``at``: time of the trip, s; ``tripped`` and ``blocked``: message and forbidden
-            direction of each; ``time``: of the cycles, s from the trip; ``winch``: tension,
-            cable length, cable speed and commanded speed by winch, SI; ``events``: time and words.
+            direction of each; ``time``: of the cycles, s from the trip; ``winch``: motor
+            angle, velocity and torque, tension, load, length of its instrument, cable length and
+            speed of the drive, and commanded speed by winch, SI; ``events``: time and words.
         """
         found = self._call("trip_history")
         return None if found is None else dict(found)

@@ -73,6 +73,14 @@ class Command(_WithExamples):
         """Read the arguments; ``-`` is refused where no file is read."""
         try:
             rest = super().parse_args(ctx, args)
+        except click.MissingParameter as error:
+            if (variable := _shared_variable(error.param)) is None:
+                raise
+            raise click.UsageError(
+                f"{error.format_message().removesuffix('.')}: give its name or file, or set "
+                f"{variable}.",
+                ctx,
+            ) from None
         except click.NoSuchOption as error:
             meaning = LETTERS.get(error.option_name.removeprefix("-"))
             if meaning is None:
@@ -111,6 +119,14 @@ class Group(_WithExamples, click.Group):
 def _variable(param: click.Parameter) -> str:
     named = [param.envvar] if isinstance(param.envvar, str) else param.envvar or ()
     return next((name for name in named if os.environ.get(name)), "the environment")
+
+
+def _shared_variable(param: click.Parameter | None) -> str | None:
+    """Environment variable that an option has in all commands; None where it has none."""
+    if param is None or not isinstance(param.envvar, list):
+        return None
+    shared = {f"WINCHKIT_{name.removeprefix('--').upper()}" for name in param.opts}
+    return next((name for name in param.envvar if name in shared), None)
 
 
 def _refuse_dash(param: click.Parameter, ctx: click.Context) -> None:

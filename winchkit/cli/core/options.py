@@ -157,7 +157,10 @@ class BusChoice:
         if not self.interface and not self.channel and (bench := _only_bench()):
             return replace(self, bench=bench).spec()
         if not self.interface or not self.channel:
-            raise UsageError("which bus? give --bench FILE, or --interface and --channel")
+            raise UsageError(
+                f"which bus? give --bench FILE, set {BENCH_VARIABLE}, or give --interface and "
+                "--channel"
+            )
         from winchkit.bench.drives.node_access import bus_only
 
         return bus_only(self.interface, self.channel, self.bitrate, self.port)

@@ -10,7 +10,7 @@ from typing import NoReturn
 
 import click
 
-from winchkit.bench.remote.interruption import Interruption, Terminated, interrupted_by_signals
+from winchkit.bench.remote.interruption import Interruption, interrupted_by_signals
 from winchkit.cli.core.terminal import escaped_output
 from winchkit.errors import FileError, WinchkitError
 
@@ -79,11 +79,13 @@ def threads_abandoned() -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt as error:
-        _tell("winchkit: interrupted")
+        interruption = Interruption()
+        interruption.note(error)
+        _tell(f"winchkit: {interruption.words}")
         with suppress(OSError):
             sys.stdout.flush()
             sys.stderr.flush()
-        os._exit(error.exit_code if isinstance(error, Terminated) else INTERRUPTED)
+        os._exit(interruption.exit_code)
 
 
 def _tell(message: str) -> None:

@@ -224,7 +224,9 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
         return
     named = diagnosis.steps[0] if diagnosis.steps else None
     if named is not None and len(named.effects) == 1:
-        file = f"{Path(asked.profile).stem}-{Path(named.effects[0]).stem}.toml"
+        from winchkit.profile_edit.naming import extended_name
+
+        file = extended_name(asked.profile, named.effects[0])
         words = ("-p", asked.profile, *asked.options, "-o", file)
         suggest_next("add", named.effects[0], "--fit", runs, *words)
     elif named is None and diagnosis.verdict == "unknown" and diagnosis.data == "runs":

@@ -12,6 +12,7 @@ from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.completion import complete_bench, complete_sim_bench
 from winchkit.cli.core.early_checks import check_file
 from winchkit.cli.core.options import PROFILE, RUN
+from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.model.options import declared_profile
 from winchkit.errors import UsageError
 
@@ -78,18 +79,20 @@ def command(
     _check_files(runs, profile, bench, simulated)
     from winchkit.web.server import serve
 
-    serve(
-        runs,
-        profile,
-        port=port,
-        folder=folder,
-        bench=bench,
-        sim=simulated,
-        allow_motion=allow_motion,
-        effects=effect_files,
-        mystery=mystery,
-        ready=lambda url: _ready(url, browser=not no_browser),
-    )
+    # A report or a fit under way is of no use without the page.
+    with threads_abandoned():
+        serve(
+            runs,
+            profile,
+            port=port,
+            folder=folder,
+            bench=bench,
+            sim=simulated,
+            allow_motion=allow_motion,
+            effects=effect_files,
+            mystery=mystery,
+            ready=lambda url: _ready(url, browser=not no_browser),
+        )
 
 
 def _check_files(

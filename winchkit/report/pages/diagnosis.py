@@ -7,6 +7,7 @@ from math import isnan
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import Diagnosis
+from winchkit.profile_edit.naming import extended_name
 from winchkit.report import tables
 from winchkit.report.as_json import report_json
 from winchkit.report.detectability import effects_of, smallest_shown
@@ -66,7 +67,9 @@ def sections(
             ),
             folded("next", "Next runs", _next(diagnosis)),
             folded("candidates", "Candidate effects", tables.candidates(answer)),
-            folded("correlations", "Correlation of fitted values", tables.correlations(diagnosis)),
+            folded(
+                "fit", "Fit: statistics, values and their correlation", tables.fit_of(diagnosis)
+            ),
             folded(
                 "detectable",
                 f"Effects that are detectable with these {runs}",
@@ -200,8 +203,8 @@ def _commands(diagnosis: Diagnosis, command: Command) -> list[str]:
     """Commands that reproduce the result and continue from it."""
     profile = command.profile
     commands = [command.compare(profile), command.diagnose(profile)]
-    for number, step in enumerate(diagnosis.steps, start=1):
-        better = f"better-{number}.toml"
+    for step in diagnosis.steps:
+        better = extended_name(profile, "calibrated" if step.whole else step.effects[0])
         more = command.calibrate(profile, better)
         commands.append(more if step.whole else command.add(step.effects[0], profile, better))
         profile = better

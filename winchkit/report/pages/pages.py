@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.add import Grown
 from winchkit.diagnosis.compare import Compared
 from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.profile_edit.naming import extended_name
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.ladder import error_ladder, present
 from winchkit.report.figures.maps import map_figures
@@ -203,9 +204,8 @@ def addition_html(
     outputs, residuals = grown.addition.outputs, residuals_of_addition(grown, command.source)
     drawn, cards = _cards(residuals, size_texts(outputs))
     ladder = error_ladder(outputs, grown=True, changed=residuals.changed, source=command.source)
-    content = addition_sections(
-        grown.addition, cards, command, better or "better.toml", title=title, ladder=ladder
-    )
+    better = better or extended_name(command.profile, grown.addition.added[0].effect.id)
+    content = addition_sections(grown.addition, cards, command, better, title=title, ladder=ladder)
     return page(title, [*present(ladder), *drawn], content, headed=False)
 
 

@@ -17,6 +17,7 @@ from winchkit.diagnosis.robot.compare import RobotCompared
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.diagnosis.robot.errors import UNITS, Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
+from winchkit.profile_edit.naming import extended_name
 from winchkit.report.figures.axes import Reading, reading
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.ladder import error_ladder, present
@@ -355,7 +356,7 @@ def robot_addition_html(
     drawn = _addition_figures(grown, command.source)
     sizes = size_texts(grown.addition.outputs)
     cards = _cards(grown.regression, drawn, *grown.errors, sizes)
-    better = better or "better.toml"
+    better = better or extended_name(command.profile, grown.addition.added[0].effect.id)
     ladder = _addition_ladder(grown, command.source)
     content = addition_sections(grown.addition, cards, command, better, title=title, ladder=ladder)
     return page(title, [*present(ladder), *drawn.values()], content, headed=False)

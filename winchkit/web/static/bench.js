@@ -1,5 +1,5 @@
 // The Bench view, and the Stop of all views. A jog lasts as long as its messages: one each 50 ms.
-import { alarm, ask, attempt, el, fill, icon, number, say, socket, svg } from "./page.js";
+import { alarm, ask, attempt, download, el, fill, icon, number, say, socket, svg } from "./page.js";
 import { cycles } from "./cycle.js";
 import { frames } from "./frames.js";
 import { objects } from "./objects.js";
@@ -104,9 +104,10 @@ const stopButton = () => el("button", { class: "stop", onclick: stop, "aria-keys
 
 function header() {
   const box = document.getElementById("station");
-  if (!box.firstChild) { box.append(el("span", { id: "where" }), el("span", { id: "role" }), stopButton()); if (!root) fill(document.getElementById("stopbar"), stopButton()); }
+  if (!box.firstChild) { box.append(el("span", { id: "where" }), el("span", { id: "tripped", class: "chip trip" }, icon("trip"), "Tripped"), el("span", { id: "role" }), stopButton()); if (!root) fill(document.getElementById("stopbar"), stopButton()); }
   const state = now();
   box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${number(state.cable_length)} m` : ""}`;
+  box.querySelector("#tripped").hidden = !tripped().length;
   const role = box.querySelector("#role"), kind = commands() ? "command" : "watch";
   if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, icon(kind), commands() ? "You command" : "Watching")); }
 }
@@ -130,7 +131,8 @@ function banner() {
   if (!text) { fill(box); return; }
   const margin = { margin: "12px 24px 0" };
   if (lost) fill(box, el("div", { class: "alert", style: margin }, el("div", {}, lost)));
-  else fill(box, el("div", { class: "alert trip", style: margin }, el("b", { class: "row title" }, icon("trip"), "Tripped"), el("div", {}, together(trips).map((words) => el("p", {}, el("b", { class: "title" }, words))), lastTrip ? consequences(lastTrip) : el("p", {}, "Everything stopped. After the reset nothing moves before a new command."), lastTrip && !root ? el("a", { href: "#bench" }, "Show the last two seconds") : null), el("button", { onclick: () => { if (confirm("Clear the trips and drive faults? Nothing moves before a new command.")) send("reset"); }, disabled: !commands() }, "Reset ", el("kbd", {}, "R"))));
+  else fill(box, el("div", { class: "alert trip", style: margin }, el("b", { class: "row title" }, icon("trip"), "Tripped"), el("div", {}, together(trips).map((words) => el("p", {}, el("b", { class: "title" }, words))), lastTrip ? consequences(lastTrip) : el("p", {}, "Everything stopped. After the reset nothing moves before a new command."), lastTrip && !root ? el("a", { href: "#bench" }, "Show the last two seconds") : null), el("span", { class: "row" }, lastTrip ? el("button", { id: "save-trip", onclick: () => attempt(() => download("/api/bench/trip.csv")) }, "Save these 2.5 s") : null,
+    el("button", { id: "reset", class: "primary", onclick: () => { if (confirm("Clear the trips and drive faults? Nothing moves before a new command.")) send("reset"); }, disabled: !commands() }, "Reset… ", el("kbd", {}, "R")))));
 }
 
 function build() {
@@ -239,7 +241,7 @@ export function keys(event) {
   else if (event.key === "ArrowDown") hold(-1);
   else if (event.key === "t") send("tare", { winch });
   else if (event.key === "p") document.getElementById("pause")?.click();
-  else if (event.key === "r" && tripped().length) document.querySelector("#trips button").click();
+  else if (event.key === "r" && tripped().length) document.getElementById("reset")?.click();
   else if (event.key === "[" || event.key === "]") { const all = [...document.querySelectorAll("#speeds button")], at = all.findIndex((b) => b.getAttribute("aria-pressed") === "true") + (event.key === "]" ? 1 : -1); if (all[at]) all[at].click(); }
   else return false;
   return true;

@@ -1,0 +1,29 @@
+"""File name that is proposed for a profile after a change of its effects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["extended_name"]
+
+
+def extended_name(profile: str | Path, *effects: str) -> str:
+    """Proposed file name of a profile with added effects, such as ``bench-drum-radius.toml``.
+
+    Command line, reports and the page propose this name, so that the commands of one continue
+    from a file of the other.
+
+    Parameters
+    ----------
+    profile : str or Path
+        The profile that was extended, a name or a file; its folder is left out.
+    *effects : str
+        Ids of the added effects in their order, of a robot's line ``EFFECT/LINE``.
+
+    Returns
+    -------
+    str
+        Name without a folder.
+    """
+    stem = Path(profile).stem if str(profile).endswith(".toml") else Path(profile).name
+    return "-".join([stem, *(effect.replace("/", "-") for effect in effects)]) + ".toml"

@@ -1,0 +1,87 @@
+"""The control cycles around a trip as a run file, which other commands read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.runs.run import Channel, Run
+from winchkit.runs.writer import write_csv
+
+__all__ = ["trip_file", "trip_run"]
+
+_CHANNELS = {
+    "motor_angle": ("motor_angle", "rad"),
+    "motor_velocity": ("motor_velocity", "rad/s"),
+    "motor_torque": ("motor_torque", "N m"),
+    "tension": ("tension", "N"),
+    "load": ("load", "N"),
+    "length": ("cable_length", "m"),
+    "cable_speed": ("drive_cable_speed", "m/s"),
+    "commanded_speed": ("commanded_cable_speed", "m/s"),
+}
+"""Name in a run, and unit, by channel of the trip's history. A run's ``cable_length`` is that of
+the length instrument, and the speeds here are those of the drive."""
+
+
+def trip_run(found: Mapping[str, Any], bench: str) -> Run:
+    """The cycles around a trip as a run; its time is 0 in the cycle of the trip.
+
+    Parameters
+    ----------
+    found : mapping
+        What :meth:`RemoteStation.trip_history` returns.
+    bench : str
+        Name of the bench.
+
+    Returns
+    -------
+    Run
+        Channels of every winch that have a value, the trips as metadata.
+    """
+    channels = {
+        f"{winch}.{name}": Channel(values, unit)
+        for winch, own in found["winch"].items()
+        for key, (name, unit) in _CHANNELS.items()
+        if np.isfinite(values := _numbers(own[key])).any()
+    }
+    metadata = {
+        "bench": bench,
+        "tripped": "; ".join(one["message"] for one in found["tripped"]),
+        "programme": "trip",
+    }
+    return Run("trip", np.array(found["time"], dtype=float), channels, metadata)
+
+
+def trip_file(found: Mapping[str, Any], bench: str, folder: Path) -> tuple[str, str]:
+    """File name with the present time (UTC), and text of the run as CSV.
+
+    Parameters
+    ----------
+    found : mapping
+        As above.
+    bench : str
+        Name of the bench.
+    folder : Path
+        For the file until it is read.
+
+    Returns
+    -------
+    tuple of str
+        Name and text.
+    """
+    name = f"trip-{datetime.now(UTC):%Y%m%d-%H%M%S}.csv"
+    path = folder / name
+    write_csv(trip_run(found, bench), path)
+    text = path.read_text(encoding="utf-8")
+    path.unlink()
+    return name, text
+
+
+def _numbers(values: Sequence[float | None]) -> Array:
+    return np.array([np.nan if value is None else value for value in values], dtype=float)
