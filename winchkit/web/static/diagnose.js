@@ -7,9 +7,10 @@ import { morph, slideRails } from "./motion.js";
 import { both, drawSides } from "./sides.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
-let view = null, root = null, shown = { effect: null, output: null }, brushed = null, panels = [], cards = {}, span = null, earlier = null, drawnCurve = null;
+// The output that the ladder proposes has the focus until another is chosen, and after an addition.
+let view = null, root = null, shown = { effect: null, output: null, chosen: false }, brushed = null, panels = [], cards = {}, span = null, earlier = null, drawnCurve = null;
 
-export function enter(main, state) { root = main; shown = { effect: null, output: null }; brushed = null; update(state); }
+export function enter(main, state) { root = main; shown = { effect: null, output: null, chosen: false }; brushed = null; update(state); }
 
 export function update(state) {
   const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, state.beside, !state.diagnosis && Boolean(state.busy)]);
@@ -39,7 +40,7 @@ function render() {
     if (!both(view).includes(shown.output)) shown.output = both(view).includes(d.ladder.focus) ? d.ladder.focus : both(view)[0];
     drawSides(root, view, shown.output, focusOfSides);
   } else if (d) {
-    const focus = d.ladder.columns.some((c) => c.output === shown.output) ? shown.output : d.ladder.focus;
+    const stays = shown.chosen || earlier, focus = stays && d.ladder.columns.some((c) => c.output === shown.output) ? shown.output : d.ladder.focus;
     shown.output = focus;
     const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
     if (!candidates.some((row) => row.effect === shown.effect)) shown.effect = candidates.length && d.verdict !== "adequate" ? candidates[0].effect : null;
@@ -54,7 +55,7 @@ function render() {
     if (shown.effect) drawCard();
   } else if (view.outputs.length) {
     if (!view.outputs.includes(shown.output)) shown.output = view.outputs[0];
-    const heads = view.outputs.map((output) => el("button", { "aria-pressed": String(output === shown.output), onclick: () => { shown.output = output; span = null; render(); } }, output.replaceAll("_", " ")));
+    const heads = view.outputs.map((output) => el("button", { "aria-pressed": String(output === shown.output), onclick: () => { shown.output = output; shown.chosen = true; span = null; render(); } }, output.replaceAll("_", " ")));
     root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, el("span", { class: "row segments" }, heads), view.busy ? null : el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })));
     drawTime();
   } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with.")));
@@ -66,7 +67,7 @@ function context() {
   const used = view.runs.filter((run) => run.used), loads = [...new Set(used.map((run) => run.load).filter(Boolean))];
   const profile = el("button", { onclick: chooseProfile }, el("b", {}, view.profile ? view.profile.name : "choose…"),
     view.profile && view.profile.added.length ? el("span", { class: "note" }, `+ ${view.profile.added.join(", ")}`) : null);
-  return el("div", { class: "row context" },
+  return el("div", { class: "row context of-runs" },
     el("span", { class: "label" }, "Runs"), el("button", { onclick: chooseRuns }, el("b", {}, `${used.length} run${used.length === 1 ? "" : "s"}`), el("span", { class: "note" }, loads.join(", "))),
     el("span", { class: "label" }, "Profile"), profile,
     view.winch ? el("span", { class: "label" }, `Winch ${view.winch}`) : null,
@@ -159,7 +160,16 @@ function showCommands() {
 
 function head(d) {
   return el("div", { class: "verdict" }, el("div", { class: "head" }, el("span", { class: `chip ${d.verdict}` }, icon(d.verdict), d.chip), el("h1", {}, d.headline)),
-    d.sentence ? el("p", {}, d.sentence) : null);
+    d.sentence ? el("p", {}, coloured(d.sentence)) : null);
+}
+
+// The errors before and after in the colours of the ladder, and no line break before a unit.
+function coloured(sentence) {
+  const joined = sentence.replace(/(\d) (?=[^\W\d_µ%°]|[µ%°])/g, "$1\u00a0").replace(/\u00a0(mN|N|kN) m\b/g, "\u00a0$1\u00a0m");
+  return joined.split(/(from [^ ]+ to [^ ]+)(?= \()/).map((part, i) => {
+    const [, before, after] = (i % 2 && /^from (.+) to (.+)$/.exec(part)) || [];
+    return before ? el("span", {}, "from ", el("b", { class: "before" }, before), " to ", el("b", { class: "after" }, after)) : part;
+  });
 }
 
 // Places of the earlier profile's errors on the present axis, in percent.
@@ -175,11 +185,12 @@ function drawLadder() {
     ladderGrid(own, { output: shown.output, effect: shown.effect, only: narrow, most: reach(own), present: presentName(view.profile), focus, choose }));
 }
 
-function focusOfSides(output) { shown.output = output; address(); render(); }
-function focus(output) { shown.output = output; span = null; brushed = null; address(); drawLadder(); drawTime(); drawMultiples(); }
+function focusOfSides(output) { shown.output = output; shown.chosen = true; address(); render(); }
+matchMedia("(max-width: 699px)").addEventListener("change", () => { if (root && root.querySelector("#ladder")) drawLadder(); });
+function focus(output) { shown.output = output; shown.chosen = true; span = null; brushed = null; address(); drawLadder(); drawTime(); drawMultiples(); }
 function choose(effect) { shown.effect = effect; address(); drawLadder(); drawCard(); }
 function address() { history.replaceState(null, "", `${location.pathname}${location.search}#diagnose/${shown.output || ""}/${shown.effect || ""}`); }
-export function restore(parts) { if (parts[0]) shown.output = parts[0]; if (parts[1]) shown.effect = parts[1]; }
+export function restore(parts) { if (parts[0]) { shown.output = parts[0]; shown.chosen = true; } if (parts[1]) shown.effect = parts[1]; }
 
 async function drawCard() {
   const box = root.querySelector("#card"), effect = shown.effect;
@@ -241,11 +252,11 @@ async function drawTime() {
         { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, marks, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }] }] });
     fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise ±1σ", true]),
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
-    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 140, top: 22, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
+    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 120, top: 22, bare: true, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
     const marked = brushed ? brushed.time : null;
     const low = marked ? mixed(data.x, data.residual, marked, brushed.residual) : [data.x, data.residual];
     const drawn = plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
-      { height: 180, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
+      { height: 200, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
     if (earlier && earlier.curve && earlier.curve.output === output && !span && !marked) {
       const { x, y, worth } = earlier.curve;
       morph(drawn, { x, y: y.map((value) => (value === null ? null : (value * worth) / data.residual_worth)) }, low);

@@ -22,7 +22,7 @@ function save(kind, name, figure) {
 const finite = (values) => values.filter((value) => value !== null && value !== undefined && Number.isFinite(value));
 const ends = (values) => (values.length ? [values.reduce((a, b) => Math.min(a, b)), values.reduce((a, b) => Math.max(a, b))] : [0, 1]);
 
-function steps(low, high) {
+export function steps(low, high) {
   const raw = (high - low || 1) / 4, power = 10 ** Math.floor(Math.log10(raw)), step = [1, 2, 5, 10].map((k) => k * power).find((k) => k >= raw);
   return Array.from({ length: 12 }, (_, i) => (Math.ceil(low / step) + i) * step).filter((value) => value <= high + step * 1e-9);
 }

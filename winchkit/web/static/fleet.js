@@ -2,8 +2,17 @@
 // winch; a cell leads to the runs behind it.
 import { ask, attempt, dialog, el, fill, number, order, say, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
+import { steps } from "./figures.js";
 
 const ROW = 20, DAY = 86400;
+
+// A value to the second digit of its standard deviation.
+function withStd(value, std) {
+  if (!(std > 0)) return number(value);
+  const decimals = Math.max(0, 1 - Math.floor(Math.log10(std)));
+  return `${value.toFixed(decimals).replace("-", "−")} ± ${std.toFixed(decimals)}`;
+}
+
 let root, state = null, found = null, tabs = null, picked = null;
 
 export async function enter(main, fresh, switcher) {
@@ -104,7 +113,7 @@ function drawGrid(own, p) {
   drawn.addEventListener("keydown", (event) => move(event, p));
   const cells = own.winches.flatMap((winch) => winch.times.map((t, s) => [winch.winch, day(t), winch.values[s], winch.stds[s], winch.deviations[s]]));
   const columns = ["winch", "date", `value [${own.unit}]`, `std [${own.unit}]`, "deviation [σ]"].map((head, i) => [head, cells.map((cell) => cell[i])]);
-  return el("div", { class: "effect" }, el("header", { class: "row" }, el("h2", {}, title(own)), el("span", { class: "note" }, `common ${number(own.common)} ± ${number(own.common_std, 2)} ${own.unit}; between winches ${number(own.between_std, 2)}, between sessions ${number(own.session_std, 2)} ${own.unit}`),
+  return el("div", { class: "effect" }, el("header", { class: "row" }, el("h2", {}, title(own)), el("span", { class: "note" }, `common ${withStd(own.common, own.common_std)} ${own.unit}; between winches ${number(own.between_std, 2)}, between sessions ${number(own.session_std, 2)} ${own.unit}`),
     drawingExporter(`fleet-${own.effect}`, `${title(own)}: deviation from the median winch`, drawn, () => sourceOf(`folder ${found.folder}`, `profile ${found.profile}`), columns)), drawn);
 }
 
@@ -140,7 +149,7 @@ function drawSeries() {
   const known = winch.values.map((v, i) => [winch.times[i], v, winch.stds[i]]), whole = ends();
   const low = Math.min(own.common, ...known.map(([, v, s]) => v - 2 * s)), high = Math.max(own.common, ...known.map(([, v, s]) => v + 2 * s)), span = high - low || 1;
   const X = (t) => LEFT + 6 + ((t - whole[0]) / (whole[1] - whole[0] || 1)) * (W - LEFT - 18), Y = (v) => H - 26 - ((v - low) / span) * (H - 40);
-  const parts = [low, (low + high) / 2, high].flatMap((v) => [svg("line", { x1: LEFT, x2: W - 4, y1: Y(v), y2: Y(v), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: Y(v) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(v, 3))]);
+  const parts = steps(low, high).flatMap((v) => [svg("line", { x1: LEFT, x2: W - 4, y1: Y(v), y2: Y(v), stroke: "var(--line)" }), svg("text", { x: LEFT - 6, y: Y(v) + 4, "text-anchor": "end", fill: "var(--muted)" }, number(v, 3))]);
   const sigma = Math.hypot(own.session_std, own.common_std);
   parts.push(svg("rect", { x: LEFT, width: W - LEFT - 4, y: Y(Math.min(high, own.common + sigma)), height: Math.max(1, Y(Math.max(low, own.common - sigma)) - Y(Math.min(high, own.common + sigma))), fill: "var(--band)" }), svg("line", { x1: LEFT, x2: W - 4, y1: Y(own.common), y2: Y(own.common), stroke: "var(--edge)", "stroke-dasharray": "4 3" }));
   if (winch.change) {

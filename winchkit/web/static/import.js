@@ -1,5 +1,5 @@
 // Import of a file of another program: its columns, the channels that they may be, and a preview.
-import { ask, attempt, dialog, el, order, svg } from "./page.js";
+import { ask, attempt, dialog, el, icon, order, svg } from "./page.js";
 
 let last = {};
 
@@ -30,14 +30,14 @@ function show(file, found, given) {
   const cells = (row) => {
     const factor = factors[row.source] || "";
     const name = el("select", { "aria-label": `Channel of ${row.source}`, onchange: () => column(row, name.value, "", factor) }, ["", ...found.channels].map((own) => el("option", { value: own, selected: own === row.channel }, own || "not used")));
-    const unit = el("input", { value: row.unit, size: 6, "aria-label": `Unit of ${row.source}`, onchange: () => column(row, row.channel, unit.value, factor) });
-    const times = el("input", { value: factor, size: 6, placeholder: "1", "aria-label": `Factor of ${row.source}`, onchange: () => column(row, row.channel, times.value ? "" : row.unit, times.value.trim()) });
-    return [el("td", {}, row.source), el("td", {}, name), el("td", {}, row.channel ? times : ""), el("td", {}, row.channel ? unit : el("span", { class: "note" }, row.unit)), el("td", {}, row.first.slice(0, 3).join(" ")), el("td", {}, spark(row.plot)), el("td", { class: "note" }, [row.confidence, row.reason].filter(Boolean).join(": "))];
+    const unit = el("input", { value: row.unit, size: 6, placeholder: "unit", "aria-label": `Unit of ${row.source}`, onchange: () => column(row, row.channel, unit.value, factor) });
+    const times = el("input", { value: factor, size: 6, placeholder: "× 1", "aria-label": `Factor of ${row.source}`, onchange: () => column(row, row.channel, times.value ? "" : row.unit, times.value.trim()) });
+    return [el("td", {}, el("b", {}, row.source)), el("td", {}, name), el("td", {}, row.channel ? times : ""), el("td", {}, row.channel ? unit : el("span", { class: "note" }, row.unit)), el("td", {}, row.first.slice(0, 3).join(" ")), el("td", {}, spark(row.plot)), el("td", { class: "note" }, [row.confidence, row.reason].filter(Boolean).join(": "))];
   };
-  const questions = found.questions.map((q) => el("p", {}, "? ", q.text, " ", q.key ? el("input", { "aria-label": q.text, placeholder: q.key.replaceAll("_", " "), onchange: (event) => again({ ...given, [q.key]: event.target.value }) }) : null));
+  const questions = found.questions.map((q) => el("p", { class: "question" }, icon("partly"), q.text, q.key ? el("input", { "aria-label": q.text, placeholder: q.key.replaceAll("_", " "), onchange: (event) => again({ ...given, [q.key]: event.target.value }) }) : null));
   const mass = el("input", { size: 8, placeholder: "10 kg", value: given.load_mass || "", "aria-label": "Mass on the cable", onchange: () => { given.load_mass = mass.value; } });
   dialog(`Import ${file}`, el("p", { class: "note" }, `${found.layout}; ${found.columns.length} columns, ${found.rows} rows. A factor is a number, or the name of a value in the file.`),
-    el("div", { class: "scroll" }, el("table", {}, el("thead", {}, el("tr", {}, ["Column", "Channel", "Factor", "Unit", "First values", "Plot", "Why"].map((text) => el("th", {}, text)))), el("tbody", {}, found.columns.map((row) => el("tr", {}, cells(row)))))),
+    el("div", { class: "scroll" }, el("table", { class: "rows" }, el("thead", {}, el("tr", {}, ["Column", "Channel", "Factor", "Unit", "First values", "Plot", "Why"].map((text) => el("th", {}, text)))), el("tbody", {}, found.columns.map((row) => el("tr", {}, cells(row)))))),
     ...questions, found.notes.map((text) => el("p", { class: "note" }, text)),
     el("div", { class: "row", style: { marginTop: "12px" } }, el("label", { class: "row" }, "Mass on the cable", mass),
       el("button", { class: "primary", disabled: found.questions.length > 0, onclick: () => attempt(async () => { last = given; await order("import", { file, answers: given }); document.getElementById("dialog").close(); }) }, "Import")));

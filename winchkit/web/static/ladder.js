@@ -24,7 +24,8 @@ export function ladderGrid({ columns, rows }, { output, effect, only, most, pres
   grid.append(el("span", {}));
   for (const c of seen) grid.append(el("button", { class: `head ${c.output === output ? "focus" : ""}`, "aria-pressed": String(c.output === output), onclick: () => focus(c.output) }, c.name, el("span", {}, c.unit)));
   const today = rows.find((row) => row.kind === "today"), joined = rows.filter((row) => row.equal);
-  for (const row of rows) {
+  for (const [at, row] of rows.entries()) {
+    const earlier = rows[at - 1] && rows[at - 1].kind === "history" ? rows[at - 1] : null;
     const chosen = row.kind === "candidate" && row.effect === effect ? "chosen" : "";
     const bracket = row.equal ? el("b", { class: `bracket ${row === joined[0] ? "first" : ""} ${row === joined.at(-1) ? "last" : ""}`, title: "cannot be distinguished with these runs" }, el("span", { class: "visually-hidden" }, "cannot be distinguished"), row === joined[Math.floor((joined.length - 1) / 2)] ? "=" : "") : null;
     grid.append(row.kind === "candidate" && choose
@@ -32,7 +33,7 @@ export function ladderGrid({ columns, rows }, { output, effect, only, most, pres
       : el("div", { class: `name ${row.kind}` }, el("span", {}, row.kind === "today" && present ? present : row.label), bracket, row.kind === "today" ? el("i", {}, "today") : null));
     for (const c of seen) {
       const cell = row.cells[c.output];
-      grid.append(el("div", { class: `cell ${row.kind} ${chosen} ${c.output === output && !chosen ? "focus" : ""}` }, rung(row, cell, today.cells[c.output], most, c.output, Boolean(chosen)), el("span", { class: "value" }, cell ? cell.text : "–")));
+      grid.append(el("div", { class: `cell ${row.kind} ${chosen} ${c.output === output && !chosen ? "focus" : ""}` }, rung(row, cell, today.cells[c.output], most, c.output, Boolean(chosen), earlier && earlier.cells[c.output]), el("span", { class: "value" }, cell ? cell.text : "–")));
     }
   }
   grid.append(el("div", { class: "axis" }, "error ÷ noise floor"));
@@ -49,24 +50,28 @@ export function ladderFigure({ columns, rows }, source) {
 }
 const toneOf = (row) => ({ history: "muted", today: "today", candidate: "with", floor: "edge" })[row.kind];
 
-function rung(row, cell, now, most, output, picked) {
-  const parts = [svg("rect", { x: "0%", y: 0, width: "10%", height: "100%", fill: "var(--band)" }), svg("line", { x1: "10%", x2: "10%", y1: 0, y2: "100%", stroke: "var(--edge)", "stroke-width": 1.5 })];
+// `before` is the error of the row above where that is an earlier profile.
+function rung(row, cell, now, most, output, picked, before) {
+  const parts = [svg("rect", { x: "0%", y: 0, width: "10%", height: "100%", fill: "var(--band)" }), svg("rect", { x: "0%", y: 0, width: "10%", height: "100%", fill: "url(#floor)" }), svg("line", { x1: "10%", x2: "10%", y1: 0, y2: "100%", stroke: "var(--edge)", "stroke-width": 1.5 })];
   const right = now && now.ratio ? `${place(now.ratio, most)}%` : null;
   const moving = (names) => ({ "data-rail": right, "data-moves": names });
-  if (right && row.kind !== "history" && row.kind !== "floor") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? "50%" : 0, y2: "100%", stroke: "var(--today)", "stroke-width": 2, class: "rail", ...moving("x1 x2") }));
+  if (right && row.kind !== "history") parts.push(svg("line", { x1: right, x2: right, y1: row.kind === "today" ? "50%" : 0, y2: "100%", stroke: "var(--today)", "stroke-width": 2, class: "rail", ...moving("x1 x2") }));
   if (cell && cell.ratio) {
     const at = `${place(cell.ratio, most)}%`;
+    if (before && before.ratio) parts.push(...stair(`${place(before.ratio, most)}%`, at));
     if (row.kind === "candidate") {
       if (right) parts.push(svg("line", { x1: at, x2: right, y1: "50%", y2: "50%", stroke: "var(--with)", "stroke-width": picked ? 3.5 : 1.5, class: "rung", ...moving("x2") }));
       parts.push(svg("circle", { cx: at, cy: "50%", r: picked ? 5.5 : 4, fill: picked ? "var(--with)" : "var(--surface)", stroke: "var(--with)", "stroke-width": 2, class: "dot" }));
     } else if (row.kind === "today") parts.push(svg("circle", { cx: at, cy: "50%", r: 5, fill: "var(--today)", class: "dot", ...moving("cx") }));
     else if (row.kind === "history") {
-      parts.push(svg("circle", { cx: at, cy: "50%", r: 4, fill: "var(--surface)", stroke: "var(--muted)", "stroke-width": 1.5 }));
-      parts.push(svg("line", { x1: at, x2: at, y1: "66%", y2: "100%", stroke: "var(--muted)", "stroke-dasharray": "2 2" }));
+      parts.push(svg("line", { x1: at, x2: at, y1: "50%", y2: "100%", ...STAIR }), svg("circle", { cx: at, cy: "50%", r: 4, fill: "var(--surface)", stroke: "var(--muted)", "stroke-width": 1.5 }));
     }
   }
   return svg("svg", { "aria-hidden": "true", "data-output": output }, parts);
 }
+
+const STAIR = { stroke: "var(--muted)", "stroke-dasharray": "2 2" };
+const stair = (from, to) => [svg("line", { x1: from, x2: from, y1: 0, y2: "50%", ...STAIR }), svg("line", { x1: from, x2: to, y1: "50%", y2: "50%", ...STAIR })];
 
 function scale(most) {
   const parts = [svg("line", { x1: "10%", x2: "96%", y1: 1, y2: 1, stroke: "var(--edge)" })];

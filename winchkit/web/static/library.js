@@ -38,7 +38,7 @@ function render() {
   el("div", { class: "grid" }, el("section", { class: "panel w8 scroll", "aria-label": "Runs" },
     el("table", { class: "rows library" }, el("thead", {}, el("tr", {}, ["", "Set, run", "Programme", "Load", "Duration", "Error ÷ noise", "Verdict"].map((text, i) => el("th", { class: i === 4 ? "number" : "" }, text || el("span", { class: "visually-hidden" }, "Choose"))))), body),
     outputs.length ? el("div", { class: "legend below" }, outputs.map((name) => el("span", {}, svg("svg", { width: 14, height: 12, "aria-hidden": "true" }, mark(name, 7, 6)), NAMES[name] || name)), el("span", {}, "line on the left: noise floor")) : el("p", { class: "note below" }, "A verdict is shown for runs that were diagnosed: on this page, or by winchkit fleet diagnose.")),
-  el("section", { class: "panel w4", "aria-label": "Overlay" }, el("header", {}, el("h2", {}, "Overlay"), el("label", { class: "row end" }, el("span", { class: "visually-hidden" }, "Channel"), pick)), el("div", { id: "overlay" }, el("p", { class: "note" }, "Choose runs on the left.")))));
+  el("section", { class: "panel w4 beside", "aria-label": "Overlay" }, el("header", {}, el("h2", {}, "Overlay"), el("label", { class: "row end" }, el("span", { class: "visually-hidden" }, "Channel"), pick)), el("div", { id: "overlay" }, el("p", { class: "note" }, "Choose runs on the left.")))));
   overlay();
 }
 

@@ -17,21 +17,21 @@ export const both = (view) => view.outputs.filter((output) => view.beside.output
 function runsText(side, view) {
   const names = usedOf(side).map((run) => run.name), [a, b] = sidesOf(view).map((each) => JSON.stringify(usedOf(each).map((run) => run.name)));
   const loads = [...new Set(usedOf(side).map((run) => run.load).filter(Boolean))].join(", ");
-  return `${names.length} run${names.length === 1 ? "" : "s"}${loads ? `, ${loads}` : ""}${a === b ? "" : `: ${names.join(", ")}`}`;
+  return `${names.length} run${names.length === 1 ? "" : "s"}${loads ? `, ${loads}` : ""}${a === b ? "" : names.length > 3 ? `: ${names[0]} to ${names.at(-1)}` : `: ${names.join(", ")}`}`;
 }
 
 const source = (side) => sourceOf(`profile ${profileOf(side)}`, usedOf(side).map((run) => run.name).join(", "));
 
 export function drawSides(root, view, output, focus) {
   span = null;
-  const most = Math.max(...sidesOf(view).map((side) => reach(side.diagnosis.ladder))), narrow = matchMedia("(max-width: 1199px)").matches;
+  const most = Math.max(...sidesOf(view).map((side) => reach(side.diagnosis.ladder)));
   const panels = (id, label) => sidesOf(view).map((side, i) => el("section", { class: "panel w6", id: `${id}-${"ab"[i]}`, "aria-label": `${label}, ${"AB"[i]}` }));
   const ladders = panels("ladder", "Held-out error of each candidate"), times = panels("time", "Residual over time"), over = panels("over", "Residual against each variable");
   sidesOf(view).forEach((side, i) => {
     const d = side.diagnosis;
     ladders[i].append(el("header", {}, el("h2", {}, `${"AB"[i]}  ${profileOf(side)}`), el("span", { class: `chip ${d.verdict}` }, icon(d.verdict), d.chip)),
       el("p", { class: "note" }, runsText(side, view)), el("p", { class: "said" }, d.headline),
-      ladderGrid(d.ladder, { output, only: narrow, most, present: presentName(side.profile), focus }));
+      ladderGrid(d.ladder, { output, only: true, most, present: presentName(side.profile), focus }));
   });
   root.append(el("div", { class: "verdict" }, el("h1", {}, headline(view, output))),
     el("div", { class: "grid" }, el("section", { class: "panel w12", "aria-label": "Errors of both sides" }, errors(view, output, focus)), ladders, times, over));
@@ -78,7 +78,7 @@ async function drawTimes(view, output, boxes) {
         panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel: "time [s]", range: signal, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone }] },
           { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel: "time [s]", range: residual, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone }] }] });
       boxes[i].replaceChildren(el("header", {}, el("h2", {}, label, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], [tone, "predicted, residual"], ["band", "noise ±1σ", true]), exporter(`${output}-over-time-${"ab"[i]}`, figure)), upper, lower);
-      plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line(tone, 1.25)], { height: 130, top: 22, runs: data.runs.map((run) => ({ ...run, labelled: true })), zoom, xRange, range: () => signal, sync: "sides", label: `${label}, measured and predicted over time` });
+      plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line(tone, 1.25)], { height: 110, top: 22, bare: true, runs: data.runs.map((run) => ({ ...run, labelled: true })), zoom, xRange, range: () => signal, sync: "sides", label: `${label}, measured and predicted over time` });
       plot(lower, [data.x, data.residual], [line(tone, 1.25)], { height: 150, runs: data.runs, zoom, xRange, range: () => residual, noise: data.noise, xLabel: "s", sync: "sides", label: `${label}, residual over time` });
     });
   });
