@@ -211,3 +211,19 @@ def test_guarding_is_refused_where_the_adapter_sends_no_remote_frames(tmp_path: 
     code, output = check(bench)
     assert code == 3
     assert "winch A: guarding needs remote frames, which 'socketcand' does not send" in output
+
+
+def test_a_mode_whose_target_no_pdo_can_carry_is_left_out(tmp_path: Path) -> None:
+    """As in the EDS of a gripper of Schunk, which has CSP, and 607Ah with PDOMapping 0."""
+    target = _between("[607A]", "[607C]")
+    path = drive(tmp_path, eds=(target, target.replace("PDOMapping=1", "PDOMapping=0")))
+    _, output = check(path.parent / "generic-cia402.eds")
+    assert "modes that winchkit can move it in: CSV, PV, IP\n" in output
+    assert "note: winchkit does not move it in CSP: no RPDO can carry 607Ah" in output
+
+
+def test_a_control_word_that_no_pdo_can_carry_is_an_obstacle(tmp_path: Path) -> None:
+    word = _between("[6040]", "[6041]")
+    path = drive(tmp_path, eds=(word, word.replace("PDOMapping=1", "PDOMapping=0")))
+    _, output = check(path.parent / "generic-cia402.eds")
+    assert "not movable: no RPDO can carry 6040h: its PDOMapping is 0 in the EDS" in output

@@ -50,7 +50,9 @@ ALWAYS = (0x6040, 0x6041, 0x6060, 0x6061, 0x6064, 0x606C)
 """Objects without which winchkit moves no drive."""
 _MOTION = ("CSV", "CSP", "PV", "IP")
 _FEEDBACK = (0x6041, 0x6064, 0x606C, 0x6077, 0x6061, 0x603F)
-_NEEDED_FEEDBACK = (0x6041, 0x6064, 0x606C)
+_CONTROL = 0x6040
+_CARRIED = (_CONTROL, 0x6041, 0x6064, 0x606C)
+"""Objects without which in a PDO winchkit moves no drive."""
 _RPDO, _TPDO, _MAPPING = 0x1400, 0x1800, 0x200
 _PDOS = 512
 _UNSIGNED_WHERE_SIGNED = (0x6064, 0x606C, 0x607A, 0x60FF, 0x6071, 0x6077)
@@ -132,7 +134,7 @@ def describe(dictionary: Any) -> DriveDescription:
         ),
         device_profile=_profile(dictionary),
         modes=modes,
-        motion_modes=tuple(mode for mode in _MOTION if mode in modes),
+        motion_modes=tuple(_motion_modes(dictionary, modes)),
         feedback=_carried(dictionary, [(index, 0) for index in _FEEDBACK], receive=False),
         targets=_carried(dictionary, [(0x6040, 0), *sorted(filter(None, targets))], receive=True),
         receive=receive,
@@ -140,7 +142,7 @@ def describe(dictionary: Any) -> DriveDescription:
         host_loss=ways,
         options=tuple(_options(dictionary)),
         obstacles=tuple(_obstacles(dictionary, modes, receive, transmit, ways)),
-        differences=tuple(_differences(dictionary, receive, transmit)),
+        differences=tuple(_differences(dictionary, modes, receive, transmit)),
     )
 
 
@@ -203,6 +205,22 @@ def _modes(dictionary: Any) -> Iterator[str]:
             yield mode
 
 
+def _motion_modes(dictionary: Any, modes: tuple[str, ...]) -> Iterator[str]:
+    """Modes whose target an RPDO can carry."""
+    for mode in _MOTION:
+        if mode in modes and not _target_obstacle(dictionary, mode):
+            yield mode
+
+
+def _target_obstacle(dictionary: Any, mode: str) -> str:
+    """Why no RPDO can carry the target of a mode; empty where one can."""
+    target = MODES[mode].target
+    assert target is not None, "a mode of motion has a target"
+    variable = declared(dictionary, *target)
+    reason = "the EDS lacks it" if variable is None else unmappable(variable, receive=True)
+    return reason and f"no RPDO can carry {object_name(*target)}: {reason}"
+
+
 def _pdos(dictionary: Any, first: int) -> Iterator[PdoEntry]:
     for number in range(1, _PDOS + 1):
         if first + number - 1 in dictionary:
@@ -243,12 +261,17 @@ def _obstacles(
     for index in ALWAYS:
         if index not in dictionary:
             yield f"the EDS lacks {index:04X}h, which every motion needs"
-        elif index in _NEEDED_FEEDBACK and (
-            reason := unmappable(declared(dictionary, index), receive=False)
+        elif index in _CARRIED and (
+            reason := unmappable(declared(dictionary, index), receive=index == _CONTROL)
         ):
-            yield f"no TPDO can carry {index:04X}h: {reason}"
-    if not any(mode in modes for mode in _MOTION):
+            kind = "RPDO" if index == _CONTROL else "TPDO"
+            yield f"no {kind} can carry {index:04X}h: {reason}"
+    present = [mode for mode in _MOTION if mode in modes]
+    if not present:
         yield f"none of the modes {', '.join(_MOTION)} is there"
+    elif not any(_motion_modes(dictionary, modes)):
+        reasons = dict.fromkeys(_target_obstacle(dictionary, mode) for mode in present)
+        yield f"it has {', '.join(present)}, but {'; '.join(reasons)}"
     for kind, entries in (("receive", receive), ("transmit", transmit)):
         if not any(entry.number <= 4 for entry in entries):
             yield f"the EDS declares no {kind} PDO (1 to 4)"
@@ -260,8 +283,14 @@ def _obstacles(
 
 
 def _differences(
-    dictionary: Any, receive: tuple[PdoEntry, ...], transmit: tuple[PdoEntry, ...]
+    dictionary: Any,
+    modes: tuple[str, ...],
+    receive: tuple[PdoEntry, ...],
+    transmit: tuple[PdoEntry, ...],
 ) -> Iterator[str]:
+    for mode in _MOTION:
+        if mode in modes and (reason := _target_obstacle(dictionary, mode)):
+            yield f"winchkit does not move it in {mode}: {reason}"
     for index in _UNSIGNED_WHERE_SIGNED:
         variable = declared(dictionary, index)
         if variable is not None and variable.data_type in datatypes.UNSIGNED_TYPES:
@@ -285,6 +314,16 @@ def _differences(
         )
     if 0x6502 not in dictionary:
         yield "6502h (supported modes) is missing: the modes of the device file count"
+    yield from _pdo_differences(receive, transmit)
+    if (sync := said(declared(dictionary, 0x1005)) or 0) & 1 << 30:
+        yield f"1005h is {sync:X}h: the drive produces SYNC itself, which is switched off"
+    if dictionary.device_information.vendor_number in (None, 0):
+        yield "the vendor number is missing: the drive cannot be recognised by its identity"
+
+
+def _pdo_differences(
+    receive: tuple[PdoEntry, ...], transmit: tuple[PdoEntry, ...]
+) -> Iterator[str]:
     for name, entries in (("RPDO", receive), ("TPDO", transmit)):
         for entry in entries:
             if entry.fixed and entry.number <= 4:
@@ -292,7 +331,3 @@ def _differences(
                 yield f"{name} {entry.number} has a fixed mapping: {held}"
         if beyond := [entry.number for entry in entries if entry.number > 4]:
             yield f"{name} {', '.join(map(str, beyond))} beyond the first four: switched off"
-    if (sync := said(declared(dictionary, 0x1005)) or 0) & 1 << 30:
-        yield f"1005h is {sync:X}h: the drive produces SYNC itself, which is switched off"
-    if dictionary.device_information.vendor_number in (None, 0):
-        yield "the vendor number is missing: the drive cannot be recognised by its identity"
