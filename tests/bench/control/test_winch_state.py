@@ -57,7 +57,8 @@ def parts(*, faulty: bool) -> Any:
 
 @pytest.mark.parametrize("faulty", [False, True])
 def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
-    found = known(parts(faulty=faulty), NOW, sync=10, resumed=RESUMED)
+    winch = parts(faulty=faulty)
+    found = known(winch, NOW, sync=10, resumed=RESUMED)
     expected = {
         "feedback_age": 0.5,
         "missed_syncs": 1,
@@ -86,6 +87,7 @@ def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
         "turns_known": True,
         "sensors": SENSORS,
         "now": NOW,
+        "feedback": winch.axis.feedback,
     }
     assert found._asdict() == expected
     assert tuple(expected) == WinchInput._fields

@@ -118,22 +118,18 @@ class CableMap:
     def at(self, motor_angle: float) -> tuple[float, float]:
         """Cable length (m) and arm (m/rad) at a motor angle (rad)."""
         asked, answer = self._asked
-        if motor_angle != asked:
-            answer = self._at(motor_angle)
-            self._asked = (motor_angle, answer)
+        if motor_angle == asked:
+            return answer
+        angle, length, arm = self._here
+        change = (motor_angle - angle) * arm
+        if -_FAR < change < _FAR or (self._now is not None and isfinite(change)):
+            answer = (length - change, arm)
+        else:
+            answer = self._line.cable_length(motor_angle), self._line.arm(motor_angle)
+            if self._now is None:
+                self._here = _Here(motor_angle, *answer)
+        self._asked = (motor_angle, answer)
         return answer
-
-    def _at(self, motor_angle: float) -> tuple[float, float]:
-        here = self._here
-        change = (motor_angle - here.angle) * here.arm
-        if self._now is None and not abs(change) < _FAR:
-            here = _Here(
-                motor_angle, self._line.cable_length(motor_angle), self._line.arm(motor_angle)
-            )
-            self._here, change = here, 0.0
-        elif not isfinite(change):
-            return self._line.cable_length(motor_angle), self._line.arm(motor_angle)
-        return here.length - change, here.arm
 
     def cable_length(self, motor_angle: float) -> float:
         """Length at a motor angle under the tension that there is, m."""

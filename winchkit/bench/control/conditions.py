@@ -1,8 +1,9 @@
 """The conditions that the supervisor tests on each winch, as a table.
 
 A row names its variable and limit in words (``docs/safety.md`` prints them), says what the
-condition forbids and whether it is latched although nothing moved, and has two small functions:
-whether it holds, and the message. Debouncing and latching are the supervisor's.
+condition forbids and whether it is latched although nothing moved, and has a test and a message.
+Most tests compare a quantity with a bound (:class:`Exceeds`); those on facts are functions.
+Debouncing and latching are the supervisor's.
 """
 
 from __future__ import annotations
@@ -12,13 +13,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-from winchkit.bench.control.observation import Instrumented, Memory, Supervised, WinchInput
+from winchkit.bench.control.observation import (
+    Instrumented,
+    Memory,
+    Quantities,
+    Supervised,
+    WinchInput,
+)
 from winchkit.bench.control.snapshot import Direction
 
-__all__ = ["BENCH_CONDITIONS", "CONDITIONS", "BenchCondition", "Condition", "Test"]
+__all__ = ["BENCH_CONDITIONS", "CONDITIONS", "BenchCondition", "Condition", "Exceeds", "Test"]
 
-_MISSED_SYNCS = 5
-"""A late cycle of the host makes feedback old; a drive that is silent also misses SYNCs."""
 _SLACK_TIME = 0.2
 """A load that swings relieves its cable for less, s."""
 _LENGTH_TOLERANCE = 5e-3
@@ -35,16 +40,31 @@ _RUNAWAY_TIME = 0.03
 _FOLLOWING_TIME = 0.25
 """At ``limits.speed``, the lag of a position loop of gain 4/s, s."""
 _FOLLOWING_DEBOUNCE = 0.05
-_SLIP = 0.05
-"""Of cable, m, and ..."""
-_SLIP_SHARE = 0.05
-"""... share of the moved length: a length sensor's filter and a profile's error are below."""
 _SLIP_TIME = 0.5
 
 Test = Callable[[WinchInput, Supervised, Memory], bool]
 Words = Callable[[WinchInput, Supervised, Memory], str]
 When = Literal["", "moving", "disabled", "follows"]
 """A field of :class:`WinchInput`; empty for always."""
+
+
+class Exceeds:
+    """The test whether a quantity is above a bound."""
+
+    def __init__(self, quantity: str, bound: Callable[[Supervised], float | None]) -> None:
+        """Take the name of a field of :class:`Quantities`, and its bound; None for no bound."""
+        self.place = Quantities._fields.index(quantity)
+        """Of the quantity among all."""
+        self._bound = bound
+
+    def bound(self, own: Supervised) -> float:
+        """Bound of a winch; infinite where it has none."""
+        found = self._bound(own)
+        return math.inf if found is None else found
+
+    def __call__(self, _item: WinchInput, own: Supervised, memory: Memory) -> bool:
+        """Whether the quantity of the newest observations is above the bound."""
+        return memory.quantities[self.place] > self.bound(own)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,46 +106,17 @@ def _age(item: WinchInput) -> float:
     return item.now - _cell(item).since
 
 
-def _high(_item: WinchInput, own: Supervised, memory: Memory) -> bool:
-    limit = own.limits.tension_high
-    return limit is not None and memory.gross > limit
-
-
-def _slack(_item: WinchInput, own: Supervised, memory: Memory) -> bool:
-    limit = own.limits.tension_slack
-    return limit is not None and memory.gross < limit
-
-
-def _rate(_item: WinchInput, own: Supervised, memory: Memory) -> bool:
-    limit = own.limits.tension_rate
-    fresh = not math.isnan(memory.gross)
-    return limit is not None and fresh and abs(memory.tension_rate) > limit
-
-
-def _unreadable(item: WinchInput, _own: Supervised, _memory: Memory) -> bool:
-    cell = _cell(item)
-    return math.isnan(cell.value) and _age(item) <= cell.max_age
-
-
-def _stale(item: WinchInput, _own: Supervised, _memory: Memory) -> bool:
-    return _age(item) > _cell(item).max_age
-
-
-def _short(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
-    return item.cable_length < own.shortest - _LENGTH_TOLERANCE
-
-
-def _long(item: WinchInput, own: Supervised, _memory: Memory) -> bool:
-    return item.cable_length > own.longest + _LENGTH_TOLERANCE
-
-
-def _beyond(speed: float, commanded: float) -> float:
-    """By how much a speed is faster than the commanded one, or directed against it."""
-    return max(abs(speed) - abs(commanded), abs(speed) if speed * commanded < 0 else 0.0)
+def _deviation_limit(own: Supervised) -> float:
+    return _DEVIATION * own.limits.speed
 
 
 def _following_limit(own: Supervised) -> float:
     return own.limits.following_error or _FOLLOWING_TIME * own.limits.speed
+
+
+def _slack_limit(own: Supervised) -> float | None:
+    slack = own.limits.tension_slack
+    return None if slack is None else -slack
 
 
 def _stale_words(item: WinchInput, _own: Supervised, _memory: Memory) -> str:
@@ -182,9 +173,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "feedback",
         "age of the newest complete feedback",
         "2 heartbeat periods, and 5 SYNCs unanswered",
-        lambda item, own, _memory: (
-            item.feedback_age > own.stale and item.missed_syncs >= _MISSED_SYNCS
-        ),
+        Exceeds("unanswered", lambda own: own.stale),
         lambda item, own, _memory: (
             f"no complete feedback for {item.feedback_age * 1e3:.0f} ms (limit "
             f"{own.stale * 1e3:.0f} ms); check the bus load and the drive"
@@ -219,7 +208,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "motion at rest",
         "cable speed by the motor while the drive is commanded to be disabled",
         "3 steps of 606Ch, at least 1 % of limits.speed",
-        lambda item, own, _memory: abs(item.winding_speed) > own.rest_speed,
+        Exceeds("speed", lambda own: own.rest_speed),
         lambda item, own, _memory: (
             f"the motor turns although rest is commanded: {item.winding_speed:.3f} m/s of "
             f"cable (limit {own.rest_speed:.3f} m/s); check the brake and who turns it, reset"
@@ -232,7 +221,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "slowing down",
         "measured cable speed while the commanded speed falls",
         "the fastest commanded within limits.response_time, and 5 %",
-        lambda _item, _own, memory: memory.unresponsive,
+        Exceeds("unresponsive", lambda _own: 0.0),
         lambda item, own, _memory: (
             f"the drive does not slow down as commanded: {item.winding_speed:.3f} m/s, commanded "
             f"{item.target_speed:.3f} m/s, within {own.limits.response_time:g} s "
@@ -244,13 +233,11 @@ CONDITIONS: tuple[Condition, ...] = (
         "deviation",
         "measured against commanded cable speed",
         "25 % of limits.speed",
-        lambda item, own, _memory: (
-            abs(item.winding_speed - item.commanded) > _DEVIATION * own.limits.speed
-        ),
+        Exceeds("deviation", _deviation_limit),
         lambda item, own, _memory: (
             f"the motor does not follow: {item.winding_speed:.3f} m/s, commanded "
             f"{item.commanded:.3f} m/s (limit of the difference "
-            f"{_DEVIATION * own.limits.speed:.3f} m/s for "
+            f"{_deviation_limit(own):.3f} m/s for "
             f"{_DEVIATION_TIME:g} s); check load, brake and drive limits"
         ),
         debounce=_DEVIATION_TIME,
@@ -260,13 +247,11 @@ CONDITIONS: tuple[Condition, ...] = (
         "runaway",
         "measured cable speed against the direction and above the size of the commanded one",
         "25 % of limits.speed",
-        lambda item, own, _memory: (
-            _beyond(item.winding_speed, item.commanded) > _DEVIATION * own.limits.speed
-        ),
+        Exceeds("runaway", _deviation_limit),
         lambda item, own, _memory: (
             f"the motor turns faster than commanded, or the other way: {item.winding_speed:.3f} "
             f"m/s, commanded {item.commanded:.3f} m/s (limit of the difference "
-            f"{_DEVIATION * own.limits.speed:.3f} m/s); check direction, scale and load"
+            f"{_deviation_limit(own):.3f} m/s); check direction, scale and load"
         ),
         debounce=_RUNAWAY_TIME,
         when="follows",
@@ -275,7 +260,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "following error",
         "target position less measured position, in cable",
         "limits.following_error, else 0.25 s at limits.speed",
-        lambda item, own, _memory: abs(item.following_error) > _following_limit(own),
+        Exceeds("following_error", _following_limit),
         lambda item, own, _memory: (
             f"following error {abs(item.following_error) * 1e3:.0f} mm of cable (limit "
             f"{_following_limit(own) * 1e3:.0f} mm); check load, brake and drive limits"
@@ -287,7 +272,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "speed",
         "cable speed by the motor",
         "1.2 x limits.speed",
-        lambda item, own, _memory: abs(item.winding_speed) > own.limits.speed * _SPEED_TOLERANCE,
+        Exceeds("speed", lambda own: own.limits.speed * _SPEED_TOLERANCE),
         lambda item, own, _memory: (
             f"cable speed {item.winding_speed:.3f} m/s is beyond limits.speed "
             f"{own.limits.speed:g} m/s by more than a fifth"
@@ -297,7 +282,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "length",
         "cable length by the motor, lower limit",
         "limits.length, with 5 mm of tolerance",
-        _short,
+        Exceeds("wound_in", lambda own: -(own.shortest - _LENGTH_TOLERANCE)),
         lambda item, own, _memory: (
             f"cable length {item.cable_length:.3f} m is below limits.length {own.shortest:g} m; "
             "only paying out is allowed"
@@ -309,7 +294,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "length",
         "cable length by the motor, upper limit",
         "limits.length, with 5 mm of tolerance",
-        _long,
+        Exceeds("paid_out", lambda own: own.longest + _LENGTH_TOLERANCE),
         lambda item, own, _memory: (
             f"cable length {item.cable_length:.3f} m is above limits.length {own.longest:g} m; "
             "only winding in is allowed"
@@ -321,7 +306,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "dead wraps",
         "cable length by the motor",
         "the length at which the last two wraps are left on the drum, by the profile",
-        lambda item, own, _memory: item.cable_length > own.safe_length,
+        Exceeds("paid_out", lambda own: own.safe_length),
         lambda item, own, _memory: (
             f"cable length {item.cable_length:.3f} m leaves fewer than two dead wraps on the drum "
             f"(from {own.safe_length:.3f} m on); only winding in is allowed"
@@ -332,7 +317,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "cable slip",
         "change of the length sensor against the change by the motor, since the motion began",
         "50 mm and 5 % of the moved length",
-        lambda _item, _own, memory: abs(memory.slip) > _SLIP + _SLIP_SHARE * memory.moved,
+        Exceeds("slip", lambda _own: 0.0),
         lambda _item, _own, memory: (
             f"the length sensor and the motor disagree by {memory.slip * 1e3:.0f} mm after "
             f"{memory.moved:.2f} m of motion; the cable slips, sticks or the profile is wrong"
@@ -345,7 +330,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "cell stale",
         "age of the load cell's newest reading",
         "the device file's longest age",
-        _stale,
+        Exceeds("expired", lambda _own: 0.0),
         _stale_words,
         needs="cell",
     ),
@@ -353,7 +338,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "cell",
         "flags of the load cell's reading",
         "a number",
-        _unreadable,
+        Exceeds("unreadable", lambda _own: 0.0),
         lambda item, *_: f"the load cell reads no number ({_cell(item).quality}); check it",
         needs="cell",
     ),
@@ -380,7 +365,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "tension high",
         "gross reading of the load cell",
         "limits.tension_high",
-        _high,
+        Exceeds("tension", lambda own: own.limits.tension_high),
         lambda _item, own, memory: (
             f"tension {memory.gross:.1f} N is above tension_high {own.limits.tension_high:g} N; "
             "only paying out is allowed until it falls"
@@ -392,7 +377,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "slack",
         "gross reading of the load cell",
         "limits.tension_slack",
-        _slack,
+        Exceeds("slackness", _slack_limit),
         lambda _item, own, memory: (
             f"tension {memory.gross:.1f} N is below tension_slack {own.limits.tension_slack:g} N; "
             "only winding in is allowed until it rises"
@@ -405,7 +390,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "tension rate",
         "change of the load cell's reading over 50 ms",
         "limits.tension_rate",
-        _rate,
+        Exceeds("tension_rate", lambda own: own.limits.tension_rate),
         lambda _item, own, memory: (
             f"tension changes by {memory.tension_rate:.0f} N/s, limit "
             f"{own.limits.tension_rate:g} N/s"

@@ -25,6 +25,7 @@ _RESET_TIME = 1.0
 _RUN_DOWN_MARGIN = 1.0
 _FRESH_SYNCS = 2
 """A status word of these SYNCs was sampled after the stop was sent."""
+_FOLLOWING = (Phase.MOVING, Phase.RUN_DOWN)
 _ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 
@@ -223,7 +224,7 @@ class Controller:
     @property
     def follows(self) -> bool:
         """Whether the drive is to follow the commanded speed in this cycle."""
-        return self.phase in (Phase.MOVING, Phase.RUN_DOWN) and not self.axis.moves_alone
+        return self.phase in _FOLLOWING and not self.axis.moves_alone
 
     def tracking(self, angle: float, arm: float) -> tuple[float, float]:
         """What the drive, at a motor angle (rad), is compared with while it :attr:`follows`.
@@ -247,17 +248,19 @@ class Controller:
         ``sync`` is the number of the SYNC that was just sent.
         """
         self._time, self._sync = time, sync
-        self._take_orders(now)
+        # As in most cycles nothing was ordered; what is ordered meanwhile is taken in the next.
+        if self._ordered is not None or self._wanted is not None:
+            self._take_orders(now)
         feedback = self.axis.feedback
         if feedback is None:
             return
         match self.phase:
+            case Phase.MOVING:
+                self._move(now, feedback)
             case Phase.DISABLED:
                 self._stay_disabled(now, feedback)
             case Phase.ENABLING:
                 self._enable(now, feedback)
-            case Phase.MOVING:
-                self._move(now, feedback)
             case Phase.RUN_DOWN:
                 self._slow_down(now, feedback)
             case Phase.STOPPING:
@@ -282,8 +285,6 @@ class Controller:
                 self._ordered = phase
 
     def _take_orders(self, now: float) -> None:
-        if self._ordered is None and self._wanted is None:
-            return  # as in most cycles; what is ordered meanwhile is taken in the next
         with self._lock:
             ordered, self._ordered = self._ordered, None
             wanted = self._wanted

@@ -13,7 +13,7 @@ from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.observation import WinchInput
 from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Phase, Trip, WinchSnapshots
 from winchkit.bench.control.supervisor import Supervisor
-from winchkit.bench.control.winch_state import WinchParts, captured, known, pictures
+from winchkit.bench.control.winch_state import WinchParts, known, pictures
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.drivers.clock import Clock
@@ -163,9 +163,9 @@ class ControlLoop:
             if self.supervisor.tripped or self.failure is not None or reason:
                 self._stop_all(reason)
             self._command(now)
-        lost = frozenset(n for n, p in self.winches.items() if not p.axis.position_absolute)
-        if self.supervisor.tripped is not self._kept or lost != self._latch.lost:
-            self._keep(lost)
+        lost = [name for name, p in self.winches.items() if not p.axis.position_absolute]
+        if self.supervisor.tripped is not self._kept or self._latch.lost.symmetric_difference(lost):
+            self._keep(frozenset(lost))
         self._sample(snapshot)
         return snapshot
 
@@ -403,15 +403,20 @@ class ControlLoop:
     def _picture(
         self, now: float, inputs: Mapping[str, WinchInput], blocked: tuple[Trip, ...]
     ) -> BenchSnapshot:
-        taken = [captured(parts) for parts in self.winches.values()]
+        taken = [
+            (parts.controller.phase, parts.cable.correction, parts.commander)
+            for parts in self.winches.values()
+        ]
         return BenchSnapshot(
-            time=now,
-            cycle=self._count,
-            winch=WinchSnapshots(lambda: pictures(inputs, taken, now)),
-            tripped=self.supervisor.tripped,
-            blocked=blocked,
-            overruns=self.overruns,
-            warnings=(*self._warnings.values(), *self.supervisor.warnings),
+            now,
+            self._count,
+            WinchSnapshots(
+                lambda: pictures(inputs, taken, now), lambda: [phase for phase, _, _ in taken]
+            ),
+            self.supervisor.tripped,
+            blocked,
+            self.overruns,
+            (*self._warnings.values(), *self.supervisor.warnings),
         )
 
 

@@ -179,6 +179,7 @@ class Jog:
         self._cable, self._limits = cable, limits
         self._ramp = Ramp(limits.acceleration)
         self._wish = 0.0
+        self._lag = limits.acceleration * limits.response_time
         self._expires = -math.inf
         self._angle = self._last = 0.0
 
@@ -201,7 +202,7 @@ class Jog:
         velocity = speed / arm
         self._angle += velocity * (time - self._last)
         self._last = time
-        return Target(velocity, self._angle, speed, done=not live and speed == 0.0)
+        return Target(velocity, self._angle, speed, not live and speed == 0.0)
 
     def _within(self, wish: float, length: float) -> float:
         """The wish, no faster than what can still be braked before a length limit.
@@ -212,7 +213,7 @@ class Jog:
             return wish
         low, high = self._limits.length
         room = max(0.0, (length - low if wish > 0 else high - length) - _MARGIN)
-        lag = self._limits.acceleration * self._limits.response_time
+        lag = self._lag
         fastest = math.sqrt(lag * lag + 2 * self._limits.acceleration * room) - lag
         return math.copysign(min(abs(wish), fastest), wish)
 

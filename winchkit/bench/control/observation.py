@@ -11,9 +11,18 @@ from operator import itemgetter
 from types import MappingProxyType
 from typing import NamedTuple
 
+from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.schema.bench import LimitSpec
 
-__all__ = ["FACTS", "Instrumented", "Memory", "Supervised", "WinchInput", "facts_of"]
+__all__ = [
+    "FACTS",
+    "Instrumented",
+    "Memory",
+    "Quantities",
+    "Supervised",
+    "WinchInput",
+    "facts_of",
+]
 
 _RATE_TIME = 0.05
 """Shortest span over which a change of tension counts, s."""
@@ -25,6 +34,13 @@ _OVERSHOOT = 0.05
 """Share of the commanded speed: of a velocity loop after an acceleration."""
 _STEPS, _REST_STEPS = 4, 3
 """Resolution steps of 606Ch below which a difference, or a speed at rest, is noise."""
+_MISSED_SYNCS = 5
+"""A late cycle of the host makes feedback old; a drive that is silent also misses SYNCs."""
+_SLIP = 0.05
+"""Of cable, m, and ..."""
+_SLIP_SHARE = 0.05
+"""... share of the moved length: a length sensor's filter and a profile's error are below."""
+_new = tuple.__new__
 
 
 class Instrumented(NamedTuple):
@@ -102,6 +118,8 @@ class WinchInput(NamedTuple):
     """Newest reading of each instrument by its role; ``tension`` is that of the cell."""
     now: float = 0.0
     """Time of the cycle, s."""
+    feedback: AxisFeedback | None = None
+    """Newest feedback of the drive, from which the above is."""
 
 
 FACTS = (
@@ -119,6 +137,42 @@ FACTS = (
 )
 """What of a :class:`WinchInput` is no measured number and seldom changes."""
 facts_of = itemgetter(*map(WinchInput._fields.index, FACTS))
+
+
+class Quantities(NamedTuple):
+    """What conditions compare with a bound: each is exceeded upwards, NaN exceeds nothing; SI."""
+
+    unanswered: float = 0.0
+    """Age of the feedback, s; zero while fewer than 5 SYNCs are unanswered."""
+    speed: float = 0.0
+    """Size of the cable speed by the motor, m/s."""
+    unresponsive: float = 0.0
+    """1 where the drive did not slow down as it was commanded, else 0."""
+    deviation: float = 0.0
+    """Size of the difference of measured and commanded speed, m/s."""
+    runaway: float = 0.0
+    """By how much it is faster than the commanded speed, or directed against it, m/s."""
+    following_error: float = 0.0
+    """Its size, m."""
+    paid_out: float = 0.0
+    """Cable length, m."""
+    wound_in: float = 0.0
+    """Negative cable length, m."""
+    slip: float = 0.0
+    """By how much cable slip is beyond what sensor and profile may be wrong by, m."""
+    expired: float = 0.0
+    """Age of the cell's reading beyond its longest age, s."""
+    unreadable: float = 0.0
+    """1 where the cell's reading is in time and no number, else 0."""
+    tension: float = 0.0
+    """Of the cable, N."""
+    slackness: float = 0.0
+    """Negative tension, N."""
+    tension_rate: float = 0.0
+    """Size of the change of the tension, N/s."""
+
+
+_NOTHING = Quantities()
 
 
 @dataclass(frozen=True)
@@ -188,6 +242,8 @@ class Memory:
     """Change of the length sensor less that by the motor since the motion began, m."""
     moved: float = 0.0
     """Cable that ran since then, m."""
+    quantities: Quantities = _NOTHING
+    """What conditions compare with a bound, of the newest observations."""
     quiet: object = None
     """The facts under which no condition on facts held when they were tested last."""
     _tension: tuple[float, float] | None = None
@@ -199,18 +255,43 @@ class Memory:
         """Take the observations of a cycle."""
         if math.isnan(self.boot_ups):
             self.boot_ups = item.boot_ups
-        cell = item.tension
-        if cell is None:
-            self.gross = math.nan
-        else:
-            value, gross = cell.value, cell.gross
-            counts = item.now - cell.since <= cell.max_age and not math.isnan(value)
-            self.gross = (gross if math.isfinite(gross) else value) if counts else math.nan
+        cell, expired, unreadable = item.tension, 0.0, False
+        gross = rate = math.nan
+        if cell is not None:
+            value, age = cell.value, item.now - cell.since
+            in_time, number = age <= cell.max_age, not math.isnan(value)
+            expired, unreadable = age - cell.max_age, in_time and not number
             if cell.time == cell.time:
                 self._follow_tension(cell)
-        self._follow_slowing(item)
+            if in_time and number:
+                gross = cell.gross if math.isfinite(cell.gross) else value
+                rate = abs(self.tension_rate)
+        self.gross = gross
+        speed, commanded, length = item.winding_speed, item.commanded, item.cable_length
+        self._follow_slowing(item.target_speed, speed)
         if item.length == item.length:
             self._follow_length(item)
+        size = abs(speed)
+        # What Quantities(...) makes, without the call of its constructor.
+        self.quantities = _new(
+            Quantities,
+            (
+                item.feedback_age if item.missed_syncs >= _MISSED_SYNCS else 0.0,
+                size,
+                self.unresponsive,
+                abs(speed - commanded),
+                size if speed * commanded < 0 else size - abs(commanded),
+                abs(item.following_error),
+                length,
+                -length,
+                abs(self.slip) - (_SLIP + _SLIP_SHARE * self.moved),
+                expired,
+                unreadable,
+                gross,
+                -gross,
+                rate,
+            ),
+        )
 
     def _follow_tension(self, cell: Instrumented) -> None:
         before = self._tension
@@ -222,7 +303,7 @@ class Memory:
             self.tension_rate = (cell.value - before[1]) / span
             self._tension = (cell.time, cell.value)
 
-    def _follow_slowing(self, item: WinchInput) -> None:
+    def _follow_slowing(self, target: float, speed: float) -> None:
         """While the commanded speed falls, compare with the fastest commanded of a response time.
 
         A lag of first order with a time constant T follows a ramp T later, and its end by
@@ -230,7 +311,7 @@ class Memory:
         whose targets do not reach it keeps its speed, and soon is.
         """
         self.unresponsive = False
-        target, track, own = item.target_speed, self._track, self.own
+        track, own = self._track, self.own
         if math.isnan(target):
             if track:
                 track.clear()
@@ -239,7 +320,6 @@ class Memory:
         if len(track) <= own.response_cycles:
             return
         track.popleft()
-        speed = item.winding_speed
         excess = speed - target if speed > 0 else target - speed
         if excess <= own.ripple:
             return  # not faster than commanded now, and so not than any of the window

@@ -90,14 +90,19 @@ class WinchSnapshot(NamedTuple):
 class WinchSnapshots(Mapping[str, WinchSnapshot]):
     """The winches of a cycle by name, made at the first access: most cycles have none.
 
-    ``make`` has what the cycle knew; it gives the same whenever and however often it is called.
+    ``make`` and ``phases`` have what the cycle knew; they give the same whenever and however often
+    they are called.
     """
 
-    __slots__ = ("_made", "_make")
+    __slots__ = ("_made", "_make", "phases")
 
-    def __init__(self, make: Callable[[], dict[str, WinchSnapshot]]) -> None:
+    def __init__(
+        self, make: Callable[[], dict[str, WinchSnapshot]], phases: Callable[[], list[Phase]]
+    ) -> None:
         self._make = make
         self._made: dict[str, WinchSnapshot] | None = None
+        self.phases = phases
+        """What each of them is doing, which is known without the rest."""
 
     def _all(self) -> dict[str, WinchSnapshot]:
         made = self._made
@@ -148,7 +153,10 @@ class BenchSnapshot:
     @property
     def at_rest(self) -> bool:
         """Whether every drive is disabled and stands still."""
-        return all(item.phase is Phase.DISABLED for item in self.winch.values())
+        winch = self.winch
+        if isinstance(winch, WinchSnapshots):
+            return all(phase is Phase.DISABLED for phase in winch.phases())
+        return all(item.phase is Phase.DISABLED for item in winch.values())
 
 
 def to_dict(snapshot: BenchSnapshot) -> dict[str, Any]:

@@ -6,11 +6,14 @@ condition needs (debounce, rates, boot-ups) and the trips that it latched.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
+from operator import gt
+from typing import NamedTuple
 
-from winchkit.bench.control.conditions import CONDITIONS, Condition, Test
-from winchkit.bench.control.observation import Memory, Supervised, WinchInput, facts_of
+from winchkit.bench.control.conditions import CONDITIONS, Condition, Exceeds, Test
+from winchkit.bench.control.observation import Memory, Quantities, Supervised, WinchInput, facts_of
 from winchkit.bench.control.snapshot import Direction, Trip
 
 __all__ = ["Supervisor", "direction_of"]
@@ -20,6 +23,17 @@ _BY_CELL = ("cell", "tension_high", "tension_slack", "tension_rate")
 _Rows = tuple[tuple[Test, Condition], ...]
 _Case = tuple[bool, bool, bool, bool]
 """Whether the load cell is there, and the winch moving, disabled and to follow."""
+
+
+class _Tested(NamedTuple):
+    """The conditions that are tested in a case."""
+
+    every: _Rows
+    by_numbers: _Rows
+    """Those on more than facts."""
+    bounds: tuple[float, ...] | None
+    """Of each quantity: the least that a condition compares it with. As long as none is exceeded,
+    none of ``by_numbers`` holds. None where one of them compares no quantity."""
 
 
 class Supervisor:
@@ -45,12 +59,18 @@ class Supervisor:
             memory.observe(item)
             own, cell = memory.own, item.tension is not None
             case = (cell, item.moving, item.disabled, item.follows)
-            every, by_numbers = self._rows[name][case]
+            tested = self._rows[name][case]
             # Under the same facts a condition on facts holds no more than before.
             facts = (cell, facts_of(item))
-            rows = by_numbers if facts == memory.quiet else every
+            rows = tested.every
+            if facts == memory.quiet:
+                bounds = tested.bounds
+                exceeded = bounds is None or True in map(gt, memory.quantities, bounds)
+                if not exceeded and not memory.since:
+                    continue
+                rows = tested.by_numbers
             held = [row for holds, row in rows if holds(item, own, memory)]
-            if rows is every:
+            if rows is tested.every:
                 memory.quiet = None if any(row.by_facts for row in held) else facts
             if held or memory.since:
                 for row in _debounced(held, memory.since, now):
@@ -104,8 +124,8 @@ def _debounced(
             yield row
 
 
-def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, tuple[_Rows, _Rows]]:
-    """The conditions that are tested in each case: all of them, and those on more than facts."""
+def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, _Tested]:
+    """The conditions that are tested in each case."""
     applying = [row for row in conditions if _applies(row, own)]
     found = {}
     for cell, moving, disabled, follows in product((False, True), repeat=4):
@@ -116,8 +136,19 @@ def _by_case(conditions: Sequence[Condition], own: Supervised) -> dict[_Case, tu
             if holds[row.when] and (cell or row.needs not in _BY_CELL)
         )
         by_numbers = tuple((test, row) for test, row in rows if not row.by_facts)
-        found[cell, moving, disabled, follows] = rows, by_numbers
+        tested = _Tested(rows, by_numbers, _bounds([test for test, _ in by_numbers], own))
+        found[cell, moving, disabled, follows] = tested
     return found
+
+
+def _bounds(tests: Sequence[Test], own: Supervised) -> tuple[float, ...] | None:
+    """The least bound of each quantity; None where a test compares no quantity."""
+    least = [math.inf] * len(Quantities._fields)
+    for test in tests:
+        if not isinstance(test, Exceeds):
+            return None
+        least[test.place] = min(least[test.place], test.bound(own))
+    return tuple(least)
 
 
 def _applies(row: Condition, own: Supervised) -> bool:

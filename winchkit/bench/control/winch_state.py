@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import AxisPort, Controller
@@ -19,7 +19,7 @@ from winchkit.errors import ConnectionLost
 from winchkit.estimation.cable_state import Sample
 from winchkit.schema.profiles.winch import CableSpec
 
-__all__ = ["Captured", "SensorPort", "WinchParts", "captured", "known", "pictures"]
+__all__ = ["Captured", "SensorPort", "WinchParts", "known", "pictures"]
 
 _IDLE = (Phase.DISABLED, Phase.RESETTING)
 _ANSWERED = 2
@@ -105,7 +105,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     heartbeat, operational = axis.heartbeat, axis.operational
     emergencies = () if fault else axis.alarms
     length = sensors.get("length")
-    # What WinchInput(...) makes, without matching 27 keywords, which takes ten times as long.
+    # What WinchInput(...) makes, without matching 28 keywords, which takes ten times as long.
     return _new(
         WinchInput,
         (
@@ -136,6 +136,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             turns_known,
             sensors,
             now,
+            feedback,
         ),
     )
 
@@ -194,21 +195,9 @@ def _sample(parts: WinchParts, feedback: AxisFeedback, now: float) -> Sample:
     )
 
 
-class Captured(NamedTuple):
-    """What a winch is shown by, beside what the supervisor saw of it, as it was in a cycle."""
-
-    feedback: AxisFeedback | None
-    phase: Phase
-    correction: float
-    """Of the cell's reading for the tension at the platform end, N."""
-    commander: str
-
-
-def captured(parts: WinchParts) -> Captured:
-    """The same, now."""
-    return Captured(
-        parts.axis.feedback, parts.controller.phase, parts.cable.correction, parts.commander
-    )
+Captured = tuple[Phase, float, str]
+"""What a winch is shown by, beside what the supervisor saw of it, as it was in a cycle: phase,
+correction of the cell's reading for the tension at the platform end (N), name of its commander."""
 
 
 def pictures(
@@ -222,11 +211,12 @@ def pictures(
 
 
 def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
-    feedback = taken.feedback or _NOTHING
+    phase, correction, commander = taken
+    feedback = seen.feedback or _NOTHING
     fresh = {role: _fresh(item, now) for role, item in seen.sensors.items()}
     cell, load = fresh.get("cell", math.nan), fresh.get("load", math.nan)
     return WinchSnapshot(
-        phase=taken.phase,
+        phase=phase,
         state=str(feedback.state),
         time=feedback.time,
         motor_angle=feedback.angle,
@@ -236,7 +226,7 @@ def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
         cable_speed=0.0 - seen.winding_speed,
         tension=cell,
         load=load,
-        rope_tension=load if math.isfinite(load) else cell + taken.correction,
+        rope_tension=load if math.isfinite(load) else cell + correction,
         length=fresh.get("length", math.nan),
         temperature=fresh.get("temperature", math.nan),
         quality={
@@ -244,6 +234,6 @@ def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
             for role, item in seen.sensors.items()
         },
         turns_known=feedback.turns_known,
-        commander=taken.commander,
+        commander=commander,
         commanded_speed=0.0 - seen.commanded,
     )

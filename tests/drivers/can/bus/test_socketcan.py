@@ -86,12 +86,15 @@ def test_a_frame_that_this_socket_has_sent_is_marked_by_linux(
 ) -> None:
     """MSG_CONFIRM: of this socket; MSG_DONTROUTE: of another one of this computer."""
     port, other = ends
-    taken = port._incoming.taken
-    monkeypatch.setattr(
-        port._incoming,
-        "taken",
-        lambda count: [(data, extra, flags) for data, extra, _ in taken(count)],
-    )
+    receive = port._recvmmsg
+
+    def marked(*arguments: object) -> int:
+        """The flags of the first message as the kernel would set them in ``struct mmsghdr``."""
+        count = int(receive(*arguments))
+        struct.pack_into("@i", port._incoming._headers, struct.calcsize("@PIPNPN"), flags)
+        return count
+
+    monkeypatch.setattr(port, "_recvmmsg", marked)
     other.send(_PACKET.pack(0x201, 2, b"\x06\0"))
     assert list(port.receive(0.05)) == ([] if ours else [Frame(0x201, b"\x06\0")])
 

@@ -12,7 +12,7 @@ import errno
 import os
 import socket
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any, NamedTuple
 
@@ -45,6 +45,7 @@ _WAIT_FOR_ONE = 0x10000
 """Flag of ``recvmmsg``: wait for the first frame only."""
 _QUEUE = 1 << 20
 """Bytes of the socket's queue; the usual one keeps 278 frames."""
+_new = tuple.__new__
 
 
 class Frame(NamedTuple):
@@ -90,13 +91,9 @@ class SocketCan:
             if number in (errno.EAGAIN, errno.EINTR):
                 return ()
             raise OSError(number, os.strerror(number))
-        frames = []
-        for data, control, flags in incoming.taken(count):
-            frame, drops = parse_socketcan(data, control)
-            if drops is not None:
-                self.dropped = drops
-            if frame is not None and not flags & _CONFIRM:
-                frames.append(frame)
+        frames, drops = incoming.taken(count)
+        if drops is not None:
+            self.dropped = drops
         return frames
 
     def send(self, identifier: int, data: bytes) -> None:
@@ -155,13 +152,27 @@ class _Messages:
         """Make them ready to receive."""
         self._headers[:] = self._empty
 
-    def taken(self, count: int) -> Iterator[tuple[bytearray, bytearray, int]]:
-        """Data, control messages and flags of the first ``count``, which were received."""
-        at = place = 0
-        headers = self._headers[: count * _MESSAGE.size]
-        for _, _, _, _, _, used, flags, size in _MESSAGE.iter_unpack(headers):
-            yield self._frames[at : at + size], self._control[place : place + used], flags
+    def taken(self, count: int) -> tuple[list[Frame], int | None]:
+        """Frames of the first ``count``, which were received, and the newest count of drops."""
+        taken: list[Frame] = []
+        dropped, at, place = None, 0, 0
+        headers = _MESSAGE.iter_unpack(self._headers[: count * _MESSAGE.size])
+        contents = _FRAME.iter_unpack(self._frames[: count * _FRAME.size])
+        for (*_, used, flags, size), (word, length, payload) in zip(headers, contents, strict=True):
+            frame: Frame | None
+            if size == _FRAME.size and word < _ERROR:
+                stamp, drops = _told(self._control, place, place + used) if used else (0.0, None)
+                # What Frame(...) makes, without the call of its constructor.
+                frame = _new(Frame, (word, payload[:length], stamp, False))
+            else:
+                control = self._control[place : place + used]
+                frame, drops = parse_socketcan(self._frames[at : at + size], control)
+            if drops is not None:
+                dropped = drops
+            if frame is not None and not flags & _CONFIRM:
+                taken.append(frame)
             at, place = at + _FRAME.size, place + self._ancillary
+        return taken, dropped
 
     def fill(self, frames: Iterable[tuple[int, bytes]]) -> None:
         """Write data frames into the first of them."""
@@ -185,11 +196,23 @@ def parse_socketcan(
     None in place of a frame of 29 bits, a remote frame or a fragment; None in place of a count
     that the kernel did not send.
     """
-    stamp, drops, at = 0.0, None, 0
-    while at + _CONTROL.size <= len(control):
+    stamp, drops = _told(control, 0, len(control))
+    if len(data) < _FRAME.size:
+        return None, drops
+    identifier, size, payload = _FRAME.unpack_from(data)
+    error = bool(identifier & _ERROR)
+    if not error and identifier & (_EXTENDED | _REMOTE):
+        return None, drops
+    return Frame(identifier & (_ERROR - 1), payload[:size], stamp, error), drops
+
+
+def _told(control: bytes | bytearray, at: int, last: int) -> tuple[float, int | None]:
+    """Time stamp and count of drops that the control messages between two places have."""
+    stamp, drops = 0.0, None
+    while at + _CONTROL.size <= last:
         length, level, kind = _CONTROL.unpack_from(control, at)
         content, end = at + _CONTROL.size, at + length
-        if length < _CONTROL.size or end > len(control):
+        if length < _CONTROL.size or end > last:
             break
         if level == socket.SOL_SOCKET:
             if kind == _SO_TIMESTAMPNS and end - content >= _STAMP.size:
@@ -198,10 +221,4 @@ def parse_socketcan(
             elif kind == _SO_RXQ_OVFL and end - content >= _DROPS.size:
                 (drops,) = _DROPS.unpack_from(control, content)
         at += -(-length // _WORD) * _WORD
-    if len(data) < _FRAME.size:
-        return None, drops
-    identifier, size, payload = _FRAME.unpack_from(data)
-    error = bool(identifier & _ERROR)
-    if not error and identifier & (_EXTENDED | _REMOTE):
-        return None, drops
-    return Frame(identifier & (_ERROR - 1), payload[:size], stamp, error), drops
+    return stamp, drops

@@ -11,7 +11,7 @@ from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
 from winchkit.drivers.can.canopen.nmt import NMT_STATES, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
-from winchkit.drivers.can.cia402.command import Command, Commander
+from winchkit.drivers.can.cia402.command import Commander
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec, await_booted, commission
 from winchkit.drivers.can.cia402.feedback import (
     AxisFeedback,
@@ -65,7 +65,7 @@ class Cia402Axis:
         self.emergencies = EmergencyLog()
         self.drive: Commissioned | None = None
         """What it agreed to; None before it is commissioned."""
-        self.mode: str = device.servo.motion_mode
+        self._mode = MODES[device.servo.motion_mode]
         self._bus, self._clock, self._watch = bus, clock, watch
         self._node = SdoNode(bus, node, Path(device.path).parent / device.servo.eds)
         terms = Terms(watch.host, watch.timeout, watch.heartbeat, watch.cycle)
@@ -77,6 +77,8 @@ class Cia402Axis:
         self._commander: Commander | None = None
         self._cycle = (0, -math.inf)
         self._boot_ups = self._beats = 0
+        self._watched = False
+        """Whether the drive has had a life sign of the host since it was commissioned."""
         self._previous = 0
         self._quick_stop = watch.quick_stop
         self._sdo_stop = SdoStop(bus, node)
@@ -104,7 +106,7 @@ class Cia402Axis:
         self._others.hear_further_rpdos(self._node)
         # Only a boot-up after this one takes away what is set up now.
         self._boot_ups = self.heartbeat.boot_ups
-        self._beats = self._bus.beats[self._watch.host]
+        self._beats, self._watched = self._bus.beats[self._watch.host], False
         drive = commission(self._node, self.servo, self._watch, self._clock, self.host)
         self.host.await_operational()
         if self._watch.prove:
@@ -116,7 +118,7 @@ class Cia402Axis:
         counter = self._position.begin(drive, self._boot_ups)
         commander = Commander(self.name, drive, self._node.node, drive.mode, counter)
         gathering = self._listen(drive)
-        self.drive, self.mode = drive, drive.mode
+        self.drive, self._mode = drive, MODES[drive.mode]
         self._quick_stop = self._watch.quick_stop
         self._commander, self._gathering = commander, gathering
         self._stop_frames = commander.stop_frames()
@@ -173,9 +175,14 @@ class Cia402Axis:
         return False if self.drive is None else self.drive.stops_on_nmt
 
     @property
+    def mode(self) -> str:
+        """Name of its mode of operation."""
+        return self._mode.name
+
+    @property
     def moves_alone(self) -> bool:
         """Whether it makes the motion of its mode by itself (HM, PP)."""
-        return MODES[self.mode].moves_alone
+        return self._mode.moves_alone
 
     @property
     def nmt_text(self) -> str:
@@ -239,7 +246,8 @@ class Cia402Axis:
     @property
     def feedback(self) -> AxisFeedback | None:
         """What its newest complete answer to a SYNC said."""
-        return None if self._gathering is None else self._gathering.feedback
+        gathering = self._gathering
+        return None if gathering is None else gathering.feedback
 
     @property
     def health(self) -> FeedbackHealth:
@@ -254,14 +262,14 @@ class Cia402Axis:
     @property
     def position_mode(self) -> bool:
         """Whether it is moved by target positions (CSP, IP) and not by speeds."""
-        return MODES[self.mode].kind is Target.ANGLE
+        return self._mode.kind is Target.ANGLE
 
     @property
     def mode_kept(self) -> bool:
         """Whether the drive still shows the mode that it was given."""
         feedback = self.feedback
         shown = None if feedback is None else feedback.mode
-        return shown is None or shown == MODES[self.mode].number
+        return shown is None or shown == self._mode.number
 
     @property
     def operational(self) -> bool:
@@ -346,9 +354,9 @@ class Cia402Axis:
         commander, feedback = self._commander, self.feedback
         if commander is None or feedback is None:
             return self._previous
-        if wish in (Wish.RUN_DOWN, Wish.HALT) and not MODES[self.mode].can_run_down:
+        if wish in (Wish.RUN_DOWN, Wish.HALT) and not self._mode.can_run_down:
             wish = Wish.STOP
-        if wish is Wish.ENABLE and not self._watched:
+        if wish is Wish.ENABLE and not self._watched and not self._note_life_sign():
             # The drive's watchdog arms on the first life sign that it receives.
             wish = Wish.DISABLE
         word = control_word(
@@ -358,10 +366,12 @@ class Cia402Axis:
             age=self._cycle[0] - feedback.sync,
             at_rest=self._position.at_rest(feedback),
         )
-        command = Command(wish, velocity, angle, torque, start)
-        word, frames = commander.frames(word, command, feedback)
-        for identifier, data in () if self.host.withholds_rpdos else frames:
-            self._bus.post(identifier, data)
+        word, frames = commander.frames(
+            word, wish, feedback, velocity=velocity, angle=angle, torque=torque, start=start
+        )
+        if not self.host.silent or not self.host.withholds_rpdos:
+            for identifier, data in frames:
+                self._bus.post(identifier, data)
         self._previous = word
         return word
 
@@ -378,18 +388,18 @@ class Cia402Axis:
             )
         homed = self.homing is Homing.DONE
         commander = Commander(self.name, drive, self._node.node, mode, self._position.counter)
-        before = self._commander, self.mode
+        before = self._commander, self._mode
         # From here on cyclic PDOs must carry the new mode, lest they set the old one again.
-        self._commander, self.mode = commander, mode
+        self._commander, self._mode = commander, MODES[mode]
         self._stop_frames = commander.stop_frames()
         try:
             change_mode(self._node, mode, self._clock)
         except WinchkitError:
-            self._commander, self.mode = before
+            self._commander, self._mode = before
             if self._commander is not None:
                 self._stop_frames = self._commander.stop_frames()
             raise
-        self._position.changed_mode(before[1], mode, homed=homed)
+        self._position.changed_mode(before[1].name, mode, homed=homed)
 
     def prepare_homing(self, homing: HomingSpec) -> None:
         """Set a homing up and change to HM, disabled; ``send(Wish.ENABLE, start=True)`` runs it.
@@ -424,10 +434,10 @@ class Cia402Axis:
         set_quick_stop(self._node, self.servo, self.drive.scale, wanted)
         self._quick_stop = wanted
 
-    @property
-    def _watched(self) -> bool:
-        """Whether the drive has had a life sign of the host since it was commissioned."""
-        return self.host.begun(self._bus.beats[self._watch.host] - self._beats)
+    def _note_life_sign(self) -> bool:
+        """Look whether the drive has had a life sign of the host; once it has, it is kept."""
+        self._watched = self.host.begun(self._bus.beats[self._watch.host] - self._beats)
+        return self._watched
 
     def _disabled_drive(self, what: str) -> Commissioned:
         if self.drive is None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import struct
 from enum import Enum
 from itertools import accumulate, islice
-from typing import NamedTuple
 
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.commission import Commissioned
@@ -22,7 +21,6 @@ from winchkit.drivers.can.cia402.state_machine import (
 from winchkit.errors import Fault, FileError, NotPermitted
 
 __all__ = [
-    "Command",
     "Commander",
     "SetPoint",
 ]
@@ -71,20 +69,6 @@ _ALWAYS = {_CONTROL, _MODE, _VELOCITY_OFFSET, _TORQUE_OFFSET}
 _MOVES = (Wish.ENABLE, Wish.RUN_DOWN)
 
 
-class Command(NamedTuple):
-    """What is asked of the drive in a cycle; SI at the motor shaft."""
-
-    wish: Wish
-    velocity: float = 0.0
-    """rad/s."""
-    angle: float | None = None
-    """rad; None holds the axis where it is."""
-    torque: float = 0.0
-    """N m."""
-    start: bool = False
-    """Start a homing."""
-
-
 class Commander:
     """Makes frames of commands, for one drive in one mode."""
 
@@ -99,7 +83,7 @@ class Commander:
         """Raise FileError where the device file maps too little, or an object without a source."""
         self._name, self._drive, self._mode = name, drive, MODES[mode]
         self.counter = counter or PositionCounter(*counter_range(drive.tpdo))
-        self._set_point = SetPoint()
+        self._set_point = SetPoint() if mode == "PP" else None
         target = self._mode.target
         _check(name, drive, mode, target)
         live = _ALWAYS if target is None else _ALWAYS | {target}
@@ -126,31 +110,50 @@ class Commander:
         self._torques = self._places((0x6071, 0) if kind is Target.TORQUE else _TORQUE_OFFSET)
 
     def frames(
-        self, word: int, command: Command, feedback: AxisFeedback
+        self,
+        word: int,
+        wish: Wish,
+        feedback: AxisFeedback,
+        *,
+        velocity: float,
+        angle: float | None,
+        torque: float,
+        start: bool,
     ) -> tuple[int, list[tuple[int, bytes]]]:
         """The control word with the bits of the mode, and the frames to send.
 
         ``word`` is what the state machine asks for; only one that keeps the drive enabled gets
-        bits and targets, any other goes with zero and the actual position. Raises NotPermitted
-        for targets beyond the drive's range.
+        bits and targets (rad/s, rad, N m), any other goes with zero and the actual position, as
+        does an ``angle`` of None. ``start`` starts a homing. Raises NotPermitted for targets beyond
+        the drive's range.
         """
         enabled = feedback.state is State.OPERATION_ENABLED
-        moves = enabled and word == ENABLE_OPERATION and command.wish in _MOVES
-        bits, angle = self._aim(command, feedback, moves)
-        if moves and command.wish is Wish.RUN_DOWN and self._mode.moves_alone:
+        moves = enabled and word == ENABLE_OPERATION and wish in _MOVES
+        actual = feedback.shown
+        if actual is None:
+            actual = self._drive.scale.angle_counts(feedback.angle)
+        bits, aim, mode = 0, actual, self._mode
+        if moves and mode.kind is Target.ANGLE:
+            bits, aim = self._aim(angle, feedback, actual)
+        elif self._set_point is not None:
+            self._set_point.reset(actual)
+        elif moves and start and mode.name == "HM":
+            bits = START
+        if moves and wish is Wish.RUN_DOWN and mode.moves_alone:
             bits = HALT
+        word |= bits
         values = self._zeros.copy()
         for place in self._controls:
-            values[place] = word | bits
+            values[place] = word
         for place in self._angles:
-            values[place] = angle
-        if moves:
-            scale = self._drive.scale
+            values[place] = aim
+        if moves and velocity:
             for place in self._speeds:
-                values[place] = scale.velocity_counts(command.velocity)
+                values[place] = self._drive.scale.velocity_counts(velocity)
+        if moves and torque:
             for place in self._torques:
-                values[place] = scale.torque_counts(command.torque)
-        return word | bits, self._packed(values)
+                values[place] = self._drive.scale.torque_counts(torque)
+        return word, self._packed(values)
 
     def stop_frames(self) -> list[tuple[int, bytes]]:
         """Frames of a quick stop that need no feedback: 02h, the mode, and zero targets.
@@ -191,27 +194,17 @@ class Commander:
                 )
         raise AssertionError("what fits into each RPDO fits into all")
 
-    def _aim(self, command: Command, feedback: AxisFeedback, moves: bool) -> tuple[int, int]:
+    def _aim(self, angle: float | None, feedback: AxisFeedback, actual: int) -> tuple[int, int]:
         """The bits of the mode and the target position: the actual one where nothing is asked."""
-        actual = feedback.shown
-        if actual is None:
-            actual = self._drive.scale.angle_counts(feedback.angle)
-        if not moves or self._mode.kind is not Target.ANGLE:
-            self._set_point.reset(actual)
-            return self._start_bit(command) if moves else 0, actual
-        wanted = None if command.angle is None else self.counts(command.angle)
-        if self._mode.name == "PP":
+        wanted = None if angle is None else self.counts(angle)
+        if self._set_point is not None:
             return self._set_point.step(wanted, feedback.status)
-        return self._start_bit(command), actual if wanted is None else wanted
+        # IP has no handshake: bit 4 is to follow.
+        return START if self._mode.name == "IP" else 0, actual if wanted is None else wanted
 
     def counts(self, angle: float) -> int:
         """Target position (607Ah) for an angle; raises NotPermitted beyond the counter's end."""
         return self.counter.target(self._drive.scale.unwrapped_counts(angle), self._name)
-
-    def _start_bit(self, command: Command) -> int:
-        """Bit 4 in modes without a handshake: follow (IP), start a homing (HM)."""
-        name = self._mode.name
-        return START if name == "IP" or (name == "HM" and command.start) else 0
 
 
 def _check(name: str, drive: Commissioned, mode: str, target: Key | None) -> None:

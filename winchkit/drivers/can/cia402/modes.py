@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 from winchkit.drivers.can.cia402.state_machine import StatusBit
 
@@ -61,12 +62,12 @@ class OperationMode:
     bits: Mapping[int, str]
     """Status bits 10, 12 and 13 in words, by mask."""
 
-    @property
+    @cached_property
     def moves_alone(self) -> bool:
         """Whether the drive goes on to a goal of its own, whatever the host sends next."""
         return self.name in ("PP", "HM")
 
-    @property
+    @cached_property
     def can_run_down(self) -> bool:
         """Whether it can be ramped to rest while it stays enabled; no torque holds a load."""
         return self.kind is not Target.TORQUE

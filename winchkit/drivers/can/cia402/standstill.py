@@ -44,11 +44,11 @@ class Standstill:
         """Take a feedback (s, rad, rad/s); whether the motor stands still. Old ones repeat."""
         if time <= self._time:
             return self._still
-        first = not isfinite(self._angle)
         self._time = time
-        if first:
+        if not isfinite(self._angle):
             self._angle = angle
-        if abs(velocity) > self.speed or abs(angle - self._angle) > self.travel:
+        turns = abs(velocity) > self.speed
+        if turns or abs(angle - self._angle) > self.travel:
             self._angle, self._since = angle, time
         self._still = abs(velocity) <= self.speed and time - self._since >= _WINDOW
         return self._still

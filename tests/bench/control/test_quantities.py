@@ -1,0 +1,169 @@
+"""Conditions that compare a quantity with a bound: the verdict is that of their formulas.
+
+The formulas of docs/safety.md stand here a second time, on the observations themselves. A table
+with them in place of the quantities has no bounds that the supervisor could test first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from winchkit.bench.control.conditions import CONDITIONS, Condition, Exceeds
+from winchkit.bench.control.observation import Instrumented, Memory, Supervised, WinchInput
+from winchkit.bench.control.supervisor import Supervisor
+from winchkit.schema.bench import LimitSpec
+
+CYCLE = 0.004
+LIMITS = LimitSpec(
+    speed=0.4,
+    length=(1.0, 9.0),
+    tension_high=500.0,
+    tension_slack=20.0,
+    tension_rate=2000.0,
+    following_error=0.02,
+)
+BENCHES = (
+    Supervised(LIMITS, stale=0.1, cycle=CYCLE, resolution=1e-3, safe_length=8.5),
+    Supervised(LimitSpec(speed=0.4), stale=0.1, cycle=CYCLE),
+)
+Formula = Callable[[WinchInput, Supervised, Memory], bool]
+
+
+def _in_time(item: WinchInput) -> bool:
+    cell = item.tension
+    return cell is not None and item.now - cell.since <= cell.max_age
+
+
+def _gross(item: WinchInput) -> float:
+    """Tension of the cable; NaN where the reading does not count."""
+    cell = item.tension
+    if cell is None or not _in_time(item) or math.isnan(cell.value):
+        return math.nan
+    return cell.gross if math.isfinite(cell.gross) else cell.value
+
+
+def _runaway(item: WinchInput) -> float:
+    speed, commanded = item.winding_speed, item.commanded
+    against = abs(speed) if speed * commanded < 0 else 0.0
+    return max(abs(speed) - abs(commanded), against)
+
+
+def _stale(item: WinchInput) -> bool:
+    cell = item.tension
+    return cell is not None and item.now - cell.since > cell.max_age
+
+
+FORMULAS: dict[tuple[str, str], Formula] = {
+    ("feedback", "age"): lambda item, own, _: (
+        item.feedback_age > own.stale and item.missed_syncs >= 5
+    ),
+    ("motion at rest", ""): lambda item, own, _: abs(item.winding_speed) > own.rest_speed,
+    ("slowing down", ""): lambda _item, _own, memory: memory.unresponsive,
+    ("deviation", ""): lambda item, own, _: (
+        abs(item.winding_speed - item.commanded) > 0.25 * own.limits.speed
+    ),
+    ("runaway", ""): lambda item, own, _: _runaway(item) > 0.25 * own.limits.speed,
+    ("following error", ""): lambda item, own, _: (
+        abs(item.following_error) > (own.limits.following_error or 0.25 * own.limits.speed)
+    ),
+    ("speed", ""): lambda item, own, _: abs(item.winding_speed) > own.limits.speed * 1.2,
+    ("length", "lower"): lambda item, own, _: item.cable_length < own.shortest - 5e-3,
+    ("length", "upper"): lambda item, own, _: item.cable_length > own.longest + 5e-3,
+    ("dead wraps", ""): lambda item, own, _: item.cable_length > own.safe_length,
+    ("cable slip", ""): lambda _item, _own, memory: abs(memory.slip) > 0.05 + 0.05 * memory.moved,
+    ("cell stale", ""): lambda item, _own, _: _stale(item),
+    ("cell", ""): lambda item, _own, _: (
+        item.tension is not None and math.isnan(item.tension.value) and _in_time(item)
+    ),
+    ("tension high", ""): lambda item, own, _: _gross(item) > (own.limits.tension_high or math.inf),
+    ("slack", ""): lambda item, own, _: _gross(item) < (own.limits.tension_slack or -math.inf),
+    ("tension rate", ""): lambda item, own, memory: (
+        not math.isnan(_gross(item))
+        and abs(memory.tension_rate) > (own.limits.tension_rate or math.inf)
+    ),
+}
+"""By kind of condition and a word of its variable."""
+
+
+def _formula(row: Condition) -> Formula:
+    (found,) = (
+        formula
+        for (kind, word), formula in FORMULAS.items()
+        if kind == row.kind and word in row.variable
+    )
+    return found
+
+
+def near(*bounds: float) -> st.SearchStrategy[float]:
+    """Values at bounds, beside them by one unit in the last place, between them, and unknown."""
+    beside = [math.nextafter(bound, way) for bound in bounds for way in (-math.inf, math.inf)]
+    between = st.floats(1.5 * min(bounds), 1.5 * max(bounds))
+    return st.one_of(st.sampled_from([*bounds, *beside, math.nan, 0.0, -0.0]), between)
+
+
+SPEEDS = near(-0.48, -0.4, -0.1, -0.004, 0.003, 0.004, 0.1, 0.4, 0.48, math.inf)
+CELLS = st.none() | st.fixed_dictionaries(
+    {
+        "value": near(20.0, 100.0, 500.0),
+        "since": st.sampled_from([-math.inf, 1.0, 1.9, 1.99]),
+        "max_age": st.sampled_from([0.01, 0.1, math.inf]),
+        "quality": st.just("good"),
+        "time": near(1.0, 1.02, 1.08),
+        "gross": near(20.0, 100.0, 500.0),
+    }
+).map(lambda fields: Instrumented(**fields))
+INPUTS = st.fixed_dictionaries(
+    {
+        "feedback_age": near(0.0, 0.1),
+        "missed_syncs": st.integers(0, 7),
+        "heartbeat_lost": st.just(False),
+        "boot_ups": st.just(0),
+        "operational": st.just(True),
+        "mode_kept": st.sampled_from([True, True, True, False]),
+        "fault": st.sampled_from(["", "", "", "error 3210h"]),
+        "winding_speed": SPEEDS,
+        "commanded": SPEEDS,
+        "cable_length": near(0.995, 1.0, 8.5, 9.0, 9.005),
+        "moving": st.booleans(),
+        "tension": CELLS,
+        "disabled": st.booleans(),
+        "follows": st.booleans(),
+        "target_speed": SPEEDS,
+        "following_error": near(-0.1, -0.02, 0.02, 0.1),
+        "length": near(1.0, 1.05, 9.0),
+        "now": st.just(2.0),
+    }
+).map(lambda fields: WinchInput(**fields))
+
+
+@pytest.mark.parametrize("own", BENCHES, ids=("all limits", "speed only"))
+@settings(max_examples=100, deadline=None)
+@given(cycles=st.lists(st.tuples(INPUTS, st.integers(1, 30)), min_size=1, max_size=6))
+def test_the_verdict_is_that_of_the_formulas(
+    own: Supervised, cycles: list[tuple[WinchInput, int]]
+) -> None:
+    """For each of several observations, each held for some cycles."""
+    plain_rows = [
+        replace(row, holds=_formula(row)) if isinstance(row.holds, Exceeds) else row
+        for row in CONDITIONS
+    ]
+    tested, plain = Supervisor({"A": own}), Supervisor({"A": own}, plain_rows)
+    now = 0.0
+    for item, count in cycles:
+        for _ in range(count):
+            now += CYCLE
+            blocked = tested.check(now, {"A": item})
+            assert blocked == plain.check(now, {"A": item})
+            assert (tested.tripped, tested.warnings) == (plain.tripped, plain.warnings)
+
+
+def test_every_quantity_is_compared() -> None:
+    compared = {row.kind for row in CONDITIONS if isinstance(row.holds, Exceeds)}
+    assert compared == {kind for kind, _ in FORMULAS}
+    assert all(isinstance(row.holds, Exceeds) or row.by_facts for row in CONDITIONS)
