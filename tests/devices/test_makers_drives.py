@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
+from drive_trial import moves, stopped
 from makers_drafts import DRAFTS, FOLDER, completed_animatics, draft
-from slave import Declared, Reactions, Slave, State
+from slave import Declared, Reactions, Slave
 from slave.held_key import HeldKey
 from slave.on_bus import SlavesOnBus
 from slave.rig import Rig, bench_text
@@ -67,30 +67,6 @@ def checked(path: Path) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
-def moves(rig: Rig, text: str, dead: Callable[[Rig], None] | None = None) -> None:
-    """Jog for a while and release; then move, and let the host die."""
-    slave = rig.slaves[0]
-    with rig.opened(text) as bench:
-        key = HeldKey(rig, bench, pay_out=0.05).press()
-        rig.wait(1.0)
-        assert abs(slave.motor.velocity) > 1.0, key.errors
-        key.release()
-        rig.wait(2.0)
-        assert not key.errors
-        assert slave.power.state is not State.ENABLED
-        here = bench.winch["A"].cable_length
-        bench.winch["A"].move_by(wind_in=0.02)
-        assert bench.winch["A"].cable_length == pytest.approx(here - 0.02, abs=2e-3)
-        if dead is not None:
-            key.press()
-            rig.wait(0.8)
-            assert slave.power.state is State.ENABLED
-            key.release()
-            rig.kill(bench)
-            rig.wait(0.5)
-            dead(rig)
-
-
 @pytest.mark.parametrize("name", ["zeroerr", "elmo"])
 def test_the_loss_of_sync_is_proved_by_commissioning_only(tmp_path: Path, name: str) -> None:
     """At rest no drive shows that it minds: nothing moves without a commissioning record."""
@@ -121,11 +97,6 @@ def test_a_drive_moves_with_guarding(tmp_path: Path) -> None:
         bench.winch["A"].move_by(pay_out=0.02)
         assert abs(slave.motor.angle) > 1.0
         assert bench.axes["A"].objects.read(0x1017) == 0, "one error control at a time"
-
-
-def stopped(rig: Rig) -> None:
-    assert rig.slaves[0].power.state is not State.ENABLED
-    assert rig.slaves[0].motor.at_rest
 
 
 @pytest.mark.parametrize(("name", "way"), WAYS)

@@ -1,4 +1,4 @@
-"""The modes of operation PP, PV, HM, CSP and CSV: commands to the motor, and measured values."""
+"""The modes PP, PV, HM, IP, CSP and CSV of CiA 402: commands to the motor, and measured values."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from slave.dictionary import Dictionary
 from slave.motor import Declared, Motor
 from slave.power import Power, State
 
-__all__ = ["CSP", "CSV", "Motion"]
+__all__ = ["CYCLIC", "Motion"]
 
-PP, PV, HM, CSP, CSV = 1, 3, 6, 8, 9
+PP, PV, HM, IP, CSP, CSV = 1, 3, 6, 7, 8, 9
+CYCLIC = (IP, CSP, CSV)
+"""Modes that take a target at every SYNC."""
 _TURN = 2 * math.pi
 _DEFAULT_RAMP = 200.0
 """rad/s^2, where the slave has no ramp object or it is zero."""
 _GAIN = 40.0
 """Of the position loop, 1/s."""
-_MODES = {PP: 1 << 0, PV: 1 << 2, HM: 1 << 5, CSP: 1 << 7, CSV: 1 << 8}
+_MODES = {PP: 1 << 0, PV: 1 << 2, HM: 1 << 5, IP: 1 << 6, CSP: 1 << 7, CSV: 1 << 8}
 
 
 @dataclass
@@ -58,6 +60,7 @@ class Motion:
         self._since = self._span = 0.0
         self._before = 0
         self._driven = False
+        self._interpolates = False
 
     @property
     def unit(self) -> float:
@@ -104,10 +107,13 @@ class Motion:
             self._hold()
 
     def sync(self, span: float) -> None:
-        """A SYNC: the target of CSP is reached over the next period ``span`` (s)."""
-        if self.mode == CSP:
+        """A SYNC: the target of CSP or IP is reached over the next period ``span`` (s)."""
+        if self.mode == CSP or (self.mode == IP and self._interpolates):
             here = self._from + (self._to - self._from) * self._share()
-            target = self.objects.get(0x607A) + self.objects.get(0x60B0)
+            if self.mode == IP:
+                target = self.objects.get(0x60C1, 1)
+            else:
+                target = self.objects.get(0x607A) + self.objects.get(0x60B0)
             away = (target - self.counts()) * self.unit
             self._from, self._to = here, self.motor.angle + away
             self._since, self._span = 0.0, max(span, 1e-4)
@@ -117,6 +123,12 @@ class Motion:
         rising = word & ~self._before
         self._before = word
         profile = self._profile
+        # CiA 402-2, interpolated position mode: bit 4 enables the interpolation; without it the
+        # drive holds where it is, whatever stands in 60C1h.
+        interpolates = self.power.state is State.ENABLED and bool(word & 0x10)
+        if self.mode == IP and interpolates != self._interpolates:
+            self._hold()
+        self._interpolates = interpolates
         if self.power.state is not State.ENABLED:
             profile.acknowledged = False
             return
@@ -166,6 +178,8 @@ class Motion:
         if self.mode == HM:
             idle = not profile.searching
             return (0x400 if idle else 0) | (0x1000 if profile.homed else 0)
+        if self.mode == IP:
+            return 0x1000 if enabled and self._interpolates else 0
         return 0x1000 if enabled and self.mode in (CSP, CSV) else 0
 
     def publish(self) -> None:
@@ -199,7 +213,7 @@ class Motion:
             self._ramp(velocity, 0x6084 if slower else 0x6083, dt)
         elif self.mode == CSV:
             self.reference = velocity
-        elif self.mode == CSP:
+        elif self.mode in (CSP, IP):
             share = self._share()
             fresh = 0 < self._since < 1.5 * self._span
             feed = (self._to - self._from) / self._span if fresh else 0.0

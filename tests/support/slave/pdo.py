@@ -179,7 +179,9 @@ class Pdos:
             raise Abort(0x06010000)
 
     def _check_mapping(self, index: int, sub: int, value: int) -> None:
-        if not self.objects.get(index - 0x200, 1) & _VALID:
+        # A drive whose COB-IDs are read-only (ElmoSimplIQ.dcf) cannot have its PDOs switched off.
+        renames = self.objects.entries[index - 0x200, 1].access not in ("ro", "const")
+        if renames and not self.objects.get(index - 0x200, 1) & _VALID:
             raise Abort(0x06010000)
         if sub == 0:
             entries = (self.objects.get(index, number) for number in range(1, value + 1))

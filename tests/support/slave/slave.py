@@ -11,7 +11,7 @@ from slave.dictionary import Abort, Dictionary, read
 from slave.emergency import Emergencies
 from slave.faults import FAULTS
 from slave.frames import Frame, kind_from_host, kind_from_slave
-from slave.motion import CSP, CSV, Motion
+from slave.motion import CYCLIC, Motion
 from slave.motor import Declared, Motor
 from slave.network import Network, Nmt
 from slave.pdo import Pdos
@@ -202,7 +202,7 @@ class Slave:
 
     def _check_sync(self, *, watches: bool) -> None:
         period = self.objects.get(0x1006) * 1e-6
-        cyclic = self.power.state is State.ENABLED and self.motion.mode in (CSP, CSV)
+        cyclic = self.power.state is State.ENABLED and self.motion.mode in CYCLIC
         if not (watches and period and cyclic):
             self._awaits_sync = False
         elif self._awaits_sync and self.time - (self._synced or 0.0) > _MISSED * period:

@@ -50,8 +50,13 @@ def set_up(node: SdoNode, direction: Direction, wanted: tuple[PdoCodec, ...]) ->
             _map(node, direction, codec)
             continue
         identifier = node.read_if_there(record, 1)
-        if identifier is not None and not identifier & _INVALID and node.writes(record, 1):
+        if identifier is None or identifier & _INVALID:
+            continue
+        mapping = _MAPPING[direction] + number - 1
+        if node.writes(record, 1):
             node.write(record, 1, identifier | _INVALID)
+        elif node.writes(mapping, 0):  # a PDO without objects is not used (CiA 301)
+            node.write(mapping, 0, 0)
 
 
 def _beyond(node: SdoNode, direction: Direction) -> list[int]:
@@ -71,8 +76,12 @@ def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
     identifier = cob_id(direction, number, node.node)
     if direction == "tpdo":
         identifier |= _NO_RTR
-    node.write(record, 1, identifier | _INVALID)
-    node.write_verified(record, 2, codec.spec.transmission)
+    renamed = node.writes(record, 1)
+    if renamed:
+        node.write(record, 1, identifier | _INVALID)
+    else:
+        _check_identifier(node, record, identifier)
+    _set_transmission(node, record, codec.spec.transmission)
     _set_timers(node, record, codec.spec)
     if node.writes(mapping, 0):
         node.write(mapping, 0, 0)
@@ -81,8 +90,34 @@ def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
         node.write_verified(mapping, 0, len(codec.objects))
     else:
         _check_fixed(node, direction, codec)
-    node.write(record, 1, identifier)
-    _verify_identifier(node, record, identifier)
+    if renamed:
+        node.write(record, 1, identifier)
+        _verify_identifier(node, record, identifier)
+
+
+def _check_identifier(node: SdoNode, record: int, identifier: int) -> None:
+    """A COB-ID that the EDS does not let change has to be in use, and the predefined one."""
+    kept = node.read(record, 1)
+    if (kept ^ identifier) & ~_NO_RTR:
+        state = "is not in use" if kept & _INVALID else f"is {kept & 0x7FF:03X}h"
+        raise NotPermitted(
+            f"{node.place(record, 1)} cannot be written by its EDS and {state}, not "
+            f"{identifier & 0x7FF:03X}h as the predefined connection set has it; use another PDO "
+            "in the device file, or set it with the maker's program"
+        )
+
+
+def _set_transmission(node: SdoNode, record: int, transmission: int) -> None:
+    """Set the transmission type, or see that one that cannot be written is the wanted one."""
+    if node.writes(record, 2):
+        node.write_verified(record, 2, transmission)
+        return
+    kept = node.read(record, 2)
+    if kept != transmission:
+        raise NotPermitted(
+            f"{node.place(record, 2)} cannot be written by its EDS and is {kept}, not "
+            f"{transmission} as in the device file; use another PDO there"
+        )
 
 
 def _check_fixed(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
