@@ -22,9 +22,18 @@ def runs() -> list[Run]:
     ]
 
 
-def test_the_bar_moves_with_every_candidate_and_never_back(runs: list[Run]) -> None:
+@pytest.fixture(scope="module")
+def ended(runs: list[Run]) -> tuple[WinchAnswer, list[tuple[str, float]]]:
+    """A diagnosis that was not interrupted, and its progress."""
     told: list[tuple[str, float]] = []
-    diagnose(runs, GROOVED, progress=lambda what, share: told.append((what, share)))
+    answer = diagnose(runs, GROOVED, progress=lambda what, share: told.append((what, share)))
+    return answer, told
+
+
+def test_the_bar_moves_with_every_candidate_and_never_back(
+    ended: tuple[WinchAnswer, list[tuple[str, float]]],
+) -> None:
+    _, told = ended
     shares = [share for _, share in told]
     assert shares == sorted(shares)
     assert shares[0] >= 0.0
@@ -64,7 +73,9 @@ def test_an_interrupt_before_the_scores_gives_nothing(runs: list[Run]) -> None:
     assert not known
 
 
-def test_a_diagnosis_that_ends_is_not_interrupted(runs: list[Run]) -> None:
-    plain = diagnose(runs, GROOVED).diagnosis.to_json()
+def test_a_diagnosis_that_ends_is_not_interrupted(
+    ended: tuple[WinchAnswer, list[tuple[str, float]]],
+) -> None:
+    plain = ended[0].diagnosis.to_json()
     assert plain["verdict"] == "explained"
     assert plain["interrupted"] is False

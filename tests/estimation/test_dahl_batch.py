@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.errors import UsageError
-from winchkit.estimation import compiled
+from winchkit.estimation import Kernels
 from winchkit.estimation.dahl_batch import dahl_batch
 from winchkit.model.friction import dahl, dahl_constant, dahl_step
 
@@ -53,16 +53,14 @@ def test_a_limit_that_changes_is_followed() -> None:
         assert np.allclose(dahl_batch(position, limit, 3000.0, shape), expected, atol=1e-9)
 
 
-def test_compiled_loops_agree() -> None:
-    pytest.importorskip("numba")
-    kernels = compiled()
+def test_compiled_loops_agree(compiled_kernels: Kernels) -> None:
     rng = np.random.default_rng(1)
     position = np.cumsum(rng.normal(0, 1e-3, 3000))
     limit = 20 + 5 * np.cos(np.linspace(0, 11, 3000))
     for shape in (0.5, 1.0, 1.4):
         for most in (limit, 20.0):
             plain = dahl_batch(position, most, 3000.0, shape, 0.2)
-            fast = dahl_batch(position, most, 3000.0, shape, 0.2, kernels=kernels)
+            fast = dahl_batch(position, most, 3000.0, shape, 0.2, kernels=compiled_kernels)
             assert np.allclose(fast, plain, rtol=1e-6, atol=1e-6)
 
 

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 
 from estimation_plant import WRAPS, cell_readings, wander
 from winchkit.errors import UsageError
-from winchkit.estimation import PLAIN, DahlEstimator, PulleyGroup, compiled, fastest
+from winchkit.estimation import PLAIN, DahlEstimator, Kernels, PulleyGroup, compiled, fastest
 
 GROUP = PulleyGroup(WRAPS, friction=0.02, stiffness=1500.0)
 moves = st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=40)
@@ -244,14 +244,13 @@ def test_fastest_is_what_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert fastest() is PLAIN
 
 
-def test_compiled_and_plain_loops_agree() -> None:
-    pytest.importorskip("numba")
-    kernels = compiled()
+def test_compiled_and_plain_loops_agree(compiled_kernels: Kernels) -> None:
     covariance = tuple(map(tuple, np.diag([1e-6, 1e4, 1e-2])))
     groups = [GROUP, PulleyGroup((1.0,), 0.05, 300.0, 1.4, covariance)]
     _, platform, wound = wander(10.0)
     rows = [
-        estimates(DahlEstimator(groups, kernels=each), platform, wound) for each in (PLAIN, kernels)
+        estimates(DahlEstimator(groups, kernels=each), platform, wound)
+        for each in (PLAIN, compiled_kernels)
     ]
     assert np.allclose(*rows, rtol=1e-12, atol=1e-9)
 

@@ -10,7 +10,7 @@ import pytest
 from estimation_plant import WRAPS, cell_readings, wander
 from winchkit.catalog import find
 from winchkit.errors import RunError, UsageError
-from winchkit.estimation import DahlEstimator
+from winchkit.estimation import DahlEstimator, Kernels
 from winchkit.estimation.dahl_identification import (
     Record,
     correlation_time,
@@ -65,8 +65,9 @@ def test_the_numbers_of_an_independent_plant_are_found(shape: float) -> None:
     assert found.at_bound == ()
 
 
-def test_stds_hold_what_noise_does_to_the_values() -> None:
-    fits = [identify_dahl([noisy(seed, 1.0, 12.0)], [WRAPS], shape=1.0) for seed in range(12)]
+def test_stds_hold_what_noise_does_to_the_values(kernels: Kernels) -> None:
+    records = [noisy(seed, 1.0, 12.0) for seed in range(12)]
+    fits = [identify_dahl([one], [WRAPS], shape=1.0, kernels=kernels) for one in records]
     for name, index in (("friction", 0), ("stiffness", 1)):
         values = [getattr(fit.groups[0], name) for fit in fits]
         told = float(np.median([fit.groups[0].std[index] for fit in fits]))
@@ -75,12 +76,13 @@ def test_stds_hold_what_noise_does_to_the_values() -> None:
     assert all(fit.groups[0].std[2] == 0.0 for fit in fits)
 
 
-def test_two_groups_of_different_presliding_are_distinguished() -> None:
+def test_two_groups_of_different_presliding_are_distinguished(kernels: Kernels) -> None:
     _, platform, wound = wander(20.0, 25.0)
     rng = np.random.default_rng(5)
     far = cell_readings(platform, wound, (pi,), 0.02, 8000.0)
     cell = cell_readings(far, wound, (pi / 2,), 0.04, 300.0) + rng.normal(0, 0.2, len(far))
-    found = identify_dahl([Record(cell, platform, wound)], [(pi / 2,), (pi,)], shape=1.0)
+    record = Record(cell, platform, wound)
+    found = identify_dahl([record], [(pi / 2,), (pi,)], shape=1.0, kernels=kernels)
     near, other = found.groups
     assert near.friction == pytest.approx(0.04, rel=0.02)
     assert near.stiffness == pytest.approx(300.0, rel=0.03)

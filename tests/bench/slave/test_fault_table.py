@@ -29,6 +29,8 @@ _WITHIN = 0.15
 """Of the first stop, s: a heartbeat of 50 ms, a consumer time of 2.5 beats."""
 _DEVIATES = 0.28
 """A deviation is debounced by 0.25 s: no fault of communication (docs/safety.md)."""
+_WATCHED = 1.0
+"""In which a drive would start again by itself, s: 20 heartbeats, 3 times its longest time-out."""
 _LAG = 0.03
 """Five time constants of the slave's velocity loop, s."""
 
@@ -89,7 +91,7 @@ def test_a_fault_under_a_held_key(tmp_path: Path, row: Row) -> None:
         rig.wait(1.0)
         mended = rig.time
         slave.mend_all()
-        rig.wait(2.0)
+        rig.wait(_WATCHED)
         after = since(rig, mended)
         assert not after.moved, "it moved again by itself"
         assert not after.enabled, "it was enabled again by itself"
@@ -109,7 +111,7 @@ def resets(rig: Rig, bench: Bench, key: HeldKey) -> None:
     """A reset under a held key starts nothing; a new press does."""
     bench.reset()
     start = rig.time
-    rig.wait(2.0)
+    rig.wait(_WATCHED)
     assert not since(rig, start).enabled, "enabled by a reset under a held key"
     key.release()
     rig.wait(1.0)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import click
 import pytest
+from click.testing import CliRunner
 
 from can_commands import invoke
 from winchkit import catalog
@@ -35,20 +36,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def complete(line: str, **environment: str) -> list[str]:
     """What bash is offered at the end of a line."""
-    done = subprocess.run(
-        [sys.executable, "-c", "from winchkit.cli import main; main(prog_name='winchkit')"],
-        env={
-            **os.environ,
-            "COMP_WORDS": line,
-            "COMP_CWORD": str(len(line.split(" ")) - 1),
-            "_WINCHKIT_COMPLETE": "bash_complete",
-            **environment,
-        },
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=True,
-    )
+    words = {
+        "COMP_WORDS": line,
+        "COMP_CWORD": str(len(line.split(" ")) - 1),
+        "_WINCHKIT_COMPLETE": "bash_complete",
+        **environment,
+    }
+    done = CliRunner().invoke(main, env=words, prog_name="winchkit")
+    assert done.exit_code == 0, done.output
     return [item.partition(",")[2] for item in done.stdout.splitlines() if item]
 
 

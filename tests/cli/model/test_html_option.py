@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -35,14 +36,29 @@ def asked(command: str, runs: list[str], html: Path, *more: str) -> Result:
     return CliRunner().invoke(main, [*words, "--html", str(html), *more])
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_the_page_is_written_into_a_new_folder(
-    command: str, runs: list[str], tmp_path: Path
-) -> None:
-    html = tmp_path / "new" / "page.html"
-    result = asked(command, runs, html, "--json")
-    assert result.exit_code == 0
-    assert result.stderr.splitlines()[-1] == f"report: {html}"
+@dataclass(frozen=True)
+class Written:
+    """A command's answer, its page in a new folder, and its figures."""
+
+    result: Result
+    html: Path
+    figures: Path
+
+
+@pytest.fixture(scope="module", params=COMMANDS)
+def written(
+    request: pytest.FixtureRequest, runs: list[str], tmp_path_factory: pytest.TempPathFactory
+) -> Written:
+    folder = tmp_path_factory.mktemp(request.param)
+    html, figures = folder / "new" / "page.html", folder / "figures"
+    result = asked(request.param, runs, html, "--json", "--figures", str(figures))
+    assert result.exit_code == 0, result.output
+    return Written(result, html, figures)
+
+
+def test_the_page_is_written_into_a_new_folder(written: Written, runs: list[str]) -> None:
+    result, html = written.result, written.html
+    assert f"report: {html}" in result.stderr.splitlines()
     page = Page(html.read_text(encoding="utf-8"))
     raw = next(word for word in page.words if word.startswith("{"))
     printed = json.loads(result.stdout)
@@ -99,15 +115,10 @@ def test_the_page_repeats_the_options_that_it_was_asked_with(
     assert "--profile bench-spiral --band 7.5 --html report.html" in page.text
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_figure_of_the_page_is_written_as_png_svg_and_csv(
-    command: str, runs: list[str], tmp_path: Path
-) -> None:
-    html, folder = tmp_path / "page.html", tmp_path / "figures"
-    result = asked(command, runs, html, "--figures", str(folder))
-    assert result.exit_code == 0, result.output
-    shown = Page(html.read_text(encoding="utf-8")).shown
-    assert f"figures: {folder} ({len(shown)} as PNG, SVG and CSV)" in result.stderr
+def test_every_figure_of_the_page_is_written_as_png_svg_and_csv(written: Written) -> None:
+    folder = written.figures
+    shown = Page(written.html.read_text(encoding="utf-8")).shown
+    assert f"figures: {folder} ({len(shown)} as PNG, SVG and CSV)" in written.result.stderr
     expected = {f"{name}.{suffix}" for name in shown for suffix in ("png", "svg", "csv")}
     assert {path.name for path in folder.iterdir()} == expected
     assert all(path.stat().st_size > 50 for path in folder.iterdir())

@@ -44,6 +44,7 @@ def coloured(random: np.random.Generator, count: int) -> Array:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [white, coloured])
 def test_intervals_cover_the_truth_in_95_of_100_cases(
     kind: Callable[[np.random.Generator, int], Array],

@@ -116,7 +116,7 @@ def numba_kernels() -> RobotKernels:
     return compiled()
 
 
-@pytest.fixture(params=["plain", "numba"])
+@pytest.fixture(params=["plain", pytest.param("numba", marks=pytest.mark.slow)])
 def kernels(request: pytest.FixtureRequest) -> RobotKernels:
     return PLAIN if request.param == "plain" else request.getfixturevalue("numba_kernels")
 
