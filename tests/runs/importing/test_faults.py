@@ -229,3 +229,14 @@ def test_a_missing_library_is_named_with_its_extra(
     monkeypatch.setitem(__import__("sys").modules, module, None)
     with pytest.raises(UsageError, match=rf"pip install 'winchkit\[{extra}\]'"):
         read_table(path)
+
+
+def test_times_of_faults_are_those_of_the_file(tmp_path: Path) -> None:
+    """A test stand writes a row of the last test first; its channels have rates of their own."""
+    lines = ["time [s],angle [deg],torque [Nm]", "2.445,1,"]
+    lines += [f"{0.01 * k:.2f},{k},{'' if k % 3 else k}" for k in range(40)]
+    with pytest.raises(RunError) as caught:
+        run(tmp_path / "log.csv", lines)
+    (fault,) = caught.value.faults
+    assert fault.line == 3
+    assert fault.message.startswith("time goes back from 2.445 s to 0 s; rows must come in order")

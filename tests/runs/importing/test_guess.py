@@ -341,3 +341,33 @@ def test_numbers_as_people_write_them() -> None:
     assert number("1'234.5", ".") == 1234.5
     assert number("1.234,5", ",") == 1234.5
     assert number("1,234", ".") is None
+
+
+def test_a_clock_without_a_name_is_the_only_column_that_increases_evenly(tmp_path: Path) -> None:
+    """As in a recording of a hanging robot: arrays of a MAT structure, time in ``st.t_r``."""
+    t = 421.448 + 0.001 * np.arange(400)
+    found = guess(
+        tmp_path / "log.csv",
+        {
+            "st_t_r": t,
+            "angle [rad]": np.sin(t),
+            "vicon_idx": 1.0 + 10.0 * np.arange(400),
+            "epsilon": np.cumsum(np.random.default_rng(1).uniform(0.1, 2.0, 400)),
+        },
+    )
+    clock = of(found, "time")
+    assert (clock.source, clock.unit, clock.confidence) == ("st_t_r", "s", "assumed")
+
+
+def test_two_columns_that_increase_evenly_are_no_clock(tmp_path: Path) -> None:
+    t = 0.1 + 0.001 * np.arange(400)
+    found = guess(tmp_path / "log.csv", {"one": t, "two": 2 * t, "angle [rad]": np.sin(t)})
+    assert not any(item.channel == "time" for item in found.assignments)
+    assert any("no column is time" in question.text for question in found.questions)
+
+
+@pytest.mark.parametrize("name", ["st_out.t", "log/time", "run.data.Zeit"])
+def test_the_last_part_of_a_name_counts_where_the_whole_says_nothing(name: str) -> None:
+    meaning = meaning_of(name)
+    assert meaning is not None
+    assert meaning.channel == "time"

@@ -57,6 +57,11 @@ _PREFERRED = {
 _AVOIDED = {"output", "abtrieb", "raw", "filtered", "filt", "error", "gear", "phase", "bus", "dc"}
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"gauche", "droite"}, {"front", "rear"})
 _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
+_UNKNOWN = "unknown name"
+_FEW = 20
+"""Values below which an even increase may be chance."""
+_UNEVEN = 0.5
+"""Range of the steps of a clock over their median."""
 _SINGLE = ("motor_angle", "motor_torque", "tension", "cable_length", "load")
 """Channels whose column is asked for where several fit equally well; others are left out."""
 
@@ -128,6 +133,8 @@ def choose(
     taken = {item.channel for item in choice.chosen}
     free = _left_after({*taken, *without}, free, choice)
     times = [item for item in free if item.channel in {"time", DATE}]
+    if not times and "time" not in {*taken, *without}:
+        times = _even_clock(choice)
     poses = [item for item in free if item.channel in (*POSE_DIMENSIONS, *MATRIX)]
     exact = [item for item in free if item.rank == 0 and item not in times]
     others = [i for i in free if i not in times and i not in poses and i not in exact]
@@ -186,7 +193,7 @@ def _by_unit(column: Column, unit: SpelledUnit | None) -> Candidate:
         return Candidate(column, channel, _BY_UNIT, unit, f"unit {column.unit}")
     if column.number == 1 and column.name.isdecimal() and _is_clock(column):
         return Candidate(column, "time", _BY_ORDER, None, "first column, increasing")
-    known = "unknown name" if unit is None else f"unknown name, {unit.dimension}"
+    known = _UNKNOWN if unit is None else f"{_UNKNOWN}, {unit.dimension}"
     return Candidate(column, "", reason=known)
 
 
@@ -206,6 +213,26 @@ def _is_clock(column: Column) -> bool:
         return False
     increases = float(np.mean(steps < 0)) < 0.05 and bool(np.any(steps > 0))
     return increases or bool(np.all(steps < 0))
+
+
+def _even_clock(choice: Choice) -> list[Candidate]:
+    """The only column of an unknown name whose values increase evenly, in a file without a time."""
+    found = [item for item in choice.unused if _increases_evenly(item)]
+    if len(found) != 1:
+        return []
+    choice.unused.remove(found[0])
+    return [replace(found[0], channel="time", rank=_BY_ORDER, reason="increases evenly")]
+
+
+def _increases_evenly(item: Candidate) -> bool:
+    """Whether an unnamed column may be a clock: whole numbers are counters as well."""
+    values = item.column.values
+    if item.unit is not None or item.column.texts is not None or len(values) < _FEW:
+        return False
+    if not item.reason.startswith(_UNKNOWN) or not np.all(np.isfinite(values)):
+        return False
+    steps, whole = np.diff(values), bool(np.all(values == np.round(values)))
+    return not whole and bool(np.all(steps > 0) and np.ptp(steps) < _UNEVEN * np.median(steps))
 
 
 def _choose_times(table: Table, times: Sequence[Candidate], choice: Choice) -> None:

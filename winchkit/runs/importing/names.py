@@ -223,7 +223,9 @@ def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
         channel = f"platform_{'xyz'[row - 1]}" if column == 4 else f"platform_r{row}{column}"
         return Meaning(channel, 1, name)
     whole = words_of(" ".join((*labels, name)))
-    for text in dict.fromkeys((_axis_of(labels, words), words, whole)):
+    # The last part of a name with dots or slashes (MAT, HDF5, ROS), where the whole says nothing.
+    last = words_of(re.split(r"[./]", name)[-1])
+    for text in dict.fromkeys((_axis_of(labels, words), words, whole, last)):
         for pattern, rank, channel in _COMPILED:
             if text and (found := pattern.search(text)):
                 return Meaning(channel, rank, found[0])

@@ -119,7 +119,9 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     """
     faults = list(streams.faults)
     if len(streams.streams) > 1:
-        faults += [fault for item in streams.streams for fault in _time_faults(streams, item)]
+        found = (fault for item in streams.streams for fault in _time_faults(streams, item))
+        # A row that has channels of several rates is one fault.
+        faults += {fault.line: fault for fault in found}.values()
     if streams.streams and not has_angle(streams):
         message = (
             f"has no motor angle (it has {', '.join(streams.channels)}); import it together with "
@@ -167,14 +169,16 @@ def _coarse_clock(time: Array) -> str:
 
 
 def _time_faults(streams: Streams, stream: Stream) -> Sequence[Fault]:
-    """Stamps that are missing or do not increase."""
+    """Stamps that are missing or do not increase, as the file has them."""
+    origin = 0.0 if streams.is_absolute else streams.origin
     faults = []
     for row in np.flatnonzero(~np.isfinite(stream.time)):
         line = streams.line_of(int(stream.rows[row]))
         faults.append(Fault("time is missing here", streams.path, line))
     for row in np.flatnonzero(stream.time[1:] <= stream.time[:-1]) + 1:
-        earlier, later = stream.time[row - 1], stream.time[row]
+        earlier, later = origin + stream.time[row - 1], origin + stream.time[row]
         word = "stands still at" if later == earlier else f"goes back from {earlier:.9g} s to"
+        message = f"time {word} {later:.9g} s; rows must come in order of time, each once"
         line = streams.line_of(int(stream.rows[row]))
-        faults.append(Fault(f"time {word} {later:.9g} s", streams.path, line))
+        faults.append(Fault(message, streams.path, line))
     return faults

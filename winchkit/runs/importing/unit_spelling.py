@@ -256,7 +256,7 @@ def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
     if mark in {r"\s*/\s*", r"\s+in\s+", r"\s*,\s*"}:
         return True
     word = unit.strip()
-    if word.casefold() in _SHORT_WORDS:
+    if _key(word).casefold() in _SHORT_WORDS:
         return False
     plain = {"count", "counts", "steps", "rotation", "rotations", "cycles", "pulses", "tour"}
     if word.casefold() in plain:
