@@ -7,15 +7,18 @@ import json
 import numpy as np
 import pytest
 
-from report_answers import answer_of, answered, recorded_both
+from report_answers import answer_of, answer_of_both
 from report_parsed import Page
 from winchkit.cli.core.output import to_json
 from winchkit.report.as_json import report_json
 from winchkit.report.pages.pages import report_html
 
+UNKNOWN = pytest.param("five-cornered-drum", marks=pytest.mark.slow)
+"""A cause that no effect describes: the search for one ends last."""
+
 
 def test_the_ladder_begins_and_ends_with_the_errors_of_the_answer() -> None:
-    answer = answered(recorded_both("demo-elastic-rope", "demo-motor-drag"))
+    answer = answer_of_both("demo-elastic-rope", "demo-motor-drag")
     ladder = report_json(answer)["waterfall"]
     for name, output in answer.diagnosis.outputs.items():
         rungs = [rung["heldout_rms"][name] for rung in ladder["rungs"]]
@@ -25,13 +28,15 @@ def test_the_ladder_begins_and_ends_with_the_errors_of_the_answer() -> None:
     assert len(ladder["first"]) == len(ladder["last"]) == 2
 
 
-def test_nothing_named_has_no_ladder_and_no_after() -> None:
-    found = report_json(answer_of("five-cornered-drum"))
+@pytest.mark.parametrize("bench", ["demo-adequate", UNKNOWN])
+def test_nothing_named_has_no_ladder_and_no_after(bench: str) -> None:
+    found = report_json(answer_of(bench))
     assert found["waterfall"] is None
     assert found["residuals"]["after"] is None
     assert found["maps"]["after"] is None
 
 
+@pytest.mark.slow
 def test_the_curve_of_the_rest_has_its_five_corners() -> None:
     curves = report_json(answer_of("five-cornered-drum"))["residuals"]["before"]
     curve = next(c for c in curves if c["order"] == 5)
@@ -41,7 +46,7 @@ def test_the_curve_of_the_rest_has_its_five_corners() -> None:
     assert int(np.argmax(spectrum[1:])) + 1 == 5
 
 
-@pytest.mark.parametrize("bench", ["demo-elastic-rope", "five-cornered-drum", "demo-adequate"])
+@pytest.mark.parametrize("bench", ["demo-elastic-rope", UNKNOWN, "demo-adequate"])
 def test_text_and_json_report_the_same(bench: str) -> None:
     answer = answer_of(bench)
     found = report_json(answer)

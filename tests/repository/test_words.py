@@ -83,6 +83,16 @@ def texts() -> tuple[tuple[str, Text], ...]:
     return tuple((path.relative_to(ROOT).as_posix(), text) for path, text in found)
 
 
+@cache
+def names() -> tuple[tuple[str, str], ...]:
+    """File and name of every test."""
+    return tuple(
+        (path.relative_to(ROOT).as_posix(), name)
+        for path in sorted((ROOT / "tests").rglob("test_*.py"))
+        for name in re.findall(r"def (test_\w+)", path.read_text(encoding="utf-8"))
+    )
+
+
 @pytest.mark.parametrize("word", GONE)
 def test_a_word_that_was_replaced_does_not_come_back(word: str) -> None:
     pattern = re.compile(rf"\b(?:{word})\b", re.IGNORECASE)
@@ -97,13 +107,8 @@ def test_a_word_that_was_replaced_does_not_come_back(word: str) -> None:
 @pytest.mark.parametrize("word", GONE)
 def test_names_of_tests_use_the_same_words(word: str) -> None:
     pattern = re.compile(rf"\b(?:{word})\b", re.IGNORECASE)
-    names = [
-        f"{path.relative_to(ROOT)}: {name}"
-        for path in sorted((ROOT / "tests").rglob("test_*.py"))
-        for name in re.findall(r"def (test_\w+)", path.read_text(encoding="utf-8"))
-        if pattern.search(name.replace("_", " "))
-    ]
-    assert not names, f"write instead: {GONE[word]}"
+    found = [f"{path}: {name}" for path, name in names() if pattern.search(name.replace("_", " "))]
+    assert not found, f"write instead: {GONE[word]}"
 
 
 def test_texts_are_docstrings_comments_and_sentences_without_names(tmp_path: Path) -> None:

@@ -77,6 +77,12 @@ def answered(runs: Sequence[Run]) -> WinchAnswer:
 
 
 @cache
+def answer_of_both(first: str, second: str) -> WinchAnswer:
+    """What the diagnosis says of :func:`recorded_both`."""
+    return answered(recorded_both(first, second))
+
+
+@cache
 def answer_of(bench: str) -> WinchAnswer:
     """What the diagnosis says of such a bench."""
     return answered(recorded(bench))
