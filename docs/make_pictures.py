@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from winchkit import (
     add,
+    diagnose,
     find,
     load_catalogue,
     read_axis,
@@ -31,6 +32,8 @@ from winchkit.effects.bind import line_of
 from winchkit.effects.term import modifiers_of
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals
+from winchkit.report.figures.export import file_svg
+from winchkit.report.pages.pages import report_figures
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,6 +73,20 @@ def first_hour() -> Axes:
         axes.plot(run.time, 1e3 * (error - error[0]), color=color, label=label, linewidth=1)
     axes.set(xlabel="time (s)", ylabel="error of the cable length (mm)")
     return axes
+
+
+def figures() -> None:
+    """Figures of the report of ``demo-eccentric-drum``, for the page about them."""
+    bench = read_simbench(find("sim", "demo-eccentric-drum"))
+    profile = read_profile(find("profiles", "bench-spiral"))
+    names = ("programme-demo", "programme-demo-fast")
+    programmes = [read_programme(find("sim", name)) for name in names]
+    runs = [run for one in programmes for run in simulate(bench, {"A": profile}, one)]
+    answer = diagnose(runs, profile)
+    drawn = {one.id: one for one in report_figures(answer, "profile bench-spiral")}
+    for name in ("errors", "time-cable_length", "over-cable_length", "map-cable_length-today"):
+        picture = PICTURES / f"figure-{name.partition('-')[0]}.svg"
+        picture.write_text(file_svg(drawn[name]) + "\n", encoding="utf-8")
 
 
 def emps(folder: Path) -> Axes:
@@ -150,6 +167,7 @@ def main() -> None:
 
     mpl.use("svg")
     mpl.rcParams.update(_STYLE)
+    figures()
     _save("first-hour", first_hour())
     if folder := os.environ.get("WINCHKIT_EMPS"):
         _save("emps", emps(Path(folder)))

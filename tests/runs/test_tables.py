@@ -56,6 +56,15 @@ def test_a_run_comes_back_the_same(through: Callable[[Run], Any]) -> None:
     assert same(run_of(through(RUN)))
 
 
+def test_a_table_that_lost_its_units_comes_back_with_those_of_the_run() -> None:
+    table = RUN.to_arrow()
+    bare = table.cast(pa.schema([pa.field(one.name, one.type) for one in table.schema]))
+    with pytest.raises(RunError, match="has no unit"):
+        run_of(bare)
+    assert RUN.units["time"] == "s"
+    assert same(run_of(bare, units=RUN.units, metadata=RUN.metadata, name="lift"))
+
+
 def test_units_and_missing_values_are_those_of_the_run() -> None:
     table = RUN.to_arrow()
     assert table.schema.field("tension").metadata == {b"unit": b"N"}
@@ -72,16 +81,14 @@ def test_polars_reads_the_stream_and_needs_the_units_back() -> None:
     frame = pl.DataFrame(RUN)
     assert frame.columns == ["time", *RUN]
     assert frame["tension"].to_list() == [98.0, None, 99.5]
-    units = {"time": "s"} | {name: RUN.channels[name].unit for name in RUN}
-    assert same(run_of(frame, units=units, metadata=RUN.metadata, name="lift"))
+    assert same(run_of(frame, units=RUN.units, metadata=RUN.metadata, name="lift"))
 
 
 def test_xarray_has_the_time_as_dimension() -> None:
     pytest.importorskip("xarray")
     dataset = RUN.to_pandas().to_xarray()
     assert dict(dataset.sizes) == {"time": 3}
-    units = {name: RUN.channels[name].unit for name in RUN} | {"time": "s"}
-    assert same(run_of(dataset.to_dataframe(), units=units, metadata=RUN.metadata, name="lift"))
+    assert same(run_of(dataset.to_dataframe(), units=RUN.units, metadata=RUN.metadata, name="lift"))
 
 
 def test_a_table_of_ones_own_has_units_in_its_names_or_beside_them() -> None:

@@ -11,16 +11,21 @@ import numpy as np
 import pytest
 
 pytest.importorskip("starlette")
+pytest.importorskip("httpx2")
 
 from hypothesis import given
 from hypothesis import strategies as st
+from starlette.applications import Starlette
+from starlette.testclient import TestClient
 
 from winchkit.catalog import find
-from winchkit.errors import FileError, NotPermitted, UsageError
+from winchkit.errors import FileError, NotPermitted, UsageError, WinchkitError
 from winchkit.runs.read import read_run
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.programme import Programme, Step, write_programme
 from winchkit.schema.read import read_simbench
+from winchkit.web.application import _refused
+from winchkit.web.bench import BenchView
 from winchkit.web.browser import Inbox
 from winchkit.web.drive_objects import drive_objects, drive_settings, write_setting
 from winchkit.web.frames import FrameWords
@@ -175,7 +180,24 @@ def test_settings_are_listed_with_types_and_limits_of_the_eds(spec: BenchSpec) -
     assert "6040h" not in known
 
 
-def test_the_cycles_of_a_trip_are_a_run_that_commands_read(tmp_path: Path) -> None:
+BENCH = """schema = 1
+kind = "bench"
+cycle = "4 ms"
+[bus.can]
+kind = "can"
+interface = "virtual"
+channel = "trip"
+[winch.A]
+profile = "bench-spiral"
+servo = { device = "generic-cia402", bus = "can", node = 1 }
+[winch.A.limits]
+speed = "0.5 m/s"
+acceleration = "1 m/s^2"
+"""
+
+
+def tripped() -> dict[str, Any]:
+    """History of a trip of two winches."""
     time = [-0.02, -0.01, 0.0, 0.01]
     own = {
         "motor_angle": [1.0, 1.1, 1.2, 1.2],
@@ -189,7 +211,7 @@ def test_the_cycles_of_a_trip_are_a_run_that_commands_read(tmp_path: Path) -> No
         "commanded_speed": [-0.1, -0.1, 0.0, 0.0],
     }
     message = "winch A: tension 113.5 N is above the limit 112 N"
-    found = {
+    return {
         "at": 7.0,
         "tripped": [{"message": message, "forbids": "winding in"}],
         "blocked": [],
@@ -197,14 +219,41 @@ def test_the_cycles_of_a_trip_are_a_run_that_commands_read(tmp_path: Path) -> No
         "winch": {"A": own, "B": own},
         "events": [],
     }
+
+
+def test_the_cycles_of_a_trip_are_a_run_that_commands_read(tmp_path: Path) -> None:
+    found = tripped()
+    own = found["winch"]["A"]
     name, text = trip_file(found, "spiral-bench", tmp_path)
     assert re.fullmatch(r"trip-\d{8}-\d{6}\.csv", name)
     (tmp_path / name).write_text(text)
     run = read_run(tmp_path / name)
     assert run.winches() == ["A", "B"]
-    assert run.metadata["tripped"] == message
-    assert run.time == pytest.approx(time)
+    assert run.metadata["tripped"] == found["tripped"][0]["message"]
+    assert run.time == pytest.approx(found["time"])
     assert run["B.tension"] == pytest.approx(own["tension"])
     assert np.isnan(run["A.motor_torque"]).tolist() == [False, False, True, False]
     assert "A.load" not in run
     assert "A.cable_length" not in run, "a run's cable length is that of the length instrument"
+
+
+def test_the_page_saves_a_trip_until_its_reset(tmp_path: Path) -> None:
+    class Watching:
+        history: dict[str, Any] | None = None
+
+        def trip_history(self) -> dict[str, Any] | None:
+            return self.history
+
+    bench = tmp_path / "bench.toml"
+    bench.write_text(BENCH)
+    view = BenchView(str(bench), allow_motion=False, folder=tmp_path)
+    refusals = {WinchkitError: _refused}
+    with TestClient(Starlette(routes=view.routes(), exception_handlers=refusals)) as client:
+        assert "not attached yet" in client.get("/api/bench/trip.csv").json()["error"]
+        view._watcher = station = Watching()  # type: ignore[assignment]
+        assert "nothing is tripped" in client.get("/api/bench/trip.csv").json()["error"]
+        station.history = tripped()
+        answer = client.get("/api/bench/trip.csv")
+    assert re.search(r'filename="trip-.*\.csv"', answer.headers["content-disposition"])
+    assert "B.tension [N]" in answer.text
+    assert list(tmp_path.iterdir()) == [bench]

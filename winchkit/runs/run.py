@@ -87,10 +87,15 @@ class Run(Plotted, Tabular):
     def _columns(self) -> Columns:
         return Columns(
             {"time": self.time, **{name: item.values for name, item in self.channels.items()}},
-            {"time": "s", **{name: item.unit for name, item in self.channels.items()}},
+            self.units,
             {**self.metadata, "name": self.name},
             ("time",),
         )
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit by column, ``time`` first; for :func:`winchkit.run_of` after a table lost them."""
+        return {"time": "s", **{name: item.unit for name, item in self.channels.items()}}
 
     @property
     def load_mass(self) -> float | None:

@@ -36,7 +36,8 @@ def run_of(
         xarray, ``dataset.to_dataframe()``. Null is a missing value.
     units : mapping of str to str, optional
         Unit by column, for columns that do not bring their own: as Arrow metadata ``unit``, in
-        ``attrs["units"]`` of pandas, or in the name, ``tension [N]``.
+        ``attrs["units"]`` of pandas, or in the name, ``tension [N]``. Polars and xarray keep
+        neither: ``run_of(frame, units=run.units, metadata=run.metadata)``.
     metadata : mapping of str to str, optional
         Such as ``{"load_mass": "10 kg"}``, beside that of the table.
     name : str, optional

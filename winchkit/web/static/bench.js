@@ -10,7 +10,7 @@ import { consequences, together, trip } from "./trip.js";
 import { card, picture as drawn, words as said } from "./winch.js";
 
 const PERIOD = 50, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
-let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, cardsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null;
+let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, cardsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
 
 // A request that fails is repeated: without it there is no Stop.
 export async function station(state) {
@@ -60,7 +60,15 @@ function receive(message) {
   }
   watchTrip();
   if (message.said && (!before || before.said !== message.said)) { alarm(message.said); say(message.said); release(); }
-  show();
+  soon();
+}
+
+// Pictures that come faster than the screen is drawn are skipped, so that keys never wait behind them.
+function soon() {
+  if (document.hidden) { show(); return; }
+  if (awaited) return;
+  awaited = true;
+  requestAnimationFrame(() => { awaited = false; show(); });
 }
 
 // The cycles around a trip: asked for once they are complete, shown until the reset.
