@@ -252,11 +252,11 @@ async function drawTime() {
         { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, marks, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }] }] });
     fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise ±1σ", true]),
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
-    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 120, top: 22, bare: true, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
+    plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 120, top: 22, bare: true, left: 58, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
     const marked = brushed ? brushed.time : null;
     const low = marked ? mixed(data.x, data.residual, marked, brushed.residual) : [data.x, data.residual];
     const drawn = plot(lower, low, [line("today", 1.25, 1, { spanGaps: Boolean(marked) }), ...(marked ? [{ paths: dots("brush", 0.9, 3), points: { show: false } }] : [])],
-      { height: 200, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
+      { height: 200, left: 58, runs: runs.map((run) => ({ ...run, labelled: false })), zoom, noise: data.noise, xLabel: "s", sync: "time", label: `Residual of the ${data.name} over time` });
     if (earlier && earlier.curve && earlier.curve.output === output && !span && !marked) {
       const { x, y, worth } = earlier.curve;
       morph(drawn, { x, y: y.map((value) => (value === null ? null : (value * worth) / data.residual_worth)) }, low);

@@ -49,7 +49,7 @@ function headline(view, output) {
 }
 
 function errors(view, output, focus) {
-  const ratio = (cell) => (cell && cell.ratio ? `${number(cell.ratio, 3)}×` : "–");
+  const ratio = (cell) => (cell && cell.ratio ? `${cell.ratio < 100 ? cell.ratio.toPrecision(3) : number(cell.ratio, 3)}×` : "–");
   const shared = view.diagnosis.ladder.columns.filter((c) => both(view).includes(c.output));
   const rows = shared.map((c) => el("tr", {}, el("td", {}, el("button", { class: "plain", "aria-pressed": String(c.output === output), onclick: () => focus(c.output) }, c.name, el("span", { class: "note" }, c.unit))),
     sidesOf(view).flatMap((side) => [el("td", { class: "number" }, text(todayOf(side)[c.output])), el("td", { class: "number wide" }, text(floorOf(side)[c.output])), el("td", { class: "number" }, ratio(todayOf(side)[c.output]))])));
@@ -78,8 +78,8 @@ async function drawTimes(view, output, boxes) {
         panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel: "time [s]", range: signal, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone }] },
           { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel: "time [s]", range: residual, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone }] }] });
       boxes[i].replaceChildren(el("header", {}, el("h2", {}, label, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], [tone, "predicted, residual"], ["band", "noise ±1σ", true]), exporter(`${output}-over-time-${"ab"[i]}`, figure)), upper, lower);
-      plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line(tone, 1.25)], { height: 110, top: 22, bare: true, runs: data.runs.map((run) => ({ ...run, labelled: true })), zoom, xRange, range: () => signal, sync: "sides", label: `${label}, measured and predicted over time` });
-      plot(lower, [data.x, data.residual], [line(tone, 1.25)], { height: 150, runs: data.runs, zoom, xRange, range: () => residual, noise: data.noise, xLabel: "s", sync: "sides", label: `${label}, residual over time` });
+      plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line(tone, 1.25)], { height: 110, top: 22, bare: true, left: 58, runs: data.runs.map((run) => ({ ...run, labelled: true })), zoom, xRange, range: () => signal, sync: "sides", label: `${label}, measured and predicted over time` });
+      plot(lower, [data.x, data.residual], [line(tone, 1.25)], { height: 150, left: 58, runs: data.runs, zoom, xRange, range: () => residual, noise: data.noise, xLabel: "s", sync: "sides", label: `${label}, residual over time` });
     });
   });
 }
