@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.errors import Fault, FileError
+from winchkit.python_can import import_python_can
 from winchkit.schema.eds.eds import read_eds_text
 
 __all__ = ["Abort", "Entry", "Guard", "Key", "ObjectDictionary", "Value", "read_eds"]
@@ -221,6 +222,7 @@ class ObjectDictionary:
 
 def read_eds(path: Path, node: int) -> dict[Key, Entry]:
     """Objects that an EDS or DCF file declares for a node id; FileError for any other file."""
+    import_python_can()  # canopen imports it
     from canopen.objectdictionary import eds
 
     library: Any = eds
