@@ -92,6 +92,8 @@ class BenchConnection(ABC):
         self.loop.start()
         await_feedback(self.loop, self.axes, self.clock)
         self.realtime.cover(self._urgent_threads(), self._wired.companions)
+        if self._wired.companions:
+            self.realtime = self.realtime.with_instruments()
         sensors = self._wired.sensors
         await_sensors((s for one in self.loop.winches for s in sensors[one].values()), self.clock)
 

@@ -77,6 +77,14 @@ def test_without_real_time_the_lines_stay_in_the_bench(live: LiveBench) -> None:
         assert bench.winch["A"].tension == pytest.approx(WEIGHT, abs=8)
 
 
+def test_the_real_time_settings_say_who_reads_the_instruments(bench: Bench) -> None:
+    """Without a priority other programs delay its readings; what would permit it is told."""
+    (item,) = (item for item in bench.realtime.items if item.name == "instruments")
+    assert not item.granted
+    assert "instrument process" in item.detail
+    assert "rtprio" in item.remedy or "cpu.rt_runtime_us" in item.remedy
+
+
 def test_readings_tares_and_facts_of_the_process(bench: Bench, tmp_path: Path) -> None:
     winch, cells = bench.winch["A"], bench.cells
     assert winch.tension == pytest.approx(WEIGHT, abs=8)

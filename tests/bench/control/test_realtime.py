@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from winchkit import catalog, open_bench
-from winchkit.bench.control.computer import survey
+from winchkit.bench.control.computer import _limit, survey
 from winchkit.bench.control.realtime import RestCollector, acquire
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase, WinchSnapshot
 from winchkit.schema.read import read_simbench
@@ -199,3 +199,22 @@ def test_old_objects_are_collected_at_rest_only() -> None:
         phase = phases.get(now[0], phase)
         collector(picture(now[0], phase))
     assert collected == [0.01, 10.01, 51.01, 61.01]
+
+
+@pytest.mark.parametrize(
+    ("runtime", "granted", "words"),
+    [
+        (950_000, True, "stand still for 50 ms"),
+        (500_000, False, "500000 of 1000000 us"),
+        (0, False, "0 of 1000000 us"),
+        (-1, True, "no limit"),
+        (1_000_000, True, "no limit"),
+    ],
+)
+def test_the_kernels_limit_of_real_time_threads_is_told(
+    runtime: int, granted: bool, words: str
+) -> None:
+    item = _limit(runtime, 1_000_000)
+    assert item.granted is granted
+    assert words in item.detail
+    assert bool(item.remedy) is not granted

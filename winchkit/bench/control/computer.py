@@ -16,6 +16,7 @@ from pathlib import Path
 __all__ = [
     "PRIORITY",
     "Item",
+    "instrument_reading",
     "locks_without_limit",
     "memory_remedy",
     "scheduling_remedy",
@@ -58,6 +59,29 @@ def survey() -> tuple[Item, ...]:
     if sys.platform != "linux":
         return (Item("real-time", False, f"not available on {sys.platform}", "use Linux"),)
     return (_scheduling(), _memory(), *_kernel())
+
+
+def instrument_reading(*, scheduled: bool) -> Item:
+    """Who reads the instruments of Modbus and serial lines, where real time is requested.
+
+    Parameters
+    ----------
+    scheduled : bool
+        Whether the process that does so may have a real-time priority.
+
+    Returns
+    -------
+    Item
+        Refused where other programs may delay the readings.
+    """
+    process = "Modbus and serial lines are read by the instrument process"
+    if scheduled:
+        return Item("instruments", True, f"{process}, with real-time priority")
+    detail = (
+        f"{process}, without real-time priority: other programs delay its readings, and a winch "
+        "whose load cell is read too late trips"
+    )
+    return Item("instruments", False, detail, scheduling_remedy())
 
 
 def scheduling_remedy() -> str:
@@ -150,15 +174,8 @@ def _kernel() -> tuple[Item, ...]:
         found.append(Item("kernel preemption", True, preemption))
     runtime = _number("/proc/sys/kernel/sched_rt_runtime_us")
     period = _number("/proc/sys/kernel/sched_rt_period_us")
-    if runtime is not None and period and 0 <= runtime < _THROTTLED * period:
-        found.append(
-            Item(
-                "kernel",
-                False,
-                f"real-time threads get {runtime} of {period} us",
-                "sysctl -w kernel.sched_rt_runtime_us=950000",
-            )
-        )
+    if runtime is not None and period:
+        found.append(_limit(runtime, period))
     governor = _text("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
     if governor and governor != "performance":
         found.append(
@@ -170,6 +187,21 @@ def _kernel() -> tuple[Item, ...]:
             )
         )
     return tuple(found)
+
+
+def _limit(runtime: int, period: int) -> Item:
+    """How long real-time threads may run on a processor within a period, us; -1 for no limit."""
+    if not 0 <= runtime < period:
+        return Item("kernel", True, "no limit of real-time threads by sched_rt_runtime_us")
+    detail = f"real-time threads get {runtime} of {period} us on each processor"
+    if runtime < _THROTTLED * period:
+        return Item("kernel", False, detail, "sysctl -w kernel.sched_rt_runtime_us=950000")
+    rest = (period - runtime) / 1000
+    return Item(
+        "kernel",
+        True,
+        f"{detail}; threads that ask for more make the control loop stand still for {rest:.0f} ms",
+    )
 
 
 def _preemption() -> str:

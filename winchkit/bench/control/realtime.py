@@ -18,12 +18,13 @@ import os
 import sys
 from collections.abc import Callable, Iterable
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from winchkit.bench.control.computer import (
     PRIORITY,
     Item,
+    instrument_reading,
     locks_without_limit,
     memory_remedy,
     scheduling_remedy,
@@ -81,6 +82,10 @@ class RealTime:
         """
         if self.scheduled:
             _prioritise(frozenset(urgent), self._before, companions)
+
+    def with_instruments(self) -> RealTime:
+        """The same, which says besides that the instrument process reads the slow lines."""
+        return replace(self, items=(*self.items, instrument_reading(scheduled=self.scheduled)))
 
     def close(self) -> None:
         """Give everything back. Twice does no harm."""

@@ -30,6 +30,10 @@ def refusals(bench: BenchSpec) -> tuple[str, ...]:
     ]
     if not real:
         return ()
-    from winchkit.bench.control.computer import survey
+    from winchkit.bench.control.computer import instrument_reading, survey
 
-    return tuple(f"this computer, {item}" for item in survey() if not item.granted)
+    items = list(survey())
+    if any(bus.kind != "can" for bus in bench.bus.values()):
+        scheduled = any(item.name == "scheduling" and item.granted for item in items)
+        items.append(instrument_reading(scheduled=scheduled))
+    return tuple(f"this computer, {item}" for item in items if not item.granted)

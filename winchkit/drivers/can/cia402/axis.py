@@ -11,7 +11,7 @@ from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
 from winchkit.drivers.can.canopen.nmt import NMT_STATES, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
-from winchkit.drivers.can.cia402.command import Commander
+from winchkit.drivers.can.cia402.command import Command, Commander
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec, await_booted, commission
 from winchkit.drivers.can.cia402.feedback import (
     AxisFeedback,
@@ -366,9 +366,8 @@ class Cia402Axis:
             age=self._cycle[0] - feedback.sync,
             at_rest=self._position.at_rest(feedback),
         )
-        word, frames = commander.frames(
-            word, wish, feedback, velocity=velocity, angle=angle, torque=torque, start=start
-        )
+        command = Command(wish, velocity, angle, torque, start)
+        word, frames = commander.frames(word, command, feedback)
         if not self.host.silent or not self.host.withholds_rpdos:
             for identifier, data in frames:
                 self._bus.post(identifier, data)
