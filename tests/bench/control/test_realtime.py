@@ -211,7 +211,7 @@ def test_old_objects_are_collected_at_rest_only() -> None:
         (1_000_000, True, "no limit"),
     ],
 )
-def test_the_kernels_limit_of_real_time_threads_is_told(
+def test_the_kernels_limit_of_real_time_threads_is_reported(
     runtime: int, granted: bool, words: str
 ) -> None:
     item = _limit(runtime, 1_000_000)
