@@ -78,7 +78,7 @@ def test_without_real_time_the_lines_stay_in_the_bench(live: LiveBench) -> None:
 
 
 def test_the_real_time_settings_say_who_reads_the_instruments(bench: Bench) -> None:
-    """Without a priority other programs delay its readings; the setting that would permit it is named."""
+    """Without a priority other programs delay its readings; the remedy is named."""
     (item,) = (item for item in bench.realtime.items if item.name == "instruments")
     assert not item.granted
     assert "instrument process" in item.detail
