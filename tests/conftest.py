@@ -12,7 +12,10 @@ import pytest
 from hypothesis import settings
 
 from stalls import LATE_CYCLES, StallWatch
+from winchkit.python_can import import_python_can
 
+# Before a test imports it: with all that it imports of MF4, each process starts seconds later.
+import_python_can()
 # No test is judged by the clock: machines are shared and noisy.
 settings.register_profile("winchkit", deadline=None)
 # A change is judged by the same examples each time; those who work on it look for new ones.
