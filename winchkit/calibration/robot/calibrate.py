@@ -35,7 +35,7 @@ from winchkit.calibration.robot.identifiability import (
 )
 from winchkit.calibration.robot.instruments import declared_instruments
 from winchkit.calibration.robot.options import Options, ProgressCallback
-from winchkit.calibration.robot.outliers import gross_errors
+from winchkit.calibration.robot.outliers import gross_errors, unexplained
 from winchkit.calibration.robot.parameters import (
     EFFECTS,
     Estimated,
@@ -92,10 +92,14 @@ class Calibrated(Plotted, Tabular):
     """Cable per motor turn of each line."""
     found_instruments: frozenset[str] = frozenset()
     """Numbers of instruments that the poses require and that the file does not declare unknown."""
+    unexplained: tuple[str, ...] = ()
+    """Instruments at the lines whose readings do not follow the geometry, in words."""
 
     @property
     def refusal(self) -> str:
         """Reason why the robot is not calibrated, in words; empty where it is."""
+        if self.unexplained:
+            return f"not calibrated: {'; '.join(self.unexplained)}; nothing was written"
         before, after = rms(self.validation_before.distance), rms(self.validation_after.distance)
         if after > before:
             return (
@@ -249,6 +253,7 @@ def calibrate(
         ),
         validation_lengths=lengths,
         ratios=ratios,
+        unexplained=tuple(unexplained(equations, solution)),
         found_instruments=chosen.free
         - (declared.instruments.free if declared.instruments else frozenset()),
     )

@@ -1,4 +1,4 @@
-"""Gross errors: measurements with residuals far outside the spread of their kind."""
+"""Gross errors of measurements, and instruments whose readings do not follow the geometry."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
 from winchkit.model.robot.identification.bundle_adjustment import Solution
 
-__all__ = ["gross_errors"]
+__all__ = ["gross_errors", "unexplained"]
 
 _WORDS = {
     "rope": "motor angles",
@@ -24,6 +24,13 @@ _NORMAL = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 _MOST_SHARE = 0.1
 _LISTED = 5
+_SHARE = 0.5
+"""Share of an instrument's variance that the fit has to explain: half."""
+_CAUSES = {
+    "swivel": "swivel_axis (the direction in which the cable reaches its pulley), the sign of the "
+    "encoders and the order of the lines",
+    "cable_length": "unit and sign of the lengths and the order of the lines",
+}
 
 
 def gross_errors(equations: Equations, solution: Solution) -> list[str]:
@@ -48,6 +55,45 @@ def gross_errors(equations: Equations, solution: Solution) -> list[str]:
                 "them out, or use --loss cauchy"
             )
     return out
+
+
+def unexplained(equations: Equations, solution: Solution) -> list[str]:
+    """One sentence per kind of instrument at the lines that does not show the predicted motion.
+
+    Notes
+    -----
+    With the readings of every line about their mean, R² is below a half although at least a half
+    of their variance is predicted: an instrument that hardly moves says nothing.
+    """
+    out = []
+    readings = {
+        "swivel": equations.measured.swivel,
+        "cable_length": equations.measured.cable_length,
+    }
+    for kind, constraint in equations.constraints(solution.state):
+        if kind not in readings:
+            continue
+        measured, residual = readings[kind], constraint.residual
+        left = _about_mean(residual)
+        given, predicted = _about_mean(measured), _about_mean(measured + residual)
+        if left > (1 - _SHARE) * given and predicted > _SHARE * given:
+            count = np.count_nonzero(np.isfinite(residual))
+            unit, factor = ("deg", 180 / np.pi) if kind == "swivel" else ("mm", 1e3)
+            noise, varies = (factor * np.sqrt(total / count) for total in (left, given))
+            out.append(
+                f"the {_WORDS[kind]} do not follow the geometry: they vary by {varies:.3g} {unit} "
+                f"and differ from it by {noise:.3g} {unit} rms beside their zeros; check "
+                f"{_CAUSES[kind]}"
+            )
+    return out
+
+
+def _about_mean(values: Array) -> float:
+    """Sum of squares about the mean of each line."""
+    known = np.isfinite(values)
+    count = np.maximum(known.sum(axis=0), 1)
+    mean = np.where(known, values, 0.0).sum(axis=0) / count
+    return float(np.sum(np.where(known, values - mean, 0.0) ** 2))
 
 
 def _outside(residual: Array) -> tuple[NDArray[np.bool_], int]:

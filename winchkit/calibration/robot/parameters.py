@@ -94,7 +94,6 @@ GEOMETRY = ("exit-point", "anchor-point", "swivel-radius")
 EFFECTS = (*LAWS, "home-length", "gear-ratio", "payload-mass", "payload-centre")
 """Effects that are fitted where they are named; ``gear-ratio/LINE`` on one line."""
 
-_HOME_LENGTH = 1e-3
 _MASS_SHARE, _MASS_LEAST = 0.2, 0.1
 _CENTRE = 20e-3
 _TRACKER_STD = {"m": 1.0, "rad": 1.0, "1": 0.01}
@@ -303,7 +302,7 @@ def parameters_of(
     _growth(build, winches)
     build.ratios(effects)
     if law or "home-length" in effects:
-        build.zeros("home_length", "m", _HOME_LENGTH, zero=False)
+        build.zeros("home_length", "m", build.prior("home_length").std, zero=False)
     if law:
         build.add("law", [_of_law(law, p, own.get(law, {})) for p in LAWS[law]])
     _payload(build, effects)

@@ -26,16 +26,20 @@ __all__ = ["FittedSpec", "HomeSpec", "LineSpec", "PlatformSpec", "PriorSpec", "R
 
 Point = tuple[Length, Length, Length]
 
-PriorName = Literal["exit_point", "anchor_point", "winding_radius", "swivel_radius", "layer_growth"]
+PriorName = Literal[
+    "exit_point", "anchor_point", "winding_radius", "swivel_radius", "layer_growth", "home_length"
+]
 PRIORS: dict[PriorName, float] = {
     "exit_point": 5e-3,
     "anchor_point": 5e-3,
     "winding_radius": 0.5e-3,
     "swivel_radius": 0.4e-3,
     "layer_growth": 0.04e-3,
+    "home_length": 1e-3,
 }
 """Standard deviations of priors that a file does not declare, m: half the width of the bounds of
-CABTIVE paper, Table 4, is read as two standard deviations."""
+CABTIVE paper, Table 4, is read as two standard deviations. That of the cable lengths at home
+(effect ``home-length``) is what remains where the platform is set into a fixture by hand."""
 
 
 @dataclass(frozen=True)
