@@ -289,3 +289,19 @@ def test_no_single_wrong_bit_passes(at: int, bit: int) -> None:
     data = bytearray(ANSWER)
     data[at] ^= 1 << bit
     assert asked().received(bytes(data)) == b""
+
+
+@given(st.integers(0, 0x08FF), st.integers(0, 0xFFFF), st.integers(0, 0xFFFF))
+@example(1, 2, 5)
+def test_the_answer_to_a_write_passes_whatever_it_looks_like(
+    before: int, transaction: int, address: int
+) -> None:
+    """It repeats the request: ``00 05 00 01`` ends as the head of transaction 1 begins."""
+    gate = TcpAnswerGate()
+    gate.sent(tcp(before, 1, 3, 0, 6, 0, 2))
+    assert gate.received(tcp(before, 1, 3, 4, 9, 9, 9, 9))
+    high, low = address.to_bytes(2, "big")
+    gate.sent(tcp(transaction, 1, 16, high, low, 0, 1, 2, 0, 99))
+    answer = tcp(transaction, 1, 16, high, low, 0, 1)
+    assert gate.received(answer) == answer
+    assert not gate.broken

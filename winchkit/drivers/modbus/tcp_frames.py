@@ -114,7 +114,9 @@ class TcpAnswerGate:
         body, refusal = frame[_HEAD:], request.refusal
         refused = body.startswith(refusal) and len(body) == len(refusal) + 1
         agrees = body.startswith(request.wanted) and len(frame) == request.size
-        if not (agrees or refused) or self._buffer or self._holds_a_head(frame, joints):
+        # The answer to a write repeats the request: none of its bytes can be of another frame.
+        doubtful = request.reads and self._holds_a_head(frame, joints)
+        if not (agrees or refused) or self._buffer or doubtful:
             self._lose()
             return False
         if agrees:
