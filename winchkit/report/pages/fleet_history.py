@@ -52,7 +52,10 @@ def fleet_history_html(history: FleetHistory, title: str, swapped: Sequence[Swap
         ("Figures", _figures_text(len(changed), len(drawn))),
     ]
     headline = (
-        f"{len(changed)} changes in {len(winches)} winches" if changed else "No change over time"
+        f"{len(changed)} change{'s' * (len(changed) > 1)} in {len(winches)} "
+        f"winch{'es' * (len(winches) > 1)}"
+        if changed
+        else "No change over time"
     )
     beyond = [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
     differs = bool(history.odd or beyond or swapped)
