@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis_runs import GROOVED, NOISE, Ride, made, with_channel, without
-from winchkit.diagnosis.data.validation import validate_runs
+from winchkit.diagnosis.data.validation import validate_runs, without_constants
 from winchkit.errors import FileError, RunError
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import GearboxSpec
@@ -163,3 +163,28 @@ def test_every_output_can_stand_alone() -> None:
         alone = made(0, noise={output: NOISE[output]})
         assert list(alone) == ["motor_angle", output]
         assert validate_runs([alone], GROOVED) == []
+
+
+def test_a_channel_that_is_constant_in_one_run_is_left_out_there() -> None:
+    """A torque in steps of 1.5 N m does not change in a run of a small load; the others measure."""
+    coarse = replace(changed("motor_torque", lambda v: np.full_like(v, 19.5), "N m"), name="low")
+    runs, found = without_constants([GOOD, coarse])
+    assert set(runs[0]) == set(GOOD)
+    assert set(runs[1]) == set(GOOD) - {"motor_torque"}
+    (finding,) = found
+    assert (finding.code, finding.run, finding.channel) == ("constant", "low", "motor_torque")
+    assert finding.value == 19.5
+    assert without_constants([coarse, coarse])[1] == [], "in all runs: refused as before"
+
+
+def test_a_run_at_rest_keeps_its_constant_reading() -> None:
+    rest = replace(
+        with_channel(
+            changed("tension", lambda v: np.full_like(v, 12.5)),
+            "motor_angle",
+            np.zeros(len(GOOD)),
+            "rad",
+        ),
+        name="rest",
+    )
+    assert "tension" in without_constants([GOOD, rest])[0][1]

@@ -24,7 +24,7 @@ from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, witho
 from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
 from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
-from winchkit.diagnosis.data.validation import validate_runs
+from winchkit.diagnosis.data.validation import validate_runs, without_constants
 from winchkit.diagnosis.data.zeroing import zeroed_anew
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import UsageError
@@ -181,6 +181,7 @@ def prepare(
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
     runs, at_rest = prepared_statics(with_torques(runs, profile), profile)
+    runs, coarse = without_constants(runs)
     notes = [*at_rest, *validate_runs(runs, profile)]
     runs, copied = without_copies(runs, profile)
     inspected = [inspect_run(run) for run in runs]
@@ -206,7 +207,7 @@ def prepare(
     return replace(
         dataset,
         notes=tuple(notes),
-        sanity=(*copied, *left_out, *sanity, *zeroed, *rounded_alike(dataset, resolution)),
+        sanity=(*copied, *left_out, *coarse, *sanity, *zeroed, *rounded_alike(dataset, resolution)),
         zeroed_anew=frozenset(finding.channel for finding in zeroed),
         resolution=resolution,
         decimation_factor=factor,

@@ -17,9 +17,11 @@ from winchkit.errors import Fault, RunError
 from winchkit.model.line import Line
 from winchkit.model.stages import OUTPUTS, Signals
 from winchkit.runs.run import Run
+from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.text import size
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["validate_runs"]
+__all__ = ["validate_runs", "without_constants"]
 
 _LEAST_SAMPLES = 50
 _SLOPE_RANGE = 0.75, 1.3333
@@ -59,6 +61,47 @@ def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     if faults:
         raise RunError(faults)
     return [note for run in runs for note in _notes(run, profile)]
+
+
+def without_constants(runs: Sequence[Run]) -> tuple[list[Run], list[Finding]]:
+    """Leave a constant channel out of a run in motion where it varies in another run.
+
+    There the instrument measures, but its resolution is coarser than what happens in this run.
+    A channel that is constant in all runs stays, for :func:`validate_runs` to refuse.
+
+    Parameters
+    ----------
+    runs
+        Measured runs.
+
+    Returns
+    -------
+    list of Run
+        Runs without these channels.
+    list of Finding
+        One for each.
+    """
+    varies = {
+        name for run in runs for name in OUTPUTS if name in run and not _is_constant(run[name])
+    }
+    kept, found = [], []
+    for run in runs:
+        moves = "motor_angle" in run and not _is_constant(run["motor_angle"])
+        names = [name for name in OUTPUTS if moves and name in varies and name in run]
+        names = [name for name in names if _is_constant(run[name])]
+        for name in names:
+            value = float(run[name][np.isfinite(run[name])][0])
+            shown = size(value, run.channels[name].unit)
+            text = f"constant at {shown} in all samples, as in no other run; not compared there"
+            found.append(Finding("constant", run.name, name, value, text))
+        channels = {name: item for name, item in run.channels.items() if name not in names}
+        kept.append(replace(run, channels=channels) if names else run)
+    return kept, found
+
+
+def _is_constant(values: Array) -> bool:
+    finite = values[np.isfinite(values)]
+    return len(finite) > 0 and float(np.ptp(finite)) == 0
 
 
 def _faults(run: Run, profile: WinchProfile) -> list[Fault]:
