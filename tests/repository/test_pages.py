@@ -67,7 +67,7 @@ NOT_RUN = {
     "needs the drive": "docs/howto/drive.md",
     "tests/devices/test_makers_drives.py runs it with the maker's file": "docs/howto/drive.md",
     "needs a bench with a robot": "docs/howto/robot-motion.md",
-    "moves a simulated robot for three minutes": "docs/howto/tracker.md",
+    "simulates minutes of motion, and needs a bench": "docs/howto/tracker.md",
     "needs a folder of runs over months": "docs/howto/fleet.md",
     "the checks of .ci/run": "CONTRIBUTING.md",
     "changes the changelog": "docs/release.md",

@@ -263,8 +263,8 @@ def test_several_effects_are_added_one_after_another() -> None:
     said = replace(real.diagnosis, steps=(*real.diagnosis.steps, FRICTION))
     text = Page(report_html(WinchAnswer(real.engine, real.result, said), "x", profile="p")).text
     assert "winchkit add cable-elongation-linear --profile p --fit" in text
-    assert "winchkit add pulley-coulomb --profile better-1.toml --fit" in text
-    assert "-o better-2.toml" in text
+    assert "winchkit add pulley-coulomb --profile p-cable-elongation-linear.toml --fit" in text
+    assert "-o p-cable-elongation-linear-pulley-coulomb.toml" in text
 
 
 def test_the_raw_diagnosis_is_there_as_json() -> None:

@@ -75,7 +75,8 @@ class ProcessInstrument(SimulatedInstrument):
     # Network.
 
     def tick(self, now: float) -> None:
-        """Evaluate the network's timers; conversions are shown by :meth:`show` before."""
+        """Evaluate the network's timers."""
+        self.show(now)
         if self.nmt is NmtState.BOOTING:
             self._send(0x700 + self.node, b"\0")
             self.nmt = NmtState.PRE_OPERATIONAL
