@@ -11,7 +11,10 @@ from winchkit.cli.core.messages import note
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
+    from winchkit.bench.bench import Bench
+    from winchkit.bench.robot.computation import Computation
     from winchkit.bench.robot.self_calibration import PoseVolume, SelfCalibration
+    from winchkit.bench.robot.tracker import Tracker
     from winchkit.calibration.robot.calibrate import Options
     from winchkit.cli.core.terminal import ProgressCallback
     from winchkit.runs.run import Run
@@ -48,7 +51,6 @@ class PoseSeries:
         from winchkit.bench.open import open_bench
         from winchkit.bench.remote.identity import client_name
         from winchkit.bench.robot.computation import ComputationProcess
-        from winchkit.bench.robot.self_calibration import self_calibrated
         from winchkit.schema.read import read_bench
 
         spec = read_bench(path)
@@ -60,23 +62,11 @@ class PoseSeries:
         ):
             tracker = opened.tracker
             assert tracker is not None, "the bench file declares it"
-            return self_calibrated(
-                opened,
-                tracker,
-                poses=self.poses,
-                validation=self.validation,
-                volume=self.volume,
-                options=self.options,
-                accuracy=self.accuracy,
-                compute=compute,
-                progress=self.progress,
-                keep=keep,
-            )
+            return self._calibrated(opened, tracker, keep, compute)
 
     def simulated(self, name: str) -> SelfCalibration:
         """Calibrate a simulated robot, by the same loop and frames in simulated time."""
         from winchkit.bench.open import open_bench
-        from winchkit.bench.robot.self_calibration import self_calibrated
         from winchkit.bench.robot.tracker import Tracker
         from winchkit.catalog import find
         from winchkit.schema.read import read_simbench
@@ -93,17 +83,30 @@ class PoseSeries:
             live.robot.on_pose = tracker.receive
             with open_bench(live.bench_spec, clock) as opened:
                 clock.sleep(_INSTRUMENTS)
-                return self_calibrated(
-                    opened,
-                    tracker,
-                    poses=self.poses,
-                    validation=self.validation,
-                    volume=self.volume,
-                    options=self.options,
-                    accuracy=self.accuracy,
-                    progress=self.progress,
-                    keep=keep,
-                )
+                return self._calibrated(opened, tracker, keep)
+
+    def _calibrated(
+        self,
+        bench: Bench,
+        tracker: Tracker,
+        keep: Callable[[Run], None],
+        compute: Computation | None = None,
+    ) -> SelfCalibration:
+        from winchkit.bench.robot.computation import at_once
+        from winchkit.bench.robot.self_calibration import self_calibrated
+
+        return self_calibrated(
+            bench,
+            tracker,
+            poses=self.poses,
+            validation=self.validation,
+            volume=self.volume,
+            options=self.options,
+            accuracy=self.accuracy,
+            compute=compute or at_once,
+            progress=self.progress,
+            keep=keep,
+        )
 
     def _check(self, spec: BenchSpec, name: str) -> None:
         """Raise UsageError unless the bench moves this robot, seen by a tracker."""

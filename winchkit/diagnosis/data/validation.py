@@ -18,7 +18,7 @@ from winchkit.model.line import Line
 from winchkit.model.stages import OUTPUTS, Signals
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import size
+from winchkit.runs.sanity.repeated_values import constant
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["validate_runs", "without_constants"]
@@ -82,26 +82,20 @@ def without_constants(runs: Sequence[Run]) -> tuple[list[Run], list[Finding]]:
         One for each.
     """
     varies = {
-        name for run in runs for name in OUTPUTS if name in run and not _is_constant(run[name])
+        name for run in runs for name in OUTPUTS if name in run and not any(constant(run, name))
     }
     kept, found = [], []
     for run in runs:
-        moves = "motor_angle" in run and not _is_constant(run["motor_angle"])
+        moves = "motor_angle" in run and not any(constant(run, "motor_angle"))
         names = [name for name in OUTPUTS if moves and name in varies and name in run]
-        names = [name for name in names if _is_constant(run[name])]
-        for name in names:
-            value = float(run[name][np.isfinite(run[name])][0])
-            shown = size(value, run.channels[name].unit)
-            text = f"constant at {shown} in all samples, as in no other run; not compared there"
-            found.append(Finding("constant", run.name, name, value, text))
-        channels = {name: item for name, item in run.channels.items() if name not in names}
-        kept.append(replace(run, channels=channels) if names else run)
+        left_out = [finding for name in names for finding in constant(run, name)]
+        for finding in left_out:
+            text = f"{finding.text}, while it varies in other runs; not compared there"
+            found.append(replace(finding, text=text))
+        without = {finding.channel for finding in left_out}
+        channels = {name: item for name, item in run.channels.items() if name not in without}
+        kept.append(replace(run, channels=channels) if without else run)
     return kept, found
-
-
-def _is_constant(values: Array) -> bool:
-    finite = values[np.isfinite(values)]
-    return len(finite) > 0 and float(np.ptp(finite)) == 0
 
 
 def _faults(run: Run, profile: WinchProfile) -> list[Fault]:
@@ -127,7 +121,7 @@ def _faults(run: Run, profile: WinchProfile) -> list[Fault]:
         if len(finite) < _LEAST_FINITE_SHARE * len(values):
             message = f"{len(values) - len(finite)} of {len(values)} samples are NaN; remove it"
             faults.append(Fault(message, where, key=key))
-        elif np.ptp(finite) == 0:
+        elif any(constant(run, name)):
             if name == "motor_angle":
                 if is_at_rest(run, profile):
                     continue

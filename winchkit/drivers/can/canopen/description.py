@@ -126,6 +126,7 @@ def describe(dictionary: Any) -> DriveDescription:
     receive, transmit = (tuple(_pdos(dictionary, first)) for first in (_RPDO, _TPDO))
     targets = {MODES[mode].target for mode in modes} - {None}
     ways = host_loss_ways(dictionary)
+    motion = {mode: _target_obstacle(dictionary, mode) for mode in _MOTION if mode in modes}
     return DriveDescription(
         maker=info.vendor_name or "",
         product=info.product_name or "",
@@ -134,15 +135,15 @@ def describe(dictionary: Any) -> DriveDescription:
         ),
         device_profile=_profile(dictionary),
         modes=modes,
-        motion_modes=tuple(_motion_modes(dictionary, modes)),
+        motion_modes=tuple(mode for mode, reason in motion.items() if not reason),
         feedback=_carried(dictionary, [(index, 0) for index in _FEEDBACK], receive=False),
         targets=_carried(dictionary, [(0x6040, 0), *sorted(filter(None, targets))], receive=True),
         receive=receive,
         transmit=transmit,
         host_loss=ways,
         options=tuple(_options(dictionary)),
-        obstacles=tuple(_obstacles(dictionary, modes, receive, transmit, ways)),
-        differences=tuple(_differences(dictionary, modes, receive, transmit)),
+        obstacles=tuple(_obstacles(dictionary, motion, receive, transmit, ways)),
+        differences=tuple(_differences(dictionary, motion, receive, transmit)),
     )
 
 
@@ -205,13 +206,6 @@ def _modes(dictionary: Any) -> Iterator[str]:
             yield mode
 
 
-def _motion_modes(dictionary: Any, modes: tuple[str, ...]) -> Iterator[str]:
-    """Modes whose target an RPDO can carry."""
-    for mode in _MOTION:
-        if mode in modes and not _target_obstacle(dictionary, mode):
-            yield mode
-
-
 def _target_obstacle(dictionary: Any, mode: str) -> str:
     """Why no RPDO can carry the target of a mode; empty where one can."""
     target = MODES[mode].target
@@ -251,7 +245,7 @@ def _options(dictionary: Any) -> Iterator[OptionEntry]:
 
 def _obstacles(
     dictionary: Any,
-    modes: tuple[str, ...],
+    motion: dict[str, str],
     receive: tuple[PdoEntry, ...],
     transmit: tuple[PdoEntry, ...],
     ways: tuple[HostLoss, ...],
@@ -266,12 +260,10 @@ def _obstacles(
         ):
             kind = "RPDO" if index == _CONTROL else "TPDO"
             yield f"no {kind} can carry {index:04X}h: {reason}"
-    present = [mode for mode in _MOTION if mode in modes]
-    if not present:
+    if not motion:
         yield f"none of the modes {', '.join(_MOTION)} is there"
-    elif not any(_motion_modes(dictionary, modes)):
-        reasons = dict.fromkeys(_target_obstacle(dictionary, mode) for mode in present)
-        yield f"it has {', '.join(present)}, but {'; '.join(reasons)}"
+    elif all(motion.values()):
+        yield f"it has {', '.join(motion)}, but {'; '.join(dict.fromkeys(motion.values()))}"
     for kind, entries in (("receive", receive), ("transmit", transmit)):
         if not any(entry.number <= 4 for entry in entries):
             yield f"the EDS declares no {kind} PDO (1 to 4)"
@@ -284,12 +276,12 @@ def _obstacles(
 
 def _differences(
     dictionary: Any,
-    modes: tuple[str, ...],
+    motion: dict[str, str],
     receive: tuple[PdoEntry, ...],
     transmit: tuple[PdoEntry, ...],
 ) -> Iterator[str]:
-    for mode in _MOTION:
-        if mode in modes and (reason := _target_obstacle(dictionary, mode)):
+    for mode, reason in motion.items():
+        if reason:
             yield f"winchkit does not move it in {mode}: {reason}"
     for index in _UNSIGNED_WHERE_SIGNED:
         variable = declared(dictionary, index)
