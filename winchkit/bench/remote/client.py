@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -70,7 +70,8 @@ class RemoteStation:
         self._connection = connection
         self._stream = connection.makefile("rwb")
         self._lock = threading.Lock()
-        self._gone = self._owed = False
+        self._gone = False
+        self._requests = 0
         try:
             reply = self._call("introduce", name or client_name(), observer)
         except BaseException:
@@ -436,30 +437,30 @@ class RemoteStation:
             self._connection.close()
 
     def _call(self, operation: str, *arguments: Any) -> Any:
-        request = json.dumps({"op": operation, "args": arguments}).encode() + b"\n"
         with self._lock:
             if self._gone:
                 raise OwnerGone("this station at the bench was left; attach again")
-            answer = self._exchange(request)
+            answer = self._exchange(operation, arguments)
         if "error" in answer:
             raise error_of(answer["error"], answer["message"])
         return answer["ok"]
 
-    def _exchange(self, request: bytes) -> dict[str, Any]:
-        """Send a request, and wait for its answer; an earlier one that was interrupted comes first.
+    def _exchange(self, operation: str, arguments: Sequence[Any]) -> dict[str, Any]:
+        """Send a request, and wait for the answer with its number; raises OwnerGone.
 
-        Raises OwnerGone.
+        Ctrl-C may interrupt it at any instruction. The answers to requests that were interrupted,
+        whole or the rest of one, come before the one with the number, and are passed over.
         """
+        self._requests += 1
+        number = self._requests
+        request = {"id": number, "op": operation, "args": arguments}
         try:
-            if self._owed:
-                self._stream.readline()
-            self._stream.write(request)
+            self._stream.write(json.dumps(request).encode() + b"\n")
             self._stream.flush()
-            self._owed = True
-            line = self._stream.readline()
-            self._owed = False
-            if line:
-                return dict(json.loads(line))
+            while line := self._stream.readline():
+                answer = _answer(line)
+                if answer.get("id") == number:
+                    return answer
         except ConnectionError:
             pass
         except (OSError, ValueError) as error:
@@ -467,6 +468,15 @@ class RemoteStation:
             raise OwnerGone(f"the bench's owner does not answer: {error}") from error
         self._gone = True
         raise OwnerGone("the process that owned the bench has ended; its drives stop") from None
+
+
+def _answer(line: bytes) -> dict[str, Any]:
+    """An answer of the owner; empty for the rest of one whose beginning was lost."""
+    try:
+        answer = json.loads(line)
+    except ValueError:
+        return {}
+    return answer if isinstance(answer, dict) else {}
 
 
 class RemoteCells:

@@ -6,6 +6,7 @@ import json
 import logging
 import socket
 import threading
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -143,27 +144,31 @@ class StationServer:
 
     def _answer(self, seat: _Seat, line: bytes) -> tuple[dict[str, Any], bool]:
         """Do what a request names, and whether it was the last one."""
-        left = False
         seat.station.client.heard()
+        operation, number = "", None
         try:
             request = json.loads(line)
-            operation, arguments = request["op"], request.get("args", [])
-            if operation == "introduce":
-                return {"ok": self._introduce(seat, *arguments)}, False
-            if operation == "hand_over":
-                return {"ok": self._hand_over(seat)}, False
-            if operation == "leave":
-                left = True
-                _end(seat.station)
-                return {"ok": None}, True
-            if operation not in OPERATIONS:
-                raise UsageError(f"no operation '{operation}'")
-            return {"ok": getattr(seat.station, operation)(*arguments)}, False
+            operation, number = request["op"], request["id"]
+            answer = {"ok": self._do(seat, operation, request["args"])}
         except WinchkitError as error:
-            return {"error": class_name(error), "message": str(error)}, left
+            answer = {"error": class_name(error), "message": str(error)}
         except (ValueError, KeyError, TypeError) as error:
             words = f"a request that cannot be read: {error}"
-            return {"error": "UsageError", "message": words}, left
+            answer = {"error": "UsageError", "message": words}
+        return {"id": number, **answer}, operation == "leave"
+
+    def _do(self, seat: _Seat, operation: str, arguments: Sequence[Any]) -> Any:
+        """Do an operation of a station, or one of those of the server; returns its result."""
+        if operation == "introduce":
+            return self._introduce(seat, *arguments)
+        if operation == "hand_over":
+            return self._hand_over(seat)
+        if operation == "leave":
+            _end(seat.station)
+            return None
+        if operation not in OPERATIONS:
+            raise UsageError(f"no operation '{operation}'")
+        return getattr(seat.station, operation)(*arguments)
 
     def _introduce(self, seat: _Seat, name: str, observer: bool) -> dict[str, Any]:
         """Take a client's name; returns who owns the bench, and whether it is handed over."""
