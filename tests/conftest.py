@@ -9,6 +9,15 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
+
+if sys.dont_write_bytecode:
+    # The tests start hundreds of processes, and each would compile the same modules again. Where
+    # no bytecode may be written beside the sources, it is kept with pytest's own cache.
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
+
 from hypothesis import settings
 
 from stalls import LATE_CYCLES, StallWatch

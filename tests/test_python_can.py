@@ -21,6 +21,7 @@ def test_a_bus_imports_no_package_of_mf4(module: str) -> None:
     assert done.stdout.strip() == "set()"
 
 
+@pytest.mark.slow
 def test_asammdf_can_be_imported_afterwards() -> None:
     pytest.importorskip("asammdf")
     code = "import winchkit.drivers.can.bus.bus, asammdf; print(asammdf.MDF.__name__)"

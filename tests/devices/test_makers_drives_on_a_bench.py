@@ -111,6 +111,7 @@ def test_a_length_that_is_not_known_is_reported_and_no_move_goes_by_it(tmp_path:
         winch.move_to(3.88)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ends", ["closed", "killed"])
 def test_turns_that_an_earlier_process_counted_are_unknown_to_the_next_one(
     tmp_path: Path, ends: str

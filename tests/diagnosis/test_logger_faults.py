@@ -196,6 +196,7 @@ def test_an_effect_far_below_the_noise_is_not_identifiable() -> None:
     assert not identity(bench(), hidden, fault).identifiable
 
 
+@pytest.mark.slow
 def test_a_zero_of_every_run_hides_what_only_an_offset_shows() -> None:
     hidden: Hidden = {"frame-compliance": {"stiffness": 1e5}}
     once = identity(bench(), *hidden_in_files(hidden))

@@ -40,6 +40,7 @@ def dataset(machine: str, pattern: str = "*.csv") -> Dataset:
     return prepare([read_run(p) for p in paths], read_profile(DATA / machine / "profile.toml"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("machine", "pattern"),
     [

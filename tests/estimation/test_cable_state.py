@@ -91,6 +91,7 @@ def test_the_length_is_that_of_the_whole_run(effect: Effect) -> None:
     assert np.max(missed) < 0.06 * size + 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ON_TENSION, ids=lambda e: e.id)
 def test_the_tension_is_the_load_that_the_whole_run_had(effect: Effect) -> None:
     signals, term = run(), term_of(effect)

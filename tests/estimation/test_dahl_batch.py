@@ -53,6 +53,7 @@ def test_a_limit_that_changes_is_followed() -> None:
         assert np.allclose(dahl_batch(position, limit, 3000.0, shape), expected, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_compiled_loops_agree(compiled_kernels: Kernels) -> None:
     rng = np.random.default_rng(1)
     position = np.cumsum(rng.normal(0, 1e-3, 3000))

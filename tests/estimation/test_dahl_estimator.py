@@ -130,6 +130,7 @@ def test_the_std_is_that_of_a_perturbed_parameter(name: str, shape: float) -> No
     assert np.allclose(found[300:], central[300:], rtol=0.03, atol=0.02 * central[300:].max())
 
 
+@pytest.mark.slow
 def test_the_std_holds_what_parameters_drawn_at_random_do() -> None:
     rng = np.random.default_rng(3)
     covariance = np.diag([1e-3, 100.0, 0.05]) ** 2

@@ -183,6 +183,7 @@ def test_directions_without_data_are_nan() -> None:
     assert np.isfinite(found).tolist() == [True, False, False, False]
 
 
+@pytest.mark.slow
 def test_a_simulated_bench_gives_back_what_it_hides() -> None:
     """Recorded with drive, ramp, noise and quantisation: 0.012 and 0.5 N/mm stand in its file."""
     bench = read_simbench(find("sim", "demo-presliding-pulleys"))

@@ -17,6 +17,7 @@ UNKNOWN = pytest.param("five-cornered-drum", marks=pytest.mark.slow)
 """A cause that no effect describes: the search for one ends last."""
 
 
+@pytest.mark.slow
 def test_the_ladder_begins_and_ends_with_the_errors_of_the_answer() -> None:
     answer = answer_of_both("demo-elastic-rope", "demo-motor-drag")
     ladder = report_json(answer)["waterfall"]

@@ -80,6 +80,7 @@ def fake_proc(folder: Path, process: int, wait: float, mark: str = "") -> Path:
     return folder
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("stall", "body", "outcome"),
     [

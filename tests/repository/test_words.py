@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from snippets import ROOT
-from texts_of import Text, texts_of
+from texts_of import Text, texts_of, without_quotes
 
 GONE = {
     r"wiring files?": "bench file",
@@ -67,16 +67,20 @@ GONE = {
     r"drawn anew|sought": "recomputed, searched",
 }
 """Pattern between word boundaries, whatever the case, and what to write instead."""
+ANY = re.compile(rf"\b(?:{'|'.join(GONE)})\b", re.IGNORECASE)
 
 
 @cache
 def texts() -> tuple[tuple[str, Text], ...]:
-    """File and text: every text of the package, docstrings and comments of the other folders."""
+    """File and text: every text of the package, docstrings and comments of the other folders.
+
+    Files without any of the words anywhere, names included, are left out.
+    """
     found = [
         (path, text)
         for folder in ("winchkit", "benchmarks", "docs", "examples", "tests")
         for path in sorted((ROOT / folder).rglob("*.py"))
-        if path != Path(__file__)
+        if path != Path(__file__) and ANY.search(without_quotes(path.read_text(encoding="utf-8")))
         for text in texts_of(path)
         if folder == "winchkit" or text.about_code
     ]

@@ -124,6 +124,7 @@ def misses(pair: Pair) -> tuple[dict[str, float], dict[str, float]]:
     return found[0], found[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pair", PAIRS, ids=lambda pair: pair.physics)
 def test_the_catalogue_describes_the_plant(pair: Pair) -> None:
     before, after = misses(pair)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Text", "texts_of"]
+__all__ = ["Text", "texts_of", "without_quotes"]
 
 _QUOTED = re.compile(r"``[^`]*``|:\w+:`[^`]*`")
 _PARAMETER = re.compile(r"^\s*\w+(, \w+)*( : .*)?$", re.MULTILINE)
@@ -25,6 +25,11 @@ class Text:
     """With single spaces, names of parameters and in double backquotes left out."""
     about_code: bool
     """A comment or docstring; else a text of the program itself."""
+
+
+def without_quotes(text: str) -> str:
+    """A text with single spaces, without its parts in double backquotes."""
+    return " ".join(_QUOTED.sub(" ", text).split())
 
 
 def texts_of(path: Path) -> Iterator[Text]:
@@ -45,4 +50,4 @@ def texts_of(path: Path) -> Iterator[Text]:
                 yield Text(node.lineno, words, documents)
     for token in tokenize.generate_tokens(io.StringIO(source).readline) if "#" in source else ():
         if token.type == tokenize.COMMENT:
-            yield Text(token.start[0], " ".join(_QUOTED.sub(" ", token.string).split()), True)
+            yield Text(token.start[0], without_quotes(token.string), True)

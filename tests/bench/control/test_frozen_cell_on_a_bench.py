@@ -14,6 +14,7 @@ def sim(sim_bench: SimBench) -> OpenedBench:
     return sim_bench("spiral-bench")
 
 
+@pytest.mark.slow
 def test_a_cell_that_freezes_at_rest_forbids_motion(sim: OpenedBench) -> None:
     """Seen by its noise of 0.3 N, 30 counts, while the count stands still."""
     sim.bench.winch["A"].move_by(wind_in=0.05, speed=0.3)

@@ -278,8 +278,12 @@ def test_the_rows_up_to_a_full_disk_can_be_read(tmp_path: Path, suffix: str) -> 
     assert "the log has ended, the bench goes on" in done.stderr
     path = tmp_path / f"a.{suffix}"
     run = read_run(path)
-    assert len(run) > 100
-    assert run["A.motor_angle"] == pytest.approx(run["A.motor_angle"][0] + 3 * run.time, abs=1e-5)
+    known = np.isfinite(run["A.motor_angle"])
+    assert known.sum() > 100
+    # The last batch of an MCAP may hold messages of the cell whose drive's were not written.
+    assert known[: known.sum()].all(), "what is unknown stands at the end"
+    angle, time = run["A.motor_angle"][known], run.time[known]
+    assert angle == pytest.approx(angle[0] + 3 * (time - time[0]), abs=1e-5)
     if suffix == "csv":
         with path.open(newline="") as file:
             rows = list(csv.reader(line for line in file if not line.startswith("#")))

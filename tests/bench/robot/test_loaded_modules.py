@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 SCRIPT = """
 import sys
 from winchkit import open_bench
@@ -23,6 +25,7 @@ with LiveBench(sim, simulated_time=clock) as live, open_bench(live.bench_spec, c
 """
 
 
+@pytest.mark.slow
 def test_a_motion_imports_nothing() -> None:
     """An import holds the interpreter lock for tens of milliseconds, and delays the loop."""
     done = subprocess.run(

@@ -13,6 +13,7 @@ from slave.rig import Rig, bench_text
 from slave.wire import GENERIC
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", ["CSV", "CSP", "PV"])
 @pytest.mark.parametrize("pay_out", [0.2, -0.2])
 def test_a_jog_in_every_mode_ends_at_the_length_limit(

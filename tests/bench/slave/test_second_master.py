@@ -79,6 +79,7 @@ def test_a_word_that_the_next_rpdo_takes_back_is_a_trip(tmp_path: Path) -> None:
     assert seen.left <= 3 * CYCLE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_command_of_somebody_else_is_a_latched_trip(tmp_path: Path, name: str) -> None:
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])

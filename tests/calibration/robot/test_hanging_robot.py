@@ -113,6 +113,7 @@ def believed(home: Array) -> Robot:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rotations", [True, False])
 def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None:
     believed, measured = hanging()
@@ -259,6 +260,7 @@ def test_motor_angles_alone_are_not_enough_for_four_cables() -> None:
         calibrate(believed, blind, blind)
 
 
+@pytest.mark.slow
 def test_inverted_swivel_encoders_are_refused() -> None:
     """As the directions of the pulleys of a real robot were: a noise of 20 degrees was fitted."""
     nominal, measured = without_tracker(14, 7, (1.0,) * ROPES)
@@ -267,6 +269,7 @@ def test_inverted_swivel_encoders_are_refused() -> None:
     assert "swivel_axis" in found.refusal
 
 
+@pytest.mark.slow
 def test_an_unknown_home_pose_is_estimated_by_the_lengths_there() -> None:
     """A robot that is switched on anywhere: its home is declared 50 mm beside the true one."""
     nominal, measured = without_tracker(30, 8, (1.0,) * ROPES)

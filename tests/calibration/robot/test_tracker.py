@@ -44,6 +44,7 @@ def seen(station: Station, *, angles: bool = True, seed: int = 1, count: int = 9
     return csv(station.show(rows(count, seed, noise=EXACT), seed), angles=angles)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("angles", [True, False], ids=["angles", "positions alone"])
 @pytest.mark.parametrize("case", MOVED)
 def test_a_tracker_set_up_anew_is_fitted_as_such(case: str, angles: bool) -> None:

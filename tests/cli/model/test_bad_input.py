@@ -252,6 +252,7 @@ def test_a_report_that_cannot_be_written(good: Path, tmp_path: Path) -> None:
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.slow
 def test_a_process_ends_with_the_code_and_no_traceback(tmp_path: Path) -> None:
     file = tmp_path / "bin.csv"
     file.write_bytes(bytes(range(256)))

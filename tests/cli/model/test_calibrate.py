@@ -146,6 +146,7 @@ def test_one_coordinate_of_the_position_is_used_and_reported(run: Path, tmp_path
     assert found["validation"]["rms_after"] < found["validation"]["rms_before"] / 5
 
 
+@pytest.mark.slow
 def test_gross_errors_are_named_and_poses_of_another_robot_rejected(
     run: Path, tmp_path: Path
 ) -> None:

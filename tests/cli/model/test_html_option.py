@@ -56,6 +56,7 @@ def written(
     return Written(result, html, figures)
 
 
+@pytest.mark.slow
 def test_the_page_is_written_into_a_new_folder(written: Written, runs: list[str]) -> None:
     result, html = written.result, written.html
     assert f"report: {html}" in result.stderr.splitlines()

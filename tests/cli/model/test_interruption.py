@@ -33,6 +33,7 @@ EFFECT = Effect(
 PATIENCE = 60
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("winch", ["all", "A"])
 def test_an_interrupted_diagnosis_waits_for_nothing(winch: str, tmp_path: Path) -> None:
     runs, both = record_files(tmp_path), tmp_path / "both.csv"

@@ -27,6 +27,7 @@ def declared(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_every_step_is_noted_and_taken_back(
     runs: list[Path], declared: Path, tmp_path: Path
 ) -> None:

@@ -29,6 +29,7 @@ def mine(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_an_own_effect_is_found(bent: list[Path], mine: Path) -> None:
     found = answer("diagnose", *bent, "-p", "bench-spiral", "--effects", mine)
     assert found["verdict"] == "explained"
@@ -40,6 +41,7 @@ def test_an_own_effect_is_found(bent: list[Path], mine: Path) -> None:
     assert "kinked-rope" in {item["effect"] for item in found["detectable"]}
 
 
+@pytest.mark.slow
 def test_an_own_effect_is_missed_without_its_file_and_nothing_is_named(bent: list[Path]) -> None:
     found = answer("diagnose", *bent, "-p", "bench-spiral")
     assert found["verdict"] in {"unknown", "partly"}

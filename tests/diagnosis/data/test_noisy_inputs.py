@@ -118,6 +118,7 @@ def alone(found: Diagnosis, effect: str) -> list[tuple[float, float]]:
     return [(e.value, e.std) for e in found.steps[0].parameters[effect].values()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("measured", [True, False])
 def test_a_loop_is_explained_whole(measured: bool) -> None:
     runs = [rubbing(mass, seed, measured=measured) for mass, seed in DRIVEN]
@@ -130,6 +131,7 @@ def test_a_loop_is_explained_whole(measured: bool) -> None:
     assert length.rms_before > 1.5 * (length.noise_rms or 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("differences", [True, False])
 def test_a_ripple_of_a_known_weight_is_explained_whole(differences: bool) -> None:
     runs = [rippling(mass, seed, differences=differences) for mass, seed in DRIVEN]

@@ -119,6 +119,7 @@ def fine() -> list[Run]:
     return [made(k, GROOVED, hidden, load_mass=10.0 + 15.0 * (k // 2), ride=FAST) for k in range(4)]
 
 
+@pytest.mark.slow
 def test_a_fit_on_uneven_samples_is_not_biased(fine: list[Run]) -> None:
     """Rows are transforms over the samples' numbers of measured and predicted alike.
 

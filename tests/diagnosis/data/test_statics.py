@@ -50,6 +50,7 @@ def test_a_perfect_cell_is_adequate() -> None:
     assert list(said.outputs) == ["tension"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("errors", "parameters"),
     [

@@ -44,6 +44,7 @@ def test_a_wander_is_no_new_zero() -> None:
     assert sum(one is not None for one in found) <= 8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("walk", [0.0, 0.3, 1.0, np.inf])
 def test_a_level_beside_a_walk_is_taken_for_one_in_a_hundredth_of_cases(walk: float) -> None:
     """400 recordings of three runs, white noise and a walk: more than eleven are 1 in 1000."""
@@ -79,6 +80,7 @@ def test_a_new_zero_is_found_beside_what_the_temperature_does_and_not_instead() 
     assert zeroed_anew("cable_length", moved[:1], thermal[:1]) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "size"), [("cable_length", 0.002), ("tension", 3.0)])
 def test_an_offset_per_run_does_not_hide_an_effect(name: str, size: float) -> None:
     """A larger drum is named with and without offsets, with the same radius."""

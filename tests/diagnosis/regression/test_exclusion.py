@@ -65,6 +65,7 @@ def test_permanent_impacts_exclude_no_sample() -> None:
     assert without_impacts(dataset, tiny) is None
 
 
+@pytest.mark.slow
 def test_backlash_is_found_and_fitted_without_its_impacts() -> None:
     runs = [
         made(int(mass) + seed, GROOVED, (PLAY,), load_mass=mass, ride=RIDE)

@@ -111,6 +111,7 @@ def chances(colour: bool) -> Array:
     return np.array(out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("colour", [False, True], ids=["white", "coloured"])
 def test_p_values_of_noise_alone_are_uniform(colour: bool) -> None:
     """The least of m independent p-values, p, has 1 − (1 − p)^m uniform.

@@ -62,6 +62,7 @@ def test_an_offset_of_every_run_is_found_with_its_standard_deviation() -> None:
     assert TimeSeriesRegression(grown).n_run_offsets == 3
 
 
+@pytest.mark.slow
 def test_noise_alone_has_offsets_at_the_level_of_the_test(monkeypatch: pytest.MonkeyPatch) -> None:
     """400 draws of the null at 5 %; at the level of 10⁻⁴ that applies, none."""
     regression, fitted = beside_friction(ridden())
@@ -93,6 +94,7 @@ def test_what_may_be_something_else_is_no_new_zero(kind: str) -> None:
     assert offset_between_runs(regression, fitted, "motor_torque") is None
 
 
+@pytest.mark.slow
 def test_friction_is_named_beside_offsets_that_the_report_lists() -> None:
     clean, shifted = ridden(), moved(ridden(), SHIFTS)
     before, answer = diagnose(clean, GROOVED).diagnosis, diagnose(shifted, GROOVED)

@@ -35,12 +35,14 @@ def first_followed(*physics: str) -> dict[str, str]:
     return out
 
 
+@pytest.mark.slow
 def test_friction_at_one_place_is_located_by_place_and_direction() -> None:
     first = first_followed("sticky place")
     assert first["tension"] == "directed_length"
     assert first["motor_torque"] == "directed_length"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("physics", "output"), [("sticky pulleys", "tension"), ("motor drag", "motor_torque")]
 )

@@ -209,6 +209,7 @@ def test_no_answer_is_refused_for_bytes_that_it_held_before(data: list[int], at:
             return  # nothing was known before the first answer
 
 
+@pytest.mark.slow
 @given(
     st.integers(0, 0xFFFF), st.integers(-120, 120), st.integers(1, 64_999), st.sampled_from([2, 4])
 )

@@ -43,6 +43,7 @@ def change(spec: HiddenSpec) -> float:
     return max(float(np.max(np.abs(other[n] - nominal[n]))) / SCALES[n] for n in SCALES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in PHYSICS if name != "loose gear"])
 def test_a_typical_one_shows(name: str) -> None:
     assert change(HiddenSpec(name, {"time": "2 s"} if name == "slip" else {})) > 1.0

@@ -148,6 +148,7 @@ def test_a_free_body_keeps_its_momentum() -> None:
     assert platform.position[2] == pytest.approx(-GRAVITY / 2, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_compiled_step_moves_as_the_plain_one() -> None:
     pytest.importorskip("numba")
     exits = np.array([[s, t, h] for s in (-1.0, 1) for t in (-1.0, 1) for h in (0.0, 2)])
