@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from winchkit import catalog
+from winchkit.arguments import require_type
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.standstill import PolledStandstill
@@ -55,6 +56,7 @@ def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
     ConnectionLost
         Where a bus does not open.
     """
+    require_type(spec, BenchSpec, "spec")
     clock = clock or MonotonicClock()
     with ExitStack() as stack:
         buses = {}

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+from winchkit.arguments import require_type
 from winchkit.bench.bench import Bench
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.bench.winch import Winch
@@ -75,6 +76,7 @@ def run_programme(
     about a load that this programme has hung already is not asked again. At a question the winches
     are disabled.
     """
+    require_type(programme, Programme, "programme")
     if not replace and (held := earlier_runs(programme, folder, suffix)):
         earlier = f"{held[0]} holds an earlier run of '{programme.name}'"
         raise UsageError(f"{earlier}; name another folder, or replace=True")

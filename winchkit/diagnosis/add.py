@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.exclusion import without_impacts
@@ -163,6 +164,8 @@ def grow(
     band: float | None = None,
 ) -> Grown:
     """The same as :func:`add`, with the fits."""
+    require_types(runs, Run, "runs")
+    require_type(profile, WinchProfile, "profile")
     catalogue = catalogue or load_catalogue()
     _require_absent(catalogue[effect_id], profile)
     dataset = prepare(runs, profile, band, decimate=True, fast=True, catalogue=catalogue)

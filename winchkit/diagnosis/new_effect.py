@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import ProgressCallback, diagnose, no_progress
 from winchkit.diagnosis.results import Diagnosis
@@ -63,6 +64,8 @@ def new_effect(
     RunError
         With every fault of every run.
     """
+    require_types(runs, Run, "runs")
+    require_type(profile, WinchProfile, "profile")
     catalogue, file = catalogue or load_catalogue(), Path(path)
     name = effect_id or file.stem.replace("_", "-")
     check_own(name, file, catalogue)

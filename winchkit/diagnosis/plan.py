@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from winchkit.arguments import require_type
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.design.plan import Offer, inseparable, offers, programme_of
 from winchkit.diagnosis.design.programmes import OperatingRange, range_of_limits, range_of_runs
@@ -72,6 +73,7 @@ def plan(
     -----
     The power is that of a noncentral χ² test (:mod:`winchkit.diagnosis.design.discrimination`).
     """
+    require_type(answer, WinchAnswer, "answer")
     regression, noise = answer.engine.regression, answer.result.noise.rms
     dataset = regression.dataset
     allowed = range_of_runs(dataset) if limits is None else range_of_limits(dataset, limits)

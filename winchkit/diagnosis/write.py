@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
+from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.effects.series import single_orders
@@ -35,6 +36,8 @@ def write_addition(
     FileError
         Where a file cannot be read or written.
     """
+    require_type(addition, Addition, "addition")
+    require_types(runs, str, "runs")
     fitted, judged = _provenance(addition.terms, addition.outputs, runs)
     write_fitted(Path(source), fitted, Path(out), judged)
 
@@ -60,6 +63,9 @@ def write_removal(
     FileError
         Where a file cannot be read or written.
     """
+    if removal is not None:
+        require_type(removal, Removal, "removal")
+    require_types(runs, str, "runs")
     terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
     fitted, judged = _provenance(terms, outputs, runs)
     write_without(Path(source), effect, fitted, Path(out), judged)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import date
 from typing import Any
 
+from winchkit.arguments import require_type
 from winchkit.errors import FileError
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.schema.profiles.robot import RobotProfile
@@ -57,6 +58,7 @@ def ladder(profile: WinchProfile | RobotProfile) -> tuple[Rung, ...]:
     tuple[Rung, ...]
         Held-out errors per step, SI.
     """
+    require_type(profile, (WinchProfile, RobotProfile), "profile")
     return tuple(_rung(entry) for entry in profile.ledger)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from winchkit.errors import UsageError
+from winchkit.arguments import require_types
+from winchkit.errors import RunError, UsageError
 from winchkit.runs.log import aligned, log_of_run
 from winchkit.runs.read import read_log, read_run
 from winchkit.runs.run import Run
@@ -39,6 +40,9 @@ def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> 
     RunError, FileError, UsageError
         For an invalid run, a file that cannot be written, an unknown suffix.
     """
+    require_types(paths, (str, Path), "paths")
+    if not paths:
+        raise RunError("no log given")
     suffix = Path(output).suffix.lower()
     if suffix not in FORMATS:
         raise UsageError(f"{output}: '{suffix}' is no format of a run; use {', '.join(FORMATS)}")

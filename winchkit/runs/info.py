@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from winchkit.arguments import require_type
 from winchkit.runs.layout import Samples, Source
 from winchkit.runs.log import Log, Note
 from winchkit.runs.run import Run
@@ -81,6 +82,7 @@ def info_of(log: Log) -> LogInfo:
     LogInfo
         Summary by source.
     """
+    require_type(log, Log, "log")
     first, last = log.span
     offset = log.layout.clock_offset
     begun = None

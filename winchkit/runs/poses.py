@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arguments import require_type, require_types
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.model.robot.rotation import angles_of, rotation_from_quaternion
@@ -120,6 +121,10 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
         With the faults of all runs: unknown lines, lines without motor angles, incomplete
         quaternions.
     """
+    require_types(runs, Run, "runs")
+    require_type(profile, RobotProfile, "profile")
+    if not runs:
+        raise RunError("no run given")
     faults: list[Fault] = []
     parts: list[Measured] = []
     for run in runs:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from winchkit.arguments import require_types
 from winchkit.errors import Fault, RunError
 from winchkit.runs.formats.csv_read import read_bytes, read_csv, read_events
 from winchkit.runs.log import Log, aligned, joined, log_of_run
@@ -73,6 +74,9 @@ def read_log(paths: str | Path | Sequence[str | Path]) -> Log:
         For invalid files, and for parts of different logs.
     """
     given = [paths] if isinstance(paths, str | Path) else paths
+    require_types(given, (str, Path), "paths")
+    if not given:
+        raise RunError("no log given")
     files = [file for path in given for file in _files(path)]
     if len(files) > 1 and not _has_begun(files[-1]):
         files.pop()

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
+from winchkit.arguments import require_type
 from winchkit.errors import UsageError
 from winchkit.runs.formats.csv_write import CsvWriter
 from winchkit.runs.read import SUFFIXES
@@ -81,6 +82,7 @@ def write_run(run: Run, path: str | Path) -> None:
     UsageError
         For an unknown suffix, and for a file to which a log is being written.
     """
+    require_type(run, Run, "run")
     _write(run, path, kind_for(path))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+from winchkit.arguments import require_type
 from winchkit.errors import Fault, FileError
 from winchkit.schema.quantity import (
     Length,
@@ -161,6 +162,7 @@ def write_programme(programme: Programme, path: Path) -> None:
     path : Path
         The file.
     """
+    require_type(programme, Programme, "programme")
     import tomlkit
 
     document = tomlkit.document()

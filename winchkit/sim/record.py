@@ -8,6 +8,7 @@ from dataclasses import replace
 from math import ceil
 from typing import TYPE_CHECKING
 
+from winchkit.arguments import require_type
 from winchkit.errors import UsageError
 from winchkit.schema.bench import WinchWiring
 from winchkit.schema.profiles.winch import WinchProfile
@@ -74,6 +75,8 @@ def simulate(
     FileError
         For a programme that does not match the bench.
     """
+    require_type(bench, SimBench, "bench")
+    require_type(programme, Programme, "programme")
     if bench.platform is not None:
         raise UsageError(
             f"{bench.name} is a robot, whose winches move one platform; 'sim record' moves each "

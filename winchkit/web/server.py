@@ -11,6 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from winchkit.arguments import require_types
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -68,6 +69,7 @@ def serve(
     UsageError
         Where the port is in use, or the extra ``web`` is not installed.
     """
+    require_types(runs, str, "runs")
     try:
         import uvicorn
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.bench.robot.computation import Computation, at_once
 from winchkit.bench.robot.path import Waypoint
@@ -134,6 +135,7 @@ def self_calibrated(
         Whatever stops a motion, a quick stop between two of them included; a tracker that sends
         nothing.
     """
+    require_type(tracker, Tracker, "tracker")
     if poses < 10 or validation < 1:
         raise UsageError(
             f"{poses} poses to fit and {validation} to validate: at least 10 and 1 are needed"

@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from winchkit.arguments import require_types
 from winchkit.arrays import Array
 from winchkit.errors import RunError
 from winchkit.schema.calibration import CalibrationPoint
@@ -87,6 +88,7 @@ def fit_cell(
         Where the points do not determine the coefficients: too few loads, a constant or an inverted
         reading.
     """
+    require_types(points, CalibrationPoint, "points")
     degree = 1 if order == "linear" else 2
     load = np.array([point.load for point in points])
     indicated = np.array([point.indicated for point in points])

@@ -21,7 +21,9 @@ from itertools import combinations
 import numpy as np
 from scipy.special import fdtrc, stdtr
 
+from winchkit.arguments import require_types
 from winchkit.arrays import Array
+from winchkit.errors import RunError
 from winchkit.schema.calibration import CalibrationPoint
 
 __all__ = ["StaticDiagnosis", "StaticEffect", "static_effects"]
@@ -81,6 +83,9 @@ def static_effects(points: Sequence[CalibrationPoint]) -> StaticDiagnosis:
         An effect that the points do not determine, such as hysteresis with loads in one direction
         only, is not among them.
     """
+    require_types(points, CalibrationPoint, "points")
+    if not points:
+        raise RunError("no point given")
     load = np.array([point.load for point in points])
     error = np.array([point.indicated for point in points]) - load
     up = np.array([1.0 if point.going == "up" else -1.0 for point in points])

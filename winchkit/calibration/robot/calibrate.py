@@ -23,6 +23,7 @@ from time import perf_counter
 
 import numpy as np
 
+from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.calibration.robot.cable_forces import CableForces
 from winchkit.calibration.robot.candidate_effects import Candidate, candidates
@@ -207,6 +208,10 @@ def calibrate(
     UsageError
         Where the poses have no redundancy, or a measurement is missing that an effect needs.
     """
+    require_type(robot, Robot, "robot")
+    require_type(fit, Measured, "fit")
+    if validation is not None:
+        require_type(validation, Measured, "validation")
     options = options or Options()
     if validation is None:
         fit, validation = split(fit)

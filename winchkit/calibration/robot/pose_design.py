@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Calibrated
 from winchkit.model.robot import Pose, Robot, angles_of, lengths, robot_of
@@ -63,6 +64,7 @@ def next_poses(found: Calibrated, count: int) -> list[NextPose]:
     Candidates are 400 random poses in the box of positions and rotations measured so far, a quarter
     wider. Collisions are not checked. The same kinds of measurement are assumed at each.
     """
+    require_type(found, Calibrated, "found")
     candidates = _candidates(found)
     parts = _information(found, candidates)
     data = found.solution.linear.information

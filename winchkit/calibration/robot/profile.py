@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Calibrated
 from winchkit.calibration.robot.elongation import LAWS
@@ -59,6 +60,7 @@ def write_calibrated(source: Path, found: Calibrated, out: Path, where: Provenan
     FileError
         Where a file cannot be read or written.
     """
+    require_type(found, Calibrated, "found")
     document = read_document(source)
     for line in document["line"]:
         _line(line, source, found)

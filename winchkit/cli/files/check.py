@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.arguments import require_type
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import TABLE, effects_option
 from winchkit.cli.core.output import echo_json
@@ -112,6 +113,7 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
     Verdict
         Kind, name, faults and warnings; ``ok`` where the file can be used.
     """
+    require_type(file, (str, Path), "file")
     file = str(file)
     suffix = Path(file).suffix.lower()
     try:

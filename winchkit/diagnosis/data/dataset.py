@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arguments import require_type, require_types
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.copies import COPIES, without_copies
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
@@ -27,7 +28,7 @@ from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_m
 from winchkit.diagnosis.data.validation import validate_runs, without_constants
 from winchkit.diagnosis.data.zeroing import zeroed_anew
 from winchkit.effects.catalogue import Catalogue
-from winchkit.errors import UsageError
+from winchkit.errors import Fault, RunError, UsageError
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS, At, Signals
@@ -178,6 +179,8 @@ def prepare(
     UsageError
         If ``band`` is not a positive frequency.
     """
+    require_types(runs, Run, "runs")
+    require_type(profile, WinchProfile, "profile")
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
     runs, at_rest = prepared_statics(with_torques(runs, profile), profile)
@@ -196,6 +199,8 @@ def prepare(
         runs = [_of_fast_count(run, decimation.factor if decimation else 1) for run in runs]
     filtering = Filtering(band, kept_cut_offs, decimation)
     dataset = assemble(runs, profile, filtering)
+    if not dataset.outputs:
+        raise RunError([_nothing_predicted(run, profile) for run in runs])
     left_out = []
     while (outlying := _outlying(dataset)) is not None:
         left_out.append(outlying[1])
@@ -366,6 +371,18 @@ def _of_fast_count(run: Run, factor: int) -> Run:
         for name, channel in run.channels.items()
     }
     return replace(run, time=run.time[:rows], channels=channels)
+
+
+def _nothing_predicted(run: Run, profile: WinchProfile) -> Fault:
+    """Fault of a run none of whose outputs is predicted from its inputs."""
+    needs = (
+        "of an axis the torque is compared: add a column 'motor_torque [N m]'"
+        if isinstance(profile, AxisProfile)
+        else "a tension is predicted from the load: add a column 'load [N]' or the metadata "
+        "'load_mass', or a column 'cable_length [m]' or 'motor_torque [N m]'"
+    )
+    has = ", ".join(output for output in OUTPUTS if output in run)
+    return Fault(f"nothing of {has} can be predicted from this run; {needs}", run.path or run.name)
 
 
 def _clock(run: Run) -> Clock:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from threading import Thread
 
+from winchkit.arguments import require_each, require_type
 from winchkit.diagnosis.diagnose import ProgressCallback, WinchAnswer, diagnose, no_progress
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
@@ -56,6 +57,8 @@ def diagnose_each(
     Two winches are computed at a time. An answer holds hundreds of megabytes after long runs:
     release one before taking the next.
     """
+    require_each(winches, Run, "winches")
+    require_type(profile, WinchProfile, "profile")
     catalogue = catalogue or load_catalogue()
     shares = dict.fromkeys(winches, 0.0)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
@@ -93,6 +94,8 @@ def grow_robot(
     catalogue: Catalogue | None = None,
 ) -> RobotGrown:
     """The same as :func:`add_to_robot`, with the errors at every pose."""
+    require_types(runs, Run, "runs")
+    require_type(profile, RobotProfile, "profile")
     catalogue = catalogue or load_catalogue()
     effect = _placed(catalogue[effect_id], profile, line)
     if any(term.effect.id == effect.id for term in robot_terms(profile, catalogue)):
@@ -185,6 +188,8 @@ def remove_from_robot(
     RunError
         With every fault of every run.
     """
+    require_types(runs, Run, "runs")
+    require_type(profile, RobotProfile, "profile")
     catalogue = catalogue or load_catalogue()
     own = [term.effect.id for term in declared_terms(profile, catalogue)]
     gone = [name for name in own if name == effect_id]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from winchkit.arguments import require_type, require_types
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
@@ -95,6 +96,8 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
         With every fault of every run; for fewer than ten poses, or without redundancy beyond the
         six coordinates of each pose.
     """
+    require_types(runs, Run, "runs")
+    require_type(robot, RobotProfile, "profile")
     if not runs:
         raise RunError("no run given")
     samples = read_trajectory(runs, robot)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from winchkit.arguments import require_type
 from winchkit.diagnosis.design.discrimination import SEPARATED_AT
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.diagnosis.robot.pose_design import (
@@ -124,6 +125,7 @@ def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
         Ranked by the number of pairs separated, then by their powers, then the same for
         detectable effects.
     """
+    require_type(answer, RobotAnswer, "answer")
     regression, final = answer.engine.regression, answer.result.final.hypothesis
     pairs = tuple(pairs_of(answer.sets))
     hidden = _hidden(answer)

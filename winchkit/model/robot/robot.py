@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
@@ -253,6 +254,7 @@ def robot_of(
     Robot
         Kinematic model of the robot.
     """
+    require_type(profile, RobotProfile, "profile")
     home, geometry = home_of(profile), geometry_of(profile)
     shown = _tracker(profile, tracker)
     own = tuple(tuple(m) for m in modifiers) or ((),) * len(profile.line)

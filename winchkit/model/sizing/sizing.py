@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from winchkit.arguments import require_type
 from winchkit.model.gearbox import worm_stage
 from winchkit.model.sizing import parts
 from winchkit.model.sizing.guide import guide_rows
@@ -47,6 +48,7 @@ def sized(spec: SizeSpec) -> list[Row]:
     list of Row
         Rows with value, limit and alternatives.
     """
+    require_type(spec, SizeSpec, "spec")
     drive = _drive(spec)
     rows = [*_motor_rows(spec, drive), *_gearbox_rows(spec), *_drum_rows(spec)]
     return [*rows, *guide_rows(spec)]

@@ -1,0 +1,128 @@
+"""Type checks of the arguments of public functions: what was given, and which call returns it.
+
+A path where runs are expected is the usual mistake; without a check it is an ``AttributeError``
+deep in a computation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from winchkit.errors import UsageError, one_line
+
+__all__ = ["require_each", "require_type", "require_types"]
+
+_CALLS = {
+    "Addition": "add(effect, runs, profile)",
+    "BenchSpec": "read_bench(path)",
+    "Bench": "open_bench(bench)",
+    "Calibrated": "calibrate(robot, fit)",
+    "CalibrationPoint": "read_points(path)",
+    "Log": "read_log(paths)",
+    "Measured": "read_poses(runs, profile)",
+    "Programme": "read_programme(path)",
+    "Removal": "remove(effect, runs, profile)",
+    "Robot": "robot_of(profile)",
+    "RobotAnswer": "diagnose_robot(runs, profile)",
+    "RobotProfile": "read_robot(path)",
+    "Run": "read_run(path)",
+    "SimBench": "read_simbench(path)",
+    "SizeSpec": "read_size(path)",
+    "Tracker": "Tracker(now)",
+    "WinchAnswer": "diagnose(runs, profile)",
+    "WinchProfile": "read_profile(path)",
+}
+"""Public call that returns an object of a type."""
+_LONGEST_VALUE = 40
+"""Characters of a wrong value that a message shows."""
+
+
+def require_type(value: object, kind: type | tuple[type, ...], name: str) -> None:
+    """Raise UsageError unless a value is of a type.
+
+    Parameters
+    ----------
+    value
+        Argument of a call.
+    kind
+        Type that it must have, or several of which it must have one.
+    name
+        Of the argument.
+
+    Raises
+    ------
+    UsageError
+        With the argument, the value and the call that returns such an object.
+    """
+    if isinstance(value, kind):
+        return
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    expected = " or ".join(one.__name__ for one in kinds)
+    calls = " or ".join(_CALLS[one.__name__] for one in kinds if one.__name__ in _CALLS)
+    remedy = f": {calls}" if calls else ""
+    raise UsageError(f"{name} is {_shown(value)}; pass a {expected}{remedy}")
+
+
+def require_types(values: object, kind: type | tuple[type, ...], name: str) -> None:
+    """Raise UsageError unless values are a sequence, such as a list, of objects of a type.
+
+    Parameters
+    ----------
+    values
+        Argument of a call; an empty sequence is accepted.
+    kind
+        Type that each must have, or several of which it must have one.
+    name
+        Of the argument.
+
+    Raises
+    ------
+    UsageError
+        With the argument, the first wrong value and the call that returns such an object.
+    """
+    kinds = kind if isinstance(kind, tuple) else (kind,)
+    if not isinstance(values, Sequence) or isinstance(values, str | bytes):
+        expected = " or ".join(one.__name__ for one in kinds)
+        calls = [_CALLS[one.__name__] for one in kinds if one.__name__ in _CALLS]
+        remedy = f", each from {' or '.join(calls)}" if calls else ""
+        raise UsageError(f"{name} is {_shown(values)}; pass a list of {expected}{remedy}")
+    for index, value in enumerate(values):
+        require_type(value, kind, f"{name}[{index}]")
+
+
+def require_each(winches: object, kind: type, name: str) -> None:
+    """Raise UsageError unless an argument maps names to sequences of objects of a type.
+
+    Parameters
+    ----------
+    winches
+        Argument of a call: a list by name of a winch.
+    kind
+        Type that each object of the lists must have.
+    name
+        Of the argument.
+
+    Raises
+    ------
+    UsageError
+        With the argument, the first wrong value and what to pass.
+    """
+    if not isinstance(winches, Mapping):
+        raise UsageError(
+            f"{name} is {_shown(winches)}; pass a dict of lists of {kind.__name__} by winch"
+        )
+    for key, values in winches.items():
+        require_types(values, kind, f"{name}[{key!r}]")
+
+
+def _shown(value: object) -> str:
+    """A value in a message: its type, and its beginning where it is text, a path or a number."""
+    if value is None:
+        return "None"
+    kind = type(value).__name__
+    article = "an" if kind[0].lower() in "aeiou" else "a"
+    if not isinstance(value, str | int | float) and not hasattr(value, "__fspath__"):
+        return f"{article} {kind}"
+    text = one_line(str(value))
+    text = text if len(text) <= _LONGEST_VALUE else text[:_LONGEST_VALUE] + "…"
+    return f"{article} {kind} '{text}'"
