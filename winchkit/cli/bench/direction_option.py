@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from winchkit.cli.core.quantities import dimension, quantity
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.errors import UsageError
 
 __all__ = ["Directed", "direction_options", "magnitude", "read_direction"]
@@ -51,8 +52,14 @@ def direction_options(value: str) -> Decorator:
     """Add --pay-out and --wind-in; ``value`` says what they take, e.g. ``SPEED|LENGTH``."""
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
-        function = click.option("--wind-in", metavar=value, help="Shorten the cable.")(function)
-        return click.option("--pay-out", metavar=value, help="Lengthen the cable.")(function)
+        for option, meaning in (("--wind-in", "Shorten"), ("--pay-out", "Lengthen")):
+            function = click.option(
+                option,
+                metavar=value,
+                type=Quantity("speed", "length", example="50 mm"),
+                help=f"{meaning} the cable.",
+            )(function)
+        return function
 
     return decorate
 

@@ -15,6 +15,7 @@ from winchkit.cli.core.options import (
     take_over_option,
 )
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 
 __all__ = ["command"]
@@ -35,22 +36,35 @@ _HOLD = 0.2
     ),
 )
 @click.argument("winch", metavar="WINCH")
-@click.argument("tension", metavar="TENSION")
+@click.argument("tension", metavar="TENSION", type=Quantity("force", example="120 N"))
 @bench_option
-@click.option("--for", "duration", metavar="TIME", help="Then stop.  [default: until Ctrl-C]")
+@click.option(
+    "--for",
+    "duration",
+    metavar="TIME",
+    type=Quantity("time", example="5 s"),
+    help="Then stop.  [default: until Ctrl-C]",
+)
 @click.option(
     "--travel",
     metavar="LENGTH",
+    type=Quantity("length", example="0.1 m"),
     default="0.1 m",
     show_default=True,
     help="Cable either way from its place at the start; the winch trips where it is used up.",
 )
 @click.option(
-    "--speed", metavar="SPEED", default="20 mm/s", show_default=True, help="Fastest; no direction."
+    "--speed",
+    metavar="SPEED",
+    type=Quantity("speed", example="20 mm/s"),
+    default="20 mm/s",
+    show_default=True,
+    help="Fastest; no direction.",
 )
 @click.option(
     "--stiffness",
     metavar="STIFFNESS",
+    type=Quantity("stiffness", example="40 kN/m"),
     help="Upper bound of cable and structure.  [default: by the profile's cable]",
 )
 @take_over_option

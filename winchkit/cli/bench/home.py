@@ -15,6 +15,7 @@ from winchkit.cli.core.options import (
     winch_argument,
 )
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 
@@ -32,15 +33,28 @@ _POLL = 0.02
 )
 @winch_argument
 @bench_option
-@click.option("--here", metavar="LENGTH", help="The present cable length; nothing moves.")
+@click.option(
+    "--here",
+    metavar="LENGTH",
+    type=Quantity("length", example="2 m"),
+    help="The present cable length; nothing moves.",
+)
 @click.option(
     "--method",
     type=click.IntRange(-128, 127),
     help="Of 6098h: 17, 18 limit switch, 19 to 22 home switch, 33, 34 index; negative: maker's.",
 )
-@click.option("--at", metavar="LENGTH", help="With --method: cable length at the zero found.")
 @click.option(
-    "--speed", metavar="SPEED", help="Of the cable.  [default: a tenth of the winch's limit]"
+    "--at",
+    metavar="LENGTH",
+    type=Quantity("length", example="0.5 m"),
+    help="With --method: cable length at the zero found.",
+)
+@click.option(
+    "--speed",
+    metavar="SPEED",
+    type=Quantity("speed", example="20 mm/s"),
+    help="Of the cable.  [default: a tenth of the winch's limit]",
 )
 @take_over_option
 @effects_option

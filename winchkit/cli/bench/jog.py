@@ -25,6 +25,7 @@ from winchkit.cli.core.options import (
     winch_argument,
 )
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 
@@ -50,11 +51,16 @@ _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
 @bench_option
 @direction_options("SPEED|LENGTH")
 @click.option(
-    "--for", "duration", metavar="TIME", help="With a SPEED: move for this long, then stop."
+    "--for",
+    "duration",
+    metavar="TIME",
+    type=Quantity("time", example="2 s"),
+    help="With a SPEED: move for this long, then stop.",
 )
 @click.option(
     "--speed",
     metavar="SPEED",
+    type=Quantity("speed", example="0.05 m/s"),
     help=f"With keys, or with a LENGTH: how fast; no direction.  [default: {_SPEED}]",
 )
 @click.option("--reset", is_flag=True, help="First clear trips and drive faults.")

@@ -12,6 +12,7 @@ from winchkit.bench.remote.interruption import Terminated
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import cell
 from winchkit.errors import one_line
 
@@ -31,8 +32,20 @@ __all__ = ["command", "status_table"]
     ),
 )
 @bench_option
-@click.option("--period", default="0.2 s", show_default=True, help="Between two pictures.")
-@click.option("--for", "duration", metavar="TIME", help="End after this time.")
+@click.option(
+    "--period",
+    type=Quantity("time", example="0.2 s"),
+    default="0.2 s",
+    show_default=True,
+    help="Between two pictures.",
+)
+@click.option(
+    "--for",
+    "duration",
+    metavar="TIME",
+    type=Quantity("time", example="10 s"),
+    help="End after this time.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line.")
 def command(*, bench: str, period: str, duration: str | None, as_json: bool) -> None:
     """Show the winches of a bench until Ctrl-C. Moves nothing.

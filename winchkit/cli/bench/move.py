@@ -18,6 +18,7 @@ from winchkit.cli.core.options import (
     winch_argument,
 )
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 from winchkit.schema.programme import ALL
@@ -41,14 +42,24 @@ _POLL = 0.05
 )
 @winch_argument
 @bench_option
-@click.option("--to", metavar="LENGTH", help="Cable length to go to.")
+@click.option(
+    "--to", metavar="LENGTH", type=Quantity("length", example="2 m"), help="Cable length to go to."
+)
 @direction_options("LENGTH")
 @click.option("--pose", metavar="POSE", help="Pose of the robot's platform, x=0.1m,yaw=2deg.")
 @click.option("--pose-by", metavar="POSE", help="Change of that pose.")
 @click.option(
-    "--speed", metavar="SPEED", help="How fast; no direction.  [default: limit of winch or robot]"
+    "--speed",
+    metavar="SPEED",
+    type=Quantity("speed", example="0.1 m/s"),
+    help="How fast; no direction.  [default: limit of winch or robot]",
 )
-@click.option("--acceleration", metavar="ACCELERATION", help="[default: limit of winch or robot]")
+@click.option(
+    "--acceleration",
+    metavar="ACCELERATION",
+    type=Quantity("acceleration", example="0.5 m/s^2"),
+    help="[default: limit of winch or robot]",
+)
 @take_over_option
 @effects_option
 @dry_run_option

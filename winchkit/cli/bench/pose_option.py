@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import degrees
 
-from winchkit.cli.core.quantities import quantity
+from winchkit.cli.core.quantities import check_typed, quantity
 from winchkit.errors import UsageError
 from winchkit.units import suggest
 
@@ -44,6 +44,7 @@ def read_pose(text: str) -> dict[str, float]:
             )
         if name in found:
             raise UsageError(f"'{text}': {name} is given twice")
+        check_typed(f"--pose, --pose-by: {name}", value, COORDINATES[name])
         found[name] = quantity(value, COORDINATES[name])
     return found
 

@@ -14,6 +14,7 @@ from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import TABLE, bench_by_default, complete_bench, complete_winch
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.cli.model.options import figures_option, write_figures, write_page
 from winchkit.errors import UsageError
@@ -66,10 +67,27 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     help="Fit these points instead of measuring.",
 )
 @click.option("--order", type=click.Choice(["linear", "quadratic"]), default="linear")
-@click.option("--for", "duration", default="3 s", show_default=True, help="Averaged per weight.")
-@click.option("--settle", default="2 s", show_default=True, help="Waited after a weight is hung.")
+@click.option(
+    "--for",
+    "duration",
+    type=Quantity("time", example="3 s"),
+    default="3 s",
+    show_default=True,
+    help="Averaged per weight.",
+)
+@click.option(
+    "--settle",
+    type=Quantity("time", example="2 s"),
+    default="2 s",
+    show_default=True,
+    help="Waited after a weight is hung.",
+)
 @click.option("--serial", help="Serial number of the cell; else what the device says.")
-@click.option("--temperature", help='At the cell, e.g. "21 degC".')
+@click.option(
+    "--temperature",
+    type=Quantity("temperature", example="21 degC"),
+    help='At the cell, e.g. "21 degC".',
+)
 @click.option(
     "--direction",
     type=click.Choice(["tension", "compression"]),
@@ -245,7 +263,10 @@ def _measure(
     from winchkit.cli.cell.options import cells
     from winchkit.cli.core.quantities import quantity
 
-    steps = plan(weights or click.prompt("Weights, rising (0 2 5 10 kg)", err=True), series)
+    try:
+        steps = plan(weights or click.prompt("Weights, rising (0 2 5 10 kg)", err=True), series)
+    except UsageError as error:
+        raise UsageError(f"--weights: {error}") from None
     average, wait = quantity(duration, "time"), quantity(settle, "time")
     with cells(bench, cell) as (found, name):
         known = found.do("identify", name)

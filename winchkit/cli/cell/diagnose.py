@@ -12,6 +12,7 @@ import click
 from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.health import Health
@@ -39,7 +40,14 @@ _MEANINGS = {
     ),
 )
 @cell_options
-@click.option("--for", "duration", default="10 s", show_default=True, help="Watched for this.")
+@click.option(
+    "--for",
+    "duration",
+    type=Quantity("time", example="10 s"),
+    default="10 s",
+    show_default=True,
+    help="Watched for this.",
+)
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Watch CELL and report rate, noise, drift, frozen or repeated counts, hum and creep.
 

@@ -9,6 +9,7 @@ import click
 from winchkit.cli.cell.options import cell_options, cells
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 
 __all__ = ["command"]
 
@@ -21,7 +22,14 @@ __all__ = ["command"]
     ),
 )
 @cell_options
-@click.option("--for", "duration", default="3 s", show_default=True, help="Measured for this.")
+@click.option(
+    "--for",
+    "duration",
+    type=Quantity("time", example="3 s"),
+    default="3 s",
+    show_default=True,
+    help="Measured for this.",
+)
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Measure the rate of CELL and say what limits it: wire, turnaround, conversions, sharing."""
     from winchkit.cli.core.quantities import quantity

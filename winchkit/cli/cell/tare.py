@@ -9,6 +9,7 @@ import click
 from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 
 __all__ = ["command"]
 
@@ -29,7 +30,14 @@ _TASKS = {
     ),
 )
 @cell_options
-@click.option("--for", "duration", default="1 s", show_default=True, help="Averaged over this.")
+@click.option(
+    "--for",
+    "duration",
+    type=Quantity("time", example="1 s"),
+    default="1 s",
+    show_default=True,
+    help="Averaged over this.",
+)
 @click.option("--clear", is_flag=True, help="Take the tare away: the host's, or with --device its.")
 @click.option("--device", is_flag=True, help="Send the device its own volatile tare instead.")
 def command(

@@ -7,6 +7,7 @@ import click
 from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 
 __all__ = ["command"]
 
@@ -19,7 +20,14 @@ __all__ = ["command"]
     ),
 )
 @cell_options
-@click.option("--for", "duration", default="1 s", show_default=True, help="Averaged over this.")
+@click.option(
+    "--for",
+    "duration",
+    type=Quantity("time", example="1 s"),
+    default="1 s",
+    show_default=True,
+    help="Averaged over this.",
+)
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Send the device of CELL its zero command: what hangs on it now becomes its gross zero.
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from winchkit.errors import UsageError
 from winchkit.schema.plausible import NUMBER, typed_quantity
-from winchkit.units import UNITS
+from winchkit.units import UNITS, article
 
-__all__ = ["dimension", "optional", "quantity", "seconds"]
+__all__ = ["check_typed", "dimension", "optional", "quantity", "seconds"]
 
 
 def quantity(text: str, dimension: str) -> float:
@@ -17,12 +17,48 @@ def quantity(text: str, dimension: str) -> float:
     return value
 
 
+def check_typed(option: str, text: str, *dimensions: str, example: str = "") -> None:
+    """Check a quantity of one of some dimensions that was typed for an option.
+
+    Parameters
+    ----------
+    option : str
+        Option or argument, for the message.
+    text : str
+        Value as typed.
+    dimensions : str
+        Dimensions that are accepted.
+    example : str
+        A valid value; by default 2 of the first unit.
+
+    Raises
+    ------
+    UsageError
+        With option, value, what is expected and an example.
+    """
+    faults = []
+    for name in dimensions:
+        try:
+            quantity(text, name)
+        except UsageError as error:
+            faults.append(str(error))
+        else:
+            return
+    fits = [name for name in dimensions if _unit(text) in UNITS[name]]
+    example = example or f"2 {next(unit for unit in UNITS[dimensions[0]] if unit != '1')}"
+    if fits:  # A number beyond its bounds, which the message of that bound gives.
+        raise UsageError(f"{option}: {faults[dimensions.index(fits[0])]} (such as '{example}')")
+    wanted = " or ".join(article(name) for name in dimensions)
+    units = "; ".join(f"{name} {', '.join(UNITS[name])}" for name in dimensions)
+    raise UsageError(
+        f"{option}: '{text}' is not {wanted} with its unit; write such as '{example}' ({units})"
+    )
+
+
 def dimension(text: str, among: tuple[str, ...]) -> str:
     """Which of these dimensions the unit of ``text`` has; raises UsageError for none of them."""
-    found = NUMBER.match(text)
-    unit = found[2].strip() if found else ""
     for name in among:
-        if unit in UNITS[name]:
+        if _unit(text) in UNITS[name]:
             return name
     units = "; ".join(f"{name} {', '.join(UNITS[name])}" for name in among)
     raise UsageError(f"'{text}' is no {' or '.join(among)} with its unit ({units})")
@@ -36,3 +72,9 @@ def optional(text: str | None, dimension: str) -> float | None:
 def seconds(text: str | None) -> float | None:
     """A duration; None where none is given."""
     return optional(text, "time")
+
+
+def _unit(text: str) -> str:
+    """The unit of a quantity as typed; empty without one."""
+    found = NUMBER.match(text)
+    return found[2].strip() if found else ""

@@ -15,6 +15,7 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import TABLE, output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
@@ -57,13 +58,31 @@ _MAPPING = "mapping.toml"
     help="Column of a channel, by name or number, e.g. 'motor_angle=Pos [deg]', "
     "'motor_torque=u*35.1'; nothing after = for none. May be given several times.",
 )
-@click.option("--rated-torque", metavar="TORQUE", help="Torque of 100 %, e.g. '2.4 N m'.")
-@click.option("--torque-constant", metavar="CONSTANT", help="Of the motor, e.g. '0.12 N m/A'.")
+@click.option(
+    "--rated-torque",
+    metavar="TORQUE",
+    type=Quantity("torque", example="2.4 N m"),
+    help="Torque of 100 %, e.g. '2.4 N m'.",
+)
+@click.option(
+    "--torque-constant",
+    metavar="CONSTANT",
+    type=Quantity("torque constant", example="0.12 N m/A"),
+    help="Of the motor, e.g. '0.12 N m/A'.",
+)
 @click.option("--counts-per-turn", type=float, metavar="N", help="Counts in a turn of the motor.")
 @click.option("--sensitivity", metavar="RATIO", help="Of the load cell, e.g. '2 mV/V'.")
-@click.option("--capacity", metavar="FORCE", help="Of the load cell, e.g. '500 N'.")
 @click.option(
-    "--sample-rate", metavar="RATE", help="Rate of the rows, in place of times, e.g. '1 kHz'."
+    "--capacity",
+    metavar="FORCE",
+    type=Quantity("force", example="500 N"),
+    help="Of the load cell, e.g. '500 N'.",
+)
+@click.option(
+    "--sample-rate",
+    metavar="RATE",
+    type=Quantity("frequency", example="1 kHz"),
+    help="Rate of the rows, in place of times, e.g. '1 kHz'.",
 )
 @click.option("--body", metavar="NAME", help="Body or marker of a tracker's export.")
 @click.option(
@@ -71,12 +90,14 @@ _MAPPING = "mapping.toml"
     "load_masses",
     multiple=True,
     metavar="MASS",
+    type=Quantity("mass", example="10 kg"),
     help="Mass on the cable, e.g. '10 kg': one for all runs, or one for each FILE in order.",
 )
 @click.option("--join", is_flag=True, help="Join all FILEs to one run.")
 @click.option(
     "--lag",
     metavar="TIME",
+    type=Quantity("time", example="-0.02 s", signed=True),
     help="Clock of the first FILE less that of the others; '0 s': one clock.",
 )
 @click.option("--replace", "overwrite", is_flag=True, help="Write over earlier runs.")
@@ -167,7 +188,10 @@ def _answers(options: Mapping[str, Any]) -> Answers:
     constants = {
         key: read_constant(key, str(options[key])) for key in CONSTANTS if options[key] is not None
     }
-    columns = tuple(read_column(text) for text in options["columns"])
+    try:
+        columns = tuple(read_column(text) for text in options["columns"])
+    except UsageError as error:
+        raise UsageError(f"--column: {error}") from None
     return _with(Answers(columns=columns, body=options["body"]), **constants)
 
 

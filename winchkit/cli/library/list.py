@@ -8,6 +8,7 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.model.options import json_option
 
 __all__ = ["command"]
@@ -24,7 +25,12 @@ __all__ = ["command"]
 @click.argument("folder", metavar="DIR")
 @click.option("--winch", metavar="NAME", help="Winch, as the list names it.")
 @click.option("--programme", metavar="NAME", help="Motion programme.")
-@click.option("--load", metavar="MASS", help="Known mass on the cable, such as '10 kg'.")
+@click.option(
+    "--load",
+    metavar="MASS",
+    type=Quantity("mass", example="10 kg"),
+    help="Known mass on the cable, such as '10 kg'.",
+)
 @click.option("--since", metavar="DATE", help="First UTC day, YYYY-MM-DD.")
 @click.option("--until", metavar="DATE", help="Last UTC day, YYYY-MM-DD.")
 @click.option(
@@ -45,14 +51,14 @@ def command(
     as_json: bool,
 ) -> None:
     """List the runs of an indexed folder, in the order of winch and time."""
+    from winchkit.cli.core.quantities import quantity
     from winchkit.library.query import library_runs
-    from winchkit.units import parse
 
     rows = library_runs(
         folder,
         winch=winch,
         programme=programme,
-        load=None if load is None else parse(load, "mass"),
+        load=None if load is None else quantity(load, "mass"),
         since=_day("--since", since),
         until=_day("--until", until),
         verdict=verdict,

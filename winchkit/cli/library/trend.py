@@ -112,8 +112,9 @@ def command(
 
 def _limit(text: str, effect_files: Sequence[str]) -> tuple[tuple[str, str], float]:
     """``cell-gain.gain_error=2 %`` as effect, parameter and SI value; raises UsageError."""
+    from winchkit.cli.core.quantities import check_typed, quantity
     from winchkit.effects.catalogue import load_catalogue
-    from winchkit.units import dimension_of, parse
+    from winchkit.units import dimension_of
 
     left, equals, value = text.partition("=")
     name, dot, parameter = left.strip().partition(".")
@@ -127,7 +128,9 @@ def _limit(text: str, effect_files: Sequence[str]) -> tuple[tuple[str, str], flo
     if parameter not in names:
         raise UsageError(f"--limit '{text}': {name} has {', '.join(names)}")
     declared = catalogue[name].parameter(parameter)
-    limit = parse(value.strip(), dimension_of(declared.unit) or "ratio")
+    dimension = dimension_of(declared.unit) or "ratio"
+    check_typed(f"--limit {name}.{parameter}", value, dimension)
+    limit = quantity(value, dimension)
     if limit == 0 or (declared.reciprocal and limit < 0):
         where = "above 0" if declared.reciprocal else "above or below 0, which is no effect"
         raise UsageError(f"--limit '{text}': it is {where}")

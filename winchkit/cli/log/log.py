@@ -22,7 +22,8 @@ from winchkit.cli.core.options import (
     output_option,
 )
 from winchkit.cli.core.output import echo_json
-from winchkit.errors import WinchkitError
+from winchkit.cli.core.quantity_type import Quantity
+from winchkit.errors import UsageError, WinchkitError
 
 if TYPE_CHECKING:
     from winchkit.bench.recording.live_sinks import LiveSink
@@ -59,10 +60,22 @@ _SHOW_PERIOD = 0.5
 @output_option("Where to: a .csv or .mcap file.")
 @click.option("--rotate", metavar="LIMIT", help="Go on in a new file, e.g. after 100MB or 10min.")
 @click.option("--replace", is_flag=True, help="Write over an earlier log of that name.")
-@click.option("--for", "duration", metavar="TIME", help="End after this time, e.g. 10s or '2 min'.")
+@click.option(
+    "--for",
+    "duration",
+    metavar="TIME",
+    type=Quantity("time", example="10 s"),
+    help="End after this time, e.g. 10s or '2 min'.",
+)
 @click.option("--jsonl", is_flag=True, help="Print live pictures to stdout, one JSON a line.")
 @click.option("--udp", metavar="HOST:PORT", help="Send live pictures as JSON, e.g. to PlotJuggler.")
-@click.option("--period", default="0.02 s", show_default=True, help="Between two live pictures.")
+@click.option(
+    "--period",
+    type=Quantity("time", example="0.02 s"),
+    default="0.02 s",
+    show_default=True,
+    help="Between two live pictures.",
+)
 @effects_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.pass_context
@@ -242,7 +255,10 @@ def _refuse(
     if rotate is not None:
         from winchkit.runs.recording.rotation import Rotation
 
-        Rotation.parse(rotate)
+        try:
+            Rotation.parse(rotate)
+        except UsageError as error:
+            raise UsageError(f"--rotate: {error}") from None
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from winchkit.cli.core.completion import complete_bench, complete_effect, comple
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE, RUN, output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     ManyValues,
@@ -84,12 +85,27 @@ _NOISE_DIMENSIONS = {
     "--held-out", type=click.IntRange(1), default=20, show_default=True, help="Poses never fitted."
 )
 @click.option(
-    "--box", metavar="LENGTH", default="75 mm", show_default=True, help="Half width about home."
+    "--box",
+    metavar="LENGTH",
+    type=Quantity("length", example="75 mm"),
+    default="75 mm",
+    show_default=True,
+    help="Half width about home.",
 )
 @click.option(
-    "--turn", metavar="ANGLE", default="7.5 deg", show_default=True, help="Half turn about home."
+    "--turn",
+    metavar="ANGLE",
+    type=Quantity("angle", example="7.5 deg"),
+    default="7.5 deg",
+    show_default=True,
+    help="Half turn about home.",
 )
-@click.option("--accuracy", metavar="LENGTH", help="Add poses until the error is below this.")
+@click.option(
+    "--accuracy",
+    metavar="LENGTH",
+    type=Quantity("length", example="1 mm"),
+    help="Add poses until the error is below this.",
+)
 @click.option(
     "--validate",
     "validate",
@@ -112,7 +128,12 @@ _NOISE_DIMENSIONS = {
     help="A known standard deviation, e.g. position='0.02 mm'; else estimated.",
 )  # fmt: skip
 @click.option("--loss", type=click.Choice(_LOSSES), default="least-squares", show_default=True)
-@click.option("--middle-force", metavar="FORCE", help="Cable force kept near, where not measured.")
+@click.option(
+    "--middle-force",
+    metavar="FORCE",
+    type=Quantity("force", example="80 N"),
+    help="Cable force kept near, where not measured.",
+)
 @click.option("--next", "following", type=click.IntRange(0), default=0, help="Poses to propose.")
 @click.option("--fit-report", is_flag=True, help="Print the report of the fit too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
@@ -216,10 +237,10 @@ def _series(
 ) -> PoseSeries:
     from winchkit.bench.robot.self_calibration import PoseVolume
     from winchkit.cli.bench.calibrate_robot import PoseSeries
-    from winchkit.units import parse
+    from winchkit.cli.core.quantities import optional, quantity
 
-    volume = PoseVolume(parse(box, "length"), parse(turn, "angle"))
-    wanted = None if accuracy is None else parse(accuracy, "length")
+    volume = PoseVolume(quantity(box, "length"), quantity(turn, "angle"))
+    wanted = optional(accuracy, "length")
     return PoseSeries(robot, output, poses, held_out, volume, options, wanted, progress)
 
 
@@ -235,9 +256,9 @@ def _options(
     effects: Sequence[str], noise: Sequence[str], loss: str, middle_force: str | None
 ) -> Options:
     from winchkit.calibration.robot.calibrate import Options
-    from winchkit.units import parse
+    from winchkit.cli.core.quantities import optional
 
-    middle = None if middle_force is None else parse(middle_force, "force")
+    middle = optional(middle_force, "force")
     return Options(tuple(effects), _loss(loss), _noise(noise), middle)
 
 
@@ -278,7 +299,7 @@ def _loss(name: str) -> Loss:
 
 def _noise(given: Sequence[str]) -> Mapping[str, float]:
     """``position=0.02 mm`` as SI by kind."""
-    from winchkit.units import parse
+    from winchkit.cli.core.quantities import check_typed, quantity
 
     out = {}
     for text in given:
@@ -290,7 +311,8 @@ def _noise(given: Sequence[str]) -> Mapping[str, float]:
                 f"--noise '{text}': write KIND=VALUE with one of {', '.join(known)}"
                 + ("" if kind in known else suggest(kind, known))
             )
-        out[kind] = parse(value.strip(), _NOISE_DIMENSIONS[kind])
+        check_typed(f"--noise {kind}", value, _NOISE_DIMENSIONS[kind])
+        out[kind] = quantity(value, _NOISE_DIMENSIONS[kind])
         if not out[kind] > 0:
             raise UsageError(f"--noise '{text}': a standard deviation is above zero")
     return out

@@ -11,6 +11,7 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import PROGRAMME, SIM_BENCH, output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.errors import UsageError
 
@@ -40,7 +41,13 @@ __all__ = ["command"]
     help="Another motion programme, as PROGRAMME.",
 )
 @click.option("--seed", default=0, show_default=True, help="Of the noise.")
-@click.option("--rate", default="50 Hz", show_default=True, help="Of the samples.")
+@click.option(
+    "--rate",
+    type=Quantity("frequency", example="50 Hz"),
+    default="50 Hz",
+    show_default=True,
+    help="Of the samples.",
+)
 @output_option(
     "Folder for the runs.",
     "DIR",

@@ -87,9 +87,13 @@ def read_constant(key: str, text: str) -> float:
     """
     dimension = CONSTANTS[key]
     plain = _COUNTED.sub("", text) if dimension == "ratio" else text
-    value = typed_quantity(plain, dimension)
+    option = f"--{key.replace('_', '-')}"
+    try:
+        value = typed_quantity(plain, dimension)
+    except UsageError as error:
+        raise UsageError(f"{option}: {error}") from None
     if value <= 0:
-        raise UsageError(f"--{key.replace('_', '-')} '{text}' must be above 0")
+        raise UsageError(f"{option} '{text}' must be above 0")
     return value
 
 
