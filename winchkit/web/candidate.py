@@ -52,9 +52,8 @@ def candidate_card(state: State, effect_id: str) -> dict[str, Any]:
     if drawn is not None:
         output, own_change = drawn
         curves = state.curves[output]
-        order = state.order_of(output)
-        variable = order[0] if order else next(iter(curves.shares))
-        periods = order[1] if order else None
+        found = curves.main_variable(own_change) or state.order_of(output)
+        variable, periods = found or (next(iter(curves.shares)), None)
         out["signature"] = curves.signature(own_change, variable, periods)
         out["signature"]["variable"] = variable
     return out

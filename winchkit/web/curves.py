@@ -19,16 +19,18 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import (
     Attribution,
     binned_share,
+    harmonic_shares,
     kept_rows,
     variables_of,
 )
 from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.model.variables import ANGLES
 from winchkit.plain_json import significant
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.reduction import bin_edges, bin_means, decimated
 from winchkit.report.words.numbers import Scale, scale_for
-from winchkit.report.words.sentence import capital
+from winchkit.report.words.sentence import CLEAR_ORDER, capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 __all__ = ["OutputCurves", "curves_of"]
@@ -37,6 +39,9 @@ _PANELS = 6
 """Small multiples; the design of the page has six."""
 _SAMPLES = 1500
 """Samples of each small multiple: the same ones in all, so that a brush marks them everywhere."""
+_BINS = (20, 100)
+"""Fewest and most bins: of 20 each has 5 % of the samples; more than 100 are no line in a panel of
+300 px."""
 _DIGITS = 5
 _TIME_DIGITS = 7
 _TURN = 2 * np.pi
@@ -145,6 +150,32 @@ class OutputCurves:
             "panels": panels,
         }
 
+    def main_variable(self, change: Array) -> tuple[str, int | None] | None:
+        """The variable over which a change of the prediction is drawn.
+
+        Parameters
+        ----------
+        change : (n,) array
+            What a candidate adds to the prediction, SI.
+
+        Returns
+        -------
+        tuple of str and (int or None), or None
+            What explains most of the change: an angle with the periods per turn of a sine over it,
+            or a variable without periods by its η² over bins; a part of a turn, over which every
+            trend resembles a sine, is thus no period. None where nothing explains a fifth of it.
+        """
+        known = np.isfinite(self.residual) & np.isfinite(change)
+        own = change[known] - np.mean(change[known]) if known.any() else change[known]
+        shares: dict[tuple[str, int | None], float] = {}
+        for name, values in self.variables.items():
+            shares[name, None] = binned_share(values[known], own, len(own))
+            if name in ANGLES:
+                waves = harmonic_shares(values[known], own)
+                shares[name, int(np.argmax(waves)) + 1] = float(np.max(waves))
+        best = max(shares, key=lambda key: shares[key], default=None)
+        return None if best is None or shares[best] <= CLEAR_ORDER else best
+
     def signature(self, change: Array, variable: str, order: int | None) -> dict[str, Any]:
         """Residual and the change by a candidate over a variable, both as means over bins.
 
@@ -186,7 +217,8 @@ class OutputCurves:
         values = self.variables[variable]
         values = values if order is None else np.mod(values, _TURN)
         how = reading(variable, within_turn=order is not None)
-        edges = bin_edges(values[compared], Attribution(self.output, variable, 0.0, order), _TURN)
+        pattern = Attribution(self.output, variable, 0.0, order)
+        edges = bin_edges(values[compared], pattern, _TURN, _bins(len(compared)))
         centres, means = bin_means(values[compared], [line[compared] for line in lines], edges)
         return {
             "variable": variable,
@@ -251,6 +283,11 @@ def _label(recording: Recording) -> str:
     mass = recording.signals.load_mass
     words = [recording.programme, "" if mass is None else f"{mass:g} kg"]
     return " ".join(word for word in words if word) or recording.name
+
+
+def _bins(samples: int) -> int:
+    """Bins of a variable that is no angle within its turn: the square-root rule, within bounds."""
+    return int(np.clip(np.sqrt(samples), *_BINS))
 
 
 def _thinned(compared: Indices) -> Indices:

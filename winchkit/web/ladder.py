@@ -116,10 +116,16 @@ def ladder(
 
     rows = [row("history", rung.label, rung.errors) for rung in history]
     rows.append(row("today", "Present profile", today))
+    # The errors of a candidate are those of its screening. Of the one effect that the sentence
+    # names they are those of the sentence, of the final fit with its own weights.
+    fitted: dict[str, Mapping[str, float]] = {}
+    if len(diagnosis.steps) == 1 and named:
+        after = {name: out.heldout_rms_after for name, out in diagnosis.outputs.items()}
+        fitted[named[0]] = after
     for item in shown:
         errors = {
             name: value
-            for name, value in item.heldout_rms.items()
+            for name, value in fitted.get(item.effect, item.heldout_rms).items()
             if abs(value - today.get(name, value)) > _CHANGE * today.get(name, 1.0)
         }
         effect = effects.get(item.effect)

@@ -55,7 +55,7 @@ def test_move_all(bench: Served) -> None:
         (("A", "--pay-out", "1m", "--wind-in", "1m"), 2, "opposite directions"),
         (("A", "--pay-out", "-50mm"), 2, "must be above zero"),
         (("A", "--wind-in", "0.1m/s"), 2, "is a speed here and must be a length"),
-        (("A", "--wind-in", "3kg"), 2, "is no speed or length"),
+        (("A", "--wind-in", "3kg"), 2, "is not a speed or a length"),
         (("A", "--to", "1"), 2, "has no unit"),
         (("--to", "1 m"), 2, "which winch?"),
         (("C", "--to", "1 m"), 2, "no winch 'C'"),

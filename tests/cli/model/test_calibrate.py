@@ -238,7 +238,7 @@ def test_rows_without_motor_angles_are_counted_and_left_out(run: Path, tmp_path:
         (("--effect", "exit-pont"), "did you mean"),
         (("--effect", "cable-elongation-linear"), "tension"),
         (("--noise", "positon=1 mm"), "did you mean 'position'"),
-        (("--noise", "position=1 kg"), "unknown length unit"),
+        (("--noise", "position=1 kg"), "is not a length with its unit"),
         (("--noise", "position=0 mm"), "above zero"),
         (("--middle-force", "60"), "no unit"),
         (("--middle-force", "-5 N"), "above 0"),

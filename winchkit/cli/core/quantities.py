@@ -50,9 +50,9 @@ def check_typed(option: str, text: str, *dimensions: str, example: str = "") -> 
         raise UsageError(f"{option}: {faults[dimensions.index(fits[0])]} (such as '{example}')")
     wanted = " or ".join(article(name) for name in dimensions)
     units = "; ".join(f"{name} {', '.join(UNITS[name])}" for name in dimensions)
-    raise UsageError(
-        f"{option}: '{text}' is not {wanted} with its unit; write such as '{example}' ({units})"
-    )
+    is_bare = NUMBER.match(text) and not _unit(text)
+    fault = f"has no unit of {wanted}" if is_bare else f"is not {wanted} with its unit"
+    raise UsageError(f"{option}: '{text}' {fault}; write such as '{example}' ({units})")
 
 
 def dimension(text: str, among: tuple[str, ...]) -> str:

@@ -29,6 +29,7 @@ __all__ = [
     "attributions",
     "binned_share",
     "chance_share",
+    "harmonic_shares",
     "harmonics",
     "kept_rows",
     "quantile_bins",
@@ -158,7 +159,7 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribu
             angle = np.concatenate(
                 [VARIABLES[name](regression.dataset.recordings[s.run].raw.at) for s, _ in own]
             )
-            shares = _harmonic_shares(angle, error)
+            shares = harmonic_shares(angle, error)
             best = int(np.argmax(shares))
             if shares[best] > _LEAST_SHARE:
                 out.append(Attribution(output, name, float(shares[best]), order=best + 1))
@@ -206,9 +207,21 @@ def quantile_bins(variable: Array) -> NDArray[np.intp]:
     return np.searchsorted(edges, variable, side="right")
 
 
-def _harmonic_shares(angle: Array, error: Array) -> Array:
+def harmonic_shares(angle: Array, error: Array) -> Array:
     """Share of the residual variance that a sine of each order explains, (orders,).
 
+    Parameters
+    ----------
+    angle, error : (n,) arrays
+        Angle, rad, and what is explained.
+
+    Returns
+    -------
+    ndarray
+        By order from 1, (40,).
+
+    Notes
+    -----
     Sines of an order are powers of those of the first order, and their products sines of twice it.
     """
     total = float(error @ error)

@@ -156,8 +156,8 @@ def curve_of(regression: TimeSeriesRegression, residual: Array, over: Attributio
     return Curve(over, centres, mean)
 
 
-def bin_edges(values: Array, over: Attribution, turn: float) -> Array:
-    """Inner edges of bins: equal within a turn, fine enough for the order; else equally filled."""
+def bin_edges(values: Array, over: Attribution, turn: float, bins: int = _BINS) -> Array:
+    """Inner edges: equal within a turn, fine enough for the order; else ``bins`` equally filled."""
     if over.order is None:
-        return filled_edges(values, _BINS)
+        return filled_edges(values, bins)
     return np.linspace(0, turn, max(_BINS, _PER_PERIOD * over.order) + 1)[1:-1]

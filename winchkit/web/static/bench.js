@@ -60,7 +60,14 @@ function receive(message) {
   }
   watchTrip();
   if (message.said && (!before || before.said !== message.said)) { alarm(message.said); say(message.said); release(); }
+  saidOnce();
   soon();
+}
+
+// A command that a trip ended is told by the trip's banner alone.
+function saidOnce() {
+  const shown = document.getElementById("banner");
+  if (tripped().some((words) => shown.textContent.startsWith(words))) alarm("");
 }
 
 // Pictures that come faster than the screen is drawn are skipped, so that keys never wait behind them.

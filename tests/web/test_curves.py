@@ -1,0 +1,67 @@
+"""Variable, fold and bins of a candidate's signature, on curves that are known in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("starlette")
+
+from winchkit.arrays import Array
+from winchkit.web.curves import OutputCurves
+
+N = 4000
+TURNS = np.linspace(0.0, 12.0, N)
+ANGLE = 2 * np.pi * TURNS
+LENGTH = 10.0 - 0.06 * ANGLE
+SPEED = np.where(np.arange(N) % 1000 < 500, 0.1, -0.1)
+
+
+def curves(residual: Array, angle: Array = ANGLE) -> OutputCurves:
+    return OutputCurves(
+        output="cable_length",
+        time=np.arange(N) * 0.02,
+        measured=LENGTH,
+        predicted=LENGTH - residual,
+        residual=residual,
+        starts=((0.0, "run"),),
+        noise=1e-4,
+        variables={"drum_angle": angle, "cable_length": LENGTH, "speed": SPEED},
+        shares={"drum_angle": 0.9, "cable_length": 0.5, "speed": 0.0},
+        sizes=(10.0, 1e-3),
+    )
+
+
+@pytest.mark.parametrize("order", [1, 3, 8])
+def test_a_periodic_change_is_folded_with_eight_bins_per_period(order: int) -> None:
+    change = 1e-3 * np.sin(order * ANGLE + 0.4)
+    found = curves(change)
+    assert found.main_variable(change) == ("drum_angle", order)
+    drawn = found.signature(change, "drum_angle", order)
+    assert len(drawn["bins"]) >= 8 * order
+    assert max(drawn["bins"]) < 360.0
+    expected = 1.0 * np.sin(order * np.radians(drawn["bins"]) + 0.4)
+    assert np.allclose(drawn["signature"], expected, atol=0.11), "mm, mean over an eighth period"
+
+
+def test_a_trend_over_one_turn_is_no_period() -> None:
+    one_turn = ANGLE / 12.0
+    change = 1e-3 * (one_turn - one_turn.mean())
+    variable, order = curves(change, one_turn).main_variable(change) or ("", 0)
+    assert (variable, order) in {("drum_angle", None), ("cable_length", None)}
+
+
+def test_a_change_with_the_direction_is_drawn_over_the_speed() -> None:
+    change = 1e-3 * np.sign(SPEED)
+    assert curves(change).main_variable(change) == ("speed", None)
+
+
+def test_bins_of_an_unwrapped_angle_grow_with_the_samples() -> None:
+    drawn = curves(np.sin(0.5 * ANGLE)).signature(np.sin(0.5 * ANGLE), "drum_angle", None)
+    assert len(drawn["bins"]) == int(np.sqrt(N))
+
+
+def test_a_change_that_nothing_explains_has_no_variable() -> None:
+    noise = np.random.default_rng(1).normal(size=N)
+    assert curves(noise).main_variable(noise) is None
+    assert curves(noise).main_variable(np.zeros(N)) is None
