@@ -38,7 +38,7 @@ def served(tmp_path: Path) -> Iterator[Served]:
     found.end()
 
 
-def test_a_jog_that_trips_the_tension_is_told_and_its_last_seconds_are_saved(
+def test_a_jog_that_trips_the_tension_is_reported_and_its_last_seconds_are_saved(
     browser: Any, served: Served, tmp_path: Path
 ) -> None:
     page, complaints = opened(browser, f"{served.url}#bench", accept_downloads=True)
