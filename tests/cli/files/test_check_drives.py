@@ -76,6 +76,20 @@ def test_what_does_not_fit_is_reported_with_its_line(
     assert told[0].startswith(f"{path}:{line_of(path, place)}: ")
 
 
+def test_modes_are_those_within_the_range_of_6060h(tmp_path: Path) -> None:
+    """Faulhaber's EDS have no 6502h, but limit 6060h to -1 to 6."""
+    name = "ParameterName=Modes of operation\n"
+    path = drive(tmp_path, eds=(name, f"{name}LowLimit=-1\nHighLimit=6\n"))
+    code, output = check(path)
+    assert code == 3
+    assert f"{path}:{line_of(path, 'modes = ')}: " in output
+    assert "CSV is 9 in 6060h, which the EDS limits to -1 to 6" in output
+    assert "HM is 6" not in output
+    code, output = check(path.parent / "generic-cia402.eds")
+    assert code == 0
+    assert "\n  modes: PP, PV, PT, HM\n" in output
+
+
 def _between(first: str, after: str) -> str:
     """All that the generic EDS says of an object and its sub-indices."""
     text = (SOURCE / "generic-cia402.eds").read_text(encoding="utf-8")

@@ -53,7 +53,7 @@ def lines_of(drive: DriveDescription) -> Iterator[str]:
 def _carried(objects: dict[str, bool]) -> str:
     able = [name for name, carried in objects.items() if carried]
     unable = [name for name, carried in objects.items() if not carried]
-    return ", ".join(able) + (f"; not {', '.join(unable)}" if unable else "")
+    return (", ".join(able) or "none") + (f"; not {', '.join(unable)}" if unable else "")
 
 
 def _pdos(name: str, entries: Sequence[PdoEntry]) -> str:

@@ -26,16 +26,16 @@ from winchkit.drivers.can.cia402.option_codes import OPTIONS
 
 __all__ = [
     "ALWAYS",
-    "NEEDED",
     "DriveDescription",
     "HostLoss",
     "OptionEntry",
     "PdoEntry",
     "describe",
     "host_loss_ways",
+    "lacking",
 ]
 
-NEEDED = {
+_NEEDED = {
     "PP": (0x607A, 0x6081, 0x6083),
     "PV": (0x60FF,),
     "PT": (0x6071,),
@@ -194,16 +194,27 @@ def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
 
 
 def _modes(dictionary: Any) -> Iterator[str]:
-    """Modes whose objects are there and which 6502h does not deny."""
+    """Modes that the EDS lets the drive have and 6502h does not deny."""
     supported = declared(dictionary, 0x6502)
     claimed = (
         modes_of(supported.default)
         if supported is not None and supported.default
-        else tuple(NEEDED)
+        else tuple(_NEEDED)
     )
-    for mode, needed in NEEDED.items():
-        if mode in claimed and all(index in dictionary for index in needed):
+    for mode in _NEEDED:
+        if mode in claimed and not any(lacking(dictionary, mode)):
             yield mode
+
+
+def lacking(dictionary: Any, mode: str) -> Iterator[str]:
+    """Why a drive cannot have a mode by its EDS: its objects, or the range of 6060h."""
+    for index in _NEEDED[mode]:
+        if index not in dictionary:
+            yield f"{mode} needs {index:04X}h, which the EDS lacks"
+    selection, number = declared(dictionary, 0x6060), MODES[mode].number
+    least, largest = getattr(selection, "min", None), getattr(selection, "max", None)
+    if least is not None and largest is not None and not least <= number <= largest:
+        yield f"{mode} is {number} in 6060h, which the EDS limits to {least} to {largest}"
 
 
 def _target_obstacle(dictionary: Any, mode: str) -> str:

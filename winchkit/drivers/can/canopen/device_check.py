@@ -8,7 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.drivers.can.canopen.declared import declared, fixed_mapping, unmappable
-from winchkit.drivers.can.canopen.description import ALWAYS, NEEDED, HostLoss, host_loss_ways
+from winchkit.drivers.can.canopen.description import (
+    ALWAYS,
+    HostLoss,
+    host_loss_ways,
+    lacking,
+)
 from winchkit.drivers.can.canopen.eds import read_eds
 from winchkit.drivers.can.canopen.pdo import parse_object
 from winchkit.drivers.can.cia402.modes import MODES
@@ -162,9 +167,7 @@ def _lacking(dictionary: Any, servo: ServoSpec) -> Iterator[str]:
         if index not in dictionary:
             yield f"{index:04X}h is not in the EDS; winchkit cannot do without"
     for mode in servo.modes:
-        for index in NEEDED[mode]:
-            if index not in dictionary:
-                yield f"{mode} needs {index:04X}h, which the EDS lacks"
+        yield from lacking(dictionary, mode)
 
 
 def _option_faults(dictionary: Any, servo: ServoSpec) -> Iterator[tuple[str, str]]:
