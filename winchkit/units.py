@@ -31,7 +31,7 @@ UNITS: dict[str, dict[str, float]] = {
     "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3},
     "jerk": {"m/s^3": 1.0, "mm/s^3": 1e-3},
     "angle": {"rad": 1.0, "deg": _DEG, "turn": _TURN, "mrad": 1e-3},
-    "angular speed": {"rad/s": 1.0, "deg/s": _DEG, "rpm": _TURN / 60},
+    "angular speed": {"rad/s": 1.0, "deg/s": _DEG, "rpm": _TURN / 60, "turn/s": _TURN},
     "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEG},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
     "frequency": {"Hz": 1.0, "kHz": 1e3},

@@ -286,11 +286,43 @@ def test_columns_of_the_user_have_precedence() -> None:
         "N m",
     )
     assert read_column("tension=").source == ""
+    other = read_column("motor_torque=-Iq [A]")
+    assert (other.source, other.sign, other.unit) == ("Iq", -1.0, "A")
     assert read_column("motor_torque=u*gtau").constant == "gtau"
     words = r"is no channel|no known unit|is not CHANNEL|is a unit of"
     for text in ("tenson=x", "tension=x [furlong]", "x", "tension=x [deg]", "A.motor_angle=x [N]"):
         with pytest.raises(ValueError, match=words):
             read_column(text)
+
+
+def test_a_minus_changes_the_sign_of_a_column(tmp_path: Path) -> None:
+    time = np.arange(200) / 50
+    columns = {"time [s]": time, "Pos [deg]": 10 * time, "M": np.sin(time), "Iq": np.cos(time)}
+    answers = Answers(
+        columns=(read_column("motor_torque=-Iq [A]"), read_column("tension=-M*2 [kN]")),
+        torque_constant=0.12,
+    )
+    found = guess(tmp_path / "a.csv", columns, answers)
+    assert found.questions == ()
+    assert of(found, "motor_torque").factor == pytest.approx(-0.12)
+    assert of(found, "tension").factor == pytest.approx(-2000.0)
+
+
+def test_axes_of_an_odrive_are_in_turns(tmp_path: Path) -> None:
+    """Names as its live plotter writes them, without units."""
+    time = np.arange(300) / 30 + 0.1
+    turns = np.sin(time)
+    columns = {
+        "time": time,
+        "ODrive 0 Position": turns,
+        "ODrive 0 Velocity": np.cos(time),
+        "ODrive 0 Current": np.sign(turns),
+    }
+    found = guess(tmp_path / "a.csv", columns, Answers(torque_constant=8.27 / 150))
+    assert found.questions == ()
+    assert of(found, "motor_angle").factor == pytest.approx(2 * np.pi)
+    assert of(found, "motor_velocity").factor == pytest.approx(2 * np.pi)
+    assert of(found, "motor_angle").confidence == "assumed"
 
 
 def test_a_channel_can_be_left_out(tmp_path: Path) -> None:

@@ -56,7 +56,8 @@ _MAPPING = "mapping.toml"
     multiple=True,
     metavar="CHANNEL=COLUMN",
     help="Column of a channel, by name or number, e.g. 'motor_angle=Pos [deg]', "
-    "'motor_torque=u*35.1'; nothing after = for none. May be given several times.",
+    "'motor_torque=u*35.1', '-Iq [A]' with the other sign; nothing after = for none. May be given "
+    "several times.",
 )
 @click.option(
     "--rated-torque",

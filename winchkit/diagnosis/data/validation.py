@@ -203,6 +203,4 @@ def _notes(run: Run, profile: WinchProfile) -> list[str]:
     named = run.metadata.get("profile", profile.name)
     if named != profile.name:
         notes.append(f"{run.name}: recorded with profile '{named}', compared with '{profile.name}'")
-    if run.gaps:
-        notes.append(f"{run.name}: {run.gaps} gaps in time")
     return notes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from winchkit.report.words.numbers import percent
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
@@ -11,7 +11,8 @@ from winchkit.runs.sanity.finding import Finding
 __all__ = ["caveat_text", "finding_texts", "used_text"]
 
 _CAVEATS = {
-    "inverted-sign": "the sign of a channel looks inverted: no effect is named with it",
+    "inverted-sign": "the sign of a channel looks inverted: no effect is named with it; import it "
+    "with a minus, --column CHANNEL=-COLUMN, or negate it",
     "wrong-factor": "the unit or factor of a channel looks wrong: no effect is named with it",
     "no-repeats": "no run repeats another: an effect outside the catalogue counts as noise and "
     "cannot be excluded",
@@ -31,7 +32,7 @@ def caveat_text(code: str) -> str:
 
 
 def finding_texts(findings: Sequence[Finding]) -> list[str]:
-    """Findings as lines, equal ones of several runs in one.
+    """Findings as lines, equal ones of several runs in one, alike ones of many runs shortened.
 
     Parameters
     ----------
@@ -43,10 +44,21 @@ def finding_texts(findings: Sequence[Finding]) -> list[str]:
     list of str
         One line per channel and text, with the runs that it applies to.
     """
-    runs: dict[tuple[str, str], list[str]] = {}
+    runs: dict[tuple[str, str], dict[str, list[str]]] = {}
     for finding in findings:
-        runs.setdefault((finding.channel, finding.text), []).append(finding.run)
-    return [f"{_place(names, channel)}: {text}" for (channel, text), names in runs.items()]
+        alike = runs.setdefault((finding.channel, finding.code), {})
+        alike.setdefault(finding.text, []).append(finding.run)
+    return [line for (channel, _), texts in runs.items() for line in _alike(channel, texts)]
+
+
+def _alike(channel: str, texts: Mapping[str, list[str]]) -> Iterator[str]:
+    """Lines of one code: the first, and where they are many, how many more there are."""
+    shown = texts if len(texts) <= _SHOWN else dict(list(texts.items())[: _SHOWN - 1])
+    for text, names in shown.items():
+        yield f"{_place(names, channel)}: {text}"
+    others = [name for text, names in texts.items() if text not in shown for name in names]
+    if others:
+        yield f"{_place(others, channel)}: the same with other numbers, listed by --json"
 
 
 def used_text(used: Mapping[str, float]) -> str:

@@ -15,7 +15,7 @@ from winchkit.units import UNITS, suggest
 __all__ = ["CONSTANTS", "Answers", "ColumnAnswer", "permitted", "read_column", "read_constant"]
 
 _COLUMN = re.compile(
-    r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<source>.*?)\s*"
+    r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"
     r"(?:\*\s*(?:(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
     r"(?:\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
 )
@@ -109,6 +109,8 @@ class ColumnAnswer:
     """Multiplier of the numbers before the unit; None where none was given."""
     constant: str = ""
     """Name of a variable of the file that is the multiplier."""
+    sign: float = 1.0
+    """-1 for a column of the other sign."""
 
 
 @dataclass(frozen=True)
@@ -133,13 +135,16 @@ class Answers:
 
 
 def read_column(text: str) -> ColumnAnswer:
-    """Read ``motor_angle=Pos [deg]`` or ``motor_torque=u*35.15``; raises UsageError.
+    """Read ``motor_angle=Pos [deg]``, ``motor_torque=u*35.15`` or ``motor_torque=-u``.
+
+    Raises UsageError for a text that is none of them.
 
     Parameters
     ----------
     text : str
         ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; the factor is a number or a
-        variable of the file; nothing after ``=`` for a channel that the file does not have.
+        variable of the file; a minus before the column changes its sign; nothing after ``=`` for a
+        channel that the file does not have.
 
     Returns
     -------
@@ -167,4 +172,5 @@ def read_column(text: str) -> ColumnAnswer:
             + ", ".join(UNITS[dimension or "ratio"])
         )
     factor = float(found["factor"]) if found["factor"] else None
-    return ColumnAnswer(channel, found["source"], unit, factor, found["constant"] or "")
+    constant, sign = found["constant"] or "", -1.0 if found["minus"] else 1.0
+    return ColumnAnswer(channel, found["source"], unit, factor, constant, sign)

@@ -39,6 +39,7 @@ _TURN = 2 * math.pi
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "turn": _TURN}
 _SPEEDS = {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": _TURN / 60, "turn/s": _TURN}
 _CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
 _SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
 _SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "effort", "thetadot", "dtheta"}
 _GAINS = {"gtau", "ktau", "kt", "km", "torqueconstant", "torquegain", "gf", "forcegain"}
@@ -153,6 +154,7 @@ def _started(work: _Work, candidate: Candidate, answer: ColumnAnswer | None) -> 
         scale = answer.factor if answer.factor is not None else 1.0
         if answer.constant:
             scale = work.table.constants.get(answer.constant, math.nan)
+        scale *= answer.sign
         if answer.unit:
             unit, text = read_unit(answer.unit), answer.unit
         elif answer.factor is not None or answer.constant:
@@ -334,9 +336,10 @@ def _by_convention(work: _Work) -> None:
                 item.settle(1.0, "s", "assumed", "steps below 1, not whole numbers")
         elif item.base == "temperature":
             item.settle(1.0, "degC", "assumed", "temperatures are in degC")
-        elif words in {"pos estimate", "vel estimate"}:
-            turn = "turn" if words == "pos estimate" else "turn/s"
-            item.settle(_TURN, turn, "assumed", "ODrive counts in turns")
+        elif item.base in _TURNS and (
+            words in {"pos estimate", "vel estimate"} or "odrive" in item.column.name.lower()
+        ):
+            item.settle(_TURN, _TURNS[item.base], "assumed", "ODrive counts in turns")
         elif _is_si(work.table, item.column.name) and not (
             item.base == "motor_angle" and _is_counted(item)
         ):
