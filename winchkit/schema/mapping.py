@@ -102,6 +102,8 @@ class MappedLog(Table):
     column: tuple[MappedColumn, ...]
     sample_rate: Frequency | None = None
     """Rate of the rows where the file has no times, or none to be used."""
+    axis: str = ""
+    """Column that names the axis of each row; empty where a row is of all axes."""
 
     def rules(self) -> Iterator[Rule]:
         """Every channel has one column."""

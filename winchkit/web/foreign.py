@@ -113,7 +113,9 @@ def imported(path: Path, answers: Mapping[str, Any]) -> Run:
 
 def _answers(given: Mapping[str, Any]) -> Answers:
     columns: Sequence[str] = given.get("columns", ())
-    answers = Answers(columns=tuple(read_column(str(text)) for text in columns))
+    answers = Answers(
+        columns=tuple(read_column(str(text)) for text in columns), axis=given.get("axis")
+    )
     values = {
         key: read_constant(key, str(given[key]))
         for key in CONSTANTS

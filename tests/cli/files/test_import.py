@@ -267,6 +267,28 @@ def test_on_a_terminal_an_assumed_unit_is_confirmed(tmp_path: Path) -> None:
     assert (tmp_path / "runs" / "log.csv").exists()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are of POSIX")
+def test_on_a_terminal_the_axes_of_a_long_table_are_separated(tmp_path: Path) -> None:
+    m = motion()
+    rows = [
+        f"{time:.10g},{name},{sign * angle:.10g},{sign * torque:.10g}"
+        for time, angle, torque in zip(m.time, np.degrees(m.angle), m.torque, strict=True)
+        for name, sign in (("A", 1), ("B", -1))
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time [s],winch,position [deg],torque [N m]", *rows]) + "\n")
+    _on_terminal(
+        ["import", str(path), "-o", str(tmp_path / "runs")],
+        [("which column 'winch' names (A, B)", "y\n")],
+    )
+    run = read_run(tmp_path / "runs" / "log.csv")
+    assert run["A.motor_angle"] == pytest.approx(m.angle)
+    assert run["B.motor_angle"] == pytest.approx(-m.angle)
+    named = command(path, "-o", tmp_path / "again", "--axis", "winch")
+    assert named.exit_code == 0, named.output
+    assert (tmp_path / "again" / "log.csv").read_bytes().count(b"\n") > len(m.time)
+
+
 def _on_terminal(arguments: Sequence[str], talk: Sequence[tuple[str, str]]) -> str:
     """Output of a command on a pseudo-terminal, with the answer to each prompt."""
     import pty

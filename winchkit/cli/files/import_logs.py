@@ -21,7 +21,7 @@ from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:
     from winchkit.runs.importing.answers import Answers
-    from winchkit.runs.importing.assignment import Guess
+    from winchkit.runs.importing.assignment import Guess, Question
     from winchkit.runs.importing.clocks import Joint
     from winchkit.runs.importing.streams import Streams
     from winchkit.runs.run import Run
@@ -84,6 +84,11 @@ _MAPPING = "mapping.toml"
     metavar="RATE",
     type=Quantity("frequency", example="1 kHz"),
     help="Rate of the rows, in place of times, e.g. '1 kHz'.",
+)
+@click.option(
+    "--axis",
+    metavar="COLUMN",
+    help="Column that names the axis, where each row is of one axis; '' where it is not.",
 )
 @click.option("--body", metavar="NAME", help="Body or marker of a tracker's export.")
 @click.option(
@@ -193,7 +198,8 @@ def _answers(options: Mapping[str, Any]) -> Answers:
         columns = tuple(read_column(text) for text in options["columns"])
     except UsageError as error:
         raise UsageError(f"--column: {error}") from None
-    return _with(Answers(columns=columns, body=options["body"]), **constants)
+    own = Answers(columns=columns, body=options["body"], axis=options["axis"])
+    return _with(own, **constants)
 
 
 def _with(answers: Answers, **constants: Any) -> Answers:
@@ -249,9 +255,7 @@ def _guesses(
     unknown = [
         item.source
         for item in answers.columns
-        if item.source
-        and declared is None
-        and not any(g.table.column(item.source) for g in guesses)
+        if item.source and declared is None and not any(g.file.column(item.source) for g in guesses)
     ]
     if not unknown:
         # A column of one file is no question about the others.
@@ -273,7 +277,7 @@ def _asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
         click.echo(tables_text(replace(guess, questions=())), err=True)
     while guess.questions:
         answers = _answered(guess, answers)
-        guess = guess_columns(guess.table, answers)
+        guess = guess_columns(guess.file, answers)
     return guess, answers
 
 
@@ -281,9 +285,7 @@ def _answered(guess: Guess, answers: Answers) -> Answers:
     question = guess.questions[0]
     click.echo(f"? {question.text}", err=True)
     if question.key:
-        example = re.sub(r'^--\S+ |"', "", question.options[0])
-        value = _until(f"  {question.key.replace('_', ' ')} (e.g. {example})", question.key)
-        return _with(answers, **{question.key: value})
+        return _with(answers, **{question.key: _value(question)})
     if question.options[0].startswith("--body"):
         return replace(answers, body=_picked([o[8:-1] for o in question.options]))
     own = [option[len('--column "') : -1] for option in question.options]
@@ -297,6 +299,14 @@ def _answered(guess: Guess, answers: Answers) -> Answers:
         text = _until(f"  CHANNEL=COLUMN [UNIT] (e.g. {own[0]})", _column)
         return replace(answers, columns=(*answers.columns, text))
     return replace(answers, columns=(*answers.columns, _column(_picked(own))))
+
+
+def _value(question: Question) -> Any:
+    """Answer to a question on a field of the answers: a constant, or the column of the axis."""
+    example = re.sub(r'^--\S+ |"', "", question.options[0])
+    if question.key == "axis":
+        return example if click.confirm("  separate the axes?", default=True, err=True) else ""
+    return _until(f"  {question.key.replace('_', ' ')} (e.g. {example})", question.key)
 
 
 def _column(text: str) -> Any:

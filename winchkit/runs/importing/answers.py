@@ -132,6 +132,8 @@ class Answers:
     """Hz; replaces the time stamps."""
     body: str | None = None
     """Body or marker of a tracker's export."""
+    axis: str | None = None
+    """Column that names the axis of each row; empty for a table whose rows are of all axes."""
 
 
 def read_column(text: str) -> ColumnAnswer:

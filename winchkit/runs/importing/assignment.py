@@ -53,6 +53,15 @@ class Guess:
     notes: tuple[str, ...] = ()
     sample_rate: float | None = None
     """Rate of the rows in place of time stamps, Hz."""
+    axis: str = ""
+    """Column that names the axis of each row, of a table in long form."""
+    whole: Table | None = None
+    """The table in long form; ``table`` is that of its first axis."""
+
+    @property
+    def file(self) -> Table:
+        """Everything that was read."""
+        return self.whole or self.table
 
     @property
     def used(self) -> tuple[Assignment, ...]:

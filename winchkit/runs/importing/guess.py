@@ -19,6 +19,7 @@ from winchkit.runs.importing.assignment import Assignment, Confidence, Guess, Qu
 from winchkit.runs.importing.candidates import Candidate, Choice, choose
 from winchkit.runs.importing.consistency import Ratio, likely_counts, ratio_of
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
+from winchkit.runs.importing.long_table import axes_of, likely_axis
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import (
@@ -39,6 +40,7 @@ _TURN = 2 * math.pi
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "turn": _TURN}
 _SPEEDS = {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": _TURN / 60, "turn/s": _TURN}
 _CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_SHOWN = 8
 _TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
 _SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
 _SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "effort", "thetadot", "dtheta"}
@@ -97,6 +99,11 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
         An assignment for every column, and what cannot be known.
     """
     answers = answers or Answers()
+    if answers.axis:
+        return _of_axes(table, answers, answers.axis)
+    if answers.axis is None and (axis := likely_axis(table)) is not None:
+        open_yet = [Assignment(item.source, "", item.unit) for item in table.columns]
+        return Guess(table, tuple(open_yet), (_axis_question(axis),))
     given, unknown = _given(table, answers)
     channels = {source: item.channel for source, item in given.items()}
     without = {item.channel for item in answers.columns if not item.source}
@@ -122,6 +129,21 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
         tuple(work.notes),
         rate,
     )
+
+
+def _of_axes(table: Table, answers: Answers, by: str) -> Guess:
+    """Assignments of a table in long form: those of its first axis, which hold for all."""
+    axes = axes_of(table, by)
+    guess = guess_columns(next(iter(axes.values())), replace(answers, axis=""))
+    note = f"each row is of one axis, by column '{by}': {', '.join(axes)}"
+    return replace(guess, axis=by, whole=table, notes=(note, *guess.notes))
+
+
+def _axis_question(axis: Column) -> Question:
+    values = axis.texts if axis.texts is not None else [f"{value:.0f}" for value in axis.values]
+    names = ", ".join(list(dict.fromkeys(values))[:_SHOWN])
+    text = f"each row seems to be of one axis, which column '{axis.source}' names ({names})"
+    return Question(text, (f'--axis "{axis.source}"', '--axis ""'), "axis")
 
 
 def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], list[Question]]:

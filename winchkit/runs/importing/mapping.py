@@ -11,6 +11,7 @@ from pathlib import Path
 from winchkit.errors import Fault, RunError
 from winchkit.runs.files import write_whole
 from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.table import Table
 from winchkit.schema.mapping import ImportMapping, MappedColumn, MappedLog
 
@@ -38,11 +39,9 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
             MappedColumn(item.source, item.channel, item.unit, item.factor, item.offset)
             for item in guess.used
         )
-        known = [
-            log for log in logs if (log.column, log.sample_rate) == (columns, guess.sample_rate)
-        ]
-        if not known:
-            logs.append(MappedLog(title, columns, guess.sample_rate))
+        own = (columns, guess.sample_rate, guess.axis)
+        if own not in [(log.column, log.sample_rate, log.axis) for log in logs]:
+            logs.append(MappedLog(title, *own))
     return ImportMapping(name, tuple(logs))
 
 
@@ -85,6 +84,8 @@ def write_mapping(mapping: ImportMapping, path: Path) -> None:
         table["name"] = log.name
         if log.sample_rate is not None:
             table["sample_rate"] = f"{log.sample_rate!r} Hz"
+        if log.axis:
+            table["axis"] = log.axis
         columns = tomlkit.aot()
         for item in log.column:
             column = tomlkit.table()
@@ -102,12 +103,12 @@ def write_mapping(mapping: ImportMapping, path: Path) -> None:
     write_whole(path, tomlkit.dumps(document).encode())
 
 
-def guess_by(table: Table, mapping: ImportMapping) -> Guess:
+def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     """Assignments of a table by a mapping.
 
     Parameters
     ----------
-    table : Table
+    whole : Table
         The file.
     mapping : ImportMapping
         Its first log whose columns the file has is used.
@@ -123,6 +124,9 @@ def guess_by(table: Table, mapping: ImportMapping) -> Guess:
         With the columns that the file lacks, where no log fits.
     """
     for log in mapping.log:
+        if log.axis and whole.column(log.axis) is None:
+            continue
+        table = next(iter(axes_of(whole, log.axis).values())) if log.axis else whole
         found = [(item, table.column(item.source)) for item in log.column]
         if any(column is None for _, column in found):
             continue
@@ -143,15 +147,22 @@ def guess_by(table: Table, mapping: ImportMapping) -> Guess:
             by_source.get(c.source, Assignment(c.source, "", c.unit, reason="not in the mapping"))
             for c in table.columns
         ]
-        return Guess(table, tuple(assignments), sample_rate=log.sample_rate)
+        return Guess(
+            table,
+            tuple(assignments),
+            sample_rate=log.sample_rate,
+            axis=log.axis,
+            whole=whole if log.axis else None,
+        )
     raise RunError(
-        [Fault(_lacking(table, log, mapping), table.path) for log in mapping.log]
-        or [Fault("the mapping has no log", table.path)]
+        [Fault(_lacking(whole, log, mapping), whole.path) for log in mapping.log]
+        or [Fault("the mapping has no log", whole.path)]
     )
 
 
 def _lacking(table: Table, log: MappedLog, mapping: ImportMapping) -> str:
-    lacking = [repr(item.source) for item in log.column if table.column(item.source) is None]
+    names = [item.source for item in log.column] + [log.axis] * bool(log.axis)
+    lacking = [repr(name) for name in names if table.column(name) is None]
     has = ", ".join(repr(column.source) for column in table.columns[:20])
     return (
         f"is no log '{log.name}' of the mapping '{mapping.path or mapping.name}': it lacks the "

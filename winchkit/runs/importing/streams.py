@@ -15,6 +15,7 @@ from winchkit.model.robot.rotation import quaternion_of
 from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
+from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.table import Column, Table
 from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
 
@@ -83,6 +84,8 @@ def streams_of(guess: Guess) -> Streams:
     Streams
         With the faults of the table's rows and of the used columns' cells, each with its line.
     """
+    if guess.axis:
+        return _of_axes(guess)
     table = guess.table
     used = {item.source: item for item in guess.used}
     columns = {c.source: c for c in table.columns if c.source in used}
@@ -132,6 +135,33 @@ def streams_of(guess: Guess) -> Streams:
         table.line_of,
         tuple(faults),
         tuple(notes),
+    )
+
+
+def _of_axes(guess: Guess) -> Streams:
+    """Streams of a table in long form: channels have the name of their axis before them."""
+    parts = {
+        name: streams_of(replace(guess, table=table, axis="", whole=None))
+        for name, table in axes_of(guess.file, guess.axis).items()
+    }
+    origin = min(part.origin for part in parts.values())
+    streams = [
+        Stream(
+            stream.time + (part.origin - origin),
+            {f"{name}.{channel}": values for channel, values in stream.channels.items()},
+            stream.rows,
+        )
+        for name, part in parts.items()
+        for stream in part.streams
+    ]
+    first = next(iter(parts.values()))
+    return replace(
+        first,
+        streams=tuple(streams),
+        origin=origin,
+        line_of=guess.file.line_of,
+        faults=tuple(dict.fromkeys(fault for part in parts.values() for fault in part.faults)),
+        notes=tuple(dict.fromkeys(note for part in parts.values() for note in part.notes)),
     )
 
 

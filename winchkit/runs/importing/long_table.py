@@ -1,0 +1,140 @@
+"""Tables in long form: each row is of one axis, which a column names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.table import Column, Table
+
+__all__ = ["axes_of", "likely_axis"]
+
+_MOST = 64
+"""Axes of one table."""
+_ROWS = 10
+"""Rows of each axis below which a repetition of values may be chance."""
+_CLOSER = 0.25
+"""Change between the rows of one axis over that between neighbouring rows, at most.
+
+Rows of one signal change more over several rows than over one: above 1 for a flag that toggles."""
+
+
+def axes_of(table: Table, by: str) -> dict[str, Table]:
+    """The table of each axis, of a table in long form.
+
+    Parameters
+    ----------
+    table : Table
+        Each row is of one axis.
+    by : str
+        Name or number of the column that names the axis.
+
+    Returns
+    -------
+    dict
+        Tables without that column by the name of the axis, in the order of the file; columns keep
+        their names and numbers. Rows without an axis are left out.
+
+    Raises
+    ------
+    RunError
+        For a column that is not there, or with too few or too many values.
+    """
+    key = table.column(by)
+    if key is None:
+        has = ", ".join(repr(column.source) for column in table.columns)
+        message = f"there is no column '{by}' that names the axis; it has {has}"
+        raise RunError(Fault(message, table.path))
+    names = _names(key)
+    found = [name for name in dict.fromkeys(names.tolist()) if name]
+    if not 1 < len(found) <= _MOST:
+        raise RunError(
+            Fault(
+                f"column '{by}' has {len(found)} values; one that names the axes has 2 to {_MOST}",
+                table.path,
+            )
+        )
+    return {name: _of_rows(table, key, np.flatnonzero(names == name)) for name in found}
+
+
+def likely_axis(table: Table) -> Column | None:
+    """The column that names the axis of each row, where there seems to be one.
+
+    Its few values alternate, and another column changes far less from row to row of one axis than
+    between neighbouring rows.
+
+    Parameters
+    ----------
+    table : Table
+        Any table.
+
+    Returns
+    -------
+    Column or None
+        The first one that fits.
+    """
+    for column in table.columns:
+        names = _names(column)
+        found, codes, counts = np.unique(names, return_inverse=True, return_counts=True)
+        if not 1 < len(found) <= _MOST or "" in found or counts.min() < _ROWS:
+            continue
+        if np.mean(codes[1:] != codes[:-1]) < 0.5:
+            continue
+        others = [one for one in table.columns if one is not column and len(one) == len(column)]
+        if any(_is_closer(one.values, codes) for one in others if one.texts is None):
+            return column
+    return None
+
+
+def _names(column: Column) -> NDArray[np.str_]:
+    """Axis of each row; empty where it has none, and everywhere for numbers that name nothing."""
+    if column.texts is not None:
+        return np.array([text.strip() for text in column.texts], dtype=np.str_)
+    known = np.isfinite(column.values)
+    found = np.unique(column.values[known])
+    names = np.full(len(known), "", dtype="<U20")
+    if len(found) > _MOST or np.any(found != np.round(found)) or np.any(found < 0):
+        return names
+    for value in found:
+        names[column.values == value] = f"{value:.0f}"
+    return names
+
+
+def _is_closer(values: Array, codes: NDArray[np.intp]) -> bool:
+    """Whether a column changes less within the rows of each axis than between neighbours."""
+    between = np.abs(np.diff(values))
+    axes = [values[codes == code] for code in np.unique(codes)]
+    within = np.concatenate([np.abs(np.diff(axis)) for axis in axes])
+    if not np.any(np.isfinite(between)) or not np.any(np.isfinite(within)):
+        return False
+    return float(np.nanmean(within)) < _CLOSER * float(np.nanmean(between))
+
+
+def _of_rows(table: Table, key: Column, rows: NDArray[np.intp]) -> Table:
+    place = {int(row): number for number, row in enumerate(rows)}
+
+    def line_of(row: int) -> int | None:
+        return table.line_of(int(rows[row]))
+
+    return replace(
+        table, columns=tuple(_columns(table, key, rows, place)), line_of=line_of, interval=None
+    )
+
+
+def _columns(
+    table: Table, key: Column, rows: NDArray[np.intp], place: dict[int, int]
+) -> Iterator[Column]:
+    for column in table.columns:
+        if column is not key and len(column) == len(key):
+            texts = column.texts
+            yield replace(
+                column,
+                values=column.values[rows],
+                texts=None if texts is None else [texts[row] for row in rows],
+                wrong=tuple((place[row], text) for row, text in column.wrong if row in place),
+            )
