@@ -14,9 +14,7 @@ from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
-from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
-from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import attributions, harmonics
@@ -43,10 +41,10 @@ from winchkit.diagnosis.verdict.decision import (
     reweighted_judgement,
     withheld,
 )
-from winchkit.diagnosis.verdict.determination import region_holds_null
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.plausibility import implausible
+from winchkit.diagnosis.verdict.significance import insignificant_addition
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -334,10 +332,10 @@ def _answer(
         judgement = reweighted_judgement(engine, judgement)
         reported = judgement.reported
     found, spread = reported, _spread(engine, reported)
-    if (index := _undetermined(engine, reported, spread, sets)) is not None:
+    if (index := insignificant_addition(engine, reported, spread, sets)) is not None:
         fewer = without_term(engine, reported, index)
         if judge_with_specification_test(engine, fewer).reported is fewer:
-            note = _undetermined_note(sets[index - added.start])
+            note = _insignificant_note(sets[index - added.start])
             return _answer(engine, fewer, tuple(dict.fromkeys((*notes, *reasons, note))))
     sets, steps, closest = _plausible(engine, reported, sets, spread)
     if closest:
@@ -396,40 +394,12 @@ def _traces(
 
 def _spread(engine: SelectionEngine, result: SelectionResult) -> Spread:
     """Uncertainty of the unknowns of the final model."""
-    return _spread_of_fit(engine, result.final, result.noise)
+    return spread_of(engine.regression, result.final, result.noise, engine.regression.blocks)
 
 
-def _spread_of_fit(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Spread:
-    return spread_of(engine.regression, fitted, noise, engine.regression.blocks)
-
-
-def _undetermined(
-    engine: TimeSeriesSelection,
-    result: SelectionResult,
-    spread: Spread,
-    sets: Sequence[EquivalenceSet],
-) -> int | None:
-    """The last addition beside others of which no member is determined; None for none."""
-    regression, noise, final = engine.regression, result.noise, result.final
-    first = engine.n_initial_terms
-    for index in reversed(range(first, first + len(sets))) if len(sets) > 1 else ():
-        if not region_holds_null(regression, final, noise, spread, index):
-            continue
-        rivals = [fitted for fitted in sets[index - first].fits if fitted is not final]
-        last = len(final.hypothesis.terms) - 1
-        if all(
-            region_holds_null(
-                regression, fitted, noise, _spread_of_fit(engine, fitted, noise), last
-            )
-            for fitted in rivals
-        ):
-            return index
-    return None
-
-
-def _undetermined_note(equivalence: EquivalenceSet) -> str:
+def _insignificant_note(equivalence: EquivalenceSet) -> str:
     names = ", ".join(equivalence.effects)
-    return f"not named: {names}; the 95 % interval of its size holds zero"
+    return f"not named: {names}; beside the other effects it is not significant"
 
 
 def _plausible(

@@ -12,10 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import ks_2samp
 
-from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_channel
+from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.prediction_cache import masked
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
@@ -281,3 +282,45 @@ def test_the_null_distribution_is_that_of_fits_to_drawn_data() -> None:
         )
         redrawn.append(gain - (float(seen @ seen) - float(left @ left) - penalty))
     assert ks_2samp(drawn, redrawn).pvalue > 1e-3
+
+
+def test_the_null_distribution_has_the_rounding_of_the_instrument() -> None:
+    """A torque in steps of ten times its noise: a curve over its rounding takes no name away.
+
+    Simulated: the same instrument with a random zero.
+    """
+    step, size, gain = 0.1, 0.01, term("torque-constant", gain_error=0.05)
+    noise = {**NOISE, "motor_torque": size}
+    runs = [
+        made(seed, GROOVED, (gain,), noise, load_mass=mass, ride=ride, encoder=0.0)
+        for seed, (ride, mass) in enumerate([(r, m) for r in RIDES for m in (10.0, 20.0)] * 2)
+    ]
+    runs = [
+        with_channel(run, "motor_torque", np.round(run["motor_torque"] / step + 0.2) * step, "N m")
+        for run in runs
+    ]
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    regression, result, random = (
+        engine.regression,
+        ended_with(engine, gain),
+        np.random.default_rng(5),
+    )
+    excess = []
+    test = SpecificationTest(engine, result)
+    critical = test._critical_excess([0])
+    for _ in range(30):
+        error, zero = np.zeros(regression.n_rows), random.random()
+        for segment in regression.segments:
+            recording = regression.dataset.recordings[segment.run]
+            exact, white = recording.nominal_smooth[segment.output], random.standard_normal
+            seen = exact + noise[segment.output] * white(len(exact))
+            if segment.output == "motor_torque":
+                seen = (np.round(seen / step + zero) - zero) * step
+            error[segment.rows] = masked(recording, segment.output, seen - exact)
+        final = replace(result.final, residual=error)
+        test = SpecificationTest(engine, replace(result, final=final))
+        found = test._excess([0], discretization=False)
+        excess.append(0.0 if found is None else found[1])
+    # Gaussian noise exceeds 15 in less than 0.5 % of cases.
+    assert np.mean(np.array(excess) > 15.0) > 0.3
+    assert max(excess) < critical

@@ -33,6 +33,7 @@ from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.results import Estimate
 from winchkit.effects.effect import Parameter
 from winchkit.effects.parametrization import Coordinates
@@ -107,8 +108,7 @@ class _Profile:
         self._along = covariance[:, index] / covariance[index, index]
         others = np.arange(len(covariance)) != index
         whitened = fit.jacobian[:, others] * inverse_sigma[:, None]
-        normal = np.linalg.pinv(whitened.T @ whitened, rcond=1e-12, hermitian=True)
-        self._others, self._whitened, self._normal = others, whitened, normal
+        self._others, self._whitened, self._normal = others, whitened, inverse_normal(whitened)
         self._bounds = regression.bounds(fit.hypothesis)
 
     def length(self, side: float, reach: float) -> float:
@@ -166,11 +166,15 @@ class Spread:
         Standard deviation.
     low, high : ndarray of shape (n_unknowns,)
         Ends of the 95 % interval.
+    widening : ndarray of shape (n_unknowns,)
+        Standard deviation over that of the likelihood; infinite where the runs do not determine the
+        unknown.
     """
 
     std: Array
     low: Array
     high: Array
+    widening: Array
 
 
 def whitened_jacobian(regression: Regression, fit: Fit, noise: Noise) -> Array:
@@ -194,11 +198,10 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
     """
     inverse_sigma = noise.inverse_sigma(regression)
     whitened = whitened_jacobian(regression, fit, noise)
-    normal = whitened.T @ whitened
-    covariance = np.asarray(np.linalg.pinv(normal, rcond=1e-12, hermitian=True), dtype=np.float64)
+    covariance = inverse_normal(whitened)
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     statistical = np.maximum(likelihood, _jackknife(regression, fit, noise, blocks))
-    unknown = (statistical > _UNDETERMINED) | (np.diag(normal) == 0.0)
+    unknown = (statistical > _UNDETERMINED) | ~np.any(whitened, axis=0)
     covariance[unknown] = covariance[:, unknown] = likelihood[unknown] = 0.0
     statistical[unknown] = _UNDETERMINED
     shift_by_discretization = covariance @ (
@@ -220,10 +223,12 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
         np.where(unknown, _UNDETERMINED, way) for way in (fit.vector - low, high - fit.vector)
     )
     systematic = HALF_WIDTH * np.sqrt(variance - own)
+    std = np.sqrt(variance)
     return Spread(
-        np.sqrt(variance),
+        std,
         fit.vector - stretch * np.hypot(below, systematic),
         fit.vector + stretch * np.hypot(above, systematic),
+        np.divide(std, likelihood, out=np.full_like(std, np.inf), where=likelihood > 0.0),
     )
 
 

@@ -6,7 +6,15 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["explained_ss", "explained_ss_of_sets", "orthonormal", "partialled_out"]
+__all__ = [
+    "explained_ss",
+    "explained_ss_of_sets",
+    "inverse_normal",
+    "orthonormal",
+    "partialled_out",
+]
+
+_UNIDENTIFIABLE = 1e-12
 
 
 def explained_ss(inner: Array, products: Array, least: float) -> float:
@@ -62,3 +70,23 @@ def orthonormal(columns: Array, most: int | None = None) -> Array:
 def partialled_out(columns: Array, vector: Array) -> Array:
     """Residual of a vector after its projection on columns, shape (n_rows,)."""
     return np.asarray(vector - columns @ np.linalg.lstsq(columns, vector)[0])
+
+
+def inverse_normal(columns: Array) -> Array:
+    """Pseudo-inverse of the normal matrix: the covariance of unknowns with whitened derivatives.
+
+    Parameters
+    ----------
+    columns
+        Shape (n_rows, k), in units of any size.
+
+    Returns
+    -------
+    ndarray of shape (k, k)
+        Zero along columns of zeros and along directions that the rows do not determine.
+    """
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    scaled = columns / np.where(size > 0.0, size, 1.0)
+    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=_UNIDENTIFIABLE, hermitian=True)
+    outer = np.outer(size, size)
+    return np.asarray(np.divide(inverse, outer, out=np.zeros_like(outer), where=outer > 0.0))

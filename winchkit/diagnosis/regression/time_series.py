@@ -108,20 +108,36 @@ class TimeSeriesRegression(Regression):
         for segment in self.segments:
             bands = self.band_of_row[segment.rows]
             np.add.at(count, bands, 1.0)
-            step = self.dataset.resolution.get(segment.output, 0.0)
-            if not step:
+            found = self.rounding_error(segment)
+            if found is None:
                 continue
-            recording = self.dataset.recordings[segment.run]
-            measured = recording.measured[segment.output]
-            predicted = recording.nominal_smooth[segment.output]
-            after = min(local_noise(measured), local_noise(measured - predicted))
-            shared, white = mean_error(predicted, step, noise_before_rounding(after, step))
-            own = white * float(np.mean(recording.valid[segment.output])) * segment.band.gain**2
-            for component in shared:
-                squares = self._masked(segment, component) ** 2
-                own = own + repeats.get(segment.run, 1) * squares
+            shared, white = found
+            valid = self.dataset.recordings[segment.run].valid[segment.output]
+            own = white * float(np.mean(valid)) * segment.band.gain**2
+            own = own + repeats.get(segment.run, 1) * np.sum(shared**2, axis=0)
             np.add.at(power, bands, own / self.dataset.decimation_factor)
         return power / np.maximum(count, 1.0)
+
+    def rounding_error(self, segment: Segment) -> tuple[Array, float] | None:
+        """Rounding error of a segment; None where its instrument has no known resolution.
+
+        Returns
+        -------
+        components : ndarray of shape (2 × harmonics, n_rows of the segment)
+            Cosine, then sine components of the harmonics of its mean, see
+            :func:`~winchkit.diagnosis.data.rounding.mean_error`.
+        white : float
+            Variance of the rest in time.
+        """
+        step = self.dataset.resolution.get(segment.output, 0.0)
+        if not step:
+            return None
+        recording = self.dataset.recordings[segment.run]
+        measured = recording.measured[segment.output]
+        predicted = recording.nominal_smooth[segment.output]
+        after = min(local_noise(measured), local_noise(measured - predicted))
+        shared, white = mean_error(predicted, step, noise_before_rounding(after, step))
+        return np.array([self._masked(segment, component) for component in shared]), white
 
     @property
     def n_observations(self) -> int:

@@ -22,6 +22,7 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
 from winchkit.diagnosis.selection.pairs import Pair, screened_pairs
 from winchkit.diagnosis.selection.scores import Projected, Score, score, zero_score
@@ -468,8 +469,7 @@ class SelectionEngine(ABC):
         series = [i for i, term in enumerate(hypothesis.terms) if term.effect.single is not None]
         if not series:
             return fitted
-        whitened = whitened_jacobian(self.regression, fitted, noise)
-        covariance = np.linalg.pinv(whitened.T @ whitened, hermitian=True)
+        covariance = inverse_normal(whitened_jacobian(self.regression, fitted, noise))
         dropped = False
         for index in series:
             term = hypothesis.terms[index]

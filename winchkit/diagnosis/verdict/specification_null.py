@@ -133,6 +133,7 @@ class _Design:
             for band in uncertain
         }
         out, known = np.zeros((n_columns, _DRAWS)), np.zeros((n_columns, n_columns))
+        rounding: dict[str, Array] = {}
         rows_of = {s.rows.start: s for s in self._regression.segments}
         segment, columns = self._regression.segments[0], np.zeros((0, n_columns))
         for band, rows in pieces(self._regression):
@@ -140,6 +141,7 @@ class _Design:
                 segment = rows_of[rows.start]
                 columns = self._columns(segment)
                 columns -= self._partial.explained[segment.rows] @ self._through
+                self._add_rounding(rounding, segment, columns)
             own = columns[rows.start - segment.rows.start : rows.stop - segment.rows.start]
             if band in factor:
                 drawn = random.standard_normal((len(own), _DRAWS)) * factor[band]
@@ -149,7 +151,20 @@ class _Design:
         values, vectors = np.linalg.eigh(known)
         # Symmetric root: the draws do not depend on the signs of the eigenvectors.
         root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-        return np.asarray(out + root @ random.standard_normal((n_columns, _DRAWS)))
+        out += root @ random.standard_normal((n_columns, _DRAWS))
+        for products in rounding.values():
+            zero = 2 * np.pi * random.random(_DRAWS)
+            turned = np.outer(np.arange(1, products.shape[1] // 2 + 1), zero)
+            out += products @ np.concatenate([np.sin(turned), np.cos(turned)])
+        return np.asarray(out)
+
+    def _add_rounding(self, products: dict[str, Array], segment: Segment, columns: Array) -> None:
+        """Add a segment's inner products of columns and mean rounding error to its output's."""
+        found = self._regression.rounding_error(segment)
+        if found is not None:
+            components = found[0] * self._partial.inverse_sigma[segment.rows]
+            own = columns.T @ components.T
+            products[segment.output] = products.get(segment.output, 0.0) + own
 
     def _columns(self, segment: Segment) -> Array:
         """Whitened columns of one segment, (rows, columns)."""

@@ -1,0 +1,85 @@
+"""Effects of a final model that are significant beside the others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.diagnose import selection_engine
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import Spread, spread_of
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.verdict.significance import excess_evidence, variance_inflation
+from winchkit.effects.term import Term
+
+DRAG = term("motor-coulomb", torque=0.02)
+
+
+def engine_of(hidden: tuple[Term, ...]) -> TimeSeriesSelection:
+    ride = Ride(samples=400)
+    runs = [
+        made(10 * load + repeat, GROOVED, hidden, load_mass=10.0 * load, ride=ride)
+        for load in (1, 2)
+        for repeat in range(2)
+    ]
+    return selection_engine(prepare(runs, GROOVED), CATALOGUE)
+
+
+def fitted_with(
+    engine: TimeSeriesSelection, terms: tuple[Term, ...], widening: float | None = None
+) -> tuple[Fit, Noise, Spread]:
+    """Fit of some terms; ``widening`` in place of that of their intervals."""
+    hypothesis = engine.initial_model
+    for one in terms:
+        hypothesis = hypothesis.with_term(one, engine.regression.n_runs)
+    final, noise = engine.fit_with_noise(hypothesis)
+    spread = spread_of(engine.regression, final, noise, engine.regression.blocks)
+    if widening is not None:
+        spread = replace(spread, widening=np.full(len(final.vector), widening))
+    return final, noise, spread
+
+
+def test_an_effect_that_is_there_is_significant_and_one_that_is_not_is_not() -> None:
+    engine = engine_of((DRAG,))
+    fitted = fitted_with(engine, (DRAG, term("gear-ratio", ratio_error=1e-7)))
+    drag, ratio = (excess_evidence(engine, *fitted, index, threshold=5.0) for index in range(2))
+    assert drag > 0.0 > ratio
+
+
+def test_evidence_is_the_decrease_of_chi_square_beyond_penalty_and_threshold() -> None:
+    engine = engine_of((DRAG,))
+    final, noise, spread = fitted_with(engine, (DRAG,), 1.0)
+    without = engine.refit(final.hypothesis.without(0), noise)
+    decrease, penalty = without.chi_square - final.chi_square, np.log(engine.regression.n_rows)
+    found = excess_evidence(engine, final, noise, spread, 0, threshold=5.0)
+    assert found == pytest.approx(decrease - penalty - 5.0)
+    # Intervals that are as many times longer take the evidence away.
+    wider = replace(spread, widening=spread.widening * np.sqrt(decrease / (penalty + 5.0)))
+    assert excess_evidence(engine, final, noise, wider, 0, threshold=5.0) == pytest.approx(
+        0.0, abs=1e-6
+    )
+
+
+def test_the_variance_of_one_amplitude_is_that_of_its_interval() -> None:
+    engine = engine_of((DRAG,))
+    final, noise, spread = fitted_with(engine, (DRAG,))
+    index = engine.regression.nuisance_columns.shape[1]
+    inflation = variance_inflation(engine.regression, final, noise, spread, 0)
+    assert inflation == pytest.approx(float(spread.widening[index]) ** 2)
+    assert inflation > 1.0
+
+
+def test_amplitudes_are_judged_together() -> None:
+    """Of a line far from its zero neither offset nor slope is determined, but their sum is."""
+    line = term("spring-balancer", stiffness=0.0, torque=0.02)
+    engine = engine_of((line,))
+    final, noise, spread = fitted_with(engine, (line,), 3.0)
+    assert variance_inflation(engine.regression, final, noise, spread, 0) == pytest.approx(9.0)
+    undetermined = replace(spread, widening=np.full(len(final.vector), np.inf))
+    assert variance_inflation(engine.regression, final, noise, undetermined, 0) == np.inf
+    assert excess_evidence(engine, final, noise, undetermined, 0, threshold=0.0) < 0.0

@@ -1,0 +1,170 @@
+"""Significance of every effect of a final model beside the others: quasi-likelihood ratio.
+
+Effects are added one at a time where their score exceeds the level of the largest score under noise
+alone. An effect that was added early must exceed the same threshold beside those that followed. The
+noise variance of the rows is not enough for that: blocks of time vary, parts of the data contradict
+each other, the motion is sampled. The decrease of χ² is therefore divided by the ratio of the
+variance that the intervals have to that of the likelihood.
+
+References
+----------
+Rao, J. N. K., Scott, A. J. (1984). On chi-squared tests for multiway contingency tables with cell
+proportions estimated from survey data. Ann. Statist. 12, 46-60.
+Kent, J. T. (1982). Robust properties of likelihood ratio tests. Biometrika 69, 19-27.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import Spread, spread_of, whitened_jacobian
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import inverse_normal
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.stepwise import SelectionResult
+from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
+from winchkit.effects.parametrization import Coordinates
+
+__all__ = ["excess_evidence", "insignificant_addition", "variance_inflation"]
+
+_UNIDENTIFIABLE = 1e-9
+
+
+def insignificant_addition(
+    engine: SelectionEngine,
+    result: SelectionResult,
+    spread: Spread,
+    sets: Sequence[EquivalenceSet],
+) -> int | None:
+    """The weakest addition beside others of whose set no member is significant.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    result
+        Result of a selection.
+    spread
+        Uncertainty of the unknowns of its final model.
+    sets
+        Equivalence set of every addition.
+
+    Returns
+    -------
+    int or None
+        Its index in the final model; None where all are significant, and for a single addition.
+    """
+    final, noise, first = result.final, result.noise, engine.n_initial_terms
+    if len(sets) < 2:
+        return None
+    excess = [
+        excess_evidence(engine, final, noise, spread, first + place, threshold=result.threshold)
+        for place in range(len(sets))
+    ]
+    for place in np.argsort(excess).tolist():
+        if excess[place] > 0.0:
+            break
+        if not any(
+            _last_is_significant(engine, rival, noise, result.threshold)
+            for rival in sets[place].fits
+            if rival is not final
+        ):
+            return first + int(place)
+    return None
+
+
+def _last_is_significant(
+    engine: SelectionEngine, rival: Fit, noise: Noise, threshold: float
+) -> bool:
+    """Whether the rival of an addition is, the last effect of its fit."""
+    last = len(rival.hypothesis.terms) - 1
+    spread = spread_of(engine.regression, rival, noise, engine.regression.blocks)
+    return excess_evidence(engine, rival, noise, spread, last, threshold=threshold) > 0.0
+
+
+def excess_evidence(
+    engine: SelectionEngine,
+    fitted: Fit,
+    noise: Noise,
+    spread: Spread,
+    index: int,
+    *,
+    threshold: float,
+) -> float:
+    """Evidence of an effect beside the others beyond a threshold.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    fitted
+        Fitted model.
+    noise
+        Noise variance.
+    spread
+        Uncertainty of the unknowns.
+    index
+        Of the effect in the hypothesis.
+    threshold
+        Score that noise alone exceeds in 1 % of cases.
+
+    Returns
+    -------
+    float
+        Decrease of χ² by the effect, the others refitted, over its variance inflation, less the
+        penalty of its parameters and the threshold.
+    """
+    without = fitted.hypothesis.without(index)
+    penalty = engine.penalty(fitted.hypothesis) - engine.penalty(without)
+    decrease = engine.refit(without, noise).chi_square - fitted.chi_square
+    inflation = variance_inflation(engine.regression, fitted, noise, spread, index)
+    return decrease / inflation - penalty - threshold
+
+
+def variance_inflation(
+    regression: Regression, fit: Fit, noise: Noise, spread: Spread, index: int
+) -> float:
+    """Variance of an effect's size over that of the likelihood.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    noise
+        Noise variance.
+    spread
+        Uncertainty of the unknowns.
+    index
+        Of the effect in the hypothesis.
+
+    Returns
+    -------
+    float
+        Infinite where the runs do not determine the effect; one where its size is not fitted.
+
+    Notes
+    -----
+    Ratio of two Wald statistics zᵀR⁻¹z of the amplitudes' distances z from their null, in standard
+    deviations of the likelihood and in those of the intervals; R are the
+    correlations of the linearised fit. For one amplitude it is the squared widening; of several
+    amplitudes it is the inflation of the combination that the fit found.
+    """
+    amplitudes = Coordinates(fit.hypothesis.terms[index].effect).amplitudes
+    own = np.flatnonzero(regression.unknowns_of(index, fit.hypothesis))[: len(amplitudes)]
+    if not own.size:
+        return 1.0
+    covariance = inverse_normal(whitened_jacobian(regression, fit, noise))[np.ix_(own, own)]
+    length = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    inverse = np.linalg.pinv(
+        covariance / np.outer(length, length), rcond=_UNIDENTIFIABLE, hermitian=True
+    )
+    z = fit.vector[own] / length
+    widened = z / spread.widening[own]
+    wald = float(widened @ inverse @ widened)
+    return float(z @ inverse @ z) / wald if wald > 0.0 else float("inf")
