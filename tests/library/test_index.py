@@ -80,6 +80,40 @@ def test_a_row_has_the_facts_of_its_run(library: Path) -> None:
     assert (library / FOLDER / "runs" / "w2" / "2026-04.parquet").exists()
 
 
+@pytest.mark.parametrize(
+    ("path", "metadata", "time", "source"),
+    [
+        ("w/x.csv", {"source Date": "2026-03-01 14:30:05"}, "2026-03-01T14:30:05", "metadata"),
+        ("w/x.csv", {"date": "2026-03-01", "time": "9:30"}, "2026-03-01T09:30:00", "metadata"),
+        (
+            "w/x.csv",
+            {"source Date": "1.3.2026", "source Time": "14:30:05"},
+            "2026-03-01T14:30:05",
+            "metadata",
+        ),
+        ("w/trip-20260301-143005.csv", {}, "2026-03-01T14:30:05", "path"),
+        ("w/2026-03-01_1430.csv", {}, "2026-03-01T14:30:00", "path"),
+        ("w/2026-03-01/x.csv", {}, "2026-03-01T00:00:00", "path"),
+        ("w/20269901-12.csv", {}, None, "file"),
+        ("w/x.csv", {"source Date": "03/01/2026"}, None, "file"),
+    ],
+)
+def test_the_time_of_a_run_is_that_of_its_file_or_path(
+    tmp_path: Path, path: str, metadata: dict[str, str], time: str | None, source: str
+) -> None:
+    put(tmp_path, path, **metadata)
+    index_library(tmp_path)
+    (row,) = library_runs(tmp_path).to_pylist()
+    assert row["time_source"] == source
+    assert time is None or row["time"].isoformat() == f"{time}+00:00"
+
+
+def test_an_imported_run_with_the_name_of_its_source_stays_in_the_index(tmp_path: Path) -> None:
+    put(tmp_path, "imported/log.csv", imported_from="log.csv")
+    assert index_library(tmp_path).indexed == ("imported/log.csv",)
+    assert paths(tmp_path) == ["imported/log.csv"]
+
+
 def test_nothing_is_read_twice_and_a_changed_file_is_read_again(library: Path) -> None:
     assert len(index_library(library).indexed) == 3
     assert index_library(library) == IndexReport((), 3, ())

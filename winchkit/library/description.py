@@ -26,7 +26,17 @@ __all__ = ["ProfileOfRuns", "described", "library_winch", "session_of"]
 _DATE = re.compile(r"\d{4}\D?\d{2}(\D?\d{2})?\b.*")
 """Name of a folder that begins with a date: a session, and no winch."""
 _STARTS = ("start_time", "started", "begun", "date")
-"""Metadata with the time of the first sample, ISO 8601."""
+"""Metadata with the time of the first sample, ISO 8601; of another program's file with the prefix
+``source``, in any case."""
+_SOURCE = "source "
+_DAY_FIRST = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})(.*)")
+"""A date with points has its day first; one with slashes is ambiguous and not used."""
+_CLOCK = re.compile(r"\d{1,2}:\d{2}(:\d{2}(\.\d+)?)?")
+_IN_A_NAME = re.compile(
+    r"(?<!\d)((?:19|20)\d{2})([-_]?)(\d{2})\2(\d{2})"
+    r"(?:[T _-]?(\d{2})[-_:h]?(\d{2})(?:[-_:m]?(\d{2}))?)?(?!\d)"
+)
+"""Date, with or without a time, in the name of a file or folder: ``trip-20260301-143005``."""
 
 
 @dataclass(frozen=True)
@@ -164,20 +174,46 @@ def _mean(run: Run, channel: str) -> float | None:
 
 
 def _time(texts: dict[str, str], info: LogInfo | None, file: RunFile) -> tuple[datetime, str]:
-    for key in _STARTS:
-        try:
-            found = datetime.fromisoformat(texts.get(key, ""))
-        except ValueError:
-            continue
-        return found.replace(tzinfo=found.tzinfo or UTC).astimezone(UTC), "metadata"
+    """Time of the first sample (UTC), and where it is from."""
+    if (found := _in_metadata(texts)) is not None:
+        return found, "metadata"
     if info is not None and info.begun is not None:
         return datetime.fromisoformat(info.begun), "clock"
     for name in reversed(PurePosixPath(file.path).parts):
+        if (found := _in_name(name)) is not None:
+            return found, "path"
+    return _changed(file), "file"
+
+
+def _in_metadata(texts: dict[str, str]) -> datetime | None:
+    known = {key.removeprefix(_SOURCE).casefold(): text for key, text in texts.items()}
+    for key in _STARTS:
+        text = _DAY_FIRST.sub(_year_first, known.get(key, "").strip())
+        clock = known.get("time", "").strip()
+        if len(text) == len("2026-03-01") and _CLOCK.fullmatch(clock):
+            hours, _, rest = clock.partition(":")
+            text = f"{text}T{int(hours):02d}:{rest}"
         try:
-            return datetime.fromisoformat(name[:10]).replace(tzinfo=UTC), "path"
+            found = datetime.fromisoformat(text)
         except ValueError:
             continue
-    return _changed(file), "file"
+        return found.replace(tzinfo=found.tzinfo or UTC).astimezone(UTC)
+    return None
+
+
+def _year_first(found: re.Match[str]) -> str:
+    day, month, year, rest = found.groups()
+    return f"{year}-{int(month):02d}-{int(day):02d}{rest}"
+
+
+def _in_name(name: str) -> datetime | None:
+    for found in _IN_A_NAME.finditer(name):
+        year, month, day, hour, minute, second = (int(found[k] or 0) for k in (1, 3, 4, 5, 6, 7))
+        try:
+            return datetime(year, month, day, hour, minute, second, tzinfo=UTC)
+        except ValueError:
+            continue
+    return None
 
 
 def _changed(file: RunFile) -> datetime:

@@ -223,7 +223,12 @@ class _Indexing:
             for _, row in placed
             if row["imported_from"] and row["mapping"] is None
         }
-        extra = [(place, row) for place, row in placed if row["path"] in sources]
+        # An imported run is no source, also where it has the name of its own source elsewhere.
+        extra = [
+            (place, row)
+            for place, row in placed
+            if row["path"] in sources and not (row["imported_from"] and row["mapping"] is None)
+        ]
         if not extra:
             return report
         paths = {row["path"] for _, row in extra}

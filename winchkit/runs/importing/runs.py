@@ -76,7 +76,7 @@ def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
     """
     table = guess.table
     own = {
-        key if key in _OWN else f"source {_one_line(key)}": _one_line(value)
+        key if key in _OWN else f"source {_one_line(key.replace(':', ' '))}": _one_line(value)
         for key, value in islice(table.metadata.items(), _MOST)
         if value
     }
@@ -89,7 +89,7 @@ def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
 
 
 def _one_line(text: str) -> str:
-    return " ".join(text.replace(":", " ").split())[:_LONGEST]
+    return " ".join(text.split())[:_LONGEST]
 
 
 def has_angle(streams: Streams) -> bool:

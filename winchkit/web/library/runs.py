@@ -167,13 +167,20 @@ def _json(name: str, row: Row, found: Judgement | None) -> dict[str, Any]:
         "session": row["session"],
         "programme": row["programme"] or "",
         "load": None if row["load_mass"] is None else f"{row['load_mass']:.4g} kg",
-        "date": row["time"].isoformat(timespec="minutes"),
+        "date": _date(row),
         "seconds": row["duration"],
         "samples": row["samples"],
         "channels": row["channels"],
         "sanity": row["sanity"],
         "verdict": None if found is None else found.to_json(),
     }
+
+
+def _date(row: Row) -> str:
+    """Time of a run; a date alone where the file, or its path, has no time of day."""
+    time = row["time"]
+    is_day = row["time_source"] in {"metadata", "path"} and time.time() == time.min.time()
+    return str(time.date().isoformat() if is_day else time.isoformat(timespec="minutes"))
 
 
 def _line(name: str, unit: str, x: Array, y: Array) -> dict[str, Any]:
