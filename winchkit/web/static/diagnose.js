@@ -8,9 +8,9 @@ import { both, drawSides } from "./sides.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
 // The output that the ladder proposes has the focus until another is chosen, and after an addition.
-let view = null, root = null, shown = { effect: null, output: null, chosen: false }, brushed = null, panels = [], cards = {}, span = null, earlier = null, drawnCurve = null;
+let view = null, root = null, shown = { effect: null, output: null, chosen: false }, brushed = null, panels = [], waiting = [], cards = {}, span = null, earlier = null, drawnCurve = null;
 
-export function enter(main, state) { root = main; shown = { effect: null, output: null, chosen: false }; brushed = null; update(state); }
+export function enter(main, state) { root = main; shown = { effect: null, output: null, chosen: false }; brushed = null; waiting = []; update(state); }
 
 export function update(state) {
   const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, state.beside, !state.diagnosis && Boolean(state.busy)]);
@@ -187,7 +187,7 @@ function drawLadder() {
 
 function focusOfSides(output) { shown.output = output; shown.chosen = true; address(); render(); }
 matchMedia("(max-width: 699px)").addEventListener("change", () => { if (root && root.querySelector("#ladder")) drawLadder(); });
-function focus(output) { shown.output = output; shown.chosen = true; span = null; brushed = null; address(); drawLadder(); drawTime(); drawMultiples(); }
+function focus(output) { shown.output = output; shown.chosen = true; span = null; brushed = null; waiting = []; address(); drawLadder(); drawTime(); drawMultiples(); }
 function choose(effect) { shown.effect = effect; address(); drawLadder(); drawCard(); }
 function address() { history.replaceState(null, "", `${location.pathname}${location.search}#diagnose/${shown.output || ""}/${shown.effect || ""}`); }
 export function restore(parts) { if (parts[0]) { shown.output = parts[0]; shown.chosen = true; } if (parts[1]) shown.effect = parts[1]; }
@@ -298,15 +298,29 @@ function brush(found, panel, low, high) {
   panel.x.forEach((x, i) => { if (x !== null && x >= low && x <= high) marked.add(i); });
   const order = [...marked].sort((a, b) => found.time[a] - found.time[b]);
   brushed = marked.size ? { time: order.map((i) => found.time[i]), residual: order.map((i) => found.residual[i]) } : null;
-  for (const { drawn, index, data } of panels) drawn.setData([data[0], data[1], index.map((i) => (marked.has(i) ? found.residual[i] : null))], false);
-  for (const { drawn } of panels) drawn.redraw();
+  const first = panels.findIndex((_, i) => found.panels[i] === panel), marks = ({ drawn, index, data }) => () => {
+    drawn.setData([data[0], data[1], index.map((i) => (marked.has(i) ? found.residual[i] : null))], false);
+    drawn.redraw();
+  };
+  oneByOne([...panels.slice(first), ...panels.slice(0, first)].map(marks).concat(drawTime));
   fill(root.querySelector("#brush"), `${marked.size} of ${found.time.length} samples, ${panel.name} ${number(low, 3)} to ${number(high, 3)} ${unitOf(panel.label)} `, el("button", { class: "plain", onclick: clear }, "Clear"));
-  drawTime();
+}
+
+// One drawing in each frame of the browser, so that the pointer never waits for all of them; what a
+// newer brush replaces is not drawn.
+function oneByOne(drawings) {
+  waiting = drawings;
+  const next = () => {
+    if (waiting !== drawings) return;
+    drawings.shift()();
+    if (drawings.length) requestAnimationFrame(next);
+  };
+  next();
 }
 
 export function clear() {
   if (!brushed) return false;
-  brushed = null;
+  brushed = null; waiting = [];
   drawMultiples(); drawTime();
   return true;
 }
