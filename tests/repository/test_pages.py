@@ -45,6 +45,7 @@ RECORDINGS = {
     "docs/tutorial/emps.md": "emps",
     "docs/tutorial/known-effect.md": "emps",
     "docs/tutorial/cogging.md": "odrive-cogging",
+    "docs/tutorial/lifting.md": "odrive-lifting",
 }
 """Pages that use recordings of others, and which."""
 

@@ -98,6 +98,7 @@ def entry_of(guess: Guess) -> dict[str, Any]:
         "rows": max((len(column) for column in table.columns), default=0),
         "interval": table.interval,
         "sample_rate": guess.sample_rate,
+        "axis": guess.axis or None,
         "metadata": table.metadata,
         "constants": table.constants,
         "columns": [
