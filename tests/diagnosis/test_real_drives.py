@@ -104,6 +104,6 @@ def test_a_joint_at_two_speeds_has_presliding() -> None:
     assert found.verdict == "partly"
     (friction,) = found.steps
     assert friction.effects == ("motor-dahl",)
-    (offered,) = (note for note in found.notes if "holds zero" in note)
+    (offered,) = (note for note in found.notes if "not significant" in note)
     assert "joint-gravity" in offered
     assert any("curve of the motor torque over the speed" in note for note in found.notes)
