@@ -10,6 +10,7 @@ import pytest
 HEAVY = ("asammdf", "pandas", "canmatrix", "openpyxl")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "module", ["winchkit.drivers.can.bus.bus", "winchkit.sim.live.bench", "winchkit.bench.open"]
 )

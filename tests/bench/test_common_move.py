@@ -48,6 +48,7 @@ def first(values: list[float]) -> int:
     return next(n for n, value in enumerate(values) if value)
 
 
+@pytest.mark.slow
 @settings(max_examples=12, deadline=None)
 @given(
     lengths=st.lists(st.one_of(st.floats(1.0, 3.9), st.floats(4.1, 7.0)), min_size=2, max_size=4),

@@ -76,6 +76,7 @@ def nodes_at_first(cycles: list[dict[int, tuple[int, int]]], word: int) -> set[i
     return set()
 
 
+@pytest.mark.slow
 def test_they_are_enabled_start_and_stop_within_one_sync(live: LiveBench, bench: Bench) -> None:
     everybody = set(range(1, len(NAMES) + 1))
     targets = {name: 3.9 + 0.02 * n for n, name in enumerate(NAMES)}

@@ -30,6 +30,7 @@ def wrapping(folder: Path) -> Path:
     return home
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("way", "sign"), [(0.15, 1), (-0.15, -1)])
 def test_the_cable_length_goes_on_where_the_counter_wraps(
     tmp_path: Path, way: float, sign: int
@@ -78,6 +79,7 @@ def test_a_move_past_the_end_of_the_counter_is_refused_before_it_begins(tmp_path
         assert abs(slave.motor.angle - begun) > 30.0
 
 
+@pytest.mark.slow
 def test_a_length_that_is_not_known_is_reported_and_no_move_goes_by_it(tmp_path: Path) -> None:
     """Nothing is heard of the drive for longer than its counter of 16 turns takes to wrap."""
     slave = Slave.from_file(GENERIC, 1, declared=Declared(counter_bits=20))

@@ -30,6 +30,7 @@ def ended(runs: list[Run]) -> tuple[WinchAnswer, list[tuple[str, float]]]:
     return answer, told
 
 
+@pytest.mark.slow
 def test_the_bar_moves_with_every_candidate_and_never_back(
     ended: tuple[WinchAnswer, list[tuple[str, float]]],
 ) -> None:

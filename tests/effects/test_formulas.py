@@ -347,6 +347,7 @@ def test_every_effect_is_tested_here() -> None:
     assert set(IDS) == set(CASES) | OWN_TESTS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect_id", CASES)
 def test_effect_agrees_with_its_closed_form(effect_id: str) -> None:
     values, closed_form = CASES[effect_id]

@@ -75,6 +75,7 @@ def followed(term: Term, signals: Signals, **given: np.ndarray) -> list[RopeStat
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("effect", ON_LENGTH, ids=lambda e: e.id)
 def test_the_length_is_that_of_the_whole_run(effect: Effect) -> None:
     signals, term = run(), term_of(effect)

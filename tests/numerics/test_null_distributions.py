@@ -138,6 +138,7 @@ class TestSignedRanks:
             wanted = stats.wilcoxon(change, alternative="greater", method="asymptotic").pvalue
             assert signed_rank_p_value(before, before - change) == pytest.approx(wanted, rel=1e-9)
 
+    @pytest.mark.slow
     def test_changes_about_zero_are_accepted_as_often_as_the_level(self) -> None:
         random, cases = np.random.default_rng(6), 1500
         before, p_values = np.full(48, 1000.0), []

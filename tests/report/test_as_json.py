@@ -47,6 +47,7 @@ def test_the_curve_of_the_rest_has_its_five_corners() -> None:
     assert int(np.argmax(spectrum[1:])) + 1 == 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", ["demo-elastic-rope", UNKNOWN, "demo-adequate"])
 def test_text_and_json_report_the_same(bench: str) -> None:
     answer = answer_of(bench)

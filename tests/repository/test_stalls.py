@@ -36,6 +36,7 @@ print(watch.largest)
 """
 
 
+@pytest.mark.slow
 def test_a_thread_that_waits_for_the_processor_shows() -> None:
     """A process of the lowest class on one processor, beside busy ones."""
     script = STARVED.format(tests=str(SUPPORT), busy=2)

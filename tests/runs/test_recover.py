@@ -21,6 +21,7 @@ def data(tmp_path: Path) -> bytes:
     return (tmp_path / "a.mcap").read_bytes()
 
 
+@pytest.mark.slow
 def test_recover_never_fails_on_a_cut_log(tmp_path: Path, data: bytes) -> None:
     path, saved = tmp_path / "cut.mcap", tmp_path / "saved.mcap"
     kept = 0

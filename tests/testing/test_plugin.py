@@ -139,6 +139,7 @@ def test_a_wire_that_cannot_be_is_refused(sim: OpenedBench) -> None:
         sim.drive_fault("A", "fire")
 
 
+@pytest.mark.slow
 def test_a_frozen_and_a_silent_cell(sim: OpenedBench) -> None:
     cell = sim.bench.winch["A"].sensors["cell"]
     sim.freeze_cell("A")
@@ -155,6 +156,7 @@ def test_a_frozen_and_a_silent_cell(sim: OpenedBench) -> None:
         sim.bench.winch["A"].jog(wind_in=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["lose_heartbeat", "reboot", "drive_fault"])
 def test_faults_of_the_drive_trip_the_bench(sim: OpenedBench, kind: str) -> None:
     expected = {"lose_heartbeat": "heartbeat", "reboot": "boot-up", "drive_fault": "fault"}[kind]

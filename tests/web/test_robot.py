@@ -90,6 +90,7 @@ def test_the_forces_of_a_picture_hold_the_platform(client: TestClient, calibrate
     assert np.all(np.array(seen["anchors"]) <= high + 1e-9)
 
 
+@pytest.mark.slow
 def test_a_slice_is_feasible_in_the_middle_and_not_at_the_frame(
     client: TestClient, calibrated: Any
 ) -> None:

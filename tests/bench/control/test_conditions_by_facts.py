@@ -100,6 +100,7 @@ def _unmarked(row: Condition) -> Condition:
     return replace(row, by_facts=False, when="", holds=holds)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_the_verdict_is_that_of_every_row_in_every_cycle(seed: int) -> None:
     """The same rows with none marked are tested in every cycle."""

@@ -42,6 +42,7 @@ def test_a_freeze_at_rest_is_seen_by_the_noise(name: str) -> None:
     assert 0.5 * soonest < seen["worst_seen"] < 3 * soonest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["quiet", "white 0.1", "white 0.3", "bursts"])
 def test_a_quiet_cell_at_rest_never_trips(name: str) -> None:
     """Ten minutes at rest, the zero moving through the step; then nothing moves at all."""

@@ -142,6 +142,7 @@ INPUTS = st.fixed_dictionaries(
 ).map(lambda fields: WinchInput(**fields))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("own", BENCHES, ids=("all limits", "speed only"))
 @settings(max_examples=100, deadline=None)
 @given(cycles=st.lists(st.tuples(INPUTS, st.integers(1, 30)), min_size=1, max_size=6))

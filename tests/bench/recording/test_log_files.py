@@ -187,6 +187,7 @@ recorder.close()
 """
 
 
+@pytest.mark.slow
 @SUFFIXES
 def test_of_processes_that_begin_at_once_exactly_one_logs(tmp_path: Path, suffix: str) -> None:
     """Half of them in parts, all of them with leave to replace."""

@@ -41,6 +41,7 @@ def errors(platform: Platform, snapshots: list[BenchSnapshot], start: Array, end
     return np.asarray(np.linalg.norm(off - np.outer(off @ along, along), axis=1))
 
 
+@pytest.mark.slow
 def test_the_platform_goes_to_a_pose_on_a_line(bench: Bench) -> None:
     platform = bench.robot
     start = platform.pose

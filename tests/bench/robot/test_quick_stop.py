@@ -45,6 +45,7 @@ def ramps(bench: Bench) -> np.ndarray:
     return np.array(out)
 
 
+@pytest.mark.slow
 def test_all_cables_of_a_platform_stop_in_the_same_time(slowing: Bench) -> None:
     platform = slowing.robot
     assert ramps(slowing) == pytest.approx(np.full(8, DECELERATION), rel=0.01), "declared"

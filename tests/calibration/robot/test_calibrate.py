@@ -176,6 +176,7 @@ def test_any_mix_of_missing_values_is_no_obstacle() -> None:
     assert rms(found.validation_after.distance) < 3e-5
 
 
+@pytest.mark.slow
 def test_outliers_cost_a_robust_fit_little() -> None:
     fit = measured(csv(rows()))
     position = fit.position.copy()

@@ -120,6 +120,7 @@ def stretched(found: tuple[Row, ...], stiffness: float) -> list[Row]:
     return out
 
 
+@pytest.mark.slow
 def test_elasticity_is_found_without_cells_by_computed_forces() -> None:
     fit = measured(csv(stretched(rows(), 2e4)))
     judged = measured(csv(stretched(rows(20, 99, noise=EXACT), 2e4)))

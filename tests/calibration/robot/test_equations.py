@@ -50,6 +50,7 @@ def residuals(made: Equations, state: State) -> dict[str, Array]:
     return {rows.kind: rows.residual for rows in made.rows(state)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effects",
     [

@@ -27,6 +27,7 @@ def bench(running: Served) -> Served:
     return without_trip(running)
 
 
+@pytest.mark.slow
 def test_move_to_and_by(bench: Served) -> None:
     before = length(bench, "B")
     done = invoke("move", "A", "--to", "3.8 m", "--speed", "0.4 m/s", "-b", bench.file, "--json")
@@ -100,6 +101,7 @@ def test_signed_options_are_gone(bench: Served, option: str) -> None:
         assert "No such option" in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["jog", "move"])
 @pytest.mark.parametrize(("option", "sign"), [("--pay-out", 1), ("--wind-in", -1)])
 def test_jog_and_move_agree_on_each_direction(

@@ -65,6 +65,7 @@ def test_a_signal_that_is_ignored_from_outside_stays_ignored() -> None:
     assert (done.returncode, done.stdout) == (0, "stopped\n"), done.stderr
 
 
+@pytest.mark.slow
 def test_a_library_installs_no_handler() -> None:
     done = run(
         "import signal, winchkit\n"

@@ -131,6 +131,7 @@ def test_check_of_a_file_of_no_kind(tmp_path: Path, name: str) -> None:
     assert "is none of .toml, .eds, .dcf, .csv, .mcap" in result.stderr
 
 
+@pytest.mark.slow
 def test_everything_that_ships_is_without_fault() -> None:
     files = [
         path

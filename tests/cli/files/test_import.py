@@ -209,6 +209,7 @@ def test_check_reads_a_mapping_with_every_fault(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path: Path) -> None:
     path = log(tmp_path / "log.csv", HEAD.replace("force", "\x1b[2Jforce"))
     done = subprocess.run(
@@ -240,6 +241,7 @@ def test_invalid_options_are_refused_in_words(
     assert text in result.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are of POSIX")
 def test_on_a_terminal_it_asks_and_writes(tmp_path: Path) -> None:
     layout = next(item for item in LAYOUTS if item.name == "epos-studio")
@@ -258,6 +260,7 @@ def test_on_a_terminal_it_asks_and_writes(tmp_path: Path) -> None:
     assert run["motor_torque"] == pytest.approx(motion().torque, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are of POSIX")
 def test_on_a_terminal_an_assumed_unit_is_confirmed(tmp_path: Path) -> None:
     path = log(tmp_path / "log.csv", "t,q,dq [rpm],tau,force [N]")

@@ -68,6 +68,7 @@ def test_the_page_is_written_into_a_new_folder(written: Written, runs: list[str]
     assert " ".join(runs) in page.text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_page_that_cannot_be_written_costs_no_answer(
     command: str, runs: list[str], tmp_path: Path

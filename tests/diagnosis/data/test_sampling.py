@@ -128,6 +128,7 @@ def test_a_fit_on_uneven_samples_is_not_biased(fine: list[Run]) -> None:
     assert coulomb([uneven(run, k) for k, run in enumerate(fine)]) == pytest.approx(0.05, rel=0.008)
 
 
+@pytest.mark.slow
 def test_stamps_that_jitter_change_no_value(fine: list[Run]) -> None:
     even = [picked(run, np.arange(0, len(run), 10)) for run in fine]
     random = np.random.default_rng(8)

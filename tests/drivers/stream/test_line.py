@@ -57,6 +57,7 @@ def test_every_device_gives_the_truth_at_the_moment_it_names(name: str) -> None:
     assert (counters.timeouts, counters.crc, counters.malformed, counters.late) == (0, 0, 0, 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEVICES)
 def test_silence_is_a_problem_and_ends_by_itself(name: str) -> None:
     rig = Rig(device(name))

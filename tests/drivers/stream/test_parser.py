@@ -72,6 +72,7 @@ def traffic(draw: st.DrawFn, name: str) -> bytes:
     return bytes(data)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEVICES)
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
@@ -86,6 +87,7 @@ def test_any_cutting_into_chunks_says_the_same(name: str, data: st.DataObject) -
     assert asdict(whole.counts) == asdict(parts.counts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DEVICES)
 @settings(max_examples=60, deadline=None)
 @given(data=st.data())
@@ -118,6 +120,7 @@ def test_what_the_simulator_writes_is_what_is_read(name: str, number: int) -> No
         assert abs(number) > (stream(name).capacity or math.inf)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TEXT)
 @settings(deadline=None)
 @given(first=st.binary(max_size=60), numbers=st.lists(NUMBERS, min_size=2, max_size=4))
@@ -132,6 +135,7 @@ def test_after_garbage_it_is_in_step_again_by_the_second_frame(
     assert values[len(values) - len(expected) :] == expected
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*GUARDED, *FIXED])
 @settings(deadline=None)
 @given(number=NUMBERS, at=st.integers(0, 100), byte=st.integers(0, 255), data=st.data())

@@ -100,6 +100,7 @@ def test_any_bytes_are_read_or_refused(data: bytes, head: bytes, tmp_path: Path)
     whole(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS[::6], ids=lambda layout: layout.name)
 def test_a_file_that_is_cut_anywhere_is_read_or_refused(layout: object, tmp_path: Path) -> None:
     path = tmp_path / f"log{layout.suffix}"  # type: ignore[attr-defined]

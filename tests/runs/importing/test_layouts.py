@@ -34,6 +34,7 @@ def imported(layout: Layout, folder: Path) -> tuple[Run, Path, Path]:
     return run_of(streams_of(guess), metadata_of(guess, {})), path, mapping
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.name)
 def test_every_layout_gives_the_same_run(layout: Layout, tmp_path: Path) -> None:
     run, path, mapping = imported(layout, tmp_path)

@@ -52,6 +52,7 @@ def _paths() -> list[Path]:
     return sorted(REAL.glob("*/*.csv")) if REAL is not None else []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(REAL is None, reason="the recordings are not here; WINCHKIT_REAL names them")
 @pytest.mark.parametrize("form", ["semicolons", "degrees"])
 @pytest.mark.parametrize("path", _paths(), ids=lambda path: path.stem)

@@ -212,6 +212,7 @@ def opened(folder: Path, seed: int) -> tuple[list[Carried], list[bytes], Path]:
     return frames, replies, recorder.path
 
 
+@pytest.mark.slow
 def test_a_bench_does_the_same_each_time(tmp_path: Path) -> None:
     runs = [opened(tmp_path / name, seed) for name, seed in (("1", 7), ("2", 7), ("3", 8))]
     (first, replies, log), (second, replies_again, again), (other, _, _) = runs

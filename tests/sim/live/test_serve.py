@@ -59,6 +59,7 @@ def end(process: subprocess.Popen[str]) -> tuple[str, str]:
     return words
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for another process")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_it_serves_until_it_is_interrupted(tmp_path: Path, number: int) -> None:
@@ -101,6 +102,7 @@ def test_a_served_robot_moves_its_platform_without_a_trip(tmp_path: Path) -> Non
             assert bench.snapshot.tripped == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("options", "last"), [([], "quit\n"), (["--end-with-input"], "")])
 def test_it_takes_lines_on_its_input(tmp_path: Path, options: list[str], last: str) -> None:
     path = tmp_path / "here.toml"
@@ -124,6 +126,7 @@ def test_an_unknown_bench_is_a_clear_error(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_not_there_is_a_clear_error(tmp_path: Path) -> None:
     found = subprocess.run(
         [*COMMAND, "spiral-bench", "--interface", "virtual", "--bench-file", "no/where.toml"],

@@ -49,6 +49,7 @@ def test_a_typical_one_shows(name: str) -> None:
     assert change(HiddenSpec(name, {"time": "2 s"} if name == "slip" else {})) > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name, kind in PHYSICS.items() if kind.size])
 def test_it_vanishes_at_its_null(name: str) -> None:
     numbers = {}

@@ -106,6 +106,7 @@ STATUS = st.sampled_from([ENABLED, 0x0233, READY, DISABLED, 0x0217, 0x0218]) | s
 )
 
 
+@pytest.mark.slow
 @given(
     events=st.lists(
         st.tuples(

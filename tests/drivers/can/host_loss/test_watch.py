@@ -41,6 +41,7 @@ def put(drive: DriveOnBus, index: int, sub: int, value: int) -> None:
         drive.drive.objects.put(index, sub, value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [1, 2, 3])
 @pytest.mark.parametrize("behaviour", [0, 1, 2])
 def test_a_drive_that_watches_is_operational_and_disabled_again(
