@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from stalls import StallWatch
+from stalls import StallWatch, stolen
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="schedstat of Linux")
 pytest_plugins = ["pytester"]
@@ -55,6 +55,27 @@ def test_processor_time_and_locks_of_the_program_are_no_stall(
         while time.process_time() - begun < 0.3:
             sum(range(10**6))
     assert watch.largest < 0.2
+
+
+def test_a_processor_that_the_host_took_away_shows(tmp_path: Path) -> None:
+    """Steal of one processor, while every thread of the test goes on; that of all is not added."""
+    proc = fake_proc(tmp_path, os.getpid(), wait=1.0)
+    ticks = os.sysconf("SC_CLK_TCK")
+
+    def count(first: float, second: float) -> None:
+        rows = [("cpu", first + second), ("cpu0", first), ("cpu1", second)]
+        lines = [f"{name} 1 2 3 4 5 6 7 {taken * ticks:.0f} 0 0" for name, taken in rows]
+        (proc / "stat").write_text("\n".join([*lines, "intr 1 2 3"]) + "\n")
+
+    count(7.0, 3.0)
+    watch = StallWatch(proc)
+    watch._stolen = stolen(proc)
+    count(7.0, 3.02)
+    watch.sample()
+    assert watch.largest == pytest.approx(0.02)
+    count(7.4, 3.35)
+    watch.sample()
+    assert watch.largest == pytest.approx(0.4)
 
 
 def test_a_wait_of_a_process_with_the_mark_shows(tmp_path: Path) -> None:

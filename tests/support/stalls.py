@@ -2,15 +2,18 @@
 
 The kernel counts the time that each thread waits for a processor (proc(5), ``schedstat``, second
 field); one wait is added when it ends. A sampling thread takes the differences. Time in which a
-thread waits for a lock, a frame or Python's interpreter lock is not counted: it is the program's.
-A standstill of the whole computer (a suspended virtual machine) shows as lateness of the sampling
-thread beyond the processor time that the process used meanwhile. Processes of a test are this one
-and those that inherit its mark in their environment, also where they have left its process tree.
+thread waits for a lock, a frame or Python's interpreter lock is not counted: it is the program's. A
+standstill of the whole computer (a suspended virtual machine) shows as lateness of the sampling
+thread beyond the processor time that the process used meanwhile. Where the host of a virtual
+machine takes one processor away, the thread on it waits for none and the others go on: the kernel
+counts that time by processor (``stat``, steal). Processes of a test are this one and those that
+inherit its mark in their environment, also where they have left its process tree.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import threading
 import time
 from collections.abc import Callable
@@ -20,13 +23,15 @@ from typing import Self
 
 import pytest
 
-__all__ = ["LATE_CYCLES", "StallWatch", "waited"]
+__all__ = ["LATE_CYCLES", "StallWatch", "stolen", "waited"]
 
 LATE_CYCLES = pytest.StashKey[Callable[[], int]]()
 """Of a test of a page: late cycles of its bench's control, where it tripped. The threads of a
 browser wait for a processor at any time; their lateness excuses no failure."""
 
 _PERIOD = 0.02
+_TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
+"""Of the kernel's counters, 1/s."""
 _SEARCH = 25
 """Samples between two searches for processes."""
 _MARK = "WINCHKIT_TESTS_OF"
@@ -43,12 +48,13 @@ class StallWatch:
         os.environ[_MARK] = str(os.getpid())
         self._processes = {str(os.getpid())}
         self._before: dict[str, float] = {}
+        self._stolen: dict[str, float] = {}
         self._lock = threading.Lock()
         self.largest = 0.0
         """s."""
 
     def __enter__(self) -> Self:
-        self._before = self._waits()
+        self._before, self._stolen = self._waits(), stolen(self._proc)
         self._thread.start()
         return self
 
@@ -94,6 +100,10 @@ class StallWatch:
             for thread, total in found.items():
                 self.largest = max(self.largest, total - self._before.get(thread, total))
             self._before |= found
+            taken = stolen(self._proc)
+            for processor, total in taken.items():
+                self.largest = max(self.largest, total - self._stolen.get(processor, total))
+            self._stolen = taken
 
     def _waits(self) -> dict[str, float]:
         return {
@@ -102,6 +112,15 @@ class StallWatch:
             for task in _tasks(self._proc, process)
             if (total := waited(task)) is not None
         }
+
+
+def stolen(proc: Path) -> dict[str, float]:
+    """How long the host has taken each processor away so far, s."""
+    try:
+        rows = [line.split() for line in (proc / "stat").read_text().splitlines()]
+    except OSError:
+        return {}
+    return {row[0]: int(row[8]) / _TICKS for row in rows if re.fullmatch(r"cpu\d+", row[0])}
 
 
 def waited(task: Path) -> float | None:
