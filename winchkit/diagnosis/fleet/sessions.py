@@ -21,6 +21,7 @@ from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.fleet.meta_analysis import shared_effects
 from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
@@ -34,7 +35,6 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = ["SessionEstimate", "common_terms", "fit_session", "null_term"]
 
 _STEP = 1e-3
-_LEAST_EIGENVALUE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ def fit_session(
             start = start.with_term(term, regression.n_runs)
     engine = TimeSeriesSelection(regression, start, [term.effect for term in terms])
     fitted, noise = engine.fit_with_noise(start)
-    covariance = _covariance(fitted.jacobian * noise.inverse_sigma(regression)[:, None])
+    covariance = inverse_normal(fitted.jacobian * noise.inverse_sigma(regression)[:, None])
     every = _parts(regression, fitted)
     parts = [every[place] for place in places]
     columns = [at for part, _ in parts for at in range(part.start, part.stop)]
@@ -223,21 +223,6 @@ def _parts(regression: TimeSeriesRegression, fitted: Fit) -> list[tuple[slice, T
         count = len(Coordinates(term.effect))
         out.append((slice(at, at + count), term))
         at += count
-    return out
-
-
-def _covariance(whitened: Array) -> Array:
-    """Covariance of the linearised fit; zero for unknowns that change nothing.
-
-    Columns are scaled to unit length, so that the unit of an unknown does not decide whether it
-    is determined.
-    """
-    length = np.sqrt(np.sum(whitened**2, axis=0))
-    there = np.flatnonzero(length > 0.0)
-    scaled = whitened[:, there] / length[there]
-    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=_LEAST_EIGENVALUE, hermitian=True)
-    out = np.zeros((len(length), len(length)))
-    out[np.ix_(there, there)] = inverse / np.outer(length[there], length[there])
     return out
 
 
