@@ -103,7 +103,7 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
         return _of_axes(table, answers, answers.axis)
     if answers.axis is None and (axis := likely_axis(table)) is not None:
         open_yet = [Assignment(item.source, "", item.unit) for item in table.columns]
-        return Guess(table, tuple(open_yet), (_axis_question(axis),))
+        return Guess(table, tuple(open_yet), (_axis_question(table, axis.source),))
     given, unknown = _given(table, answers)
     channels = {source: item.channel for source, item in given.items()}
     without = {item.channel for item in answers.columns if not item.source}
@@ -139,11 +139,10 @@ def _of_axes(table: Table, answers: Answers, by: str) -> Guess:
     return replace(guess, axis=by, whole=table, notes=(note, *guess.notes))
 
 
-def _axis_question(axis: Column) -> Question:
-    values = axis.texts if axis.texts is not None else [f"{value:.0f}" for value in axis.values]
-    names = ", ".join(list(dict.fromkeys(values))[:_SHOWN])
-    text = f"each row seems to be of one axis, which column '{axis.source}' names ({names})"
-    return Question(text, (f'--axis "{axis.source}"', '--axis ""'), "axis")
+def _axis_question(table: Table, by: str) -> Question:
+    names = ", ".join(list(axes_of(table, by))[:_SHOWN])
+    text = f"each row seems to be of one axis, which column '{by}' names ({names})"
+    return Question(text, (f'--axis "{by}"', '--axis ""'), "axis")
 
 
 def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], list[Question]]:

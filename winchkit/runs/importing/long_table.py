@@ -51,7 +51,7 @@ def axes_of(table: Table, by: str) -> dict[str, Table]:
         message = f"there is no column '{by}' that names the axis; it has {has}"
         raise RunError(Fault(message, table.path))
     names = _names(key)
-    found = [name for name in dict.fromkeys(names.tolist()) if name]
+    found = [] if names is None else [name for name in dict.fromkeys(names.tolist()) if name]
     if not 1 < len(found) <= _MOST:
         raise RunError(
             Fault(
@@ -79,7 +79,11 @@ def likely_axis(table: Table) -> Column | None:
         The first one that fits.
     """
     for column in table.columns:
-        names = _names(column)
+        # Most columns of text are stamps, which need not be sorted.
+        if column.texts is not None and len(set(column.texts)) > _MOST:
+            continue
+        if (names := _names(column)) is None:
+            continue
         found, codes, counts = np.unique(names, return_inverse=True, return_counts=True)
         if not 1 < len(found) <= _MOST or "" in found or counts.min() < _ROWS:
             continue
@@ -91,15 +95,17 @@ def likely_axis(table: Table) -> Column | None:
     return None
 
 
-def _names(column: Column) -> NDArray[np.str_]:
-    """Axis of each row; empty where it has none, and everywhere for numbers that name nothing."""
+def _names(column: Column) -> NDArray[np.str_] | None:
+    """Axis of each row, empty where it has none; None for numbers that name nothing."""
     if column.texts is not None:
         return np.array([text.strip() for text in column.texts], dtype=np.str_)
-    known = np.isfinite(column.values)
-    found = np.unique(column.values[known])
-    names = np.full(len(known), "", dtype="<U20")
-    if len(found) > _MOST or np.any(found != np.round(found)) or np.any(found < 0):
-        return names
+    known = column.values[np.isfinite(column.values)]
+    if np.any(known < 0) or np.any(known != np.round(known)):
+        return None
+    found = np.unique(known)
+    if len(found) > _MOST:
+        return None
+    names = np.full(len(column), "", dtype="<U20")
     for value in found:
         names[column.values == value] = f"{value:.0f}"
     return names
