@@ -142,7 +142,7 @@ def logging(served: Path, log: Path) -> Iterator[subprocess.Popen[str]]:
     """A log in a process of its own, once it writes; it is ended at the end."""
     with start("log", "-b", str(served), "-o", str(log), "--json") as logger:
         try:
-            until_written(log)
+            until_written(log, logger)
             yield logger
         finally:
             if logger.poll() is None:
@@ -150,15 +150,19 @@ def logging(served: Path, log: Path) -> Iterator[subprocess.Popen[str]]:
                 logger.communicate()
 
 
-def until_written(log: Path) -> None:
+def until_written(log: Path, logger: subprocess.Popen[str]) -> None:
     """Wait for 20 more lines of a CSV log that are no comments: events are comments, rows not."""
 
     def lines() -> int:
         text = log.read_text() if log.is_file() else ""
         return sum(not line.startswith("#") for line in text.splitlines())
 
+    def written() -> bool:
+        assert logger.poll() is None, f"the log has ended: {logger.communicate()}"
+        return lines() > before + 20
+
     before = lines()
-    until(lambda: lines() > before + 20, f"no 20 rows came to {log}")
+    until(written, f"no 20 rows came to {log}")
 
 
 def ended(process: subprocess.Popen[str]) -> tuple[int, str]:
@@ -390,7 +394,7 @@ def test_a_log_outlives_the_jog_that_opened_the_bench(served: Path, tmp_path: Pa
     with jogging(served) as jog, logging(served, log) as logger:
         jog.send_signal(signal.SIGINT)
         ended(jog)
-        until_written(log)
+        until_written(log, logger)
         logger.send_signal(signal.SIGINT)
         out, errors = logger.communicate(timeout=90)
     assert logger.returncode == 0, errors
@@ -404,12 +408,12 @@ def test_a_program_takes_the_bench_from_a_log_which_goes_on(served: Path, tmp_pa
     with logging(served, log) as logger:
         second = tmp_path / "lift-2.csv"
         with open_bench(served, name="a control program") as bench:
-            until_written(second)
+            until_written(second, logger)
             assert any(client.name.startswith("log ") for client in bench.stations.clients)
             with pytest.raises(NotPermitted, match=r"owned by a control program"):
                 open_bench(served)
         third = tmp_path / "lift-3.csv"
-        until_written(third)
+        until_written(third, logger)
         logger.send_signal(signal.SIGINT)
         out, errors = logger.communicate(timeout=90)
     assert logger.returncode == 0, errors

@@ -25,6 +25,12 @@ _RESET_TIME = 1.0
 _RUN_DOWN_MARGIN = 1.0
 _FRESH_SYNCS = 2
 """A status word of these SYNCs was sampled after the stop was sent."""
+_UNSEEN_SYNCS = 5
+"""Answers to SYNC that are missing before a drive's power state counts as unknown; single frames
+get lost."""
+_ASK_PERIOD = 0.05
+"""Of the reads of an unknown power state by SDO, s: with the writes that follow, a drive that
+somebody else enables is stopped well within 0.15 s, the longest a first stop may take."""
 _FOLLOWING = (Phase.MOVING, Phase.RUN_DOWN)
 _ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
@@ -173,6 +179,8 @@ class Controller:
         self._since = self._time = 0.0
         self._word = 0
         self._sync = self._stop_sync = 0
+        self._asked: float | None = None
+        """When the power state was asked for by SDO, while no answer to SYNC shows it."""
 
     def new_failure(self) -> str:
         """Why the drive could not go on, returned once; empty where it could."""
@@ -336,12 +344,35 @@ class Controller:
         self._enter(Phase.STOPPING, now)
 
     def _stay_disabled(self, now: float, feedback: AxisFeedback) -> None:
-        if feedback.state is State.OPERATION_ENABLED:
+        if feedback.state is State.OPERATION_ENABLED or self._enabled_unseen(now, feedback):
             self.uncommanded = "the drive was enabled without a command from here"
             self._enter(Phase.STOPPING, now)
             self._stop(now, feedback)
             return
         self._word = self.axis.send(Wish.DISABLE)
+
+    def _enabled_unseen(self, now: float, feedback: AxisFeedback) -> bool:
+        """Whether a drive that answers no SYNC tells by SDO that it is in operation enabled.
+
+        Somebody else may enable it while it is pre-operational. It is quick-stopped by SDO once,
+        then its status word is read.
+        """
+        if self.axis.operational and self._sync - feedback.sync <= _UNSEEN_SYNCS:
+            if self._asked is not None:
+                self._asked = None
+                self.axis.end_stop()
+            return False
+        if self.axis.sdo_state is State.OPERATION_ENABLED:
+            # What is sent next is the quick stop again, and no further read.
+            self._asked = None
+            self.axis.end_stop()
+            return True
+        if heard_by_sdo(self.axis.nmt_text) and (
+            self._asked is None or now - self._asked >= _ASK_PERIOD
+        ):
+            self._asked = now
+            self.axis.stop_by_sdo()
+        return False
 
     def _leave(self, now: float, feedback: AxisFeedback) -> None:
         """The drive has left operation enabled although it was commanded to stay."""
@@ -424,7 +455,9 @@ class Controller:
         sampled = feedback.sync > self._stop_sync
         if self.escalation.rung is not None:
             self._escalate(now, feedback)
-        elif sampled and feedback.state is State.OPERATION_ENABLED:
+        elif (sampled and feedback.state is State.OPERATION_ENABLED) or self._enabled_unseen(
+            now, feedback
+        ):
             self.uncommanded = "the drive was enabled while it was being stopped"
             self.axis.end_stop()
             self._stop_sync = self._sync

@@ -12,12 +12,13 @@ from typing import Protocol
 from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.observation import WinchInput
 from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Phase, Trip, WinchSnapshots
+from winchkit.bench.control.standstill import StandstillCause
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts, known, pictures
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.scheduling import Thread, event_of, thread_of
+from winchkit.drivers.scheduling import Scheduler, Thread, event_of, thread_of
 from winchkit.errors import ConnectionLost, MotionError, WinchkitError
 
 __all__ = ["BusPort", "Callback", "ControlLoop"]
@@ -116,7 +117,8 @@ class ControlLoop:
         self._latch = latch or LatchFile("")
         self._kept: tuple[Trip, ...] = supervisor.tripped
         self._longest_gap = longest_gap
-        self._before = math.nan
+        self._before = self._ended = math.nan
+        self._cause = StandstillCause(counted=not isinstance(clock, Scheduler))
         self._resumed = self._catching_up = -math.inf
         self._broken_at = math.inf
         self._warnings: dict[str, Trip] = {}
@@ -197,8 +199,10 @@ class ControlLoop:
             # Frames that came meanwhile are read first: until then no silence is judged.
             self._catching_up = now + _LATE * self.cycle
         if not (gap > self._longest_gap or gap < 0):
+            self._cause.note(now)
             return
         self._resumed = now
+        cause = self._cause.explain(now, gap, between=now - self._ended)
         moving = any(p.controller.phase not in _STOPPED for p in self.winches.values())
         silence = max((now - each.last for _, _, each in self._buses), default=gap)
         if moving or gap < 0 or silence > _DRIVES_NOTICE * self._longest_gap:
@@ -207,8 +211,7 @@ class ControlLoop:
                     "computer",
                     "",
                     f"this computer stood still for {gap:.2f} s (limit {self._longest_gap:.2f} s): "
-                    "other programs, a suspended process, or a clock that was set; see "
-                    "'A computer for a bench' in docs/realtime.md, then reset",
+                    f"{cause}; see 'A computer for a bench' in docs/realtime.md, then reset",
                     latches=True,
                 )
             )
@@ -287,7 +290,8 @@ class ControlLoop:
             else:
                 self.stop_step(now)
             due += self.cycle
-            self._clock.sleep(due - self._clock.now())
+            self._ended = self._clock.now()
+            self._clock.sleep(due - self._ended)
 
     def fail(self, error: BaseException, now: float) -> None:
         """Stop every drive from prepared frames, and do nothing else from now on."""

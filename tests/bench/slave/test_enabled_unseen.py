@@ -1,0 +1,86 @@
+"""A drive that answers no SYNC, and that somebody enables meanwhile: its state is read by SDO.
+
+A pre-operational drive processes no PDO and sends none, but it answers SDOs (CiA 301), so that
+another master can enable it. The state of the drive is the slave's own, at every step of 1 ms.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from slave import Slave, State
+from slave.held_key import jogging
+from slave.rig import Rig
+from slave.wire import GENERIC
+
+_FIRST_STOP = 0.15
+"""The longest that a drive may be enabled without a command, s."""
+_PRE_OPERATIONAL = ("pre-operational by a stranger", "goes pre-operational")
+
+
+def longest_enabled(rig: Rig, begin: float) -> float:
+    """Longest time without a break in operation enabled since ``begin``, s."""
+    longest = 0.0
+    since: float | None = None
+    for sample in rig.samples[0]:
+        if sample.time < begin:
+            continue
+        if sample.state is not State.ENABLED:
+            since = None
+            continue
+        since = sample.time if since is None else since
+        longest = max(longest, sample.time - since)
+    return longest
+
+
+@pytest.mark.parametrize("delay", [0.001, 0.03, 0.4])
+@pytest.mark.parametrize("enabled_by", ["second master enables", "enables itself"])
+@pytest.mark.parametrize("unseen", [*_PRE_OPERATIONAL, "tpdo lost"])
+def test_a_drive_at_rest_that_answers_no_sync(
+    tmp_path: Path, unseen: str, enabled_by: str, delay: float
+) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        rig.wait(0.2)
+        rig.slaves[0].inject(unseen)
+        rig.wait(delay)
+        for _ in range(2):  # the second time after it was already stopped by SDO once
+            begin = rig.time
+            rig.slaves[0].inject(enabled_by)
+            assert rig.slaves[0].power.state is State.ENABLED
+            rig.wait(0.6)
+            assert longest_enabled(rig, begin) < _FIRST_STOP
+        assert bench.snapshot.tripped or bench.snapshot.blocked
+        rig.slaves[0].mend_all()
+        rig.wait(0.3)
+        bench.reset()
+        jogging(rig, bench).release()
+
+
+@pytest.mark.parametrize("unseen", _PRE_OPERATIONAL)
+def test_a_drive_that_went_pre_operational_in_motion(tmp_path: Path, unseen: str) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        rig.slaves[0].inject(unseen)
+        rig.wait(1.0)
+        key.release()
+        begin = rig.time
+        rig.slaves[0].inject("second master enables")
+        assert rig.slaves[0].power.state is State.ENABLED
+        rig.wait(0.6)
+        assert longest_enabled(rig, begin) < _FIRST_STOP
+
+
+def test_a_drive_that_answers_is_asked_nothing_by_sdo(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        begin = rig.time
+        rig.wait(0.5)
+        key.release()
+        rig.wait(2.0)
+        assert not bench.snapshot.tripped
+        assert not [f for t, f in rig.frames if t > begin and f.identifier == 0x601]
