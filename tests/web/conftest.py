@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -11,6 +12,7 @@ import pytest
 from browsing import Served
 from chromium import chromium
 from stalls import LATE_CYCLES
+from winchkit import find
 
 
 @pytest.fixture(scope="module")
@@ -20,9 +22,21 @@ def browser() -> Iterator[Any]:
 
 
 @contextmanager
-def moving(name: str, folders: pytest.TempPathFactory) -> Iterator[Served]:
-    """A simulated bench that pages may move, in a folder of its own."""
-    found = Served("--sim", name, "--allow-motion", folder=folders.mktemp("work"))
+def moving(
+    name: str, folders: pytest.TempPathFactory, *, cycle: str | None = None
+) -> Iterator[Served]:
+    """A simulated bench that pages may move, in a folder of its own.
+
+    Another ``cycle`` than its own takes another share of the computer.
+    """
+    folder = folders.mktemp("work")
+    if cycle is not None:
+        text = find("sim", name).read_text()
+        changed = re.sub(r"(?m)^cycle = .*$", f'cycle = "{cycle}"', text)
+        assert changed != text
+        (folder / f"{name}.toml").write_text(changed)
+        name = f"{name}.toml"
+    found = Served("--sim", name, "--allow-motion", folder=folder)
     yield found
     found.end()
 
@@ -66,8 +80,11 @@ def bench(winch_served: Served, request: pytest.FixtureRequest) -> Served:
 def robot(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Served]:
-    """A bench of a robot of eight cables; it needs a core, and ends with its test."""
-    with moving("cabtive-robot", tmp_path_factory) as found:
+    """A bench of a robot of eight cables, which ends with its test.
+
+    With its own cycle of 8 ms it takes a processor, and a browser needs most of the other.
+    """
+    with moving("cabtive-robot", tmp_path_factory, cycle="16 ms") as found:
         yield judged(found, request)
 
 

@@ -352,7 +352,7 @@ class Controller:
         self._word = self.axis.send(Wish.DISABLE)
 
     def _enabled_unseen(self, now: float, feedback: AxisFeedback) -> bool:
-        """Whether a drive that answers no SYNC tells by SDO that it is in operation enabled.
+        """Whether a drive that answers no SYNC shows by SDO that it is in operation enabled.
 
         Somebody else may enable it while it is pre-operational. It is quick-stopped by SDO once,
         then its status word is read.

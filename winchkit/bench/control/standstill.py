@@ -25,7 +25,7 @@ _UNKNOWN = (
 
 @dataclass(frozen=True, slots=True)
 class _Counters:
-    """Since the start, s; NaN where the kernel does not tell."""
+    """Since the start, s; NaN where the kernel does not count it."""
 
     time: float
     thread: float
@@ -98,7 +98,7 @@ class StandstillCause:
 
 
 def _pages_read() -> int:
-    """Major page faults of the process so far; 0 where the system does not tell."""
+    """Major page faults of the process so far; 0 where the system does not count them."""
     try:
         import resource
     except ImportError:
