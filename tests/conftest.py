@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import sys
 from collections.abc import Generator
@@ -71,6 +72,11 @@ SLOW = frozenset(
 """Files and folders whose tests the default run leaves out: diagnoses of many runs, campaigns, and
 sessions of the pages."""
 _WATCH = pytest.StashKey[StallWatch]()
+_ASLEEP = re.compile(
+    r"this computer stood still for [\d.]+ s(?!.* computed for).*\(between two cycles\)"
+)
+"""A trip of a bench whose control thread slept too long while no thread of its process computed:
+the kernel or the host of this virtual machine did not wake it."""
 
 
 def pytest_configure() -> None:
@@ -143,6 +149,10 @@ def pytest_runtest_makereport(
             report.outcome = "skipped"
             said = f"Skipped: decides nothing: {words}, and then: {call.excinfo.exconly()[:500]}"
             report.longrepr = (path, (line or 0) + 1, said)
+        return report
+    if found := _ASLEEP.search(call.excinfo.exconly()):
+        report.outcome = "skipped"
+        report.longrepr = (path, (line or 0) + 1, f"Skipped: decides nothing: {found[0]}")
         return report
     watch.sample()
     stall = watch.largest
