@@ -26,9 +26,9 @@ from winchkit.python_can import import_python_can
 
 # Before a test imports it: with all that it imports of MF4, each process starts seconds later.
 import_python_can()
-# No test is judged by the clock: machines are shared and noisy.
-settings.register_profile("winchkit", deadline=None)
-# A change is judged by the same examples each time; those who work on it look for new ones.
+# No test is judged by the clock: machines are shared and noisy. A change is judged by the same 100
+# examples of each property; those who work on it look for 30 new ones at each run.
+settings.register_profile("winchkit", deadline=None, max_examples=30)
 settings.register_profile("landing", deadline=None, derandomize=True)
 settings.load_profile("winchkit")
 
