@@ -208,6 +208,28 @@ class TestLargestScore:
             )
         assert stats.ks_2samp(simulated, drawn).pvalue > 0.001
 
+    def test_scores_do_not_depend_on_the_units_of_the_unknowns(
+        self, regression: TimeSeriesRegression
+    ) -> None:
+        """An unknown in nanometres is partialled out as one in metres."""
+        effects = [effect for effect in load_catalogue() if not effect.memory]
+        found = signatures(regression, Hypothesis(), effects)
+        noise, phase = known_noise(regression, 1e9), np.linspace(0.0, 20.0, regression.n_rows)
+        columns = np.column_stack([regression.nuisance_columns, np.sin(phase), np.cos(phase)])
+        units = np.logspace(-9, 9, columns.shape[1])
+        residual = next(residuals(regression, 1, 12))
+        plain, scaled = (
+            score(Projected(regression, found, given, noise), residual, regression.n_rows)
+            for given in (columns, columns * units)
+        )
+        assert [item.candidate for item in scaled] == [item.candidate for item in plain]
+        np.testing.assert_allclose(
+            [item.explained_ss for item in scaled],
+            [item.explained_ss for item in plain],
+            rtol=1e-6,
+            atol=1e-9,
+        )
+
 
 class TestSeveralWinches:
     def test_homogeneity_is_cochrans_test(self) -> None:

@@ -9,6 +9,7 @@ from winchkit.arrays import Array
 __all__ = [
     "explained_ss",
     "explained_ss_of_sets",
+    "inverse_information",
     "inverse_normal",
     "orthonormal",
     "partialled_out",
@@ -85,8 +86,24 @@ def inverse_normal(columns: Array) -> Array:
     ndarray of shape (k, k)
         Zero along columns of zeros and along directions that the rows do not determine.
     """
-    size = np.sqrt(np.sum(columns**2, axis=0))
-    scaled = columns / np.where(size > 0.0, size, 1.0)
-    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=_UNIDENTIFIABLE, hermitian=True)
+    return inverse_information(columns.T @ columns)
+
+
+def inverse_information(normal: Array) -> Array:
+    """Pseudo-inverse of a normal matrix, whose rank does not depend on the units of its unknowns.
+
+    Parameters
+    ----------
+    normal
+        Inner products of whitened derivatives, (k, k).
+
+    Returns
+    -------
+    ndarray of shape (k, k)
+        As :func:`inverse_normal`.
+    """
+    size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     outer = np.outer(size, size)
+    scaled = np.divide(normal, outer, out=np.zeros_like(outer), where=outer > 0.0)
+    inverse = np.linalg.pinv(scaled, rcond=_UNIDENTIFIABLE, hermitian=True)
     return np.asarray(np.divide(inverse, outer, out=np.zeros_like(outer), where=outer > 0.0))

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import inverse_information
 from winchkit.diagnosis.selection.signatures import Candidate, Signatures, pieces
 
 __all__ = ["Projected", "Score", "null_maxima", "score", "zero_score"]
@@ -92,7 +93,7 @@ class Projected:
             np.tensordot(share, part, axes=1)
             for part in (self._cross, self._normal, signatures.gram)
         )
-        self._through = -np.linalg.pinv(normal, rcond=1e-12, hermitian=True) @ cross
+        self._through = -inverse_information(normal) @ cross
         self.inner = _projected(gram, cross, normal, self._through)
         """Inner products of the whitened, projected columns, (p, p)."""
         plain = np.einsum("b,bii->i", share, signatures.gram)
