@@ -74,6 +74,51 @@ def test_a_drive_that_went_pre_operational_in_motion(tmp_path: Path, unseen: str
         assert longest_enabled(rig, begin) < _FIRST_STOP
 
 
+def requests_from_here(rig: Rig, begin: float, others: list[bytes]) -> list[bytes]:
+    """SDO requests to the drive since ``begin`` that are not those of somebody else."""
+    found = [f.data for time, f in rig.frames if time > begin and f.identifier == 0x601]
+    for data in (*others, *others):  # they arrive at the drive and at the host
+        found.remove(data)
+    return found
+
+
+def test_a_transfer_of_somebody_else_is_not_disturbed(tmp_path: Path) -> None:
+    """A maker's tool writes a firmware to a pre-operational drive, beside an open bench."""
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened():
+        rig.wait(0.2)
+        rig.slaves[0].inject("pre-operational by a stranger")
+        rig.wait(0.3)
+        begin, sent = rig.time, [bytes.fromhex("C2501F0100000100")]
+        rig.from_stranger(0x601, sent[0])
+        rig.wait(0.02)
+        begun = len(requests_from_here(rig, begin, sent))
+        assert begun <= 1, "one may have been under way"
+        for number in range(1, 100):
+            sent.append(bytes((number, *range(7))))
+            rig.from_stranger(0x601, sent[-1])
+            rig.wait(0.02)
+        assert len(requests_from_here(rig, begin, sent)) == begun
+        rig.wait(1.5)
+        assert len(requests_from_here(rig, begin, sent)) > begun, "the state is read again"
+
+
+def test_a_control_word_within_a_transfer_is_answered_by_a_quick_stop(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened():
+        rig.wait(0.2)
+        rig.slaves[0].inject("pre-operational by a stranger")
+        rig.wait(0.3)
+        rig.from_stranger(0x601, bytes.fromhex("40001F0100000000"))
+        rig.wait(0.1)
+        begin = rig.time
+        for word in (0x06, 0x07, 0x0F):
+            rig.from_stranger(0x601, bytes((0x2B, 0x40, 0x60, 0x00, word, 0, 0, 0)))
+        rig.until(lambda: rig.slaves[0].power.state is State.ENABLED, within=0.1)
+        rig.wait(0.6)
+        assert 0.0 < longest_enabled(rig, begin) < 0.02
+
+
 def test_a_drive_that_answers_is_asked_nothing_by_sdo(tmp_path: Path) -> None:
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     with rig.opened() as bench:

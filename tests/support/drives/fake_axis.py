@@ -66,6 +66,8 @@ class FakeAxis:
     alarms: tuple[int, ...] = ()
     alarm_text: str = ""
     sdo_refused: bool = False
+    last_request_elsewhere: float = -math.inf
+    control_words_elsewhere: int = 0
     sdo_state: State | None = None
     sdo_stops: int = 0
     torque: float = 0.0

@@ -31,6 +31,9 @@ get lost."""
 _ASK_PERIOD = 0.05
 """Of the reads of an unknown power state by SDO, s: with the writes that follow, a drive that
 somebody else enables is stopped well within 0.15 s, the longest a first stop may take."""
+_TRANSFER_PAUSE = 1.0
+"""Longest time between two requests of one SDO transfer, s: the usual time-out of a client. A frame
+from here in between would abort the transfer, which may be that of a firmware."""
 _FOLLOWING = (Phase.MOVING, Phase.RUN_DOWN)
 _ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
@@ -87,6 +90,14 @@ class AxisPort(Protocol):
     @property
     def second_master(self) -> str:
         """The first command to it that was not sent here, in words; empty where none was."""
+
+    @property
+    def last_request_elsewhere(self) -> float:
+        """When another SDO client last sent this drive a request, s."""
+
+    @property
+    def control_words_elsewhere(self) -> int:
+        """SDO writes of 6040h by other clients so far."""
 
     @property
     def stops_on_nmt(self) -> bool:
@@ -181,6 +192,8 @@ class Controller:
         self._sync = self._stop_sync = 0
         self._asked: float | None = None
         """When the power state was asked for by SDO, while no answer to SYNC shows it."""
+        self._words_elsewhere = 0
+        """Writes of 6040h by other SDO clients that were dealt with."""
 
     def new_failure(self) -> str:
         """Why the drive could not go on, returned once; empty where it could."""
@@ -354,24 +367,30 @@ class Controller:
     def _enabled_unseen(self, now: float, feedback: AxisFeedback) -> bool:
         """Whether a drive that answers no SYNC shows by SDO that it is in operation enabled.
 
-        Somebody else may enable it while it is pre-operational. It is quick-stopped by SDO once,
-        then its status word is read.
+        Somebody else may enable it while it is pre-operational. It is quick-stopped by SDO, and its
+        status word is read again and again: not during an SDO transfer of somebody else, of which a
+        write of 6040h is answered by a quick stop at once.
         """
-        if self.axis.operational and self._sync - feedback.sync <= _UNSEEN_SYNCS:
+        axis = self.axis
+        words, self._words_elsewhere = self._words_elsewhere, axis.control_words_elsewhere
+        if axis.operational and self._sync - feedback.sync <= _UNSEEN_SYNCS:
             if self._asked is not None:
                 self._asked = None
-                self.axis.end_stop()
+                axis.end_stop()
             return False
-        if self.axis.sdo_state is State.OPERATION_ENABLED:
-            # What is sent next is the quick stop again, and no further read.
+        if axis.sdo_state is State.OPERATION_ENABLED:
             self._asked = None
-            self.axis.end_stop()
+            axis.end_stop()
             return True
-        if heard_by_sdo(self.axis.nmt_text) and (
-            self._asked is None or now - self._asked >= _ASK_PERIOD
+        if words != self._words_elsewhere:
+            axis.end_stop()  # what is sent next is the quick stop again, and no further read
+        elif (self._asked is not None and now - self._asked < _ASK_PERIOD) or (
+            now - axis.last_request_elsewhere < _TRANSFER_PAUSE
         ):
+            return False
+        if heard_by_sdo(axis.nmt_text):
             self._asked = now
-            self.axis.stop_by_sdo()
+            axis.stop_by_sdo()
         return False
 
     def _leave(self, now: float, feedback: AxisFeedback) -> None:

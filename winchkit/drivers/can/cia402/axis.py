@@ -213,6 +213,16 @@ class Cia402Axis:
         """The first command to it that was not sent here, in words; empty where none was."""
         return self._others.heard
 
+    @property
+    def last_request_elsewhere(self) -> float:
+        """When another SDO client last sent this drive a request, s."""
+        return self._others.last_request
+
+    @property
+    def control_words_elsewhere(self) -> int:
+        """SDO writes of 6040h by other clients so far."""
+        return self._others.control_words
+
     def forget_second_master(self) -> None:
         """A reset begins; another master's commands from now on are reported again."""
         self._others.forget()

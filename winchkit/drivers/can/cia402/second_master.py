@@ -6,6 +6,7 @@ maker's own object may command a motion, and one of the communication area end t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from functools import partial
 
@@ -22,6 +23,7 @@ _INVALID, _IDENTIFIER = 1 << 31, 0x7FF
 _DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6
 """Command specifiers of requests (CiA 301); a block download begins where bit 0 is 0."""
 _HEAD = 4
+_CONTROL_WORD = 0x6040
 _COMMANDS = {
     0x01: "start",
     0x02: "stop",
@@ -45,6 +47,10 @@ class SecondMaster:
         """
         self.heard = ""
         """The first command that was not sent here, in words; empty where there was none."""
+        self.last_request = -math.inf
+        """When somebody else last sent an SDO request of any kind, s."""
+        self.control_words = 0
+        """SDO writes of 6040h that somebody else has begun so far."""
         self._bus, self._node = bus, node
         self._rpdos = set(rpdos)
         for number in self._rpdos:
@@ -79,12 +85,14 @@ class SecondMaster:
     def _take_rpdo(self, number: int, data: bytes, _now: float) -> None:
         self._note(f"RPDO {number} to node {self._node} ({data.hex(' ')})")
 
-    def _take_sdo(self, data: bytes, _now: float) -> None:
+    def _take_sdo(self, data: bytes, now: float) -> None:
+        self.last_request = now
         if len(data) < _HEAD:
             return
         specifier = data[0] >> 5
         if specifier == _DOWNLOAD or (specifier == _BLOCK_DOWNLOAD and not data[0] & 1):
             index = int.from_bytes(data[1:3], "little")
+            self.control_words += index == _CONTROL_WORD
             sub = f":{data[3]}" if data[3] else ""
             self._note(f"SDO write of {index:04X}h{sub} of node {self._node} ({data.hex(' ')})")
 
