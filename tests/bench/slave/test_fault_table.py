@@ -80,7 +80,17 @@ _ROWS = (
 )
 
 
-@pytest.mark.parametrize("row", _ROWS, ids=lambda row: row.name)
+_QUICK = ("enable input open", "stopped by a stranger", "drive fault", "host frames lost", "silent")
+"""One of each kind is tried by default, the others with the whole suite."""
+
+
+@pytest.mark.parametrize(
+    "row",
+    [
+        pytest.param(row, id=row.name, marks=() if row.fault in _QUICK else pytest.mark.slow)
+        for row in _ROWS
+    ],
+)
 def test_a_fault_under_a_held_key(tmp_path: Path, row: Row) -> None:
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     slave = rig.slaves[0]

@@ -105,6 +105,7 @@ def test_an_over_tension_stops_winding_in_and_lets_it_out(tmp_path: Path) -> Non
         rig.wait(1.0)
 
 
+@pytest.mark.slow
 def test_eight_winches_stop_in_one_sync(tmp_path: Path) -> None:
     rig = rig_of(tmp_path, 8)
     with rig.opened() as bench:
