@@ -19,8 +19,9 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import (
     Attribution,
     binned_share,
-    harmonic_shares,
+    half_of_samples_per_turn,
     kept_rows,
+    strongest_harmonic,
     variables_of,
 )
 from winchkit.diagnosis.residuals.traces import traces_of
@@ -171,8 +172,10 @@ class OutputCurves:
         for name, values in self.variables.items():
             shares[name, None] = binned_share(values[known], own, len(own))
             if name in ANGLES:
-                waves = harmonic_shares(values[known], own)
-                shares[name, int(np.argmax(waves)) + 1] = float(np.max(waves))
+                orders = half_of_samples_per_turn([values[known]])
+                found = strongest_harmonic(values[known], own, orders)
+                if found is not None:
+                    shares[name, found[0]] = found[1]
         best = max(shares, key=lambda key: shares[key], default=None)
         return None if best is None or shares[best] <= CLEAR_ORDER else best
 

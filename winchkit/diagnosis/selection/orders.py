@@ -26,6 +26,7 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.residuals.attribution import half_of_samples_per_turn
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.effects.parametrization import Coordinates
@@ -35,7 +36,6 @@ from winchkit.effects.term import Term
 __all__ = ["Periodogram", "further_orders", "has_orders", "periodogram", "with_orders"]
 
 _LEVEL = 0.01
-_MOST_ORDERS = 1000
 _MOST_IN_SERIES = 24
 _CELLS = 32
 _LEAST_WITHIN = 0.1
@@ -278,17 +278,10 @@ def _orders_per_turn(regression: TimeSeriesRegression) -> int:
 
     Zero also where no run covers a whole turn: periods are not observed there.
     """
-    steps = []
+    whole = []
     for recording in regression.dataset.recordings:
         angle = recording.signals.motor_angle
-        own = np.abs(np.diff(angle))
         # A map of a whole turn ends one step before its beginning.
-        if float(np.ptp(angle)) + 2 * float(np.median(own)) >= _TURN:
-            steps.append(own)
-    if not steps:
-        return 0
-    step = np.sort(np.concatenate(steps))
-    step = step[step > 0]
-    within = np.cumsum(step)
-    last = min(int(np.searchsorted(within, _TURN)), len(step) - 1)
-    return int(min(_TURN / step[last] / 2, _MOST_ORDERS))
+        if float(np.ptp(angle)) + 2 * float(np.median(np.abs(np.diff(angle)))) >= _TURN:
+            whole.append(angle)
+    return half_of_samples_per_turn(whole)
