@@ -57,6 +57,37 @@ def test_without_a_terminal_every_answer_is_named(tmp_path: Path) -> None:
     assert not (tmp_path / "runs").exists()
 
 
+def test_the_angle_of_a_recording_of_the_velocity_is_its_integral(tmp_path: Path) -> None:
+    """Known motion: θ = 9 (1 − cos 1.25 t), ω = 11.25 sin 1.25 t; its unit is that of the file."""
+    t = np.arange(400) / 100
+    omega, angle = 11.25 * np.sin(1.25 * t), 9 - 9 * np.cos(1.25 * t)
+    lines = [f"{a:.2f},{b * 9.549297:.9g},{1 + 0.1 * b:.9g}" for a, b in zip(t, omega, strict=True)]
+    path = tmp_path / "drive.csv"
+    path.write_text("\n".join(["time [s],speed [rpm],torque [Nm]", *lines]) + "\n")
+    refused = command(path, "-o", tmp_path / "runs")
+    assert refused.exit_code == 2
+    assert "integral of motor_velocity" in refused.stderr
+    result = command(path, "-o", tmp_path / "runs", "--yes")
+    assert result.exit_code == 0
+    assert "an offset of the velocity is a drift" in result.stderr
+    run = read_run(tmp_path / "runs" / "drive.csv")
+    # The trapezoidal rule errs by the span times h²/12 of the second derivative of ω.
+    assert run["motor_angle"] == pytest.approx(angle, abs=4 * 1e-4 / 12 * 11.25 * 1.25**2 * 2)
+    again = read_run(path, mapping=tmp_path / "runs" / "mapping.toml")
+    assert np.array_equal(again["motor_angle"], run["motor_angle"])
+
+
+def test_two_recordings_of_the_velocity_are_two_runs(tmp_path: Path) -> None:
+    paths = []
+    for name in ("a", "b"):
+        rows = (f"{k / 100},{5 + k % 3},{k % 5}" for k in range(100))
+        paths.append(tmp_path / f"{name}.csv")
+        paths[-1].write_text("\n".join(["time [s],speed [rpm],torque [Nm]", *rows]) + "\n")
+    result = command(*paths, "-o", tmp_path / "runs", "--yes")
+    assert result.exit_code == 0
+    assert sorted(os.listdir(tmp_path / "runs")) == ["a.csv", "b.csv", "mapping.toml"]
+
+
 def test_a_certain_guess_needs_no_consent_and_the_mapping_makes_the_next_import_silent(
     tmp_path: Path,
 ) -> None:

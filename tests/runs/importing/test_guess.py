@@ -199,6 +199,67 @@ def test_counts_per_turn_follow_from_a_velocity_with_unit(tmp_path: Path) -> Non
     assert alone.questions[0].options[0] == "--counts-per-turn 4096"
 
 
+def test_counts_per_turn_are_used_where_the_file_has_no_unit(tmp_path: Path) -> None:
+    angle = np.round(4096 * np.sin(np.arange(300) / 50))
+    columns = {"time [s]": np.arange(300) / 100, "Measured Pos (raw)": angle}
+    found = guess(tmp_path / "a.csv", columns, Answers(counts_per_turn=4096))
+    assert not found.questions
+    assert of(found, "motor_angle").factor == pytest.approx(TURN / 4096)
+
+
+def test_the_value_of_a_velocity_in_its_own_unit_is_in_the_question(tmp_path: Path) -> None:
+    """A servo of 0.229 rpm per unit, whose angle is in counts."""
+    time = np.arange(600) / 100
+    counts = np.round(4096 * np.sin(time))
+    raw = np.round(TURN * np.cos(time) / (0.229 * TURN / 60))
+    columns = {"time [s]": time, "Measured Pos (raw)": counts, "Measured Vel (raw)": raw}
+    found = guess(tmp_path / "a.csv", columns, Answers(counts_per_turn=4096))
+    (question,) = found.questions
+    factor = float(question.options[0].split("*")[1].split(" ")[0])
+    assert factor == pytest.approx(0.229 * TURN / 60, rel=0.01)
+    answered = Answers(counts_per_turn=4096, columns=(read_column(question.options[0][10:-1]),))
+    assert not guess(tmp_path / "a.csv", columns, answered).questions
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["boom angle [deg]", "sway_angle [rad]", "angle of attack [deg]", "Pendelwinkel [°]",
+     "fleet angle [deg]", "droop pulses [pulses]", "elevation [deg]"],
+)  # fmt: skip
+def test_angles_of_other_bodies_are_not_the_motors(name: str, tmp_path: Path) -> None:
+    time = np.arange(300) / 100
+    columns = {"time [s]": time, name: np.sin(time), "tension [N]": 100 + np.cos(time)}
+    found = guess(tmp_path / "a.csv", columns)
+    assert {item.channel for item in found.used} == {"time", "tension"}
+
+
+@pytest.mark.parametrize("name", ["motor swing angle [deg]", "drum angle [deg]", "angle [deg]"])
+def test_angles_of_the_motor_are_named(name: str, tmp_path: Path) -> None:
+    time = np.arange(300) / 100
+    found = guess(tmp_path / "a.csv", {"time [s]": time, name: np.sin(time)})
+    assert found.is_certain
+
+
+def test_the_angle_of_a_joint_needs_consent(tmp_path: Path) -> None:
+    time = np.arange(300) / 100
+    found = guess(tmp_path / "a.csv", {"time [s]": time, "ankle_angle [deg]": np.sin(time)})
+    assert of(found, "motor_angle").confidence == "derived"
+    assert not found.is_certain
+
+
+def test_a_wind_speed_and_a_constant_are_no_channels(tmp_path: Path) -> None:
+    time = np.arange(300) / 100
+    columns = {
+        "time [s]": time,
+        "motor angle [deg]": np.sin(time),
+        "hook load [kN]": 2 + np.sin(time),
+        "wind speed [1/s]": np.cos(time),
+        "torque constant [Nm/A]": np.cos(time),
+    }
+    found = guess(tmp_path / "a.csv", columns)
+    assert {item.channel for item in found.used} == {"time", "motor_angle", "load"}
+
+
 def test_an_opposite_sense_and_a_wrong_unit_are_reported(tmp_path: Path) -> None:
     m = motion()
     columns = {"t [s]": m.time, "angle [rad]": m.angle, "speed [rad/s]": -m.velocity}

@@ -335,11 +335,17 @@ def _until(words: str, read: str | Callable[[str], Any]) -> Any:
 
 
 def _is_accepted(guesses: Sequence[Guess], yes: bool, as_json: bool) -> bool:
-    if yes or all(guess.is_certain for guess in guesses):
+    if yes or (all(guess.is_certain for guess in guesses) and not _are_integrated(guesses)):
         return True
     if not _may_ask(yes, as_json):
         return False
     return click.confirm("Import as shown?", default=True, abort=True, err=True)
+
+
+def _are_integrated(guesses: Sequence[Guess]) -> bool:
+    """Whether the motor angle is the integral of a velocity: no file has an angle."""
+    bases = {item.channel.rpartition(".")[2] for guess in guesses for item in guess.used}
+    return "motor_velocity" in bases and "motor_angle" not in bases
 
 
 def _unanswered(guesses: Sequence[Guess]) -> str:
@@ -359,6 +365,8 @@ def _unanswered(guesses: Sequence[Guess]) -> str:
             ]
     if any(guess.questions for guess in guesses):
         return "\n".join(["not known, and no terminal to ask; give", *lines])
+    if _are_integrated(guesses):
+        lines.append("  no column has the motor angle: it is the integral of motor_velocity from 0")
     accept = 'accept the guess by --yes, or correct it by --column "CHANNEL=COLUMN [UNIT]":'
     return "\n".join([accept, *lines])
 
@@ -437,8 +445,10 @@ def _runs(
 ) -> tuple[list[tuple[int, Run]], tuple[Joint, ...]]:
     """Runs with the index of their file; files without a motor angle are joined to the one with."""
     from winchkit.runs.importing.clocks import joined
-    from winchkit.runs.importing.runs import has_angle, run_of
+    from winchkit.runs.importing.runs import has_angle, run_of, with_angle
 
+    if not any(has_angle(part) for part in parts):
+        parts = [with_angle(part) for part in parts]
     angles = [index for index, part in enumerate(parts) if has_angle(part)]
     others = [index for index in range(len(parts)) if index not in angles]
     if others and angles and (len(angles) == 1 or is_joined):

@@ -58,6 +58,7 @@ _AVOIDED = {"output", "abtrieb", "raw", "filtered", "filt", "error", "gear", "ph
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"gauche", "droite"}, {"front", "rear"})
 _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
 _UNKNOWN = "unknown name"
+_NOT_USED = "set point, error, state, counter, constant or a quantity of another body"
 _FEW = 20
 """Values below which an even increase may be chance."""
 _UNEVEN = 0.5
@@ -172,7 +173,7 @@ def _by_name(column: Column, meaning: Meaning, unit: SpelledUnit | None) -> Cand
     """Channel that the name stands for, or that of the unit where the two contradict each other."""
     base = meaning.channel.rpartition(".")[2]
     if base == IGNORED:
-        return Candidate(column, "", reason=f"'{meaning.text}': set point, error, state or counter")
+        return Candidate(column, "", reason=f"'{meaning.text}': {_NOT_USED}")
     if base == CURRENT:
         base, unit = "motor_torque", unit or read_unit("A")
     channel = base if meaning.channel == CURRENT else meaning.channel

@@ -81,6 +81,8 @@ class _Work:
     columns: list[_Column] = field(default_factory=list)
     questions: list[Question] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    measured: dict[str, float] = field(default_factory=dict)
+    """SI value of 1 of a velocity without a unit, by its ratio to the angle; by column."""
 
 
 def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
@@ -189,6 +191,9 @@ def _started(work: _Work, candidate: Candidate, answer: ColumnAnswer | None) -> 
     elif unit is not None:
         _settle_unit(work, item, unit, scale, confidence)
         item.unit = item.unit or text
+    elif item.base == "motor_angle" and work.answers.counts_per_turn and _is_counted(item):
+        counts = work.answers.counts_per_turn or math.nan
+        item.settle(_TURN / counts * scale, "counts", "given", f"{counts:g} counts per turn")
     return item
 
 
@@ -302,6 +307,9 @@ def _apply_ratio(
                 unit, factor = options.pop()
                 text = f"ratio of angle and velocity (correlation {abs(ratio.correlation):.4f})"
                 item.settle(factor, unit, "derived", text)
+        if velocity.factor is None and angle.factor is not None and clock.factor is not None:
+            measured = ratio.value * angle.factor / clock.factor
+            work.measured[velocity.column.source] = measured
     if None not in (angle.factor, velocity.factor) and ratio.value * (velocity.factor or 1) < 0:
         velocity.factor = -(velocity.factor or 1)
         velocity.reason += "; sense reversed: it is opposite to the angle"
@@ -431,9 +439,16 @@ def _ask_units(work: _Work) -> None:
             units = ", ".join(UNITS[si]) if si else "1"
             spelled = item.column.unit
             had = f"has the unknown unit '{spelled}'" if spelled else "has no unit"
-            work.questions.append(
-                Question(f"'{name}' ({channel}) {had}; one of {units}", (own,), "", si or "")
-            )
+            text = f"'{name}' ({channel}) {had}; one of {units}"
+            if name in work.measured:
+                measured = f"{work.measured[name]:.4g}"
+                text += f"; by its ratio to the angle 1 is {measured} rad/s"
+                own = f'--column "{channel}={name}*{measured} [rad/s]"'
+                work.questions.append(Question(text, (own, f'--column "{channel}="')))
+                continue
+            if item.base != "time":
+                text += f'; --column "{channel}=" where it is none of them'
+            work.questions.append(Question(text, (own,), "", si or ""))
 
 
 _OPTIONS = {

@@ -33,6 +33,18 @@ class Meaning:
     """Part of the name that decided."""
 
 
+_NO_MOTOR = r"(?!.*\b(motor\w*|mot|rotor|drum|winch|drive|servo|encoder|axis)\b)"
+_CRANE = (
+    rf"^{_NO_MOTOR}.*\b(boom|jib|sway|swing|slew|slewing|luff|luffing|tilt|inclination|fleet|wrap|"
+    r"rudder|payload|hook|ausleger|pendel\w*|neigungs?\w*|schwenk\w*)\b.*"
+    r"\b(angles?|pos|positions?|\w*winkel)\b|\b(pendel|neigungs|ausleger|schwenk)winkel\b"
+)
+"""Angles and positions of a crane's boom or load, of a vessel, of a cable at its drum."""
+_JOINT = (
+    rf"^{_NO_MOTOR}.*\b(knee|ankle|hip|elbow|wrist|shoulder|finger|pendulum|arm|knie\w*)\b.*"
+    r"\b(angles?|pos|positions?|\w*winkel)\b"
+)
+"""Angles of a joint, which a cable or a gearbox may separate from the motor."""
 _RULES: tuple[tuple[str, int, str], ...] = (
     # Set points, errors, states and counters.
     (
@@ -45,10 +57,18 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     ),
     (
         r"\b(error|err|diff|difference|fehler|regelabweichung|schlepp\w*|following|erreur|deviation|abweichung|"
-        r"residual|mean error|std|stddev|variance|covariance)\b",
+        r"residual|mean error|std|stddev|variance|covariance|droop)\b",
         1,
         IGNORED,
     ),
+    # Constants of a device, the wind, and angles of what is no motor.
+    (
+        r"\b(constants?|gain|stiffness|inertia|angle of attack|aoa|wind|wind ?speed|"
+        r"windgeschwindigkeit|\w*wind ?speed|latitude|longitude|altitude|azimuth|elevation)\b",
+        1,
+        IGNORED,
+    ),
+    (_CRANE, 1, IGNORED),
     (r"^pulses?$", 1, IGNORED),
     (
         r"^(frame|sub ?frame|index|idx|nr|no|number|sample|samples|counter|count|row|"
@@ -109,7 +129,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     ),
     (
         r"\b(load|platform|hook|last|haken|end) ?(force|kraft|side force)\b|\blastkraft\b|"
-        r"\bhakenlast\b|\bfuerza de carga\b",
+        r"\bhakenlast\b|\b(hook|suspended) ?load\b|\bfuerza de carga\b",
         1,
         "load",
     ),
@@ -141,6 +161,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         2,
         CURRENT,
     ),
+    (_JOINT, 3, "motor_angle"),
     (
         r"\b(motor ?angles?|motor ?pos(ition)?|motorwinkel|motorposition|rotor\w*|theta|phi|"
         r"encoder\w*|geber\w*|drehgeber|resolver|angles?|\w*winkel\w*|angulo|angolo|q|qm|px)\b",

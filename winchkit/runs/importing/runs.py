@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
@@ -22,7 +23,12 @@ from winchkit.schema.mapping import ImportMapping
 from winchkit.schema.read import read_mapping
 from winchkit.units import UNITS
 
-__all__ = ["has_angle", "metadata_of", "read_mapped", "run_of"]
+__all__ = ["has_angle", "metadata_of", "read_mapped", "run_of", "with_angle"]
+
+_INTEGRAL = (
+    "no column has the motor angle: it is the integral of motor_velocity from 0, so that its "
+    "absolute value is unknown and an offset of the velocity is a drift of the angle"
+)
 
 _OWN = ("load_mass", "length_zeroed", "programme")
 """Metadata that winchkit uses, in a file that has its names."""
@@ -56,7 +62,9 @@ def read_mapped(path: str | Path, mapping: str | Path | ImportMapping) -> Run:
     """
     read = mapping if isinstance(mapping, ImportMapping) else read_mapping(mapping)
     guess = guess_by(read_table(path), read)
-    return run_of(streams_of(guess), metadata_of(guess, {"imported_mapping": mapping_id(read)}))
+    streams = streams_of(guess)
+    streams = streams if has_angle(streams) else with_angle(streams)
+    return run_of(streams, metadata_of(guess, {"imported_mapping": mapping_id(read)}))
 
 
 def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
@@ -95,6 +103,49 @@ def _one_line(text: str) -> str:
 def has_angle(streams: Streams) -> bool:
     """Whether a file has a motor angle, without which there is no run."""
     return any(name.rpartition(".")[2] == "motor_angle" for name in streams.channels)
+
+
+def with_angle(streams: Streams) -> Streams:
+    """Add the motor angle of a recording that has the motor velocity only.
+
+    Parameters
+    ----------
+    streams : Streams
+        Channels in SI, without a motor angle.
+
+    Returns
+    -------
+    Streams
+        The integral of each velocity over its own time stamps, with a note; unchanged without a
+        velocity or without times.
+
+    Notes
+    -----
+    Trapezoidal rule between the samples that have a velocity; the angle is NaN where the velocity
+    is NaN.
+    """
+    if not streams.has_time:
+        return streams
+    parts, is_found = [], False
+    for part in streams.streams:
+        own = dict(part.channels)
+        for name, values in part.channels.items():
+            winch, dot, base = name.rpartition(".")
+            if base == "motor_velocity":
+                own[f"{winch}{dot}motor_angle"] = _integral(part.time, values)
+                is_found = True
+        parts.append(Stream(part.time, own, part.rows))
+    if not is_found:
+        return streams
+    return replace(streams, streams=tuple(parts), notes=(*streams.notes, _INTEGRAL))
+
+
+def _integral(time: Array, velocity: Array) -> Array:
+    known = np.isfinite(time) & np.isfinite(velocity)
+    t, v = time[known], velocity[known]
+    angle = np.full(len(velocity), np.nan)
+    angle[known] = np.concatenate(([0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))))[: len(t)]
+    return angle
 
 
 def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 from winchkit.runs.importing.formats.cells import number
+from winchkit.runs.importing.names import meaning_of
 from winchkit.runs.importing.unit_spelling import is_unit_row, read_unit, split_unit
 
 __all__ = ["KEYS", "Header", "keyed_width", "read_header"]
@@ -29,6 +30,9 @@ KEYS = frozenset(
 )
 """Keys of a TwinCAT Scope export."""
 _RULE = re.compile(r":?[-=_+]{2,}:?")
+_NAME_ROW = {"channel name", "channelname", "signal name", "kanalname"}
+_UNIT_ROW = {"unit", "units", "unit symbol", "einheit"}
+"""First cells of the rows of a header that has the title of each row above the times."""
 _ROW_LABELS = {"type", "name", "id", "parent", "unit", "units", "description", "channel"}
 _IDENTIFIER = re.compile(r"[0-9A-Fa-f]{8,}(-[0-9A-Fa-f]{4,})*|\d+")
 _RATEKEYS = re.compile(
@@ -38,7 +42,8 @@ _RATEKEYS = re.compile(
     re.IGNORECASE,
 )
 _STEPKEYS = re.compile(
-    r"(delta_x|sample ?time|sampling ?time|sample ?interval|sampling ?interval|sample ?period|"
+    r"(delta_x|interval|sampl(?:e|ing) ?time ?interval|"
+    r"sample ?time|sampling ?time|sample ?interval|sampling ?interval|sample ?period|"
     r"sampling ?period|abtastzeit|abtastintervall|zykluszeit|cycle ?time|dt)"
     r"\W*(?P<unit>[mun]?s)?\W*",
     re.IGNORECASE,
@@ -87,7 +92,7 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     ]
     if is_blank:
         block = [_with_brackets(cells, width) for cells in block]
-    header = _keyed(block, width) or _stacked(block, width)
+    header = _keyed(block, width) or _titled(block, width) or _stacked(block, width)
     header.metadata.update(_metadata([[" ".join(c)] if is_blank else c for c in above]))
     header.rows = tuple(tuple(cells) for _, cells in rows[cut:] if any(cells))
     header.interval = header.interval or _interval(header.metadata, decimal)
@@ -210,6 +215,29 @@ def _keyed(block: list[list[str]], width: int) -> Header | None:
     return found
 
 
+def _titled(block: list[list[str]], width: int) -> Header | None:
+    """Rows whose first cell is their title, above the times: LabVIEW SignalExpress, DIAdem.
+
+    The title stands again above the times of every further channel.
+    """
+    titles = [cells[0].strip().casefold() if cells else "" for cells in block]
+    row = next((n for n, title in enumerate(titles) if title in _NAME_ROW), None)
+    if row is None:
+        return None
+    title, names = block[row][0], _padded(block[row], width)
+    below = next((n for n, own in enumerate(titles) if own in _UNIT_ROW), None)
+    units = [""] * width if below is None else _padded(block[below], width)
+    split = [("time", "") if name == title else split_unit(name) for name in names]
+    given = [unit if read_unit(unit) else "" for unit in units]
+    others = [cells[:2] for n, cells in enumerate(block) if n not in {row, below}]
+    return Header(
+        [name for name, _ in split],
+        [own or unit for (_, own), unit in zip(split, given, strict=True)],
+        [()] * width,
+        {cells[0]: cells[1] for cells in others if len(cells) == 2},
+    )
+
+
 def _stacked(block: list[list[str]], width: int) -> Header:
     """Rows of labels, the lowest of which has the names, and perhaps a row of units."""
     rows = [_padded(cells, width) for cells in block]
@@ -228,12 +256,20 @@ def _stacked(block: list[list[str]], width: int) -> Header:
         if unit_row is not None and not unit:
             unit = unit_row[index].strip()
         found = next((text for text in reversed(above) if text), "")
-        if not name and found:
+        if found and (not name or _is_unit_of(own_name, found)):
+            unit = unit or own_name
             name, above = found, above[:-1]
         names.append(name)
         units.append(unit if unit.lower().strip("[](){}") not in {"", "-", "none"} else "")
         labels.append(above)
     return Header(names, units, labels)
+
+
+def _is_unit_of(cell: str, label: str) -> bool:
+    """Whether a cell in the row of names is the unit of a time, whose name is above it."""
+    unit, meaning = read_unit(cell), meaning_of(label)
+    is_time = meaning is not None and meaning.channel == "time"
+    return is_time and unit is not None and unit.dimension == "time"
 
 
 def _filled(row: list[str]) -> list[str]:
