@@ -50,7 +50,7 @@ class SecondMaster:
         self.last_request = -math.inf
         """When somebody else last sent an SDO request of any kind, s."""
         self.control_words = 0
-        """SDO writes of 6040h that somebody else has begun so far."""
+        """SDO writes of 6040h that somebody else has started so far."""
         self._bus, self._node = bus, node
         self._rpdos = set(rpdos)
         for number in self._rpdos:
