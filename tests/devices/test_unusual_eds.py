@@ -94,6 +94,21 @@ def test_a_drive_whose_identifiers_cannot_be_written_moves(tmp_path: Path) -> No
     assert [slave.objects.get(index) for index in (0x1A02, 0x1A03, 0x1602, 0x1603)] == [0] * 4
 
 
+def test_a_drive_with_rpdos_by_event_and_a_fixed_exponent_moves(tmp_path: Path) -> None:
+    """Trinamic's RPDOs are of the type 255 for good, Yiyou's 60C2h:2 is read-only."""
+
+    def change(eds: str) -> str:
+        eds = section("1400sub2", "=rw\nDefaultValue=", "=ro\nDefaultValue=255\n;")(eds)
+        return section("60C2sub2", "=rw\nDefaultValue=", "=ro\nDefaultValue=-3\n;")(eds)
+
+    home = device(tmp_path, change, (('"0x60FF"]', '"0x60FF"]\ntransmission = 255'),))
+    rig = rig_of(tmp_path, home)
+    moves(rig, bench_text(rig.channel, device=str(home)), stopped)
+    slave = rig.slaves[0]
+    assert [slave.objects.get(0x60C2, sub) for sub in (1, 2)] == [4, -3]
+    assert slave.objects.get(0x1400, 2) == 255
+
+
 def fixed(name: str, value: str) -> Callable[[str], str]:
     """An object that cannot be written and has this default."""
     return section(name, "=rw\nDefaultValue=", f"=ro\nDefaultValue={value}\n;")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 
@@ -74,6 +75,43 @@ def test_what_does_not_fit_is_reported_with_its_line(
     told = [row for row in output.split("\n") if said in row]
     assert told, output
     assert told[0].startswith(f"{path}:{line_of(path, place)}: ")
+
+
+def fixed(record: str, sub: int, value: str) -> tuple[str, str]:
+    """A communication parameter that cannot be written, with this value."""
+    eds = (SOURCE / "generic-cia402.eds").read_text(encoding="utf-8")
+    begin = eds.index(f"[{record}sub{sub}]")
+    text = eds[begin : eds.index("\n[", begin)]
+    value = f"AccessType=ro\nDefaultValue={value}\n;"
+    return text, re.sub(r"AccessType=.*\nDefaultValue=", value, text)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("1400", 2, "255"), "rpdo 1 has the transmission type 255, which cannot be written"),
+        (("1800", 2, "254"), "tpdo 1 has the transmission type 254, which cannot be written"),
+        (("1400", 1, "0x321"), "rpdo 1 has the identifier 321h at node 1, which cannot be written"),
+        (("1800", 1, "0x80000181"), "tpdo 1 is not in use: 1800h:1 cannot be written"),
+        (("1400", 1, "$NODEID+0x200"), ""),
+        (("1800", 1, "$NODEID+0x40000180"), ""),
+        (("1800", 2, "1"), ""),
+    ],
+)
+def test_pdo_parameters_that_cannot_be_written_have_to_fit(
+    tmp_path: Path, change: tuple[str, int, str], said: str
+) -> None:
+    """Trinamic's TMCM-6214 has RPDOs of the type 255 that cannot be changed."""
+    path = drive(tmp_path, eds=fixed(*change))
+    code, output = check(path)
+    assert code == (3 if said else 0), output
+    assert said in output
+
+
+def test_a_transmission_type_as_the_drive_has_it_is_in_order(tmp_path: Path) -> None:
+    written = ('"0x60FF"]', '"0x60FF"]\ntransmission = 255')
+    code, output = check(drive(tmp_path, device=written, eds=fixed("1400", 2, "255")))
+    assert code == 0, output
 
 
 def test_modes_are_those_within_the_range_of_6060h(tmp_path: Path) -> None:

@@ -24,6 +24,8 @@ __all__ = ["Verdict", "check", "command"]
 
 RUNS = (".csv", ".mcap")
 EDS = (".eds", ".dcf")
+_XML = (".xdd", ".xdc", ".xml")
+"""Device descriptions that the reader of EDS files refuses, with what to do."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
     try:
         if suffix in RUNS:
             return _run(file)
-        if suffix in EDS:
+        if suffix in (*EDS, *_XML):
             return _eds(file)
         if suffix == ".toml" or not Path(file).is_file():
             return _declaration(file, effects)

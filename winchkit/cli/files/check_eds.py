@@ -13,7 +13,8 @@ if TYPE_CHECKING:
 
 __all__ = ["describe_eds", "lines_of"]
 
-_SERVO = 402
+_SHOWN = 12
+"""Values of an instrument in one line."""
 
 
 def describe_eds(path: Path) -> tuple[DriveDescription, tuple[Fault, ...]]:
@@ -27,9 +28,14 @@ def describe_eds(path: Path) -> tuple[DriveDescription, tuple[Fault, ...]]:
 
 def lines_of(drive: DriveDescription) -> Iterator[str]:
     """The description in words, a line for each topic."""
-    if drive.device_profile not in (None, _SERVO):
-        yield f"device profile CiA {drive.device_profile}: no servo drive"
+    if not drive.servo_drive:
+        yield _other_device(drive)
         yield f"PDOs: {_pdos('receive', drive.receive)}; {_pdos('transmit', drive.transmit)}"
+        if drive.values:
+            shown = ", ".join(drive.values[:_SHOWN])
+            more = f" and {len(drive.values) - _SHOWN} more" if len(drive.values) > _SHOWN else ""
+            yield f"values that a TPDO can carry: {shown}{more}"
+            yield "an instrument is declared by [process] in a device file: docs/howto/load-cell.md"
         return
     yield f"modes: {', '.join(drive.modes) or 'none'}"
     yield f"modes that winchkit can move it in: {', '.join(drive.motion_modes) or 'none'}"
@@ -48,6 +54,12 @@ def lines_of(drive: DriveDescription) -> Iterator[str]:
         yield f"note: {difference}"
     for obstacle in drive.obstacles:
         yield f"not movable: {obstacle}"
+
+
+def _other_device(drive: DriveDescription) -> str:
+    if drive.device_profile is None:
+        return "no device profile in 1000h, and 6040h and 6041h are not both there: no servo drive"
+    return f"device profile CiA {drive.device_profile}: no servo drive"
 
 
 def _carried(objects: dict[str, bool]) -> str:

@@ -103,6 +103,13 @@ def _sections(text: str, findings: Findings) -> list[Section]:
         elif line.startswith("["):
             findings.fault(number, f"{line!r} is not a section; it should read [name]")
             sections.append(Section(line, number))
+        elif not sections and line.startswith("<"):
+            findings.fault(
+                number,
+                "is XML (XDD or XDC of CiA 311, or ESI of EtherCAT), not an EDS or DCF of CiA 306: "
+                "use the maker's EDS, or convert it by a CANopen editor",
+            )
+            return []
         elif not sections:
             findings.fault(
                 number, f"is not an EDS: expected a section such as [FileInfo], not {line!r}"

@@ -160,6 +160,16 @@ def test_a_drive_that_takes_one_exponent_only_gets_that_one() -> None:
     assert objects.values == {(0x60C2, 1): 40, (0x60C2, 2): -4}
 
 
+def test_an_exponent_that_cannot_be_written_is_used_as_it_is() -> None:
+    """Yiyou's EuServo: 60C2h:2 is read-only and -3; the period itself can be written."""
+    objects = interpolation(1, -3)
+    objects.refuses = lambda _index, sub, _value: sub == 2
+    assert set_cycle(objects, 0.004) == pytest.approx(0.004)  # type: ignore[arg-type]
+    assert objects.values == {(0x60C2, 1): 4, (0x60C2, 2): -3}
+    with pytest.raises(NotPermitted, match=r"cannot hold a cycle of 2\.5 ms"):
+        set_cycle(objects, 0.0025)  # type: ignore[arg-type]
+
+
 def test_a_drive_that_keeps_another_period_is_refused() -> None:
     objects = interpolation(1, -3)
     objects.refuses = lambda _index, _sub, _value: True

@@ -55,6 +55,12 @@ _CARRIED = (_CONTROL, 0x6041, 0x6064, 0x606C)
 """Objects without which in a PDO winchkit moves no drive."""
 _RPDO, _TPDO, _MAPPING = 0x1400, 0x1800, 0x200
 _PDOS = 512
+_FIRST_PDOS, _PDO_BITS = 4, 64
+_SERVO = 402
+_OWN, _VALUES = 0x6000, range(0x2000, 0xA000)
+"""Below 6000h objects are the maker's own (CiA 301)."""
+_FURTHER_AXES = range(0x6840, 0xA000, 0x800)
+"""Control words of the logical devices 2 to 8 (CiA 402-1)."""
 _UNSIGNED_WHERE_SIGNED = (0x6064, 0x606C, 0x607A, 0x60FF, 0x6071, 0x6077)
 """Signed objects of CiA 402-2 that some makers declare unsigned."""
 
@@ -101,6 +107,10 @@ class DriveDescription:
     identity: Identity
     device_profile: int | None
     """Lower half of 1000h, 402 for drives; None where the EDS does not say."""
+    servo_drive: bool
+    """Whether it is described as one: 1000h says 402, or 6040h and 6041h are there."""
+    values: tuple[str, ...]
+    """Of a device that is no drive: objects that a TPDO can carry, the maker's own last."""
     modes: tuple[str, ...]
     """Whose objects the EDS has."""
     motion_modes: tuple[str, ...]
@@ -123,6 +133,7 @@ def describe(dictionary: Any) -> DriveDescription:
     """Describe a drive by canopen's dictionary of its EDS."""
     info = dictionary.device_information
     modes = tuple(_modes(dictionary))
+    servo_drive = _is_drive(dictionary)
     receive, transmit = (tuple(_pdos(dictionary, first)) for first in (_RPDO, _TPDO))
     targets = {MODES[mode].target for mode in modes} - {None}
     ways = host_loss_ways(dictionary)
@@ -134,6 +145,8 @@ def describe(dictionary: Any) -> DriveDescription:
             info.vendor_number or 0, info.product_number or 0, info.revision_number or 0
         ),
         device_profile=_profile(dictionary),
+        servo_drive=servo_drive,
+        values=() if servo_drive else tuple(_values(dictionary)),
         modes=modes,
         motion_modes=tuple(mode for mode, reason in motion.items() if not reason),
         feedback=_carried(dictionary, [(index, 0) for index in _FEEDBACK], receive=False),
@@ -150,6 +163,24 @@ def describe(dictionary: Any) -> DriveDescription:
 def _profile(dictionary: Any) -> int | None:
     kind = said(declared(dictionary, 0x1000))
     return None if not kind else kind & 0xFFFF
+
+
+def _is_drive(dictionary: Any) -> bool:
+    """Whether the objects are a drive's; some makers write another device profile into 1000h."""
+    return _profile(dictionary) == _SERVO or (0x6040 in dictionary and 0x6041 in dictionary)
+
+
+def _values(dictionary: Any) -> Iterator[str]:
+    """Objects of the device profile, then the maker's, that a TPDO can carry; reals among them."""
+    for index in sorted(
+        filter(_VALUES.__contains__, dictionary), key=lambda one: (one < _OWN, one)
+    ):
+        found = dictionary[index]
+        subs = sorted(getattr(found, "subindices", {0: found}))
+        for sub in subs:
+            variable = declared(dictionary, index, sub)
+            if variable.pdo_mappable and variable.access_type not in ("wo", "rww"):
+                yield object_name(index, sub)
 
 
 def host_loss_ways(dictionary: Any) -> tuple[HostLoss, ...]:
@@ -261,8 +292,11 @@ def _obstacles(
     transmit: tuple[PdoEntry, ...],
     ways: tuple[HostLoss, ...],
 ) -> Iterator[str]:
-    if _profile(dictionary) not in (None, 402):
-        yield f"it is no servo drive: 1000h says device profile {_profile(dictionary)}, not 402"
+    if not _is_drive(dictionary):
+        profile = _profile(dictionary)
+        said_so = "no device profile" if profile is None else f"device profile {profile}, not 402"
+        yield f"it is no servo drive: 1000h says {said_so}, and 6040h and 6041h are not both there"
+        return
     for index in ALWAYS:
         if index not in dictionary:
             yield f"the EDS lacks {index:04X}h, which every motion needs"
@@ -275,14 +309,41 @@ def _obstacles(
         yield f"none of the modes {', '.join(_MOTION)} is there"
     elif all(motion.values()):
         yield f"it has {', '.join(motion)}, but {'; '.join(dict.fromkeys(motion.values()))}"
-    for kind, entries in (("receive", receive), ("transmit", transmit)):
-        if not any(entry.number <= 4 for entry in entries):
+    targets = [
+        (_CONTROL, 0),
+        *(MODES[mode].target for mode, reason in motion.items() if not reason),
+    ]
+    for kind, entries, wanted in (
+        ("receive", receive, [[targets[0], target] for target in targets[1:]]),
+        ("transmit", transmit, [[(index, 0) for index in _CARRIED if index != _CONTROL]]),
+    ):
+        if not any(entry.number <= _FIRST_PDOS for entry in entries):
             yield f"the EDS declares no {kind} PDO (1 to 4)"
+        elif (missing := [_no_room(dictionary, entries, keys) for keys in wanted]) and all(missing):
+            yield f"the {kind} PDOs 1 to 4 have no room for {missing[0]}"
     if not ways:
         yield (
             "the EDS has no way to notice a dead host (1016h, 100Ch with 100Dh, 1400h:5, 1006h); "
             "a maker's own, or the hardware that stops the drive, is to be declared as host_loss"
         )
+
+
+def _no_room(dictionary: Any, entries: tuple[PdoEntry, ...], keys: list[Any]) -> str:
+    """What of these objects no PDO can take beside the others; empty where each has its place."""
+    first = [entry for entry in entries if entry.number <= _FIRST_PDOS]
+    held = {name for entry in first if entry.fixed for name in entry.objects}
+    free = [_PDO_BITS for entry in first if not entry.fixed]
+    for index, sub in keys:
+        variable = declared(dictionary, index, sub)
+        if variable is None or (f"0x{index:04X}:{sub}" if sub else f"0x{index:04X}") in held:
+            continue
+        bits = len(variable)
+        place = next((number for number, room in enumerate(free) if room >= bits), None)
+        if place is None:
+            others = ", ".join(object_name(*key) for key in keys if key != (index, sub))
+            return f"{object_name(index, sub)} ({bits} bits) beside {others}"
+        free[place] -= bits
+    return ""
 
 
 def _differences(
@@ -291,6 +352,7 @@ def _differences(
     receive: tuple[PdoEntry, ...],
     transmit: tuple[PdoEntry, ...],
 ) -> Iterator[str]:
+    yield from _kind_differences(dictionary)
     for mode, reason in motion.items():
         if reason:
             yield f"winchkit does not move it in {mode}: {reason}"
@@ -317,11 +379,29 @@ def _differences(
         )
     if 0x6502 not in dictionary:
         yield "6502h (supported modes) is missing: the modes of the device file count"
+    elif not said(declared(dictionary, 0x6502)):
+        yield (
+            "6502h (supported modes) has no value in the EDS: modes are those whose objects are "
+            "there, `winchkit info` reads the drive's"
+        )
     yield from _pdo_differences(receive, transmit)
     if (sync := said(declared(dictionary, 0x1005)) or 0) & 1 << 30:
         yield f"1005h is {sync:X}h: the drive produces SYNC itself, which is switched off"
     if dictionary.device_information.vendor_number in (None, 0):
         yield "the vendor number is missing: the drive cannot be recognised by its identity"
+
+
+def _kind_differences(dictionary: Any) -> Iterator[str]:
+    """Another device profile, and axes beside the first."""
+    profile = _profile(dictionary)
+    if profile not in (None, _SERVO):
+        yield (
+            f"1000h says device profile {profile}, not 402; 6040h and 6041h are there, so it is "
+            "described as a drive of CiA 402"
+        )
+    if axes := [first for first in _FURTHER_AXES if first in dictionary]:
+        others = ", ".join(f"{index:04X}h" for index in axes)
+        yield f"control words of further axes at {others}: winchkit moves the axis of 6040h only"
 
 
 def _pdo_differences(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from winchkit.drivers.can.canopen.declared import declared, fixed_mapping, unmappable
+from winchkit.drivers.can.canopen.declared import declared, fixed_mapping, said, unmappable
 from winchkit.drivers.can.canopen.description import (
     ALWAYS,
     HostLoss,
@@ -16,6 +16,7 @@ from winchkit.drivers.can.canopen.description import (
 )
 from winchkit.drivers.can.canopen.eds import read_eds
 from winchkit.drivers.can.canopen.pdo import parse_object
+from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.cia402.option_codes import OPTIONS
 from winchkit.errors import Fault, FileError
@@ -27,6 +28,9 @@ from winchkit.schema.reading.source import open_source
 __all__ = ["EdsReport", "check_drive", "host_loss_problem"]
 
 _LONGEST = 64
+_NODE = 1
+"""For which the EDS is read: $NODEID of its identifiers."""
+_INVALID, _IDENTIFIER = 1 << 31, 0x7FF
 _CONTROL = (0x6040, 0)
 _OBJECTS = {
     "heartbeat": "a writable 1016h:1",
@@ -52,7 +56,7 @@ def check_drive(device: DeviceSpec) -> EdsReport:
     servo = device.servo
     if servo is None:
         return EdsReport((), ())
-    dictionary, warnings = read_eds(Path(device.path).parent / servo.eds, 1)
+    dictionary, warnings = read_eds(Path(device.path).parent / servo.eds, _NODE)
     source = open_source(device.path)
     faults = [
         source.fault(("servo", kind, place, "objects"), message)
@@ -123,6 +127,7 @@ def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec) -> Iterator[str]:
     for index in (record, record + 0x200):
         if index not in dictionary:
             yield f"{kind} {spec.number} needs {index:04X}h, which the EDS lacks"
+    yield from _communication_faults(dictionary, record, kind, spec)
     bits = 0
     for text in spec.objects:
         try:
@@ -141,6 +146,28 @@ def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec) -> Iterator[str]:
         yield f"{kind} {spec.number} would have {bits} bits; a PDO carries {_LONGEST}"
     else:
         yield from _fixed_faults(dictionary, receive, spec)
+
+
+def _communication_faults(dictionary: Any, record: int, kind: str, spec: PdoSpec) -> Iterator[str]:
+    """Identifier and transmission type that the EDS does not let change and that differ."""
+    identifier, type_ = (declared(dictionary, record, sub) for sub in (1, 2))
+    kept = said(identifier)
+    wanted = cob_id("rpdo" if kind == "rpdo" else "tpdo", spec.number, _NODE)
+    if identifier is not None and not identifier.writable and kept is not None:
+        if kept & _INVALID:
+            yield f"{kind} {spec.number} is not in use: {record:04X}h:1 cannot be written"
+        elif kept & _IDENTIFIER != wanted:
+            yield (
+                f"{kind} {spec.number} has the identifier {kept & _IDENTIFIER:03X}h at node "
+                f"{_NODE}, which cannot be written, not {wanted:03X}h of the predefined "
+                "connection set"
+            )
+    kept = said(type_)
+    if type_ is not None and not type_.writable and kept not in (None, spec.transmission):
+        yield (
+            f"{kind} {spec.number} has the transmission type {kept}, which cannot be written: "
+            f"write transmission = {kept}, or use another PDO"
+        )
 
 
 def _fixed_faults(dictionary: Any, receive: bool, spec: PdoSpec) -> Iterator[str]:

@@ -116,7 +116,8 @@ def _set_transmission(node: SdoNode, record: int, transmission: int) -> None:
     if kept != transmission:
         raise NotPermitted(
             f"{node.place(record, 2)} cannot be written by its EDS and is {kept}, not "
-            f"{transmission} as in the device file; use another PDO there"
+            f"{transmission} as in the device file; write transmission = {kept} there, or use "
+            "another PDO"
         )
 
 

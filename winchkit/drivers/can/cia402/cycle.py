@@ -17,16 +17,19 @@ _EXACT = 1e-6
 def set_cycle(node: SdoNode, cycle: float) -> float | None:
     """Make 60C2h equal to ``cycle`` (s); returns what the drive keeps, None without a 60C2h.
 
-    A drive may take only some of the exponents by which the same period can be written. Raises
+    A drive may take only some of the exponents by which the same period can be written; that which
+    it has is tried first, as it may be read-only. Raises
     NotPermitted when it takes none of them, NoReply.
     """
     kept = _kept(node)
     if kept is None or abs(kept - cycle) <= _EXACT * cycle:
         return kept
     refusals = []
-    for exponent, value in _ways(cycle):
+    present = node.read(0x60C2, 2)
+    for exponent, value in sorted(_ways(cycle), key=lambda way: way[0] != present):
         try:
-            node.write_verified(0x60C2, 2, exponent)
+            if exponent != node.read(0x60C2, 2):
+                node.write_verified(0x60C2, 2, exponent)
             node.write_verified(0x60C2, 1, value)
         except DeviceRefused as error:
             refusals.append(str(error))
