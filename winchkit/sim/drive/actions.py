@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Container
 
 from winchkit.schema.devices.servo import QuirkSpec
-from winchkit.sim.drive.axis import Axis
 from winchkit.sim.drive.homing import HOMING_METHODS
 from winchkit.sim.drive.modes import Mode
 from winchkit.sim.drive.motion import Motion
@@ -61,11 +60,10 @@ class Actions:
         shaft: Shaft,
         power: PowerStage,
         motion: Motion,
-        axis: Axis,
         *,
         quirks: QuirkSpec,
     ) -> None:
-        self._shaft, self._power, self._motion, self._axis = shaft, power, motion, axis
+        self._shaft, self._power, self._motion = shaft, power, motion
         guard_options(objects, motion.modes, quirks)
         guards, watchers = objects.guards, objects.watchers
         for index in SCALES:
@@ -93,4 +91,3 @@ class Actions:
 
     def _scale_again(self, _sub: int, _value: int) -> None:
         self._motion.settings.read_units()
-        self._axis.forget_sample()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import ceil, inf
+from typing import NamedTuple
 
 from winchkit.sim.drive.motion import Motion
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
@@ -16,6 +17,19 @@ __all__ = ["Axis"]
 
 _LEAST_SLICE = 2e-5
 """Shorter times are left to the next call, s."""
+
+
+class _Sample(NamedTuple):
+    """Feedback and demand at one instant, SI."""
+
+    angle: float = 0.0
+    speed: float = 0.0
+    torque: float = 0.0
+    demanded_angle: float = 0.0
+    demanded_speed: float = 0.0
+    demanded_torque: float = 0.0
+    """The actual torque where the mode does not control it."""
+    following_error: float = 0.0
 
 
 class Axis:
@@ -37,70 +51,88 @@ class Axis:
         longest_step: float,
     ) -> None:
         self._longest_step = longest_step
-        self._objects, self._shaft = objects, shaft
+        self._shaft = shaft
         self._power, self._motion, self._status = power, motion, status
         self.following_failed: Callable[[], None] = lambda: None
         self.now = now
-        self._sampled_at = -inf
+        self._sampled_at, self._sampled = -inf, _Sample()
         self._following_since: float | None = None
+        objects.computed.update({(index, 0): value for index, value in self._actual_values()})
 
     def advance(self, now: float, tolerance: float = 0.0) -> None:
         """Move until ``now``, if more than ``tolerance`` s is left."""
         duration = now - self.now
-        if duration < max(_LEAST_SLICE, tolerance):
+        if duration < _LEAST_SLICE or duration < tolerance:
             return
         count = ceil(duration / self._longest_step - 1e-6)
         dt = duration / count
-        start, shaft, motion = self.now, self._shaft, self._motion
+        start, shaft, motion, power = self.now, self._shaft, self._motion, self._power
         for index in range(count):
-            command = motion.step(self._power.order, shaft.motor_angle, shaft.motor_velocity, dt)
+            command = motion.step(power.order, shaft.motor_angle, shaft.motor_velocity, dt)
             shaft.advance(dt, command)
             self.now = start + (index + 1) * dt
-            if motion.stop_is_over(shaft.motor_velocity):
-                self._power.standstill()
-            self._watch_following()
+            if motion.stopping and motion.stop_is_over(shaft.motor_velocity):
+                power.standstill()
+            if motion.controls_position:
+                self._watch_following()
+            else:
+                self._status.following_error, self._following_since = False, None
         self.now = now
         self._status.advance(shaft.motor_angle, shaft.motor_velocity, duration)
 
-    def sample(self, error_code: int) -> None:
-        """Update the actual values in the object dictionary."""
-        put, motion = self._objects.put, self._motion
-        put(0x6041, 0, self._status.word(self._power.state))
-        put(0x603F, 0, error_code)
-        put(0x6061, 0, motion.mode)
+    def sample(self) -> None:
+        """Sample feedback and demand for the actual values in the object dictionary."""
         if self._sampled_at == self.now:
             return
         self._sampled_at = self.now
-        reading, settings, demand = self._shaft.measure(), motion.settings, motion.demand
-        units = settings.units
-        put(0x6064, 0, wrapped(settings.counts(reading.motor_angle), 32))
-        put(0x606C, 0, wrapped(reading.motor_velocity / units.speed, 32))
-        torque = _permille(reading.motor_torque / units.torque)
-        put(0x6077, 0, torque)
-        put(0x6078, 0, torque)
-        demanded = demand.torque if motion.set_points.torque else reading.motor_torque
-        put(0x6074, 0, _permille(demanded / units.torque))
-        put(0x6062, 0, wrapped(settings.counts(demand.angle), 32))
-        put(0x606B, 0, wrapped(demand.speed / units.speed, 32))
-        error = demand.angle - reading.motor_angle if motion.controls_position else 0.0
-        put(0x60F4, 0, wrapped(error / units.angle, 32))
-        put(0x60FD, 0, motion.switches.inputs(self._shaft.motor_angle))
+        reading, motion, demand = self._shaft.measure(), self._motion, self._motion.demand
+        self._sampled = _Sample(
+            reading.motor_angle,
+            reading.motor_velocity,
+            reading.motor_torque,
+            demand.angle,
+            demand.speed,
+            demand.torque if motion.set_points.torque else reading.motor_torque,
+            demand.angle - reading.motor_angle if motion.controls_position else 0.0,
+        )
 
-    def forget_sample(self) -> None:
-        """Discard the last sample, e.g. after a change of units."""
-        self._sampled_at = -inf
+    def _actual_values(self) -> Iterator[tuple[int, Callable[[], int]]]:
+        """Objects of the last sample by index."""
+        status, power, motion, shaft = self._status, self._power, self._motion, self._shaft
+        settings = motion.settings
+
+        def counts(angle: float) -> int:
+            return wrapped(settings.counts(angle), 32)
+
+        def speed(value: float) -> int:
+            return wrapped(value / settings.units.speed, 32)
+
+        def torque(value: float) -> int:
+            return _permille(value / settings.units.torque)
+
+        yield 0x6041, lambda: status.word(power.state)
+        yield 0x6061, lambda: motion.mode
+        yield 0x6064, lambda: counts(self._sampled.angle)
+        yield 0x606C, lambda: speed(self._sampled.speed)
+        yield 0x6077, lambda: torque(self._sampled.torque)
+        yield 0x6078, lambda: torque(self._sampled.torque)
+        yield 0x6074, lambda: torque(self._sampled.demanded_torque)
+        yield 0x6062, lambda: counts(self._sampled.demanded_angle)
+        yield 0x606B, lambda: speed(self._sampled.demanded_speed)
+        yield 0x60F4, lambda: wrapped(self._sampled.following_error / settings.units.angle, 32)
+        yield 0x60FD, lambda: motion.switches.inputs(shaft.motor_angle)
 
     def _watch_following(self) -> None:
         motion = self._motion
         error = abs(motion.demand.angle - self._shaft.motor_angle)
-        beyond = motion.controls_position and error > motion.settings.following_window()
+        beyond = error > motion.settings.limits.following_window
         self._status.following_error = beyond
         if not beyond:
             self._following_since = None
             return
         if self._following_since is None:
             self._following_since = self.now
-        if self.now - self._following_since >= motion.settings.following_time():
+        if self.now - self._following_since >= motion.settings.limits.following_time:
             self.following_failed()
 
 

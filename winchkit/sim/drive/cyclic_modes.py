@@ -69,7 +69,7 @@ class _Interpolation:
 
     def step(self, dt: float) -> float:
         """Demand after another ``dt`` s."""
-        period = self._settings.period()
+        period = self._settings.limits.period
         self._elapsed += dt
         if self._elapsed >= period:
             return self._goal
@@ -100,7 +100,7 @@ class CyclicPosition(SetPoints):
 
     def aim(self) -> None:
         """Move to the target within the software limits."""
-        low, high = self.settings.soft_limits()
+        low, high = self.settings.limits.angle
         wanted = self.target()
         goal = min(max(wanted, low), high)
         self._clipped = goal != wanted
@@ -116,7 +116,7 @@ class CyclicPosition(SetPoints):
         self._wanted = self._interpolation.step(dt)
         demand, wanted = self.demand, self._smooth.step(self._wanted, dt)
         before = demand.angle
-        demand.angle = approach(before, wanted, self.settings.top_speed() * dt)
+        demand.angle = approach(before, wanted, self.settings.limits.top_speed * dt)
         demand.limited = self._clipped or demand.angle != wanted
         demand.speed = (demand.angle - before) / dt
         extra = self.settings.number(0x60B1, 0, 0) * self.settings.units.speed
@@ -191,7 +191,7 @@ class CyclicVelocity(SetPoints):
         """Follow the interpolated target within the motor's speed and deceleration."""
         demand = self.demand
         self._wanted = self._interpolation.step(dt)
-        goal = self.clamped(self._smooth.step(self._wanted, dt), self.settings.top_speed())
+        goal = self.clamped(self._smooth.step(self._wanted, dt), self.settings.limits.top_speed)
         hardest = self.settings.ramp(0x60C6)
         goal = self.within(goal, angle, hardest)
         demand.speed = approach(demand.speed, goal, hardest * dt)

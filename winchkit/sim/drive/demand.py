@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import copysign, inf, sqrt
+from typing import Protocol
 
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.plant.servo import DriveCommand
@@ -30,18 +31,23 @@ class Demand:
     """Status bit 11: a limit restricts the demand."""
 
 
-@dataclass(frozen=True)
-class Windows:
+class Windows(Protocol):
     """Present state of the windows and thresholds of CiA 402."""
 
-    position_reached: bool
-    """Within the position window (6067h, 6068h)."""
-    speed_reached: bool
-    """Within the velocity window (606Dh, 606Eh)."""
-    slow: bool
-    """Below the velocity threshold (606Fh, 6070h)."""
     following_error: bool
     """Beyond the following error window (6065h)."""
+
+    @property
+    def position_reached(self) -> bool:
+        """Within the position window (6067h, 6068h)."""
+
+    @property
+    def speed_reached(self) -> bool:
+        """Within the velocity window (606Dh, 606Eh)."""
+
+    @property
+    def slow(self) -> bool:
+        """Below the velocity threshold (606Fh, 6070h)."""
 
 
 class SetPoints:
@@ -85,19 +91,19 @@ class SetPoints:
     def by_speed(self, angle: float) -> DriveCommand:
         """Command that follows the demanded speed from an angle."""
         self.demand.angle = angle
-        below, above = self.settings.torque_band()
+        below, above = self.settings.limits.torque
         return DriveCommand(speed=self.demand.speed, torque_limit=above, negative_limit=below)
 
     def by_position(self, forward: float) -> DriveCommand:
         """Command that follows the demanded angle with a speed fed forward (rad/s)."""
-        below, above = self.settings.torque_band()
+        below, above = self.settings.limits.torque
         return DriveCommand(
             angle=self.demand.angle, speed=forward, torque_limit=above, negative_limit=below
         )
 
     def by_torque(self, angle: float) -> DriveCommand:
         """Command with the demanded torque."""
-        below, above = self.settings.torque_band()
+        below, above = self.settings.limits.torque
         demand = self.demand
         demand.angle, demand.speed = angle, 0.0
         demand.limited |= not -below <= demand.torque <= above
@@ -105,7 +111,7 @@ class SetPoints:
             torque=demand.torque,
             torque_limit=above,
             negative_limit=below,
-            top_speed=self.settings.top_speed(),
+            top_speed=self.settings.limits.top_speed,
         )
 
     def clamped(self, speed: float, fastest: float) -> float:
@@ -117,7 +123,7 @@ class SetPoints:
 
     def within(self, speed: float, angle: float, deceleration: float) -> float:
         """Reduce a speed so that the motor can stop before the software limit (607Dh)."""
-        low, high = self.settings.soft_limits()
+        low, high = self.settings.limits.angle
         room = high - angle if speed > 0 else angle - low
         if speed == 0 or room == inf:
             return speed

@@ -96,8 +96,6 @@ class SimDrive:
         self._sdo_refuses = self._inhibited = False
         self._line = Line(send, self._emergency)
         self._sdo = SdoServer(objects)
-        short = partial(self._emergency, _PDO_TOO_SHORT)
-        self._pdos = Pdos(objects, self._line.send, self._sample, short)
         lost, back = self._host_lost, self._host_back
         self._heartbeats = Heartbeats(objects, self._send_heartbeat, lost, back)
         self._heartbeats.needs_both = self._quirks.needs_both_heartbeats
@@ -120,7 +118,10 @@ class SimDrive:
             longest_step=longest_step,
         )
         self._axis.following_failed = lambda: self._fault(FAULTS["following error"])
-        Actions(objects, shaft, self._power, self._motion, self._axis, quirks=self._quirks)
+        objects.computed[0x603F, 0] = lambda: self._error
+        short = partial(self._emergency, _PDO_TOO_SHORT)
+        self._pdos = Pdos(objects, self._line.send, self._axis.sample, short)
+        Actions(objects, shaft, self._power, self._motion, quirks=self._quirks)
         self._show_modes()
 
     # State.
@@ -276,7 +277,7 @@ class SimDrive:
         if self.nmt is NmtState.STOPPED:
             return
         self.advance(now)
-        self._sample()
+        self._axis.sample()
         reply = self._sdo.refuse(data) if self._sdo_refuses else self._sdo.answer(data)
         if reply is not None:
             self._line.answer(0x580 + self.node, reply, now)
@@ -329,9 +330,6 @@ class SimDrive:
     def advance(self, now: float) -> None:
         """Move until ``now``, without evaluating the network's timers."""
         self._axis.advance(now)
-
-    def _sample(self) -> None:
-        self._axis.sample(self._error)
 
     def _show_modes(self) -> None:
         self.objects.put(0x6502, 0, supported(self._motion.modes))

@@ -25,6 +25,7 @@ _STANDSTILL = 0.05
 """Speed below which a ramp has ended, rad/s."""
 _PATIENCE = 0.5
 """Longest wait for standstill after the ramp of a stop, s."""
+_HOLD, _BRAKED, _FREE = DriveCommand(), DriveCommand.off(brake=True), DriveCommand.off(brake=False)
 
 
 class Motion:
@@ -44,20 +45,17 @@ class Motion:
         self.settings = settings
         self.demand = Demand()
         self.switches = Switches()
-        self.mode = Mode.NONE
         self.halted = False
         self.stopping = False
         self._brake = brake
         self._set_points = _all(settings, self.demand, smoothing, lambda: self.switches)
         self.modes = frozenset(modes) & frozenset(self._set_points)
+        self.mode = Mode.NONE
+        self.set_points = self._set_points[self.mode]
+        """Set-points of the present mode."""
         self._following = False
         self._last_word = 0
         self._stood = 0.0
-
-    @property
-    def set_points(self) -> SetPoints:
-        """Set-points of the present mode."""
-        return self._set_points[self.mode]
 
     @property
     def controls_position(self) -> bool:
@@ -66,7 +64,7 @@ class Motion:
 
     def set_mode(self, mode: Mode, angle: float) -> None:
         """Change the mode; set-points start at the motor's angle."""
-        self.mode = mode
+        self.mode, self.set_points = mode, self._set_points[mode]
         self.set_points.reset()
         self._begin(angle)
 
@@ -81,7 +79,7 @@ class Motion:
 
     def step(self, order: Order, angle: float, speed: float, dt: float) -> DriveCommand:
         """Command for the next ``dt`` s, given the motor's angle and speed."""
-        if order in (Order.OFF, Order.CUT):
+        if order is Order.OFF or order is Order.CUT:
             self._brake.off(dt, still=abs(speed) < _STANDSTILL, cut=order is Order.CUT)
             return self._rest(angle, speed)
         self._brake.power(dt)
@@ -118,8 +116,8 @@ class Motion:
         self.set_points.reset()
         self.demand.angle, self.demand.speed = angle, speed
         if self._brake.holding:
-            return DriveCommand()
-        return DriveCommand.off(brake=self._brake.closed)
+            return _HOLD
+        return _BRAKED if self._brake.closed else _FREE
 
     def _stop(self, order: Order, angle: float, dt: float) -> DriveCommand:
         if order is Order.FOLLOW:

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -101,19 +102,22 @@ class ObjectDictionary:
     """Entries with their present values.
 
     ``guards`` may refuse a new number before it is stored, ``watchers`` are called afterwards; both
-    are kept by index. Storing (1010h) and restoring (1011h) take effect at ``reset``.
+    are kept by index. ``computed`` has the functions of numbers that the device computes when they
+    are read; it is complete before the first one is. Storing (1010h) and restoring (1011h) take
+    effect at ``reset``.
     """
 
     def __init__(self, entries: Mapping[Key, Entry]) -> None:
         self._entries = dict(entries)
         self._indices = {index for index, _ in entries}
         self._values: dict[Key, Value] = {}
-        self._layouts: dict[tuple[Key, ...], tuple[struct.Struct, tuple[Key, ...]]] = {}
+        self._layouts: dict[tuple[Key, ...], tuple[struct.Struct, list[Callable[[], Value]]]] = {}
         self._stored: dict[Key, Value] = {}
         self.guards: dict[int, Guard] = {0x1010: self._store, 0x1011: self._restore}
         self.watchers: dict[int, Watcher] = {}
+        self.computed: dict[Key, Callable[[], int]] = {}
         self.changes = 0
-        """Number of changes by clients and resets, but of the set-points of a cycle."""
+        """Number of changes of stored values, but of the set-points of a cycle."""
         self.reset()
 
     def __contains__(self, key: Key) -> bool:
@@ -150,13 +154,18 @@ class ObjectDictionary:
         """Set a value by the device itself, without access rights, guards and watchers."""
         if (index, sub) in self._entries:
             self._values[index, sub] = value
+            self.changes += 1
 
     def read(self, key: Key) -> bytes | Abort:
         """Read by a client."""
         entry = self.entry(key)
         if isinstance(entry, Abort):
             return entry
-        return entry.pack(self._values[key]) if entry.readable else Abort.WRITE_ONLY
+        return entry.pack(self._source(key)()) if entry.readable else Abort.WRITE_ONLY
+
+    def _source(self, key: Key) -> Callable[[], Value]:
+        """Function that returns the present value of a declared object."""
+        return self.computed.get(key) or partial(self._values.__getitem__, key)
 
     def packed(self, keys: tuple[Key, ...]) -> bytes:
         """Values of several objects on the bus, without those that cannot be read."""
@@ -164,10 +173,31 @@ class ObjectDictionary:
         if layout is None:
             declared = [(key, self._entries[key]) for key in keys if key in self._entries]
             kept = [(key, entry) for key, entry in declared if entry.readable and entry.format]
-            pattern = "<" + "".join(entry.format for _, entry in kept)
-            layout = self._layouts[keys] = struct.Struct(pattern), tuple(key for key, _ in kept)
-        values = self._values
-        return layout[0].pack(*[values[key] for key in layout[1]])
+            pattern = struct.Struct("<" + "".join(entry.format for _, entry in kept))
+            layout = self._layouts[keys] = pattern, [self._source(key) for key, _ in kept]
+        pattern, sources = layout
+        return pattern.pack(*[value() for value in sources])
+
+    def receiver(self, keys: tuple[Key, ...], sizes: tuple[int, ...]) -> Callable[[bytes], None]:
+        """Function that writes several objects from bytes on the bus, each of a size in bytes.
+
+        An object that is missing, that cannot be written or that has another size is skipped.
+        """
+        pattern, kept = "<", []
+        for key, size in zip(keys, sizes, strict=True):
+            entry = self._entries.get(key)
+            if entry is None or not entry.writable or entry.size not in (0, size):
+                pattern += f"{size}x"
+                continue
+            pattern += entry.format or f"{size}s"
+            kept.append((key, entry))
+        layout, store = struct.Struct(pattern), self._store_checked
+
+        def receive(data: bytes) -> None:
+            for (key, entry), value in zip(kept, layout.unpack_from(data), strict=True):
+                store(key, entry, value)
+
+        return receive
 
     def refusal(self, key: Key) -> Abort | None:
         """Abort code for a write of any value by a client; None where writing is permitted."""
@@ -184,17 +214,23 @@ class ObjectDictionary:
         if not entry.writable:
             return Abort.READ_ONLY
         value = entry.unpack(data)
-        if isinstance(value, Abort):
-            return value
-        if isinstance(value, int):
-            refused = self._check(key, entry, value)
-            if refused is not None:
-                return refused
+        return value if isinstance(value, Abort) else self._store_checked(key, entry, value)
+
+    def _store_checked(self, key: Key, entry: Entry, value: Value) -> Abort | None:
+        """Store a value of a client that the object may have."""
+        if isinstance(value, bytes):
+            self._values[key] = value
+            self.changes += 1
+            return None
+        refused = self._check(key, entry, value)
+        if refused is not None:
+            return refused
+        index, sub = key
         self._values[key] = value
-        self.changes += key[0] not in _SET_POINTS
-        watcher = self.watchers.get(key[0])
-        if watcher is not None and isinstance(value, int):
-            watcher(key[1], value)
+        self.changes += index not in _SET_POINTS
+        watcher = self.watchers.get(index)
+        if watcher is not None:
+            watcher(sub, value)
         return None
 
     def _check(self, key: Key, entry: Entry, value: int) -> Abort | None:

@@ -34,6 +34,8 @@ class _Pdo:
     """Transmission type."""
     keys: tuple[Key, ...]
     sizes: tuple[int, ...]
+    receive: Callable[[bytes], None]
+    """Writes the objects of an RPDO."""
     inhibit: float = 0.0
     event: float = 0.0
     waiting: bytes | None = None
@@ -42,13 +44,9 @@ class _Pdo:
     sent: bytes | None = None
     sent_at: float = -inf
 
-    @property
-    def synchronous(self) -> bool:
-        return self.kind <= _LAST_SYNCHRONOUS
-
-    @property
-    def length(self) -> int:
-        return sum(self.sizes)
+    def __post_init__(self) -> None:
+        self.synchronous = self.kind <= _LAST_SYNCHRONOUS
+        self.length = sum(self.sizes)
 
 
 class Pdos:
@@ -68,7 +66,8 @@ class Pdos:
         self._objects = objects
         self._send, self._sample, self._short = send, sample, short
         self._receive: dict[int, _Pdo] = {}
-        self._transmit: list[_Pdo] = []
+        self._synchronous: list[_Pdo] = []
+        self._event_driven: list[_Pdo] = []
         self.mute = False
         """Whether sending is disabled."""
         for index in {key[0] for key in objects}:
@@ -88,7 +87,11 @@ class Pdos:
     def rebuild(self) -> None:
         """Resolve the mappings in the object dictionary; discards waiting RPDOs."""
         self._receive = {pdo.identifier: pdo for pdo in self._valid(0x1400)}
-        self._transmit = self._valid(0x1800)
+        transmit = self._valid(0x1800)
+        self._synchronous = [pdo for pdo in transmit if pdo.synchronous]
+        self._event_driven = [
+            pdo for pdo in transmit if not pdo.synchronous and pdo.kind not in _RTR_TYPES
+        ]
 
     def listens(self, identifier: int) -> bool:
         """Whether it is the identifier of a valid RPDO."""
@@ -108,25 +111,21 @@ class Pdos:
         elif pdo.synchronous:
             pdo.waiting = data
         else:
-            self._apply(pdo, data)
+            pdo.receive(data)
 
     def latch(self) -> None:
         """SYNC: apply the waiting RPDOs."""
         for pdo in self._receive.values():
             if pdo.waiting is not None:
                 data, pdo.waiting = pdo.waiting, None
-                self._apply(pdo, data)
+                pdo.receive(data)
 
     def on_sync(self, now: float) -> None:
         """SYNC: send the TPDOs that are due."""
-        sampled = False
-        for pdo in self._transmit:
-            if not pdo.synchronous:
-                continue
-            if not sampled:
-                self._sample()
-                sampled = True
-            data = self._pack(pdo)
+        if self._synchronous:
+            self._sample()
+        for pdo in self._synchronous:
+            data = self._objects.packed(pdo.keys)
             pdo.syncs += 1
             due = data != pdo.sent if pdo.kind == 0 else pdo.syncs >= pdo.kind
             if due:
@@ -136,13 +135,13 @@ class Pdos:
     def poll(self, now: float) -> None:
         """Send the event-driven TPDOs whose data changed or whose timer expired."""
         sampled = False
-        for pdo in self._transmit:
-            if pdo.synchronous or pdo.kind in _RTR_TYPES or now - pdo.sent_at < pdo.inhibit:
+        for pdo in self._event_driven:
+            if now - pdo.sent_at < pdo.inhibit:
                 continue
             if not sampled:
                 self._sample()
                 sampled = True
-            data = self._pack(pdo)
+            data = self._objects.packed(pdo.keys)
             timer = pdo.event > 0 and now - pdo.sent_at >= pdo.event
             if timer or data != pdo.sent:
                 self._emit(pdo, data, now)
@@ -161,16 +160,6 @@ class Pdos:
         if not self.mute:
             self._send(pdo.identifier, data)
 
-    def _pack(self, pdo: _Pdo) -> bytes:
-        return self._objects.packed(pdo.keys)
-
-    def _apply(self, pdo: _Pdo, data: bytes) -> None:
-        start = 0
-        for key, size in zip(pdo.keys, pdo.sizes, strict=True):
-            if key[0] > _LAST_DUMMY:
-                self._objects.write(key, data[start : start + size])
-            start += size
-
     def _valid(self, base: int) -> list[_Pdo]:
         found = []
         for number in _PDOS:
@@ -187,12 +176,15 @@ class Pdos:
         def optional(sub: int, unit: float) -> float:
             return objects.number(record, sub) * unit if (record, sub) in objects else 0.0
 
+        keys = tuple((entry >> 16, entry >> 8 & 0xFF) for entry in entries)
+        sizes = tuple((entry & 0xFF) // 8 for entry in entries)
         return _Pdo(
             number,
             objects.number(record, 1) & _IDENTIFIER,
             objects.number(record, 2),
-            tuple((entry >> 16, entry >> 8 & 0xFF) for entry in entries),
-            tuple((entry & 0xFF) // 8 for entry in entries),
+            keys,
+            sizes,
+            objects.receiver(keys, sizes),
             optional(3, _TICK_INHIBIT) if base == 0x1800 else 0.0,
             optional(5, _TICK_EVENT) if base == 0x1800 else 0.0,
         )

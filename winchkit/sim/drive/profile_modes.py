@@ -107,7 +107,7 @@ class ProfilePosition(SetPoints):
         if relative:
             last = self._moves.last
             wanted += (angle if last is None else last) - settings.zero
-        low, high = settings.soft_limits()
+        low, high = settings.limits.angle
         return Move(
             min(max(wanted, low), high),
             settings.number(0x6081) * settings.units.speed,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from winchkit.sim.drive.demand import Windows
 from winchkit.sim.drive.modes import Mode
 from winchkit.sim.drive.motion import Motion
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
@@ -11,9 +10,6 @@ from winchkit.sim.drive.power import State
 __all__ = ["StatusBits"]
 
 _VOLTAGE, _REMOTE, _REACHED, _LIMIT = 1 << 4, 1 << 9, 1 << 10, 1 << 11
-_NARROW = 100
-"""Default of a missing window, counts."""
-_MS = 1e-3
 
 
 class StatusBits:
@@ -31,16 +27,15 @@ class StatusBits:
 
     def advance(self, angle: float, speed: float, dt: float) -> None:
         """Advance by ``dt`` s with the motor at ``angle`` (rad) and ``speed`` (rad/s)."""
-        number, settings = self._objects.number, self._motion.settings
-        unit = settings.units
+        settings = self._motion.settings
+        limits = settings.limits
         self._speed = speed
-        off = abs(self._target() - angle)
-        near = off <= number(0x6067, 0, _NARROW) * unit.angle
+        near = abs(self._target() - angle) <= limits.position_window
         self._position_time = self._position_time + dt if near else 0.0
-        off = abs(number(0x60FF, 0, 0) * unit.speed - speed)
-        near = off <= number(0x606D, 0, _NARROW) * unit.speed
+        target = self._objects.number(0x60FF, 0, 0) * settings.units.speed
+        near = abs(target - speed) <= limits.speed_window
         self._speed_time = self._speed_time + dt if near else 0.0
-        slow = abs(speed) <= number(0x606F, 0, _NARROW) * unit.speed
+        slow = abs(speed) <= limits.slow_speed
         self._slow_time = self._slow_time + dt if slow else 0.0
 
     def _target(self) -> float:
@@ -49,14 +44,20 @@ class StatusBits:
             return settings.angle(number(0x60C1, 1, 0))
         return settings.angle(number(0x607A, 0, 0))
 
-    def _windows(self) -> Windows:
-        number = self._objects.number
-        return Windows(
-            position_reached=self._position_time > number(0x6068, 0, 0) * _MS,
-            speed_reached=self._speed_time > number(0x606E, 0, 0) * _MS,
-            slow=self._slow_time > number(0x6070, 0, 0) * _MS,
-            following_error=self.following_error,
-        )
+    @property
+    def position_reached(self) -> bool:
+        """Within the position window (6067h) for the time 6068h."""
+        return self._position_time > self._motion.settings.limits.position_time
+
+    @property
+    def speed_reached(self) -> bool:
+        """Within the velocity window (606Dh) for the time 606Eh."""
+        return self._speed_time > self._motion.settings.limits.speed_time
+
+    @property
+    def slow(self) -> bool:
+        """Below the velocity threshold (606Fh) for the time 6070h."""
+        return self._slow_time > self._motion.settings.limits.slow_time
 
     def word(self, state: State) -> int:
         """Status word (6041h) in a state."""
@@ -73,7 +74,7 @@ class StatusBits:
 
     def _mode_bits(self, still: bool) -> int:
         motion = self._motion
-        bits = motion.set_points.bits(self._windows())
+        bits = motion.set_points.bits(self)
         if motion.set_points.cyclic:
             bits = 0 if motion.stopping else bits
             return bits | (_REACHED if self._toggling and self.syncs % 2 else 0)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from math import isfinite, nan
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from winchkit.errors import UsageError
 from winchkit.schema.devices.modbus import StatusMeaning
@@ -23,8 +22,7 @@ _FAST, _SLOW = 0.05, 0.5
 """Time constants of the two averages whose difference indicates motion, s."""
 
 
-@dataclass(frozen=True, slots=True)
-class Converted:
+class Converted(NamedTuple):
     """One conversion, in the unit of the device."""
 
     due: float
@@ -70,12 +68,10 @@ class Converter:
         if not broken:
             self._average(value)
 
-    def take(self, now: float) -> list[Converted]:
-        """Conversions that have passed the filter by ``now``, each once."""
-        found = []
-        while self._pipeline and self._pipeline[0].due <= now:
-            found.append(self._pipeline.popleft())
-        return found
+    def take(self, now: float) -> Converted | None:
+        """Next conversion that has passed the filter by ``now``, each once."""
+        pipeline = self._pipeline
+        return pipeline.popleft() if pipeline and pipeline[0].due <= now else None
 
     @property
     def motion(self) -> float:
@@ -132,7 +128,7 @@ class SimulatedInstrument:
 
     def show(self, now: float) -> None:
         """Show the conversions that have passed the filter by ``now``."""
-        for shown in self._converter.take(now):
+        while (shown := self._converter.take(now)) is not None:
             self._shown = shown
             self._showing()
 

@@ -91,8 +91,10 @@ class LiveWinch:
         read = self.plant.read
         measuring = {role: partial(read, quantity) for role, quantity in _QUANTITIES.items()}
         self.instruments = instruments_of(wiring, beside, measuring, send, now=now)
-        devices = self.instruments.values()
+        devices = list(self.instruments.values())
         self._on_can = [one for one in devices if isinstance(one, ProcessInstrument)]
+        self._devices = devices
+        self._conversion_due = self._next_conversion()
         if clocks_deviate:
             for role, one in self.instruments.items():
                 random = Random(f"{seed}/{name}/{role}/clock")
@@ -102,17 +104,20 @@ class LiveWinch:
         """Advance to ``now``, with each conversion at its own instant."""
         self._convert(now)
         self.drive.advance(now)
-        for one in self.instruments.values():
+        for one in self._devices:
             one.show(now)
 
     def _convert(self, now: float) -> None:
         """Advance to the conversions that are due."""
-        instruments = self.instruments.values()
-        while (due := min([one.next_conversion for one in instruments], default=inf)) <= now:
+        while (due := self._conversion_due) <= now:
             self.drive.advance(due)
-            for one in instruments:
+            for one in self._devices:
                 if one.next_conversion <= due:
                     one.convert()
+            self._conversion_due = self._next_conversion()
+
+    def _next_conversion(self) -> float:
+        return min([one.next_conversion for one in self._devices], default=inf)
 
     def listens(self, identifier: int) -> bool:
         """Whether it is an RPDO of the drive."""
@@ -133,7 +138,7 @@ class LiveWinch:
         """
         self._convert(now)
         self.drive.tick(now, all_heard)
-        for one in self.instruments.values():
+        for one in self._devices:
             one.show(now)
         for one in self._on_can:
             one.tick(now)

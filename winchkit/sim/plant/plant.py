@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import ceil
 from typing import Any
 
@@ -73,7 +72,8 @@ class WinchPlant:
         self._wound_reference = self._kinematics.drum.wound(self._kinematics.wound_reference)[0]
         self._wraps = tuple(pulley.wrap for pulley in true.pulley)
         self._inertia = sum(piece.rotor_inertia() for piece in self._pieces)
-        self._truth = truth
+        self._temperature = truth.temperature
+        self._drift = truth.temperature_drift / 3600
         self._servo = Servo()
         self._bind_hooks()
         length = nominal.length_reference if cable_length is None else cable_length
@@ -108,6 +108,7 @@ class WinchPlant:
         self._motor = bound["motor"]
         self._torque_signal = bound["torque_signal"]
         self._length_signal = bound["length_signal"]
+        self._carried_share = 1.0 if not self._compliance else _SMALLEST_INERTIA_SHARE
 
     # True state.
 
@@ -169,8 +170,7 @@ class WinchPlant:
 
     def warm(self, temperature: float) -> None:
         """Set the temperature (degC), from which the declared drift continues."""
-        drifted = self._truth.temperature_drift / 3600 * self._state.time
-        self._truth = replace(self._truth, temperature=temperature - drifted)
+        self._temperature = temperature - self._drift * self._state.time
         self._state.temperature = temperature
         self._settle()
 
@@ -230,15 +230,15 @@ class WinchPlant:
         state.motor_speed += dt * acceleration
         state.motor_acceleration = acceleration
         state.time += dt
-        drift = self._truth.temperature_drift / 3600
-        state.temperature = self._truth.temperature + drift * state.time
+        state.temperature = self._temperature + self._drift * state.time
         winding_speed = self._wind(dt)
         state.winding_acceleration = (winding_speed - state.winding_speed) / dt
         state.winding_speed = winding_speed
         compliance = 0.0
         for hook in self._compliance:
             compliance += hook(state)
-        load.step(state.unstrained + self._stretched(dt), -winding_speed, compliance, dt)
+        stretched = self._stretched(dt) if self._stretch else 0.0
+        load.step(state.unstrained + stretched, -winding_speed, compliance, dt)
         state.load = load.tension
         state.cable_length = load.position
         self._powered = command.power and not command.brake
@@ -292,8 +292,7 @@ class WinchPlant:
         for spend in self._motor:
             torque += spend(state)
         carried = state.arm * state.arm * state.load_mass
-        share = 1.0 if not self._compliance else _SMALLEST_INERTIA_SHARE
-        self._total_inertia = self._inertia + share * carried
+        self._total_inertia = self._inertia + self._carried_share * carried
         self._torque_needed = torque
         state.motor_torque = torque if self._powered else 0.0
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import exp, sqrt
 from random import Random
+from typing import NamedTuple
 
 from winchkit.schema.simbench import NoiseSpec
 from winchkit.sim.physics.state import State
@@ -32,8 +32,6 @@ class Noise:
 
     def sample(self, interval: float) -> float:
         """Next value, ``interval`` s after the one before."""
-        if not (self._white or self._slow_sigma):
-            return 0.0
         if self._slow_sigma > 0.0:
             keep = exp(-interval / self._time) if self._time > 0.0 else 0.0
             kick = self._slow_sigma * sqrt(1.0 - keep * keep)
@@ -44,8 +42,7 @@ class Noise:
 _NOISY = ("motor_torque", "tension", "load", "cable_length", "temperature")
 
 
-@dataclass(frozen=True, slots=True)
-class Measurement:
+class Measurement(NamedTuple):
     """Readings of the instruments at one instant with noise, SI."""
 
     time: float
@@ -62,31 +59,35 @@ class Instruments:
     """Adds independent noise to every reading, reproducible by a seed."""
 
     def __init__(self, noise: NoiseSpec, seed: int | str) -> None:
+        sigmas = {name: getattr(noise, name) for name in _NOISY}
         self._noise = {
-            name: Noise(
-                getattr(noise, name), noise.colour, noise.colour_time, Random(f"{seed}/{name}")
-            )
-            for name in _NOISY
+            name: Noise(sigma, noise.colour, noise.colour_time, Random(f"{seed}/{name}"))
+            if sigma
+            else None
+            for name, sigma in sigmas.items()
         }
         self._sampled_at = dict.fromkeys(_NOISY, 0.0)
 
     def noise(self, name: str, time: float) -> float:
         """Noise of one quantity at a time (s)."""
+        noise = self._noise[name]
+        if noise is None:
+            return 0.0
         interval, self._sampled_at[name] = time - self._sampled_at[name], time
-        return self._noise[name].sample(interval)
+        return noise.sample(interval)
 
     def read(
         self, state: State, *, motor_torque: float, tension: float, cable_length: float
     ) -> Measurement:
         """Read; the arguments are outputs of drive, cell and length instrument without noise."""
-        noise = {name: self.noise(name, state.time) for name in _NOISY}
+        noise, time = self.noise, state.time
         return Measurement(
-            state.time,
+            time,
             state.motor_angle,
             state.motor_speed,
-            motor_torque + noise["motor_torque"],
-            tension + noise["tension"],
-            state.load + noise["load"],
-            cable_length + noise["cable_length"],
-            state.temperature + noise["temperature"],
+            motor_torque + noise("motor_torque", time),
+            tension + noise("tension", time),
+            state.load + noise("load", time),
+            cable_length + noise("cable_length", time),
+            state.temperature + noise("temperature", time),
         )

@@ -48,10 +48,11 @@ class Coupling:
     def advance(self) -> None:
         """Advance the platform to the time of the winch that is furthest behind."""
         platform, ends = self.platform, self.ends
-        to = min(end.time for end in ends)
+        for end in ends:
+            if end.time - platform.time < _LEAST_STEP:
+                return
+        to = min([end.time for end in ends])
         passed = to - platform.time
-        if passed < _LEAST_STEP:
-            return
         start = [end.passed for end in ends]
         goal = [
             end.passed + passed / (end.time - platform.time) * (end.unstrained - end.passed)
@@ -71,7 +72,7 @@ class CableEnd:
         platform = coupling.platform
         self._coupling, self._index = coupling, index
         self._axial_stiffness, self._dead_length = axial_stiffness, dead_length
-        self.position, _, self._home_wrap = platform.cable(index)
+        self.position, _, self._home_wrap = platform.cable[index]
         self.mass = platform.body.mass / platform.count
         """Share of the platform, kg, which the motor accelerates beside its own rotor."""
         self.time = platform.time
@@ -89,8 +90,9 @@ class CableEnd:
 
     def rest(self, cable_end: float, compliance: float) -> None:
         """Take the unstrained cable of the winch; the platform does not move at once."""
-        self._take(cable_end, 0.0, compliance)
-        self.passed = cable_end
+        self.unstrained = self.passed = cable_end
+        self.flexibility = self._flexibility(compliance)
+        self._take(0.0)
 
     def step(self, cable_end: float, end_speed: float, compliance: float, dt: float) -> None:
         """Advance by ``dt`` s; the unstrained length is then ``cable_end``."""
@@ -101,15 +103,14 @@ class CableEnd:
         self.flexibility = self._flexibility(compliance)
         if furthest:
             self._coupling.advance()
-        self._take(cable_end, end_speed, compliance)
+        self._take(end_speed)
 
-    def _take(self, cable_end: float, end_speed: float, compliance: float) -> None:
-        platform, index = self._coupling.platform, self._index
-        self.unstrained = cable_end
-        self.flexibility = self._flexibility(compliance)
-        length, speed, wrap = platform.cable(index)
+    def _take(self, end_speed: float) -> None:
+        """Continue the cable from the platform's time; its unstrained end moves at a speed."""
+        platform = self._coupling.platform
+        length, speed, wrap = platform.cable[self._index]
         self.position = length + speed * (self.time - platform.time)
-        stretch = self.position - cable_end
+        stretch = self.position - self.unstrained
         pull = (stretch + platform.damping_time * (speed - end_speed)) / self.flexibility
         self.tension = max(0.0, pull) if stretch > 0 else 0.0
         self.wrap_change = wrap - self._home_wrap

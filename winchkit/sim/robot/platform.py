@@ -101,6 +101,8 @@ class CablePlatform:
         cables(self._lines, self._center, self._rotation, self._rows)
         if compiled:
             self._advance(0.0, self._floats(self._weight))  # compiles it
+        self.cable = self._cable_states()
+        """Length (m), its rate (m/s) and wrap (rad) of each cable."""
 
     @property
     def count(self) -> int:
@@ -155,10 +157,13 @@ class CablePlatform:
         """Rates of the cable lengths, (n,), m/s."""
         return np.array(self._forces[1::2])
 
-    def cable(self, index: int) -> tuple[float, float, float]:
-        """Length (m), its rate (m/s) and wrap (rad) of one cable."""
-        row = ROW * index
-        return self._rows[row], self._forces[2 * index + 1], self._rows[row + 7]
+    def _cable_states(self) -> list[tuple[float, float, float]]:
+        # Plain floats: arithmetic with those of NumPy takes four times as long.
+        rows, forces = (
+            values.tolist() if isinstance(values, np.ndarray) else values
+            for values in (self._rows, self._forces)
+        )
+        return list(zip(rows[0::ROW], forces[1::2], rows[7::ROW], strict=True))
 
     def equilibrium(self, pretension: float) -> Array:
         """Cable forces at rest nearest to ``pretension``, (n,), N; negative where none exist."""
@@ -203,6 +208,7 @@ class CablePlatform:
             springs[0::3] = [a + (b - a) * share for a, b in zip(start, end, strict=True)]
             self._advance(dt, load)
         self.time = to
+        self.cable = self._cable_states()
 
     def _advance(self, dt: float, load: Any) -> None:
         """Make one step of ``dt`` s under an external load (6,)."""
