@@ -5,7 +5,7 @@ The latch is cleared last, once nothing forbids motion: a reset that fails leave
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.snapshot import Direction, Phase
@@ -130,14 +130,6 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
             "the control loop has failed and only sends stops; close the bench, open it again, "
             "then reset"
         )
-    wired.loop.listening = False
-    try:
-        return _reset(wired, spec, clock)
-    finally:
-        wired.loop.listening = True
-
-
-def _reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     loop, axes = wired.loop, wired.axes
     assert loop.snapshot is not None, "an open bench has had a cycle"
     seen = loop.snapshot
@@ -149,22 +141,22 @@ def _reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     if "" in troubled:
         troubled = {name for name in axes if axes[name].lost_set_up} | troubled - {""}
     troubled |= _on_reopened(wired, spec)
-    if not loop.beating:
+    silent = not loop.beating
+    if silent:
         # Every drive has missed the heartbeat, and its watchdog is proved anew.
-        troubled, loop.beating = set(axes), True
+        troubled = set(axes)
     if any(axes[name].host.disturbs for name in troubled):
         # The proof of one is a silence towards all: each of them is set up anew.
         troubled = set(axes)
     lost = [name for name in axes if name in troubled]
     # The last feedback of a drive without its mapping stays: only commissioning reads anew.
     await_rest(loop, [name for name in axes if name not in lost], clock)
-    for name in lost:
-        axes[name].commission()
-    if any(axes[name].host.disturbs for name in lost):
-        for name in lost:
-            axes[name].host.settle()
-    await_feedback(loop, axes, clock)
-    await_rest(loop, lost, clock)
+    if not (loop.beating or silent):
+        raise LimitTripped(
+            "a drive did not obey the stop that the reset waited for, and the host's heartbeat "
+            "ended; look at the drives, then reset again"
+        )
+    _set_up(lost, wired, clock)
     faults = {name: axis.fault_text for name, axis in axes.items() if axis.state is State.FAULT}
     reported = {trip.winch for trip in seen.tripped if trip.kind == "fault"}
     cleared += [
@@ -182,6 +174,22 @@ def _reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     loop.forget_warnings()
     await_cycles(loop, clock, 2)
     return cleared
+
+
+def _set_up(lost: Sequence[str], wired: Wired, clock: Clock) -> None:
+    """Commission drives anew, with heartbeats, which no drive ends that obeys no stop meanwhile."""
+    loop, axes = wired.loop, wired.axes
+    loop.listening, loop.beating = False, True
+    try:
+        for name in lost:
+            axes[name].commission()
+        if any(axes[name].host.disturbs for name in lost):
+            for name in lost:
+                axes[name].host.settle()
+        await_feedback(loop, axes, clock)
+        await_rest(loop, lost, clock)
+    finally:
+        loop.listening = True
 
 
 def _on_reopened(wired: Wired, spec: BenchSpec) -> set[str]:

@@ -12,11 +12,15 @@ from pathlib import Path
 
 import pytest
 
+from slave import Slave, State
 from slave.frames import Frame
 from slave.held_key import jogging, observe
+from slave.oracle import ESCALATED
 from slave.rig import Rig
+from slave.wire import GENERIC
 from winchkit.bench.control import stop_escalation
 from winchkit.bench.control.stop_escalation import STOP_TABLE, Rung
+from winchkit.errors import WinchkitError
 
 _RAMP, _LAG = 628.0, 0.03
 _WITHIN = 0.15
@@ -24,6 +28,8 @@ _WITHIN = 0.15
 _SDO_STOP = bytes.fromhex("2b406000")
 _NMT_STOP = bytes.fromhex("0201")
 _BEAT = 0x77F
+_DEAD_MAN, _RAMP_DOWN = 0.2, 0.3
+"""Of a jog that is not repeated, and of the ramp from limits.speed, s."""
 
 
 def _is_sdo_stop(frame: Frame) -> bool:
@@ -115,3 +121,22 @@ def test_a_rung_that_is_switched_off_makes_a_test_fail(
 
 def test_every_rung_has_a_case() -> None:
     assert {case.rung for case in CASES} == {row.rung for row in STOP_TABLE} == set(Rung)
+
+
+def test_a_reset_during_a_motion_withholds_no_way_to_stop(tmp_path: Path) -> None:
+    """Only silence stops a drive that heeds no control word, also while a reset waits for rest."""
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    slave = rig.slaves[0]
+    with rig.opened() as bench:
+        jogging(rig, bench)
+        slave.inject("control word unheeded")
+        begin = rig.time
+        with pytest.raises(WinchkitError):
+            bench.reset()  # nobody repeats the jog meanwhile: the dead-man expires
+        enabled = [s.time for s in rig.samples[0] if s.state is State.ENABLED]
+        assert max(enabled) - begin < _DEAD_MAN + _RAMP_DOWN + ESCALATED
+        assert "does not obey the stop" in str(bench.snapshot.tripped)
+        slave.mend_all()
+        rig.wait(1.0)
+        bench.reset()
+        assert not bench.snapshot.tripped
