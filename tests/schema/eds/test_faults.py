@@ -243,7 +243,7 @@ def test_all_faults_of_a_file_are_reported_at_once(tmp_path: Path) -> None:
         (b"", ":1: is not an EDS: it has no sections"),
         (b"; only a comment\n", ":1: is not an EDS: it has no sections"),
         (b"\n\nhello = 3\n", ":3: is not an EDS: expected a section"),
-        (b"<?xml version='1.0'?>\n", ":1: is not an EDS: expected a section"),
+        (b"<?xml version='1.0'?>\n", ":1: is XML (XDD or XDC of CiA 311"),
         (b"[FileInfo]\n\x00\x01\x02", ":2: is binary, not the text of an EDS"),
     ],
 )

@@ -1,4 +1,4 @@
-"""What ``winchkit check`` says of drives: a device file against its EDS, and those of a bench."""
+"""What ``winchkit check`` says of CANopen devices: a device file against its EDS; a bench's."""
 
 from __future__ import annotations
 
@@ -25,16 +25,19 @@ class DriveReport:
 
 
 def report_of(value: object) -> DriveReport:
-    """Check a drive's device file, or all device files of a bench. Raises FileError."""
+    """Check the device file of a CANopen device, or all those of a bench. Raises FileError."""
     if isinstance(value, SimBench):
         return _of_bench(value.bench)
     if isinstance(value, BenchSpec):
         found = _of_bench(value)
         return replace(found, warnings=(*found.warnings, *_not_commissioned(value)))
-    if not isinstance(value, DeviceSpec) or value.servo is None:
+    if not isinstance(value, DeviceSpec) or value.kind not in ("servo", "process"):
         return DriveReport()
-    from winchkit.drivers.can.canopen.device_check import check_drive
+    from winchkit.drivers.can.canopen.device_check import check_drive, check_process
 
+    if value.process is not None:
+        instrument = check_process(value)
+        return DriveReport(instrument.faults, instrument.warnings)
     report = check_drive(value)
     ways = ", ".join(f"{one.way} ({one.reaction})" for one in report.host_loss)
     return DriveReport(
@@ -61,6 +64,7 @@ def _of_bench(spec: BenchSpec) -> DriveReport:
     from winchkit.drivers.can.bus.interface import sends_remote
     from winchkit.drivers.can.canopen.device_check import (
         check_drive,
+        check_process,
         host_loss_problem,
     )
     from winchkit.errors import Fault
@@ -92,4 +96,8 @@ def _of_bench(spec: BenchSpec) -> DriveReport:
             if ref is not None:
                 instrument = load(find("devices", ref.device, spec.path or None))
                 warnings |= dict.fromkeys(instrument.warnings)
+                if isinstance(instrument.value, DeviceSpec):
+                    read = check_process(instrument.value)
+                    faults |= dict.fromkeys(read.faults)
+                    warnings |= dict.fromkeys(read.warnings)
     return DriveReport(tuple(faults), tuple(warnings), tuple(details))

@@ -12,6 +12,7 @@ from winchkit.schema.devices.process import ProcessSpec
 from winchkit.schema.devices.servo import ServoSpec
 from winchkit.schema.devices.stream import StreamSpec
 from winchkit.schema.table import Rule, Table
+from winchkit.units import dimension_of
 
 __all__ = ["TABLES", "DeviceSpec"]
 
@@ -44,6 +45,24 @@ class DeviceSpec(Table):
     def kind(self) -> str:
         """Name of the table that is given."""
         return next((table for table in TABLES if getattr(self, table) is not None), "nothing")
+
+    @property
+    def unit(self) -> str:
+        """Unit of the value of an instrument; empty for a drive, or where a frame names several."""
+        if self.modbus is not None:
+            fields = (one.unit for one in self.modbus.field if one.name == self.modbus.value)
+            return next(fields, "")
+        if self.stream is not None:
+            units = {one.unit for one in self.stream.units.values()} or {self.stream.unit}
+            return units.pop() if len(units) == 1 else ""
+        return "" if self.process is None else self.process.unit
+
+    @property
+    def dimension(self) -> str | None:
+        """Dimension of the value of an instrument; None for a drive and for unknown units."""
+        if self.stream is not None:
+            return self.stream.dimension()
+        return dimension_of(self.unit) if self.unit else None
 
     @property
     def commands(self) -> dict[str, bool]:

@@ -249,6 +249,12 @@ class StreamSpec(Table):
             templates = self.templates()
         except UsageError:
             return  # reported already, at its own key
+        for key, text in [("example", self.example), *(("frame", text) for text in self.frame)]:
+            if self.terminator and self.terminator in text:
+                yield (
+                    key,
+                    f"'{text}' contains the terminator, which ends a line and is no part of it",
+                )
         if templates and fields_of(templates[0], self.example) is None:
             yield "example", f"'{self.example}' does not fit '{self.frame[0]}'"
 

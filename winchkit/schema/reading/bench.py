@@ -24,6 +24,9 @@ from winchkit.units import suggest
 __all__ = ["bench", "sim_bench"]
 
 ROLES = ("servo", "cell", "load", "length", "temperature")
+_MEASURED = {"cell": "force", "load": "force", "length": "length", "temperature": "temperature"}
+"""What an instrument of each role measures."""
+_FORCE_OF_MASS = 9.80665
 DeviceReader = Callable[[str | Path], DeviceSpec]
 RobotReader = Callable[[str | Path], RobotProfile]
 _FITTING = {
@@ -224,6 +227,7 @@ def _check_device(
         what = "a servo drive" if servo else "an instrument"
         reading.fault((*at, "device"), f"'{device.name}' is {what}, which does not fit here")
         return
+    _check_measured(reading, device, at)
     fitting = _FITTING[device.kind]
     address, other = ("node", "unit") if fitting == ("can",) else ("unit", "node")
     if address not in raw and _is_addressed(device):
@@ -235,6 +239,17 @@ def _check_device(
     if kind is not None and kind not in fitting:
         message = f"[bus.{bus}] is of kind {kind}; '{device.name}' needs {' or '.join(fitting)}"
         reading.fault((*at, "bus"), message)
+
+
+def _check_measured(reading: Reading, device: DeviceSpec, at: Key) -> None:
+    """An instrument measures what its role needs; bare counts of a cell have a calibration."""
+    wanted, found = _MEASURED.get(str(at[-1])), device.dimension
+    if wanted is None or found in (None, wanted) or (wanted, found) == ("force", "ratio"):
+        return
+    message = f"'{device.name}' measures {found} ('{device.unit}'); as {at[-1]} it has to measure {wanted}"
+    if (wanted, found) == ("force", "mass"):
+        message += f': in its device file write unit = "N" and a scale {_FORCE_OF_MASS} N per kg'
+    reading.fault((*at, "device"), message)
 
 
 def _is_addressed(device: DeviceSpec) -> bool:

@@ -20,9 +20,11 @@ def declared(dictionary: Any, index: int, sub: int = 0) -> Any:
     return found if sub == 0 else None
 
 
-def unmappable(variable: Any, *, receive: bool) -> str:
-    """Why an object cannot stand in a PDO; empty where it can."""
-    if variable.data_type not in datatypes.INTEGER_TYPES:
+def unmappable(variable: Any, *, receive: bool, real: bool = False) -> str:
+    """Why an object cannot stand in a PDO; empty where it can. ``real``: real numbers can too."""
+    if variable.data_type not in datatypes.INTEGER_TYPES and not (
+        real and variable.data_type in datatypes.FLOAT_TYPES
+    ):
         return "it is no whole number"
     if not variable.pdo_mappable:
         return "its PDOMapping is 0 in the EDS"

@@ -1,4 +1,4 @@
-"""Whether a device file of a drive fits the EDS that it names."""
+"""Whether a device file of a drive or a CANopen instrument fits the EDS that it names."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from canopen.objectdictionary import datatypes
 
 from winchkit.drivers.can.canopen.declared import declared, fixed_mapping, said, unmappable
 from winchkit.drivers.can.canopen.description import (
@@ -21,11 +23,13 @@ from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.cia402.option_codes import OPTIONS
 from winchkit.errors import Fault, FileError
 from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.process import ProcessSpec
 from winchkit.schema.devices.servo import PdoSpec, ServoSpec
 from winchkit.schema.host_loss import HARDWARE, VENDOR
+from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.source import open_source
 
-__all__ = ["EdsReport", "check_drive", "host_loss_problem"]
+__all__ = ["EdsReport", "check_drive", "check_process", "host_loss_problem"]
 
 _LONGEST = 64
 _NODE = 1
@@ -83,6 +87,52 @@ def check_drive(device: DeviceSpec) -> EdsReport:
     return EdsReport(tuple(faults), warnings, ways)
 
 
+def check_process(device: DeviceSpec) -> EdsReport:
+    """Check a device file of a CANopen instrument against its EDS; FileError without one."""
+    spec = device.process
+    if spec is None:
+        return EdsReport((), ())
+    dictionary, warnings = read_eds(Path(device.path).parent / spec.eds, _NODE)
+    source = open_source(device.path)
+    found: list[tuple[Key, str]] = [
+        (("process", "tpdo", place, "objects"), message)
+        for place, pdo in enumerate(spec.tpdo)
+        for message in _pdo_faults(dictionary, "tpdo", pdo, real=True)
+    ]
+    found += [(("process", key), message) for key, message in _value_faults(dictionary, spec)]
+    found += [
+        (("process", "command", name, "object"), message)
+        for name, command in spec.command.items()
+        for message in _written_faults(dictionary, command.object)
+    ]
+    return EdsReport(tuple(source.fault(key, message) for key, message in found), warnings)
+
+
+def _value_faults(dictionary: Any, spec: ProcessSpec) -> Iterator[tuple[str, str]]:
+    """Key and fault of the value and its status: not there, or of another type."""
+    for key, text in (("value", spec.value), ("status", spec.status)):
+        if text is None:
+            continue
+        if (place := _key(text)) is None:
+            yield key, f"'{text}' is no object; write it as 0x6130:1"
+        elif (variable := declared(dictionary, *place)) is None:
+            yield key, f"{text} is not in the EDS"
+        elif key == "value" and spec.type == "f32" and variable.data_type != datatypes.REAL32:
+            yield key, f'{text} is no REAL32 in the EDS; write type = "integer" and its scale'
+        elif (key == "status" or spec.type == "integer") and (
+            variable.data_type not in datatypes.INTEGER_TYPES
+        ):
+            yield key, f"{text} is no whole number in the EDS"
+
+
+def _written_faults(dictionary: Any, text: str) -> Iterator[str]:
+    variable = None if (place := _key(text)) is None else declared(dictionary, *place)
+    if variable is None:
+        yield f"{text} is not in the EDS"
+    elif not variable.writable:
+        yield f"{text} is {variable.access_type} in the EDS, it cannot be written"
+
+
 def _not_watched(dictionary: Any, servo: ServoSpec) -> str:
     """What the device file leaves out for its way to notice a dead host; empty where nothing."""
     if servo.host_loss == "sync-loss" and not MODES[servo.motion_mode].cyclic:
@@ -121,7 +171,7 @@ def host_loss_problem(ways: tuple[HostLoss, ...], way: str) -> str:
     )
 
 
-def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec) -> Iterator[str]:
+def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec, *, real: bool = False) -> Iterator[str]:
     receive = kind == "rpdo"
     record = (0x1400 if receive else 0x1800) + spec.number - 1
     for index in (record, record + 0x200):
@@ -140,7 +190,7 @@ def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec) -> Iterator[str]:
             yield f"{text} is not in the EDS"
             continue
         bits += len(variable)
-        if reason := unmappable(variable, receive=receive):
+        if reason := unmappable(variable, receive=receive, real=real):
             yield f"{text} ({variable.name}) cannot be mapped: {reason}"
     if bits > _LONGEST:
         yield f"{kind} {spec.number} would have {bits} bits; a PDO carries {_LONGEST}"
