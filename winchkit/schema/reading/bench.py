@@ -246,7 +246,10 @@ def _check_measured(reading: Reading, device: DeviceSpec, at: Key) -> None:
     wanted, found = _MEASURED.get(str(at[-1])), device.dimension
     if wanted is None or found in (None, wanted) or (wanted, found) == ("force", "ratio"):
         return
-    message = f"'{device.name}' measures {found} ('{device.unit}'); as {at[-1]} it has to measure {wanted}"
+    message = (
+        f"'{device.name}' measures {found} ('{device.unit}'); "
+        f"as {at[-1]} it has to measure {wanted}"
+    )
     if (wanted, found) == ("force", "mass"):
         message += f': in its device file write unit = "N" and a scale {_FORCE_OF_MASS} N per kg'
     reading.fault((*at, "device"), message)
