@@ -124,7 +124,7 @@ def test_every_rung_has_a_case() -> None:
 
 
 def test_a_reset_during_a_motion_withholds_no_way_to_stop(tmp_path: Path) -> None:
-    """Only silence stops a drive that heeds no control word, also while a reset waits for rest."""
+    """Only silence stops a drive that does not follow the control word, also while a reset waits for rest."""
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     slave = rig.slaves[0]
     with rig.opened() as bench:
@@ -132,7 +132,7 @@ def test_a_reset_during_a_motion_withholds_no_way_to_stop(tmp_path: Path) -> Non
         slave.inject("control word unheeded")
         begin = rig.time
         with pytest.raises(WinchkitError):
-            bench.reset()  # nobody repeats the jog meanwhile: the dead-man expires
+            bench.reset()  # the jog is not repeated meanwhile: the dead-man expires
         enabled = [s.time for s in rig.samples[0] if s.state is State.ENABLED]
         assert max(enabled) - begin < _DEAD_MAN + _RAMP_DOWN + ESCALATED
         assert "does not obey the stop" in str(bench.snapshot.tripped)
