@@ -124,7 +124,7 @@ def test_every_rung_has_a_case() -> None:
 
 
 def test_a_reset_during_a_motion_withholds_no_way_to_stop(tmp_path: Path) -> None:
-    """Only silence stops a drive that does not follow the control word, also while a reset waits for rest."""
+    """Only silence stops a drive that follows no control word, also while a reset waits."""
     rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
     slave = rig.slaves[0]
     with rig.opened() as bench:

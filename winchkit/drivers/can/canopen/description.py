@@ -176,10 +176,14 @@ def _values(dictionary: Any) -> Iterator[str]:
         filter(_VALUES.__contains__, dictionary), key=lambda one: (one < _OWN, one)
     ):
         found = dictionary[index]
-        subs = sorted(getattr(found, "subindices", {0: found}))
+        subs = sorted(set(getattr(found, "subindices", ())) - {0}) or [0]
         for sub in subs:
             variable = declared(dictionary, index, sub)
-            if variable.pdo_mappable and variable.access_type not in ("wo", "rww"):
+            if (
+                variable is not None
+                and variable.pdo_mappable
+                and variable.access_type not in ("wo", "rww")
+            ):
                 yield object_name(index, sub)
 
 
