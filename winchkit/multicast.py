@@ -8,6 +8,7 @@ what was sent here is not received.
 from __future__ import annotations
 
 import ctypes
+import select
 import socket
 import struct
 import sys
@@ -57,6 +58,8 @@ class MulticastPort:
             with socket.socket(family, socket.SOCK_DGRAM) as probe:
                 probe.connect(self._group)
                 self._output.bind((probe.getsockname()[0], 0))
+            # Connected, so that the kernel looks for the route once.
+            self._output.connect(self._group)
             self._own: tuple[str, int] = self._output.getsockname()[:2]
             shared = ("SO_REUSEADDR", "SO_REUSEPORT")
             for option in (getattr(socket, name) for name in shared if hasattr(socket, name)):
@@ -65,6 +68,7 @@ class MulticastPort:
             if family == socket.AF_INET:
                 _drop_from(self._input, *self._own)
             self._input.bind(("", port))
+            self._input.setblocking(False)
             if family == socket.AF_INET:
                 member = address.packed + bytes(4)
                 self._input.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, member)
@@ -74,6 +78,8 @@ class MulticastPort:
             if sys.platform == "linux":
                 self._input.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
             self._opened = opened.pop_all()
+        self._arrival = select.poll()
+        self._arrival.register(self._input, select.POLLIN)
         self.arrived = 0.0
         """Arrival of the last frame by the kernel, s since the epoch; 0 where it does not say."""
 
@@ -92,17 +98,18 @@ class MulticastPort:
             "bitrate_switch": False,
             "error_state_indicator": False,
         }
-        self._output.sendto(self._pack(frame), self._group)
+        self._output.send(self._pack(frame))
 
     def receive(self, timeout: float) -> tuple[int, bytes] | None:
         """Take the next data frame of 11 bits of another sender, if one comes within ``timeout`` s.
 
         Raises OSError, and ValueError for a datagram that is no frame.
         """
-        self._input.settimeout(timeout)
         try:
             datagram, ancillary, _, sender = self._input.recvmsg(_LONGEST, _ANCILLARY)
-        except (BlockingIOError, TimeoutError):
+        except BlockingIOError:
+            if timeout > 0 and self._arrival.poll(timeout * 1e3):
+                return self.receive(0.0)
             return None
         if sender[:2] == self._own:
             return self.receive(0.0)
