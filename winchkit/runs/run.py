@@ -13,9 +13,11 @@ from winchkit.rendering import Plotted
 from winchkit.tabular import Columns, Tabular
 from winchkit.units import parse, suggest
 
-__all__ = ["CHANNEL_DIMENSIONS", "Channel", "Run"]
+__all__ = ["ANGLE_INTEGRATED", "CHANNEL_DIMENSIONS", "Channel", "Run"]
 
 
+ANGLE_INTEGRATED = "integral of motor_velocity"
+"""Metadata ``motor_angle`` of a run whose recording has no angle."""
 CHANNEL_DIMENSIONS: dict[str, str] = {
     "motor_angle": "angle",
     "motor_velocity": "angular speed",
@@ -107,6 +109,11 @@ class Run(Plotted, Tabular):
     def length_zeroed(self) -> bool:
         """Whether the length instrument was zeroed at the reference: no offset to fit."""
         return self.metadata.get("length_zeroed", "").strip().lower() in {"true", "yes", "1"}
+
+    @property
+    def is_angle_integrated(self) -> bool:
+        """Whether the motor angle counts from 0 in this run: the integral of a velocity."""
+        return self.metadata.get("motor_angle", "") == ANGLE_INTEGRATED
 
     @property
     def interval(self) -> float:

@@ -14,7 +14,7 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.zeroing import wanders, zeroed_anew
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.runs.run import Run
+from winchkit.runs.run import ANGLE_INTEGRATED, Run
 
 
 def shifted(run: Run, name: str, offset: float) -> Run:
@@ -111,6 +111,23 @@ def test_every_run_has_a_column_of_its_own() -> None:
         regression.nuisance_columns, regression.nominal_residual, rcond=None
     )
     assert np.diff(offsets[:3]) == pytest.approx([0.01, 0.01], abs=1e-4)
+
+
+def test_an_angle_that_counts_from_each_runs_start_has_an_offset_per_run() -> None:
+    """Loads differ as well: without the metadata the difference of the offsets may be theirs."""
+    runs = [made(k, GROOVED, load_mass=mass) for k, mass in enumerate((10.0, 25.0))]
+    at = [0.0, 2.0]
+    moved = [shifted(run, "motor_angle", angle) for run, angle in zip(runs, at, strict=True)]
+    stated = [
+        replace(run, metadata={**run.metadata, "motor_angle": ANGLE_INTEGRATED}) for run in moved
+    ]
+    known, wrong, right = (compare(own, GROOVED) for own in (runs, moved, stated))
+    length = "cable_length"
+    assert wrong.outputs[length].rms > 5 * known.outputs[length].rms
+    assert right.outputs[length].rms == pytest.approx(known.outputs[length].rms, rel=0.1)
+    assert [(f.code, f.channel) for f in right.sanity] == [("zeroed-anew", length)]
+    # One run has the offset that every set of runs has.
+    assert compare(stated[1:], GROOVED).sanity == ()
 
 
 def test_recorded_repeats_share_one_zero() -> None:

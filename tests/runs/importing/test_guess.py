@@ -224,7 +224,7 @@ def test_the_value_of_a_velocity_in_its_own_unit_is_in_the_question(tmp_path: Pa
 @pytest.mark.parametrize(
     "name",
     ["boom angle [deg]", "sway_angle [rad]", "angle of attack [deg]", "Pendelwinkel [°]",
-     "fleet angle [deg]", "droop pulses [pulses]", "elevation [deg]"],
+     "fleet angle [deg]", "kite_pos_east [m]", "droop pulses [pulses]", "elevation [deg]"],
 )  # fmt: skip
 def test_angles_of_other_bodies_are_not_the_motors(name: str, tmp_path: Path) -> None:
     time = np.arange(300) / 100
@@ -238,6 +238,19 @@ def test_angles_of_the_motor_are_named(name: str, tmp_path: Path) -> None:
     time = np.arange(300) / 100
     found = guess(tmp_path / "a.csv", {"time [s]": time, name: np.sin(time)})
     assert found.is_certain
+
+
+def test_short_names_of_a_current_and_a_set_point(tmp_path: Path) -> None:
+    time = np.arange(300) / 100
+    columns = {
+        "Time": time,
+        "vel [rad/s]": np.cos(time),
+        "cur [A]": np.sin(time),
+        "tar_vel [rad/s]": np.cos(time),
+    }
+    found = guess(tmp_path / "a.csv", columns, Answers(torque_constant=0.1))
+    assert of(found, "motor_velocity").source == "vel"
+    assert of(found, "motor_torque").factor == pytest.approx(0.1)
 
 
 def test_the_angle_of_a_joint_needs_consent(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from scipy.signal import butter, sosfilt
 from scipy.stats import binom
 
 from winchkit.runs.run import Channel, Run
+from winchkit.runs.sanity.factors import Slope, named_factor
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
 from winchkit.runs.sanity.local_noise import local_noise, sorted_quantile
@@ -357,6 +358,29 @@ def test_velocity_against_angle(change: Callable[[Array], Array], code: str, wor
     ]
     assert [f.code for f in findings] == ([code] if code else [])
     assert all(word in f.text for f in findings)
+
+
+def test_a_velocity_is_in_no_unit_of_force() -> None:
+    """0.981 is decanewtons and kilograms, 2.2 pounds, 25.4 inches."""
+    for value in (0.981 * 0.75, 2.2046, 25.4):
+        assert not named_factor(Slope(value, 1e-3), is_angle=True)
+    assert "inches" in named_factor(Slope(25.4, 1e-3))
+    assert "rpm" in named_factor(Slope(60 / (2 * np.pi), 1e-3), is_angle=True)
+
+
+@pytest.mark.parametrize(("spread", "codes"), [(0.3, []), (0.05, ["wrong-factor"])])
+def test_a_slope_is_judged_by_its_uncertainty(spread: float, codes: list[str]) -> None:
+    """40 blocks with slopes of 0.7 ± spread: 0.70 ± 0.05 may be 0.8, 0.700 ± 0.008 may not."""
+    time = np.arange(COUNT) / RATE
+    block = np.minimum(np.arange(COUNT) * 40 // COUNT, 39)
+    channels = {
+        "motor_angle": Channel(time.copy(), "rad"),
+        "motor_velocity": Channel(0.7 + spread * np.where(block % 2, 1.0, -1.0), "rad/s"),
+    }
+    findings = inspect_run(Run("r", time, channels)).findings
+    assert [
+        f.code for f in findings if f.channel == "motor_velocity" and "factor" in f.code
+    ] == codes
 
 
 @given(SEEDS, st.floats(0.02, 0.16), st.integers(3, 6))

@@ -26,7 +26,7 @@ from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
 from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs, without_constants
-from winchkit.diagnosis.data.zeroing import zeroed_anew
+from winchkit.diagnosis.data.zeroing import angles_from_zero, zeroed_anew
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.model.derivatives import Clock
@@ -208,6 +208,8 @@ def prepare(
         dataset = assemble(runs, profile, filtering)
     anew = [zeroed_anew(output, *_repeat_differences(dataset, output)) for output in OUTPUTS]
     zeroed = [finding for finding in anew if finding is not None]
+    if "cable_length" not in {finding.channel for finding in zeroed}:
+        zeroed += angles_from_zero(runs)
     factor = 1 if decimation is None else decimation.factor
     return replace(
         dataset,

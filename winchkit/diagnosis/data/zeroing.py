@@ -26,10 +26,11 @@ from scipy.special import fdtrc
 
 from winchkit.arrays import Array
 from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import size
 
-__all__ = ["BLOCKS", "LEVEL", "anew", "wanders", "zeroed_anew"]
+__all__ = ["BLOCKS", "LEVEL", "anew", "angles_from_zero", "wanders", "zeroed_anew"]
 
 BLOCKS = 8
 LEVEL = 1e-4
@@ -110,6 +111,22 @@ def anew(output: str, spread: float, p_value: float, between: str) -> Finding:
         f"and an offset per run is fitted{limit}"
     )
     return Finding("zeroed-anew", "", output, spread, text)
+
+
+def angles_from_zero(runs: Sequence[Run]) -> list[Finding]:
+    """Finding ``zeroed-anew`` of the cable length, where an integral of a velocity is the angle.
+
+    The angle is 0 at the start of such a run, wherever the cable was: an offset of the length
+    belongs to each run.
+    """
+    own = [run for run in runs if run.is_angle_integrated and "cable_length" in run]
+    if not own or len(runs) < 2:
+        return []
+    text = (
+        "the motor angle is the integral of a velocity from 0 at the start of each run, and an "
+        "offset per run is fitted"
+    )
+    return [Finding("zeroed-anew", "", "cable_length", float("nan"), text)]
 
 
 def wanders(means: Array) -> bool:

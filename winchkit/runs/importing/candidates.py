@@ -132,7 +132,8 @@ def choose(
             found = _candidate(column, numbered)
             (free if found.channel else choice.unused).append(found)
     taken = {item.channel for item in choice.chosen}
-    free = _left_after({*taken, *without}, free, choice)
+    free = _left_after(taken, free, choice)
+    free = _left_after(without, free, choice, "has no column, by --column")
     times = [item for item in free if item.channel in {"time", DATE}]
     if not times and "time" not in {*taken, *without}:
         times = _even_clock(choice)
@@ -147,12 +148,15 @@ def choose(
     return choice
 
 
-def _left_after(taken: set[str], free: list[Candidate], choice: Choice) -> list[Candidate]:
+def _left_after(
+    taken: Collection[str],
+    free: list[Candidate],
+    choice: Choice,
+    words: str = "is given otherwise",
+) -> list[Candidate]:
     for item in free:
         if item.channel in taken:
-            choice.unused.append(
-                replace(item, channel="", reason=f"{item.channel} is given otherwise")
-            )
+            choice.unused.append(replace(item, channel="", reason=f"{item.channel} {words}"))
     return [item for item in free if item.channel not in taken]
 
 

@@ -48,7 +48,8 @@ _JOINT = (
 _RULES: tuple[tuple[str, int, str], ...] = (
     # Set points, errors, states and counters.
     (
-        r"\b(soll\w*|\w+soll|target|set ?points?|set (?=pos|vel|tor|cur|ang|spe)|"
+        r"\b(soll\w*|\w+soll|target|tar(?= (pos|vel|tor|cur|ang|spe))|set ?points?|"
+        r"set (?=pos|vel|tor|cur|ang|spe)|"
         r"sp|cmd|commande?d?|demand(ed)?|desired|des|"
         r"reference|ref|consigne|consigna|goal|planned|vorgabe|fuhrungs\w*|profile|offset|"
         r"limit\w*)\b",
@@ -64,7 +65,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     # Constants of a device, the wind, and angles of what is no motor.
     (
         r"\b(constants?|gain|stiffness|inertia|angle of attack|aoa|wind|wind ?speed|"
-        r"windgeschwindigkeit|\w*wind ?speed|latitude|longitude|altitude|azimuth|elevation)\b",
+        r"windgeschwindigkeit|\w*wind ?speed|latitude|longitude|altitude|azimuth|elevation|"
+        r"east|north|south|west|easting|northing)\b",
         1,
         IGNORED,
     ),
@@ -156,7 +158,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     ),
     (
         r"\b(currents?|strom\w*|\w+strom|istrom|courant|corriente|corrente|iq|i q|"
-        r"amperage|curr|i ist|"
+        r"amperage|curr?|i ist|"
         r"motor i|phase current)\b",
         2,
         CURRENT,

@@ -18,7 +18,7 @@ from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.mapping import guess_by, mapping_id
 from winchkit.runs.importing.streams import Stream, Streams, merged, streams_of
-from winchkit.runs.run import Run
+from winchkit.runs.run import ANGLE_INTEGRATED, Run
 from winchkit.schema.mapping import ImportMapping
 from winchkit.schema.read import read_mapping
 from winchkit.units import UNITS
@@ -186,6 +186,8 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     known = time[np.isfinite(time)]
     first = float(known[0]) if len(known) else 0.0
     texts = dict(metadata)
+    if _INTEGRAL in streams.notes:
+        texts["motor_angle"] = ANGLE_INTEGRATED
     if streams.is_absolute:
         moment = datetime.fromtimestamp(streams.origin + first, UTC)
         texts["start_time"] = moment.isoformat(timespec="microseconds")

@@ -15,6 +15,8 @@ __all__ = ["velocity_consistency"]
 
 _RANGE = 0.8, 1.25
 """Slopes that are no wrong unit: a velocity that its drive has filtered or estimated."""
+_SIGMAS = 3.0
+"""Standard deviations by which a slope must be outside the range."""
 _BLOCKS = 40
 _LEAST_SAMPLES = 50
 _CORRELATION = 0.5
@@ -59,8 +61,9 @@ def _judged(run: Run, name: str, slope: Slope) -> Iterator[Finding]:
     if slope.value < 0:
         text = f"the sign looks inverted: {beside}"
         yield Finding("inverted-sign", run.name, name, slope.value, text)
-    if not _RANGE[0] < abs(slope.value) < _RANGE[1]:
-        known = named_factor(slope)
+    margin = _SIGMAS * slope.std
+    if abs(slope.value) + margin < _RANGE[0] or abs(slope.value) - margin > _RANGE[1]:
+        known = named_factor(slope, is_angle=True)
         why = f"that is {known}" if known else "no known constant explains it"
         text = f"the unit looks wrong: {beside}; {why}"
         yield Finding("wrong-factor", run.name, name, slope.value, text)

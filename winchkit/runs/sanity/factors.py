@@ -22,6 +22,14 @@ _UNITS: tuple[tuple[float, str], ...] = (
     (60.0, "60: per minute and per second"),
     (60 / (2 * pi), "60/(2π): rpm and rad/s"),
     (6.0, "6: rpm and deg/s"),
+    (pi, "π: circumference and diameter"),
+    *((2.0**n, f"2^{n}: counts") for n in range(_FEWEST_BITS, _MOST_BITS + 1)),
+    *(
+        (2.0**n / (2 * pi), f"2^{n}/(2π): counts of a turn and radians")
+        for n in range(_FEWEST_BITS, _MOST_BITS + 1)
+    ),
+)
+_OF_LOADS: tuple[tuple[float, str], ...] = (
     (_GRAVITY, "9.81: kilograms and newtons"),
     (_GRAVITY * 1e3, "9.81·10³: tonnes or grams and newtons"),
     (_GRAVITY / 10, "0.981: decanewtons and kilograms"),
@@ -32,16 +40,11 @@ _UNITS: tuple[tuple[float, str], ...] = (
     (2.2046226, "2.20: pounds and kilograms"),
     (8.8507458, "8.85: inch-pounds and newton metres"),
     (2.0, "2: diameter and radius, or a second fall of the cable"),
-    (pi, "π: circumference and diameter"),
-    *((2.0**n, f"2^{n}: counts") for n in range(_FEWEST_BITS, _MOST_BITS + 1)),
-    *(
-        (2.0**n / (2 * pi), f"2^{n}/(2π): counts of a turn and radians")
-        for n in range(_FEWEST_BITS, _MOST_BITS + 1)
-    ),
 )
+"""Constants of masses, forces and lengths, which no angle or angular speed is wrong by."""
 
 KNOWN_FACTORS: tuple[float, ...] = tuple(
-    factor for value, _ in _UNITS for factor in (value, 1 / value)
+    factor for value, _ in (*_UNITS, *_OF_LOADS) for factor in (value, 1 / value)
 )
 """Known constants and their reciprocals."""
 
@@ -54,13 +57,15 @@ class Slope:
     std: float
 
 
-def named_factor(slope: Slope) -> str:
+def named_factor(slope: Slope, *, is_angle: bool = False) -> str:
     """Known constant that the size of a slope is, or whose reciprocal it is.
 
     Parameters
     ----------
     slope : Slope
         Its sign has no influence.
+    is_angle : bool, optional
+        Whether an angle or an angular speed is wrong, which is in no unit of force or length.
 
     Returns
     -------
@@ -71,8 +76,8 @@ def named_factor(slope: Slope) -> str:
     if size == 0:
         return ""
     tolerance = _SIGMAS * slope.std / size + _TOLERANCE
-    distances = [(abs(abs(log(size)) - log(value)), text) for value, text in _UNITS if value > 1]
-    distances += [(abs(abs(log(size)) + log(value)), text) for value, text in _UNITS if value < 1]
+    known = _UNITS if is_angle else (*_UNITS, *_OF_LOADS)
+    distances = [(abs(abs(log(size)) - abs(log(value))), text) for value, text in known]
     nearest, text = min(distances)
     return text if nearest < tolerance else ""
 
