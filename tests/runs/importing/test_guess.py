@@ -224,7 +224,9 @@ def test_the_value_of_a_velocity_in_its_own_unit_is_in_the_question(tmp_path: Pa
 @pytest.mark.parametrize(
     "name",
     ["boom angle [deg]", "sway_angle [rad]", "angle of attack [deg]", "Pendelwinkel [°]",
-     "fleet angle [deg]", "kite_pos_east [m]", "droop pulses [pulses]", "elevation [deg]"],
+     "fleet angle [deg]", "kite_pos_east [m]",
+     "AngularIncrement_deg", "RopeVelocity [rad/s]", "cable speed [rpm]", "Line speed [1/min]",
+     "droop pulses [pulses]", "elevation [deg]"],
 )  # fmt: skip
 def test_angles_of_other_bodies_are_not_the_motors(name: str, tmp_path: Path) -> None:
     time = np.arange(300) / 100
@@ -251,6 +253,17 @@ def test_short_names_of_a_current_and_a_set_point(tmp_path: Path) -> None:
     found = guess(tmp_path / "a.csv", columns, Answers(torque_constant=0.1))
     assert of(found, "motor_velocity").source == "vel"
     assert of(found, "motor_torque").factor == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [("CurrentEncoderReading", "motor_angle"), ("Current Position", "motor_angle"),
+     ("current load", "tension"), ("Motor current", "current"), ("Current", "current")],
+)  # fmt: skip
+def test_current_is_an_ampere_or_the_present_value(name: str, channel: str) -> None:
+    meaning = meaning_of(name)
+    assert meaning is not None
+    assert meaning.channel == channel
 
 
 def test_the_angle_of_a_joint_needs_consent(tmp_path: Path) -> None:

@@ -66,7 +66,9 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     (
         r"\b(constants?|gain|stiffness|inertia|angle of attack|aoa|wind|wind ?speed|"
         r"windgeschwindigkeit|\w*wind ?speed|latitude|longitude|altitude|azimuth|elevation|"
-        r"east|north|south|west|easting|northing)\b",
+        r"east|north|south|west|easting|northing|ang(le|ular) increments?|"
+        r"(cable|r[o]pe|wire|tether|line|hook|load|trolley|platform|reel ?out|reel ?in)"
+        r" ?(reel ?out |reel ?in )?(speed|velocity))\b",
         1,
         IGNORED,
     ),
@@ -157,7 +159,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         "motor_torque",
     ),
     (
-        r"\b(currents?|strom\w*|\w+strom|istrom|courant|corriente|corrente|iq|i q|"
+        r"\b(currents?(?! (encoder|pos|angle|length|reading|tension|force|load))|"
+        r"strom\w*|\w+strom|istrom|courant|corriente|corrente|iq|i q|"
         r"amperage|curr?|i ist|"
         r"motor i|phase current)\b",
         2,
