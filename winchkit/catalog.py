@@ -13,6 +13,12 @@ __all__ = ["Kind", "find", "folder", "names"]
 
 Kind = Literal["devices", "profiles", "sim"]
 
+_SINGULAR: dict[Kind, str] = {
+    "devices": "device",
+    "profiles": "profile",
+    "sim": "simulated bench",
+}
+
 
 def folder(kind: Kind) -> Path:
     """The folder of shipped declarations: inside the wheel, else in the checkout."""
@@ -63,9 +69,9 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
     if Path(name).exists() and (special := file_kind(Path(name).stat().st_mode)):
         raise FileError(f"{name}: is {special}, not a regular file")
     known = names(kind)
-    singular = {"devices": "device", "profiles": "profile", "sim": "simulated bench"}[kind]
+    listed = f" ({', '.join(known)})" if known else ""
+    other = next((_SINGULAR[each] for each in _SINGULAR if name in names(each)), None)
     raise FileError(
-        f"there is no {singular} '{name}', neither as a file nor shipped"
-        + (f" ({', '.join(known)})" if known else "")
-        + suggest(name, known)
+        f"there is no {_SINGULAR[kind]} '{name}', neither as a file nor shipped{listed}"
+        + (f"; '{name}' is a shipped {other}" if other else suggest(name, known))
     )

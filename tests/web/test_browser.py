@@ -83,6 +83,27 @@ def test_drop_see_add_the_ladder_falls_save_and_reload(
     page.context.close()
 
 
+def test_files_that_are_no_runs_are_one_line_of_the_library(browser: Any, tmp_path: Path) -> None:
+    """A folder has figures, mappings and notes beside its runs: they must not hide these."""
+    write_run(next(iter(example_runs("demo-adequate").runs)), tmp_path / "lift.csv")
+    for number in range(12):
+        (tmp_path / f"figure-{number}.csv").write_text("load [N],mean residual [mm]\n1,2\n")
+    served = Served("--folder", str(tmp_path))
+    try:
+        page, complaints = opened(browser, f"{served.url}#library")
+        until(page, lambda: page.locator("tr.set").count() == 1)
+        assert "1 run in 1 set" in page.inner_text("main")
+        assert "12 files are no runs" in page.inner_text("main")
+        assert "figure-3.csv" not in page.inner_text("main")
+        page.click("#faults")
+        until(page, lambda: "there is no column 'time [s]'" in page.inner_text("main"))
+        assert page.get_attribute("#faults", "aria-expanded") == "true"
+        assert complaints == []
+        page.context.close()
+    finally:
+        served.end()
+
+
 EMPS = """\
 schema = 1
 kind = "axis"

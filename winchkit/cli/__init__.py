@@ -30,25 +30,28 @@ SECTIONS: dict[str, dict[str, At]] = {
             "winchkit.cli.sim.demo", "Find a hidden effect on a simulated bench, start to end."
         ),
         "compare": At(
-            "winchkit.cli.model.compare", "Compare runs with a model: where does it fail?"
+            "winchkit.cli.model.compare",
+            "Compare runs with a model: its errors, by variable.",
         ),
         "diagnose": At(
             "winchkit.cli.model.diagnose", "Name the physical effect that the model lacks."
         ),
         "add": At("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
-        "remove": At("winchkit.cli.model.remove", "Take an effect out of a profile."),
-        "undo": At("winchkit.cli.model.undo", "Take back the last step of a profile's ledger."),
-        "ledger": At("winchkit.cli.model.ledger", "Show how a profile grew, step by step."),
+        "remove": At("winchkit.cli.model.remove", "Remove an effect from a profile."),
+        "undo": At("winchkit.cli.model.undo", "Undo the last add or remove of a profile."),
+        "ledger": At(
+            "winchkit.cli.model.ledger",
+            "List the changes of a profile, with their errors.",
+        ),
         "serve": At(
-            "winchkit.cli.web.serve", "Serve the page: look, learn, add, watch the error fall."
+            "winchkit.cli.web.serve",
+            "Serve the page in the browser: all of this, with figures.",
         ),
         "fleet": At("winchkit.cli.library.fleet", "Many winches: diagnose a library of runs."),
         "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
-        "effects": At(
-            "winchkit.cli.model.effects", "List the physical effects, or show one's card."
-        ),
+        "effects": At("winchkit.cli.model.effects", "List the physical effects, or describe one."),
         "size": At(
-            "winchkit.cli.model.size", "Size a winch: every requirement, its limit, the verdict."
+            "winchkit.cli.model.size", "Size a winch: compare each requirement with its limit."
         ),
         "calibrate": At(
             "winchkit.cli.model.calibrate", "Calibrate a cable robot from measured poses."
@@ -56,10 +59,11 @@ SECTIONS: dict[str, dict[str, At]] = {
     },
     "Bench": {
         "commission": At(
-            "winchkit.cli.bench.commission", "Commission a bench: try, confirm, record."
+            "winchkit.cli.bench.commission",
+            "Commission a bench: test, confirm, record.",
         ),
         "jog": At("winchkit.cli.bench.jog", "Move a winch by hand."),
-        "move": At("winchkit.cli.bench.move", "Move a winch, or all as one, to a cable length."),
+        "move": At("winchkit.cli.bench.move", "Move one winch, or all, to a cable length."),
         "hold-tension": At(
             "winchkit.cli.bench.hold_tension", "Keep the tension of a cable by the winch's speed."
         ),
@@ -72,17 +76,17 @@ SECTIONS: dict[str, dict[str, At]] = {
             "winchkit.cli.bench.reset", "Clear trips and drive faults; nothing is enabled."
         ),
         "monitor": At("winchkit.cli.bench.monitor", "Show a bench live."),
-        "log": At("winchkit.cli.log.log", "Log a bench; look into, recover, replay logs."),
+        "log": At("winchkit.cli.log.log", "Log a bench; inspect, recover, replay logs."),
         "tare": At("winchkit.cli.bench.tare", "Tare a load cell."),
     },
     "Devices": {
         "cell": At("winchkit.cli.cell.group", "Load cells: info, rate, diagnose, tare, calibrate."),
-        "scan": At("winchkit.cli.drive.scan", "Who is on the CAN bus?"),
-        "info": At("winchkit.cli.drive.info", "What a drive says of itself."),
+        "scan": At("winchkit.cli.drive.scan", "List the nodes of a CAN bus."),
+        "info": At("winchkit.cli.drive.info", "Show identity, state and limits of a drive."),
         "config": At(
             "winchkit.cli.drive.config", "Drive settings: save, load, diff, store, restore."
         ),
-        "lss": At("winchkit.cli.drive.lss", "Give a drive its node number and bit rate."),
+        "lss": At("winchkit.cli.drive.lss", "Set node number and bit rate of a drive (CiA 305)."),
         "busload": At(
             "winchkit.cli.drive.busload", "CAN load of a bench, and the fastest SYNC that fits."
         ),
@@ -135,7 +139,7 @@ class _Main(LazyGroup):
 )
 @click.version_option(__version__, prog_name="winchkit")
 def main() -> None:
-    """Move winches, measure tension, and learn which physical effect the model lacks.
+    """Move winches, measure tension, and identify the physical effect that a model lacks.
 
     Every option is also an environment variable: --json of check is WINCHKIT_CHECK_JSON. Results
     go to stdout, everything else to stderr. Exit codes: 0 done, 1 the check failed, 2 usage,

@@ -35,7 +35,7 @@ _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 36
 _SAMPLES = 400
 _COLUMNS = 80
-_MARGIN = 15
+_MARGIN = 17
 _FLAT = 1e-9
 
 

@@ -105,6 +105,12 @@ def _has_begun(path: Path) -> bool:
 
 def _format_of(path: str | Path) -> str:
     suffix = Path(path).suffix.lower()
+    if Path(path).is_dir():
+        runs = Path(path) / "*.csv"
+        raise RunError(Fault(f"is a folder; name the runs in it, such as {runs}", str(path)))
+    if suffix == ".toml":
+        message = "is a declaration such as a profile, and no run; runs are .csv or .mcap files"
+        raise RunError(Fault(message, str(path)))
     if suffix not in SUFFIXES:
         known = ", ".join(SUFFIXES)
         message = (

@@ -173,6 +173,67 @@ def test_a_defect_is_one_line_unless_it_is_looked_for(monkeypatch: pytest.Monkey
     assert isinstance(running(monkeypatch, body).exception, KeyError)
 
 
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (PermissionError(13, "Permission denied", "runs/a.csv"), "runs/a.csv: cannot be used: "),
+        (OSError(28, "No space left on device"), "standard output: cannot be used: "),
+    ],
+)
+def test_a_refusal_of_the_operating_system_names_its_file(
+    monkeypatch: pytest.MonkeyPatch, error: OSError, message: str
+) -> None:
+    def body() -> None:
+        raise error
+
+    monkeypatch.delenv("WINCHKIT_DEBUG", raising=False)
+    result = running(monkeypatch, body)
+    assert result.exit_code == 3
+    assert result.stderr == f"{message}{error.strerror}\n"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is of Linux")
+def test_a_full_disk_below_standard_output_is_no_defect() -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "winchkit", "effects"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+    assert done.returncode == 3
+    assert done.stderr == "standard output: cannot be used: No space left on device\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+def test_an_interrupt_during_the_imports_is_one_line() -> None:
+    code = (
+        "import sys\n"
+        "class Interrupting:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'winchkit.cli':\n"
+        "            raise KeyboardInterrupt\n"
+        "sys.meta_path.insert(0, Interrupting())\n"
+        "from winchkit.__main__ import program\n"
+        "program()"
+    )
+    done = python(code)
+    assert done.returncode == 130
+    assert done.stderr == "winchkit: interrupted\n"
+
+
+@pytest.mark.parametrize(
+    ("word", "meant"),
+    [("page", "did you mean 'serve'?"), ("diagnos", "did you mean 'diagnose'?")],
+)
+def test_an_unknown_command_is_told_the_one_that_is_meant(word: str, meant: str) -> None:
+    result = CliRunner().invoke(main, [word])
+    assert result.exit_code == 2
+    assert meant in result.stderr
+
+
 @pytest.mark.parametrize(("value", "code"), [(None, 0), (3, 3), (True, 0), ("text", 0)])
 def test_what_a_command_returns(monkeypatch: pytest.MonkeyPatch, value: object, code: int) -> None:
     assert running(monkeypatch, lambda: value).exit_code == code

@@ -69,3 +69,52 @@ def test_what_is_refused_without_a_bus(
     assert result.exit_code == code, result.output
     assert message in result.stderr
     assert "Errno" not in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("compare a.csv -p bench-spiral --html none/sub/x.html", "there is no folder 'none'"),
+        ("compare a.csv -p bench-spiral --figures a.csv", "is a file, and no folder can be made"),
+        ("add cable-creep --fit a.csv -p bench-spiral -o none/x.toml", "there is no folder 'none'"),
+        ("export a.csv -o none/x.csv", "there is no folder 'none'"),
+        ("plan a.csv -p bench-spiral -o .", ".: cannot be written: it is a folder"),
+        ("sim record demo-adequate programme-demo -o a.csv/runs", "no folder can be made there"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, message: str
+) -> None:
+    """The run is no run: a command that read it first would report that."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.csv").write_text("no run")
+    result = CliRunner().invoke(main, words.split())
+    assert result.exit_code in {2, 3}
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.csv"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("compare runs -p bench-spiral", "runs: is a folder; name the runs in it, such as runs/*"),
+        (
+            "compare p.toml -p bench-spiral",
+            "p.toml: is a declaration such as a profile, and no run",
+        ),
+        ("compare a.csv -p a.csv", "a.csv: is a .csv file, and no declaration: profiles"),
+        ("compare a.csv -p spiral-bench", "'spiral-bench' is a shipped simulated bench"),
+        ("sim record bench-spiral programme-demo", "'bench-spiral' is a shipped profile"),
+    ],
+)
+def test_a_file_of_another_kind_is_named_by_its_kind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str, message: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "p.toml").write_text('schema = 1\nkind = "winch"\n')
+    (tmp_path / "a.csv").write_text("time [s],motor_angle [rad]\n0,0\n1,1\n2,2\n")
+    result = CliRunner().invoke(main, words.split())
+    assert result.exit_code == 3
+    assert message in result.stderr

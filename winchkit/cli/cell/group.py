@@ -28,7 +28,7 @@ COMMANDS = {
     ),
 )
 def command() -> None:
-    """Load cells: zero, tare and calibration are three things, and none touches another.
+    """Load cells: rate, diagnosis, tare, zero and calibration, each independent of the others.
 
     CELL is a winch, which stands for its load cell, or WINCH.ROLE such as A.load.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,14 @@ if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.programme import Programme
 
-__all__ = ["check_exists", "check_file", "check_folder", "check_output", "check_winches"]
+__all__ = [
+    "check_exists",
+    "check_file",
+    "check_folder",
+    "check_new_file",
+    "check_output",
+    "check_winches",
+]
 
 
 def check_output(path: str | Path, suffixes: tuple[str, ...]) -> None:
@@ -27,11 +35,37 @@ def check_output(path: str | Path, suffixes: tuple[str, ...]) -> None:
         raise UsageError(f"-o {path}: there is no folder '{target.parent}'; make it first")
 
 
-def check_folder(path: str | Path) -> None:
-    """Raise UsageError for a folder that cannot be made, since a file is in its way."""
-    for place in (Path(path), *Path(path).parents):
+def check_new_file(path: str | Path, _option: str = "-o") -> None:
+    """Raise FileError for a file that cannot be written: a folder, in none, not permitted."""
+    target = Path(path)
+    if target.is_dir():
+        raise FileError(Fault("cannot be written: it is a folder; name a file", str(path)))
+    if not target.parent.is_dir():
+        reason = f"there is no folder '{target.parent}'; make it first"
+        raise FileError(Fault(f"cannot be written: {reason}", str(path)))
+    _check_permission(target if target.exists() else target.parent, path)
+
+
+def check_folder(path: str | Path, option: str = "-o") -> None:
+    """Raise UsageError for a folder that cannot be made, since a file is in its way.
+
+    Raises FileError where it must not be written or made.
+    """
+    places = (Path(path), *Path(path).parents)
+    for place in places:
         if place.exists() and not place.is_dir():
-            raise UsageError(f"-o {path}: '{place}' is a file, and no folder can be made there")
+            raise UsageError(
+                f"{option} {path}: '{place}' is a file, and no folder can be made there"
+            )
+    _check_permission(next(place for place in places if place.is_dir()), path)
+
+
+def _check_permission(place: Path, path: str | Path) -> None:
+    if not os.access(place, os.W_OK):
+        kind = "folder" if place.is_dir() else "file"
+        raise FileError(
+            Fault(f"cannot be written: no permission for the {kind} '{place}'", str(path))
+        )
 
 
 def check_exists(path: str | Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from importlib import import_module
 from importlib.util import find_spec
@@ -66,8 +67,20 @@ class LazyGroup(Group):
         """Find the command that the arguments begin with; a misspelt one gets a guess."""
         name = args[0] if args else ""
         if name and name not in self.table and not name.startswith("-"):
-            ctx.fail(f"no command '{name}'{suggest(name, list(self.table))}")
+            ctx.fail(f"no command '{name}'{self._like(name)}")
         return super().resolve_command(ctx, args)
+
+    def _like(self, name: str) -> str:
+        """A command of a similar name, else the commands whose help has the word."""
+        if close := suggest(name, list(self.table)):
+            return close
+        word = name.casefold()
+        named = [
+            f"'{key}'"
+            for key, entry in self.table.items()
+            if word in re.findall(r"\w+", entry.help.casefold())
+        ]
+        return f"; did you mean {' or '.join(named)}?" if named else ""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands of every section with the table's help, importing none."""

@@ -20,6 +20,7 @@ from winchkit.cli.core.completion import (
     complete_winch,
     files_of_kind,
 )
+from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.standard_input import Readable
 from winchkit.errors import UsageError
@@ -40,6 +41,7 @@ __all__ = [
     "bench_by_default",
     "bench_option",
     "bus_options",
+    "checked",
     "complete_bench",
     "complete_device",
     "complete_winch",
@@ -123,8 +125,25 @@ dry_run_option: Decorator = click.option(
 
 
 def output_option(help: str, metavar: str = "FILE", *names: str, **more: Any) -> Decorator:
-    """The option ``-o``: where a command writes; ``names`` are further spellings of it."""
+    """The option ``-o``: where a command writes; ``names`` are further spellings of it.
+
+    With the metavar ``DIR`` a folder, which may be made, else a file in an existing folder: a place
+    that cannot be written is refused before the work, unless the command has a ``callback`` of its
+    own.
+    """
+    more.setdefault("callback", checked(check_folder if metavar == "DIR" else check_new_file))
     return click.option("-o", "--output", *names, metavar=metavar, help=help, **more)
+
+
+def checked(check: Callable[[str, str], None]) -> Callable[..., Any]:
+    """A callback that lets a check refuse the value of an option before the command begins."""
+
+    def callback(ctx: click.Context, param: click.Parameter, value: Any) -> Any:
+        if value is not None and not ctx.resilient_parsing:
+            check(value, param.opts[0])
+        return value
+
+    return callback
 
 
 @dataclass(frozen=True)

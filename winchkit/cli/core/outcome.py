@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable, Iterator
@@ -12,12 +13,14 @@ import click
 
 from winchkit.bench.remote.interruption import Interruption, interrupted_by_signals
 from winchkit.cli.core.terminal import escaped_output
-from winchkit.errors import FileError, WinchkitError
+from winchkit.errors import Fault, FileError, WinchkitError
 
 __all__ = ["INTERNAL", "INTERRUPTED", "finish", "threads_abandoned"]
 
 INTERRUPTED = 130
 INTERNAL = 70
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+"""Numbers of errors that have no file name when a stream is written: no space, a quota, a limit."""
 _DEBUG = "WINCHKIT_DEBUG"
 
 
@@ -51,15 +54,29 @@ def _run(call: Callable[[], object], interruption: Interruption) -> int:
         if not interruption.note(_interrupt(error)):
             if os.environ.get(_DEBUG):
                 raise
-            _tell(
-                f"winchkit: internal error: {type(error).__name__}: {error} "
-                f"(a defect of winchkit, please report it; {_DEBUG}=1 shows where)"
-            )
-            return INTERNAL
+            return _failed(error)
     else:
         return result if type(result) is int else 0
     _tell(f"winchkit: {interruption.words}")
     return interruption.exit_code
+
+
+def _failed(error: Exception) -> int:
+    """Report what the operating system refused, else a defect of winchkit; returns the exit code.
+
+    A refusal has the name of a file, or is that of a full disk below standard output.
+    """
+    if isinstance(error, OSError):
+        place = error.filename if isinstance(error.filename, str) else ""
+        if place or error.errno in _FULL:
+            fault = Fault(f"cannot be used: {error.strerror}", place or "standard output")
+            _tell(str(FileError(fault)))
+            return FileError.exit_code
+    _tell(
+        f"winchkit: internal error: {type(error).__name__}: {error} "
+        f"(a defect of winchkit, please report it; {_DEBUG}=1 shows where)"
+    )
+    return INTERNAL
 
 
 def _interrupt(error: BaseException) -> BaseException | None:

@@ -21,6 +21,8 @@ from winchkit.cli.core.messages import detail, is_quiet, is_verbose
 from winchkit.errors import one_line, printable
 
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.live import Live
     from rich.table import Table
     from rich.text import Text
 
@@ -34,10 +36,12 @@ __all__ = [
     "counter_rows",
     "counter_table",
     "escaped_output",
+    "live_display",
     "live_sinks",
     "progress_bar",
     "screen",
     "status_line",
+    "terminal_console",
 ]
 
 
@@ -104,6 +108,60 @@ def screen(stream: TextIO | None = None) -> TextIO:
     return getattr(asked, "rich_proxied_file", asked)
 
 
+def terminal_console() -> Console:
+    """A console of rich on standard error.
+
+    rich takes the standard error of the moment, which escapes what steers the terminal: a live
+    display would appear as its own control sequences.
+    """
+    from rich.console import Console
+
+    return Console(file=screen())
+
+
+class _AboveDisplay(EscapedStream):
+    """A stream on the terminal of a live display, which is erased while a text is written."""
+
+    def __init__(self, stream: EscapedStream, live: Live) -> None:
+        super().__init__(stream.rich_proxied_file)
+        self.names = stream.names
+        self._live = live
+
+    def write(self, text: str) -> int:
+        """Write a text in place of the display, which is then drawn below it."""
+        if not self._live.is_started:
+            return super().write(text)
+        kept, self._live.transient = self._live.transient, True
+        self._live.stop()
+        try:
+            written = super().write(text)
+            self.rich_proxied_file.flush()
+        finally:
+            self._live.transient = kept
+            self._live.start(refresh=True)
+        return written
+
+
+@contextmanager
+def live_display(live: Live) -> Iterator[None]:
+    """Show a live display; what is printed meanwhile on the same terminal stands above it.
+
+    rich could redirect both streams itself, but click writes past it, into the display's line.
+    """
+    with escaped_output(), live:
+        before = sys.stdout, sys.stderr
+        sys.stdout, sys.stderr = (
+            cast("TextIO", _AboveDisplay(stream, live))
+            if isinstance(stream, EscapedStream) and stream.isatty()
+            else stream
+            for stream in before
+        )
+        try:
+            yield
+        finally:
+            sys.stdout, sys.stderr = before
+
+
 def cell(text: str) -> Text:
     """A text for a cell of a table of rich: in one line, printable, its brackets no markup."""
     from rich.text import Text
@@ -160,16 +218,28 @@ def progress_bar() -> Iterator[ProgressCallback]:
     if is_quiet() or not sys.stderr.isatty():
         yield lambda what, share: None
         return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeElapsedColumn,
+    )
 
     columns = (
         BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
+        TaskProgressColumn("{task.percentage:>3.0f} %"),
         TimeElapsedColumn(),
         TextColumn("{task.description}", markup=False),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+    bar = Progress(
+        *columns,
+        console=terminal_console(),
+        transient=True,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    with live_display(bar.live):
         task = bar.add_task("reading", total=None)
 
         def update(what: str, share: float | None) -> None:

@@ -70,7 +70,7 @@ def command() -> None:
 )
 @_who
 @bus_options
-@output_option("A .dcf or .json file.", required=True, type=_FILE)
+@output_option("A .dcf or .json file.", required=True, type=_FILE, callback=None)
 @_json
 def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
     """Read every setting of a drive into a file."""
@@ -171,7 +171,7 @@ def load(who: str, file: str, *, dry_run: bool, as_json: bool, **bus: Any) -> No
 @dry_run_option
 @_json
 def store(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> None:
-    """Let a drive keep its present settings in its memory (1010h)."""
+    """Store the present settings of a drive in its memory (1010h)."""
     from winchkit.drivers.can.tools.config import STORE
     from winchkit.drivers.can.tools.config import store as write
 
@@ -191,7 +191,7 @@ def store(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> N
 @dry_run_option
 @_json
 def restore(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> None:
-    """Let a drive take the maker's settings at its next start (1011h)."""
+    """Restore the maker's settings at the drive's next start (1011h)."""
     from winchkit.drivers.can.tools.config import RESTORE
     from winchkit.drivers.can.tools.config import restore as write
 

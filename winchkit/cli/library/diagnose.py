@@ -8,7 +8,7 @@ import click
 
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.completion import complete_file
-from winchkit.cli.core.messages import note
+from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import json_option
@@ -83,4 +83,5 @@ def command(
     else:
         counts = f"{report.diagnosed} diagnosed, {report.unchanged} unchanged"
         click.echo(f"{counts}, {len(report.failures)} failed")
+        suggest_next("library", "list", folder)
     return 1 if report.failures else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.messages import note
+from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import progress_bar
@@ -42,3 +42,4 @@ def command(folder: str, profile: str | None, as_json: bool) -> None:
         return
     counts = f"{len(report.indexed)} read, {report.unchanged} unchanged, "
     click.echo(f"{counts}{len(report.removed)} removed, {len(report.faults)} with a fault")
+    suggest_next("library", "list", folder)

@@ -31,7 +31,7 @@ _SHOWN = 100
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=RUN)
 @click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
 def command(files: tuple[str, ...], as_json: bool) -> None:
-    """Say what FILE holds: channels, rates, gaps, duration, counters, and whether it was closed.
+    """Summarise FILE: channels, rates, gaps, duration, counters, and whether it was closed.
 
     Several files are the parts of one log; so is FILE itself where only its parts exist.
     """

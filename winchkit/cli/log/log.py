@@ -57,7 +57,7 @@ _SHOW_PERIOD = 0.5
     shell_complete=complete_bench,
     help="Bench file.  [default: the only one of this folder]",
 )
-@output_option("Where to: a .csv or .mcap file.")
+@output_option("Where to: a .csv or .mcap file.", callback=None)
 @click.option("--rotate", metavar="LIMIT", help="Go on in a new file, e.g. after 100MB or 10min.")
 @click.option("--replace", is_flag=True, help="Write over an earlier log of that name.")
 @click.option(
@@ -267,14 +267,19 @@ def _counter_row(station: Station) -> Iterator[Callable[[], None]]:
     if not sys.stderr.isatty():
         yield lambda: None
         return
-    from rich.console import Console
     from rich.live import Live
 
-    from winchkit.cli.core.terminal import counter_table
+    from winchkit.cli.core.terminal import counter_table, live_display, terminal_console
 
     shown = 0.0
 
-    with Live(console=Console(stderr=True), auto_refresh=False) as live:
+    live = Live(
+        console=terminal_console(),
+        auto_refresh=False,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    with live_display(live):
 
         def show() -> None:
             nonlocal shown

@@ -60,13 +60,19 @@ def _table_unless(asked: list[LiveSink]) -> Iterator[list[LiveSink]]:
     if asked:
         yield asked
         return
-    from rich.console import Console
     from rich.live import Live
 
     from winchkit.cli.bench.monitor import status_table
+    from winchkit.cli.core.terminal import live_display, terminal_console
 
     shown, last = 0.0, None
-    with Live(console=Console(stderr=True), auto_refresh=False) as live:
+    live = Live(
+        console=terminal_console(),
+        auto_refresh=False,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    with live_display(live):
 
         def show(status: Mapping[str, Any]) -> None:
             nonlocal shown, last

@@ -66,7 +66,7 @@ def command(
     html: str | None,
     figures: str | None,
 ) -> None:
-    """Fit EFFECT beside the effects of a profile on runs, and write the better profile.
+    """Fit EFFECT together with those of a profile to runs, and write the new profile.
 
     Values that the profile has already are refitted with it; every value gets its standard
     deviation, the runs and the date.

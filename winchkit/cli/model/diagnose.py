@@ -51,7 +51,7 @@ __all__ = ["command"]
 )
 @runs_argument
 @model_options
-@click.option("--every-sample", is_flag=True, help="Do not thin long runs out.")
+@click.option("--every-sample", is_flag=True, help="Do not decimate long runs.")
 @click.option(
     "--as-recorded", is_flag=True, help="Look for effects although a sign or unit looks wrong."
 )
@@ -70,9 +70,9 @@ def command(
     html: str | None,
     figures: str | None,
 ) -> None:
-    """Name the physical effect that the model lacks, with its size and what it would buy.
+    """Name the physical effect that the model lacks, its size, and the error that it removes.
 
-    Two runs of one programme and load are the measure of the noise: record everything twice.
+    The noise is estimated from two runs of one programme and load: record each motion twice.
     Ctrl-C prints the errors and the candidates so far, without a verdict.
     Long runs are decimated as far as their signals allow; --winch all diagnoses each by
     itself and reports what they have in common.

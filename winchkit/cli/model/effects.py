@@ -61,7 +61,7 @@ class _Effects(LazyGroup):
     ),
 )
 def command() -> None:
-    """List the effects that a model may lack, show the card of one, or begin one of your own.
+    """List the effects that a model may lack, describe one, or write a new one.
 
     'winchkit effects' and 'winchkit effects ID' are short for 'winchkit effects show [ID]'.
     """
@@ -87,7 +87,7 @@ def command() -> None:
 @click.option("--json", "as_json", is_flag=True, help="Print JSON, complete, in SI units.")
 @html_option
 def show(effect_id: str | None, files: Sequence[str], as_json: bool, html: str | None) -> None:
-    """List the effects that a model may lack, or show the card of one.
+    """List the effects that a model may lack, or describe one.
 
     The page of --html holds the card, or all cards, with the signatures drawn.
     """

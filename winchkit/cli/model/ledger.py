@@ -22,7 +22,7 @@ __all__ = ["command"]
 @click.option("--json", "as_json", is_flag=True, help="Print the ledger as JSON.")
 @html_option
 def command(profile: str, as_json: bool, html: str | None) -> None:
-    """Show every effect that was added to or removed from a profile and what that did."""
+    """List every effect that was added to or removed from a profile, and the errors then."""
     from winchkit.catalog import find
     from winchkit.cli.model.options import declared_profile
     from winchkit.profile_edit.history import ladder

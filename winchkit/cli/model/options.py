@@ -13,8 +13,9 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_file
+from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import PROFILE, RUN
+from winchkit.cli.core.options import PROFILE, RUN, checked
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.schema.programme import ALL
 
@@ -205,23 +206,33 @@ def _of_winch(run: Run, winch: str | None) -> Run:
     return run.of_winch(winch if known != [""] else "")
 
 
-html_option = click.option("--html", metavar="FILE", help="Also write the answer as one page.")
+def _check_page(path: str, option: str) -> None:
+    """Raise FileError for a page that cannot be written; :func:`save_page` makes one folder."""
+    parent = Path(path).parent
+    check_new_file(path if parent.is_dir() else str(parent), option)
+
+
+html_option = click.option(
+    "--html",
+    metavar="FILE",
+    callback=checked(_check_page),
+    help="Also write the answer as one page.",
+)
 _RUNS_NAMED = 3
 
 
-def _drawable(_: click.Context, __: click.Parameter, folder: str | None) -> str | None:
-    """Refuse ``--figures`` before any work where PNG cannot be written."""
-    if folder is not None:
-        from winchkit.report.figures.export import require_png
+def _check_figures(folder: str, option: str) -> None:
+    """Refuse ``--figures`` before any work where the folder or PNG cannot be written."""
+    from winchkit.report.figures.export import require_png
 
-        require_png()
-    return folder
+    check_folder(folder, option)
+    require_png()
 
 
 figures_option = click.option(
     "--figures",
     metavar="DIR",
-    callback=_drawable,
+    callback=checked(_check_figures),
     help="Also write every figure as PNG, SVG and CSV into this folder.",
 )
 _NO_FILE = pattern(r"[^\w.-]")

@@ -48,9 +48,9 @@ __all__ = ["command"]
 @model_options
 @json_option
 def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json: bool) -> None:
-    """Write a profile without EFFECT; with --fit the effects that stay are refitted.
+    """Write a profile without EFFECT; with --fit the other effects are refitted.
 
-    A robot's effect on one line is EFFECT/LINE, or EFFECT with --winch LINE. The ledger notes the
+    A robot's effect on one line is EFFECT/LINE, or EFFECT with --winch LINE. The ledger records the
     step, and 'winchkit undo' takes it back.
     """
     from winchkit.cli.model.options import declared_profile, refuse_options

@@ -25,7 +25,7 @@ __all__ = ["command"]
 @profile_option
 @output_option("Profile to write; else the same file.", "NEW.toml")
 def command(profile: str, output: str | None) -> None:
-    """Take back what 'add' or 'remove' did last; values that it refitted are as before too."""
+    """Undo the last 'add' or 'remove'; the values that it refitted are restored too."""
     from winchkit.catalog import find
     from winchkit.cli.model.options import declared_profile
     from winchkit.errors import UsageError

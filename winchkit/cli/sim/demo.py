@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,17 +11,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Command, Example
-from winchkit.cli.core.messages import is_quiet, suggest_next
+from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import output_option
 from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
 
 if TYPE_CHECKING:
-    from winchkit.cli.sim.demo_loop import Findings, ProgressCallback
+    from winchkit.cli.sim.demo_loop import Findings
     from winchkit.diagnosis.results import Comparison
 
 __all__ = ["command"]
 
 _RECORDING_SECONDS = 62.0
+_BEFORE_THE_END = 0.98
+"""Largest share that the bar shows, since the diagnosis follows the recording."""
 _LONG = "takes half a minute; .ci/run executes it"
 _SHARES_SHOWN = 2
 _OPENING = (
@@ -168,23 +171,7 @@ def _outcome(
 
 
 @contextmanager
-def _progress(total: float) -> Iterator[ProgressCallback]:
+def _progress(total: float) -> Iterator[Callable[[str, float], None]]:
     """A progress bar on stderr, by the recorded time."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-    console = Console(stderr=True)
-    columns = (
-        BarColumn(),
-        TextColumn("{task.percentage:>3.0f} %"),
-        TimeElapsedColumn(),
-        TextColumn("{task.description}"),
-    )
-    hidden = is_quiet() or not console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=hidden) as bar:
-        task = bar.add_task("starting", total=total)
-
-        def progress(what: str, recorded: float) -> None:
-            bar.update(task, description=what, completed=min(recorded, 0.98 * total))
-
-        yield progress
+    with progress_bar() as bar:
+        yield lambda what, recorded: bar(what, min(recorded / total, _BEFORE_THE_END))

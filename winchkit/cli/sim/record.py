@@ -108,7 +108,8 @@ def command(
                 output.mkdir(parents=True, exist_ok=True)
                 write(run, path)
                 written.append(_entry(path, run, programme))
-                progress(f"{programme.name}: {path.name} written", index / len(named))
+                done = index / len(named) if len(named) > 1 else None
+                progress(f"{programme.name}: {path.name} written", done)
                 if not as_json:
                     click.echo(path)
     if as_json:

@@ -61,7 +61,7 @@ def command(
     mystery: int | None,
     no_browser: bool,
 ) -> None:
-    """Serve the page on this computer: look, learn, add, and watch the error fall.
+    """Serve the page in the browser of this computer: runs, model, bench, robot, library.
 
     The URL is the first line on stdout. The page answers on the loopback address only; other
     computers reach it through a tunnel (docs/page.md). Ctrl-C ends it.

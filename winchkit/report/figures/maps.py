@@ -110,7 +110,7 @@ def _figure(
     ]
     return Figure(
         name,
-        f"Mean residual over {over}{state}",
+        f"Mean residual of the {output} over {over}{state}",
         f"Mean residual of the {output}{state} {map_text(drawn, scale)}. "
         "Empty without measurements; cells with a minus are negative.",
         axes[0],

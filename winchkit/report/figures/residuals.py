@@ -272,7 +272,7 @@ def _over_variable(
     drawn = "Dots are samples" if cells is None else "Shading is the number of samples"
     return Figure(
         f"over-{curves.output}",
-        f"Residual over {over}: {percent(followed.share)} of its variance",
+        f"Residual of the {output} over {over}: {percent(followed.share)} of its variance",
         f"Residual of the {output} over {over}{often}, which explains "
         f"{percent(followed.share)} of its variance. {drawn}, lines are means.",
         how.axis(limits),

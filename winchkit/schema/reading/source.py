@@ -109,6 +109,9 @@ def _text(path: Path) -> str:
 
 
 def _syntax_fault(message: str, path: str, text: str) -> Fault:
+    if (suffix := Path(path).suffix) not in {"", ".toml"}:
+        kind = f"is a {suffix} file, and no declaration"
+        return Fault(f"{kind}: profiles, benches and programmes are TOML files", path)
     found = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)$", message)
     if found is None:
         return Fault(f"TOML syntax: {message}", path)

@@ -8,7 +8,7 @@ const MOST = 300, TONES = ["with", "today", "brush", "ok", "muted", "unknown", "
 const MARKS = { cable_length: "square", tension: "ring", motor_torque: "triangle" };
 const NAMES = { cable_length: "cable length", tension: "tension", motor_torque: "motor torque" };
 
-let root, state = null, found = { runs: [] }, chosen = new Set(), opened = new Set(), channel = "tension", filter = "", verdict = "", part = "runs";
+let root, state = null, found = { runs: [] }, chosen = new Set(), opened = new Set(), channel = "tension", filter = "", verdict = "", part = "runs", faultsOpen = false;
 
 export function enter(main, fresh) { root = main; state = fresh; root.removeAttribute("data-signature"); load(); }
 export function update(fresh) { const before = state; state = fresh; if (part === "fleet") fleet.update(fresh, before); }
@@ -32,8 +32,9 @@ function render() {
   const verdicts = [...new Map(found.runs.filter((run) => run.verdict).map((run) => [run.verdict.verdict, run.verdict.chip]))];
   const judged = verdicts.length ? el("select", { "aria-label": "Verdict", onchange: () => { verdict = judged.value; again(); } }, [["", "any verdict"], ...verdicts].map(([value, words]) => el("option", { value, selected: value === verdict }, words))) : null;
   const pick = el("select", { "aria-label": "Channel", onchange: () => { channel = pick.value; overlay(); } }, channels.map((name) => el("option", { selected: name === channel }, name)));
+  const readable = found.runs.filter((run) => !run.fault).length;
   const outputs = [...new Set(found.runs.flatMap((run) => (run.verdict ? Object.keys(run.verdict.ratios) : [])))];
-  fill(root, el("h1", { class: "visually-hidden" }, "Library"), el("div", { class: "row context" }, tabs, el("span", { class: "label" }, `Folder ${found.folder}: ${found.runs.length} run${found.runs.length === 1 ? "" : "s"} in ${sets().length} set${sets().length === 1 ? "" : "s"}`), search, judged,
+  fill(root, el("h1", { class: "visually-hidden" }, "Library"), el("div", { class: "row context" }, tabs, el("span", { class: "label" }, `Folder ${found.folder}: ${readable} run${readable === 1 ? "" : "s"} in ${sets().length} set${sets().length === 1 ? "" : "s"}`), search, judged,
     el("span", { class: "row end" }, el("button", { class: "primary", id: "open", disabled: !chosen.size, onclick: () => attempt(async () => { await order("library", { names: [...chosen] }); location.hash = "#diagnose"; }) }, openWords()))),
   el("div", { class: "grid" }, el("section", { class: "panel w8 scroll", "aria-label": "Runs" },
     el("table", { class: "rows library" }, el("thead", {}, el("tr", {}, ["", "Set, run", "Programme", "Load", "Duration", "Error ÷ noise", "Verdict"].map((text, i) => el("th", { class: i === 4 ? "number" : "" }, text || el("span", { class: "visually-hidden" }, "Choose"))))), body),
@@ -67,8 +68,12 @@ function rows() {
     out.push(setRow(key, runs, open), ...(open ? runs.map(runRow) : []));
   }
   if (seen.length > MOST) out.push(el("tr", {}, el("td", { colspan: 7, class: "note" }, `and ${seen.length - MOST} more sets; filter them`)));
-  return [...out, ...faults.slice(0, MOST).map((run) => el("tr", {}, el("td", {}), el("td", {}, run.name), el("td", { colspan: 5, class: "note" }, run.fault)))];
+  return [...out, ...(faults.length ? [faultsRow(faults), ...(faultsOpen ? faults.slice(0, MOST).map(faultRow) : [])] : [])];
 }
+
+const faultsRow = (faults) => el("tr", {}, el("td", {}), el("td", { colspan: 6 }, el("button", { class: "plain fold", id: "faults", "aria-expanded": String(faultsOpen), onclick: () => { faultsOpen = !faultsOpen; redraw(); } }, el("span", { "aria-hidden": "true" }, faultsOpen ? "▾" : "▸"), `${faults.length} file${faults.length === 1 ? " is no run" : "s are no runs"}`)));
+
+const faultRow = (run) => el("tr", {}, el("td", {}), el("td", {}, run.name), el("td", { colspan: 5, class: "note" }, run.fault));
 
 function redraw() { fill(root.querySelector("table.library tbody"), ...rows()); const button = document.getElementById("open"); button.disabled = !chosen.size; fill(button, openWords()); overlay(); }
 
