@@ -35,7 +35,7 @@ _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 36
 _SAMPLES = 400
 _COLUMNS = 80
-_MARGIN = 17
+_MARGIN = 15
 _FLAT = 1e-9
 
 
@@ -158,7 +158,7 @@ def card(effect: Effect) -> str:
         ("Contains", ", ".join(effect.contains)),
         ("Looks like", effect.looks_like),
         ("Confused with", ", ".join(effect.confused_with)),
-        ("Distinguished by", effect.told_apart),
+        ("Separated by", effect.told_apart),
         ("In control", in_control(effect)),
     ]
     lines = [effect.id, ""]
