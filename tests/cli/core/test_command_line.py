@@ -228,7 +228,7 @@ def test_an_interrupt_during_the_imports_is_one_line() -> None:
     ("word", "meant"),
     [("page", "did you mean 'serve'?"), ("diagnos", "did you mean 'diagnose'?")],
 )
-def test_an_unknown_command_is_told_the_one_that_is_meant(word: str, meant: str) -> None:
+def test_an_unknown_command_suggests_the_one_that_is_meant(word: str, meant: str) -> None:
     result = CliRunner().invoke(main, [word])
     assert result.exit_code == 2
     assert meant in result.stderr
