@@ -257,6 +257,17 @@ def test_short_names_of_a_current_and_a_set_point(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "channel"),
+    [("theta_dot", "motor_velocity"), ("q_dot", "motor_velocity"), ("phi dot", "motor_velocity"),
+     ("theta_ddot", ""), ("q_ddot", ""), ("theta", "motor_angle"), ("Mot_pos", "motor_angle")],
+)  # fmt: skip
+def test_derivatives_by_their_dots(name: str, channel: str) -> None:
+    meaning = meaning_of(name)
+    assert meaning is not None
+    assert (meaning.channel, meaning.rank) == (channel, 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
     [("CurrentEncoderReading", "motor_angle"), ("Current Position", "motor_angle"),
      ("current load", "tension"), ("Motor current", "current"), ("Current", "current")],
 )  # fmt: skip
@@ -264,6 +275,19 @@ def test_current_is_an_ampere_or_the_present_value(name: str, channel: str) -> N
     meaning = meaning_of(name)
     assert meaning is not None
     assert meaning.channel == channel
+
+
+def test_a_time_of_which_no_channel_is_used_is_not_asked(tmp_path: Path) -> None:
+    count = np.arange(1.0, 301.0)
+    columns = {
+        "time_ground": count,
+        "wind speed [m/s]": np.cos(count),
+        "time [s]": count / 100,
+        "motor angle [deg]": np.sin(count / 100),
+    }
+    found = guess(tmp_path / "a.csv", columns)
+    assert not found.questions
+    assert of(found, "time").source == "time"
 
 
 def test_the_angle_of_a_joint_needs_consent(tmp_path: Path) -> None:

@@ -115,9 +115,9 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
         work.columns.append(_started(work, candidate, given.get(candidate.column.source)))
     _from_velocity(work)
     _by_convention(work)
+    _drop_clocks(work)
     _ask_units(work)
     rate = _rate(work)
-    _drop_clocks(work)
     _ask_columns(work, choice)
     assigned = {item.column.source: _assignment(item) for item in work.columns}
     unused = {

@@ -73,6 +73,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         IGNORED,
     ),
     (_CRANE, 1, IGNORED),
+    (r"\b(theta|phi|q|x|y|z) ?(ddot|dot dot|double ?dot)\b|\bdd(theta|phi|q)\b", 1, IGNORED),
     (r"^pulses?$", 1, IGNORED),
     (
         r"^(frame|sub ?frame|index|idx|nr|no|number|sample|samples|counter|count|row|"
@@ -148,7 +149,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     (
         r"\b(velocity|velocities|velocite|velo?|speeds?|drehzahl\w*|\w+drehzahl|geschwindigkeit\w*|"
         r"\w+geschwindigkeit|winkelgeschwindigkeit|omega|vitesse|velocidad|velocita|dq|qd|qdot|"
-        r"dtheta|thetadot|rpm|n ist|nist|v ist|vist|vx|angular rate|rotational speed|w)\b",
+        r"dtheta|thetadot|(theta|phi|q) dot|phidot|dphi|"
+        r"rpm|n ist|nist|v ist|vist|vx|angular rate|rotational speed|w)\b",
         1,
         "motor_velocity",
     ),
@@ -168,8 +170,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     ),
     (_JOINT, 3, "motor_angle"),
     (
-        r"\b(motor ?angles?|motor ?pos(ition)?|motorwinkel|motorposition|rotor\w*|theta|phi|"
-        r"encoder\w*|geber\w*|drehgeber|resolver|angles?|\w*winkel\w*|angulo|angolo|q|qm|px)\b",
+        r"\b(motor ?angles?|mot(or)? ?(pos(ition)?|angle)|motorwinkel|motorposition|rotor\w*|"
+        r"theta|phi|encoder\w*|geber\w*|drehgeber|resolver|angles?|\w*winkel\w*|angulo|angolo|q|qm|px)\b",
         1,
         "motor_angle",
     ),
