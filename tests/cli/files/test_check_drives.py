@@ -108,6 +108,16 @@ def test_pdo_parameters_that_cannot_be_written_have_to_fit(
     assert said in output
 
 
+def test_more_objects_than_mapping_entries_are_reported(tmp_path: Path) -> None:
+    """An EDS of a CANopenNode drive has one entry in 1600h; the drive refuses the second."""
+    eds = (SOURCE / "generic-cia402.eds").read_text(encoding="utf-8")
+    begin = eds.index("[1600sub2]")
+    path = drive(tmp_path, eds=(eds[begin : eds.index("[1601]", begin)], ""))
+    code, output = check(path)
+    assert code == 3
+    assert "rpdo 1 has 2 objects; 1600h has 1 mapping entries in the EDS" in output
+
+
 def test_a_transmission_type_as_the_drive_has_it_is_in_order(tmp_path: Path) -> None:
     written = ('"0x60FF"]', '"0x60FF"]\ntransmission = 255')
     code, output = check(drive(tmp_path, device=written, eds=fixed("1400", 2, "255")))

@@ -178,6 +178,12 @@ def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec, *, real: bool = False
         if index not in dictionary:
             yield f"{kind} {spec.number} needs {index:04X}h, which the EDS lacks"
     yield from _communication_faults(dictionary, record, kind, spec)
+    entries = set(getattr(dictionary.get(record + 0x200), "subindices", ())) - {0}
+    if entries and len(spec.objects) > len(entries):
+        yield (
+            f"{kind} {spec.number} has {len(spec.objects)} objects; {record + 0x200:04X}h has "
+            f"{len(entries)} mapping entries in the EDS"
+        )
     bits = 0
     for text in spec.objects:
         try:
