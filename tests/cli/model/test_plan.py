@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import click
 import pytest
 
 from model_files import answer, invoke, record_files
 from winchkit.catalog import find
+from winchkit.cli.model.plan import suggest_run
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.design.plan import programme_of
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES
@@ -121,3 +123,19 @@ def test_a_warmed_programme_asks_for_temperatures_that_a_simulation_obeys(tmp_pa
     assert len(runs) == 4
     means = [float(run["temperature"].mean()) for run in runs]
     assert means == pytest.approx([asked[0], asked[1]] * 2, abs=0.1)
+
+
+def test_the_suggested_run_names_a_bench_or_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with click.Context(click.Command("plan")):
+        suggest_run(Path("next.toml"), None)
+        suggest_run(Path("next.toml"), "b.toml")
+        (tmp_path / "bench.toml").write_text('schema = 1\nkind = "bench"\n')
+        suggest_run(Path("next.toml"), None)
+    assert capsys.readouterr().err.splitlines() == [
+        "on a bench: winchkit run next.toml -b BENCH.toml",
+        "next: winchkit run next.toml -b b.toml",
+        "next: winchkit run next.toml",
+    ]

@@ -99,7 +99,8 @@ def command(
         }
         echo_json(told)
     else:
-        click.echo(f"{found.sessions} sessions, effects {', '.join(found.effects)}\n")
+        sessions = f"{found.sessions} session{'' if found.sessions == 1 else 's'}"
+        click.echo(f"{sessions}, effects {', '.join(found.effects)}\n")
         click.echo(history_text(history, found.swapped))
     if html:
         from winchkit.report.pages.fleet_history import fleet_history_html

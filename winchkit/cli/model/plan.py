@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote
 from string import ascii_uppercase
 from typing import TYPE_CHECKING
 
 import click
 
 from winchkit.cli.core.command import Command
+from winchkit.cli.core.completion import files_of_kind
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import BENCH, output_option
 from winchkit.cli.core.output import echo_json
@@ -37,6 +39,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "command",
+    "suggest_run",
     "tell_poses",
 ]
 
@@ -239,6 +242,14 @@ def _plan_winch(
         return
     write_programme(found.programme(path.stem), path)
     note(f"written: {path}, the first of the list: {found.offers[0].kind.name}")
+    suggest_run(path, bench)
+
+
+def suggest_run(path: Path, bench: str | None) -> None:
+    """Suggest to execute a programme; without any bench file the command has a blank to fill."""
+    if bench is None and len(files_of_kind(Path(), ("bench",))) != 1:
+        note(f"on a bench: winchkit run {quote(str(path))} -b BENCH.toml")
+        return
     suggest_next("run", str(path), *(() if bench is None else ("-b", bench)))
 
 
