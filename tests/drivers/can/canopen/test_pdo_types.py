@@ -131,6 +131,7 @@ def with_second_tpdo(transmission: int, event_timer: float) -> DeviceSpec:
     return dataclasses.replace(spec, servo=dataclasses.replace(spec.servo, tpdo=(first, slower)))
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize(("transmission", "event_timer"), [(3, 0.0), (255, 0.01)])
 def test_a_drive_is_moved_with_slower_feedback_of_its_speed(
     rig: tuple[DriveOnBus, CanBus], transmission: int, event_timer: float
