@@ -30,7 +30,7 @@ def read_run(path: str | Path, mapping: str | Path | ImportMapping | None = None
         The file; ``lift.mcap`` also stands for the parts ``lift.001.mcap``, ``lift.002.mcap`` …
     mapping : str, Path or ImportMapping, optional
         Channels and units of another program's columns, as ``winchkit import`` writes them; the
-        file may then be text, XLSX, MAT, HDF5, Parquet, NPZ or MCAP.
+        file may then be of any format that it reads.
 
     Returns
     -------

@@ -130,7 +130,8 @@ def test_one_clock_with_rows_in_between_of_a_rate_of_its_own(tmp_path: Path) -> 
         (bytes(range(256)) * 20, "binary file of an unknown format"),
         (b"\x1f\x8b\x08\x00", "compressed by gzip"),
         (b"\xd0\xcf\x11\xe0\xa1\xb1", "old Excel file"),
-        (b"TDSm....", "TDMS file"),
+        (b"TDSm....", "has no channels with numbers"),
+        (b"MDF     broken", "not a readable MDF file"),
         (b"PK\x03\x04broken", "damaged ZIP"),
         (b"MATLAB 5.0 MAT-file" + b" " * 109, "not a readable MAT file"),
         (b"PAR1broken", "not a readable Parquet file"),
@@ -142,7 +143,12 @@ def test_one_clock_with_rows_in_between_of_a_rate_of_its_own(tmp_path: Path) -> 
 def test_files_that_cannot_be_read_are_refused_in_words(
     content: bytes, text: str, tmp_path: Path
 ) -> None:
-    for needed, mark in (("pyarrow", b"PAR1"), ("h5py", b"\x89HDF")):
+    for needed, mark in (
+        ("pyarrow", b"PAR1"),
+        ("h5py", b"\x89HDF"),
+        ("nptdms", b"TDSm"),
+        ("asammdf", b"MDF "),
+    ):
         if content.startswith(mark) and importlib.util.find_spec(needed) is None:
             pytest.skip(f"needs {needed}")
     path = tmp_path / "log.bin"

@@ -124,11 +124,11 @@ def command(
 ) -> None:
     """Import recordings of other programs as runs in DIR, one for each FILE.
 
-    Reads text (any delimiter and decimal sign), XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP and
-    exports of trackers. Guesses columns and units, shows the guess, and asks what it cannot know;
-    without a terminal it ends with 2 and names the options that answer. The mapping that it saves
-    makes the next import silent. A FILE without a motor angle is joined to the one that has it, by
-    its time stamps or by cross-correlation (docs/howto/logger.md).
+    Reads text (any delimiter and decimal sign), XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF,
+    TDMS and exports of trackers. Guesses columns and units, shows the guess, and asks what it
+    cannot know; without a terminal it ends with 2 and names the options that answer. The mapping
+    that it saves makes the next import silent. A FILE without a motor angle is joined to the one
+    that has it, by its time stamps or by cross-correlation (docs/howto/logger.md).
     """
     from winchkit.cli.files.import_table import entry_of, tables_text
     from winchkit.runs.importing.streams import streams_of

@@ -21,7 +21,7 @@ def read_table(path: str | Path) -> Table:
     Parameters
     ----------
     path : str or Path
-        Text, XLSX, MAT, HDF5, Parquet, NPY, NPZ or MCAP.
+        Text, XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF or TDMS.
 
     Returns
     -------
@@ -48,6 +48,10 @@ def read_table(path: str | Path) -> Table:
         from winchkit.runs.importing.formats.messages import read_messages
 
         return read_messages(name, data)
+    if data.startswith((b"MDF ", b"TDSm")):
+        from winchkit.runs.importing.formats.measurement_files import read_mdf, read_tdms
+
+        return (read_mdf if data.startswith(b"MDF ") else read_tdms)(name, data)
     _refuse_known(name, data)
     from winchkit.runs.importing.formats.text import read_text_table
 
@@ -106,8 +110,6 @@ def _is_mat4(path: str | Path, data: bytes) -> bool:
 _KNOWN = {
     b"\x1f\x8b": "is compressed by gzip; unpack it first",
     b"\xd0\xcf\x11\xe0": "is an old Excel file (XLS); save it as XLSX or CSV",
-    b"TDSm": "is a TDMS file; export it as text, or as HDF5",
-    b"MDF ": "is an MDF file; export it as CSV, Parquet or HDF5",
     b"%PDF": "is a PDF document",
     b"SQLite format 3": "is an SQLite database (perhaps a ROS 2 bag); convert it to MCAP or CSV",
 }

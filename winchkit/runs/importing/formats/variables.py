@@ -10,7 +10,7 @@ import numpy as np
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.table import Column, Table, named_apart
 
-__all__ = ["table_of_arrays"]
+__all__ = ["column_of", "table_of_arrays"]
 
 _WIDEST = 200
 """Most columns of one matrix; a larger one is an image or a table of another kind."""
@@ -60,7 +60,7 @@ def table_of_arrays(
         unit = (units or {}).get(name, "")
         array = np.squeeze(np.asarray(value))
         if array.dtype.names:
-            columns += [_column(f"{name}.{k}", array[k], unit) for k in array.dtype.names]
+            columns += [column_of(f"{name}.{k}", array[k], unit) for k in array.dtype.names]
         elif array.dtype.kind in "USO":
             if array.ndim == 0:
                 texts[name] = str(array)
@@ -72,10 +72,10 @@ def table_of_arrays(
         elif array.ndim == 0:
             constants[name] = float(array)
         elif array.ndim == 1 and len(array):
-            columns.append(_column(name, array, unit))
+            columns.append(column_of(name, array, unit))
         elif array.ndim == 2 and min(array.shape) <= _WIDEST:
             long = array if array.shape[0] >= array.shape[1] else array.T
-            columns += [_column(f"{name}[{k}]", long[:, k], unit) for k in range(long.shape[1])]
+            columns += [column_of(f"{name}[{k}]", long[:, k], unit) for k in range(long.shape[1])]
         elif array.size:
             left.append(f"variable '{name}' of shape {array.shape} is left out")
     lengths = sorted({len(item) for item in columns})
@@ -93,8 +93,18 @@ def table_of_arrays(
     )
 
 
-def _column(name: str, array: Any, unit: str) -> Column:
-    """Numbers; dates as nanoseconds since 1970."""
+def column_of(name: str, array: Any, unit: str) -> Column:
+    """Column of a vector of numbers, or of dates as nanoseconds since 1970.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    array : (n,) array
+        Numbers, dates or durations (``datetime64``, ``timedelta64``).
+    unit : str
+        Unit of numbers as spelled in the file.
+    """
     if array.dtype.kind in "mM":
         missing = np.isnat(array)
         whole = array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64).astype(np.float64)

@@ -1,0 +1,202 @@
+"""Readers of ASAM MDF files (extra ``mf4``) and of NI TDMS files (extra ``tdms``)."""
+
+from __future__ import annotations
+
+import gc
+import html
+import io
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.errors import Fault, RunError, UsageError, WinchkitError
+from winchkit.runs.importing.formats.variables import column_of
+from winchkit.runs.importing.table import Column, Table, named_apart, refuse_size
+
+__all__ = ["read_mdf", "read_tdms"]
+
+_NUMBERS = "fiub"
+"""Kinds of arrays (NumPy) that hold numbers or truth values."""
+_TIMES = "mM"
+
+
+def read_mdf(path: str, data: bytes) -> Table:
+    """Read an MDF file of version 3 or 4, in physical units.
+
+    Parameters
+    ----------
+    path : str
+        File, for messages.
+    data : bytes
+        Its content.
+
+    Returns
+    -------
+    Table
+        A column per channel of numbers; channels of one channel group have one time. Samples that
+        the file marks as invalid are NaN. Lines ``key: value`` of its comment are metadata.
+
+    Raises
+    ------
+    UsageError
+        Without asammdf.
+    RunError
+        For an invalid file, or one without channels of numbers.
+    """
+    try:
+        from asammdf import MDF
+    except ImportError:
+        raise UsageError(
+            f"{path}: MDF needs asammdf; install it with pip install 'winchkit[mf4]'"
+        ) from None
+    notes: list[str] = []
+    columns: list[Column] = []
+    version = comment = failure = ""
+    with _failing_destructors():
+        try:
+            with MDF(io.BytesIO(data)) as file:
+                count = sum(g.channel_group.cycles_nr * len(g.channels) for g in file.groups)
+                refuse_size(path, 8 * count, "channels")
+                columns += _channels(file, notes)
+                version, comment = str(file.version), str(file.header.comment or "")
+        except WinchkitError:
+            raise
+        except Exception as error:  # noqa: BLE001 - the library raises many kinds
+            failure = str(error)
+        if failure:
+            gc.collect()  # the reader that failed refers to itself
+    if failure or not version:
+        raise RunError(Fault(f"is not a readable MDF file: {failure}", path))
+    return _table(path, f"MDF {version}", columns, _metadata(comment), notes)
+
+
+def _metadata(comment: str) -> dict[str, str]:
+    """Lines ``key: value`` of the comment of an MDF file, which may be the text of an XML block."""
+    block = re.search(r"<TX\b[^>]*>(.*?)</TX>", comment, re.DOTALL)
+    text = html.unescape(block[1]) if block else comment
+    pairs = (line.partition(": ") for line in text.splitlines())
+    return {key.strip(): value.strip() for key, mark, value in pairs if mark}
+
+
+@contextmanager
+def _failing_destructors() -> Iterator[None]:
+    """asammdf's destructor raises for a file that it could not open, which Python would print."""
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _raised: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = hook
+
+
+def _channels(file: Any, notes: list[str]) -> Iterator[Column]:
+    """The channels of numbers of an MDF file, each group's time before its first one."""
+    timed: set[int] = set()
+    for signal in file.iter_channels(skip_master=True):
+        group = int(signal.group_index)
+        named = file.groups[group].channel_group.acq_name or f"channel group {group + 1}"
+        values = np.asarray(signal.samples)
+        if values.ndim != 1 or values.dtype.kind not in _NUMBERS:
+            notes.append(f"channel '{signal.name}' has no numbers and is left out")
+            continue
+        if not len(values):
+            continue
+        if group not in timed:
+            timed.add(group)
+            stamps = np.asarray(signal.timestamps, dtype=np.float64)
+            yield Column("time", stamps, "s", (named,), group=named)
+        numbers = values.astype(np.float64)
+        if signal.invalidation_bits is not None:
+            numbers[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+        yield Column(signal.name, numbers, signal.unit or "", (named,), group=named)
+
+
+def read_tdms(path: str, data: bytes) -> Table:
+    """Read a TDMS file of LabVIEW, with scaled values.
+
+    Parameters
+    ----------
+    path : str
+        File, for messages.
+    data : bytes
+        Its content.
+
+    Returns
+    -------
+    Table
+        A column per channel of numbers or time stamps. Channels that are waveforms have the time
+        of their increment; those of one group with one time are sampled together.
+
+    Raises
+    ------
+    UsageError
+        Without npTDMS.
+    RunError
+        For an invalid file, or one without channels of numbers.
+    """
+    try:
+        from nptdms import TdmsFile
+    except ImportError:
+        raise UsageError(
+            f"{path}: TDMS needs npTDMS; install it with pip install 'winchkit[tdms]'"
+        ) from None
+    notes: list[str] = []
+    try:
+        file = TdmsFile.read(io.BytesIO(data))
+        refuse_size(path, 8 * sum(len(c) for g in file.groups() for c in g.channels()), "channels")
+        columns = [column for group in file.groups() for column in _of_group(group, notes)]
+        metadata = {str(key): str(value) for key, value in file.properties.items()}
+    except WinchkitError:
+        raise
+    except Exception as error:  # noqa: BLE001 - the library raises many kinds
+        raise RunError(Fault(f"is not a readable TDMS file: {error}", path)) from None
+    return _table(path, "TDMS", columns, metadata, notes)
+
+
+def _of_group(group: Any, notes: list[str]) -> Iterator[Column]:
+    """The channels of a group; channels of another length or increment are a group of their own."""
+    several = len({_timing(channel) for channel in group.channels() if len(channel)}) > 1
+    timed: set[tuple[int, float, float]] = set()
+    for channel in group.channels():
+        values = np.asarray(channel[:]) if len(channel) else np.zeros(0)
+        if values.dtype.kind not in _NUMBERS + _TIMES:
+            notes.append(f"channel '{channel.name}' has no numbers and is left out")
+            continue
+        if not len(values):
+            continue
+        timing = count, increment, _ = _timing(channel)
+        own = f"{group.name} ({count} samples, {increment:g} s)" if several else group.name
+        if increment > 0 and timing not in timed:
+            timed.add(timing)
+            yield Column("time", _waveform(timing), "s", (own,), group=own)
+        properties = channel.properties
+        unit = properties.get("unit_string") or properties.get("NI_UnitDescription") or ""
+        found = column_of(channel.name, values, str(unit))
+        yield Column(found.name, found.values, found.unit, (own,), group=own)
+
+
+def _timing(channel: Any) -> tuple[int, float, float]:
+    """Samples, increment (s; 0 for no waveform) and offset (s) of a channel."""
+    properties = channel.properties
+    return (
+        len(channel),
+        float(properties.get("wf_increment", 0.0)),
+        float(properties.get("wf_start_offset", 0.0)),
+    )
+
+
+def _waveform(timing: tuple[int, float, float]) -> Array:
+    count, increment, offset = timing
+    return np.asarray(offset + increment * np.arange(count))
+
+
+def _table(
+    path: str, layout: str, columns: list[Column], metadata: dict[str, str], notes: list[str]
+) -> Table:
+    if not columns:
+        raise RunError(Fault("; ".join(["has no channels with numbers", *notes]), path))
+    return Table(path, layout, named_apart(columns), metadata=metadata, notes=tuple(notes))
