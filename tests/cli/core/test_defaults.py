@@ -68,6 +68,13 @@ def test_the_variable_of_all_commands(folder: Path) -> None:
     assert stop("--bench", "there/lab.toml", WINCHKIT_BENCH="nowhere.toml").exit_code == 0
 
 
+def test_a_bench_of_the_variable_that_is_not_there_is_named_with_the_variable(folder: Path) -> None:
+    result = stop(WINCHKIT_BENCH="nowhere.toml")
+    assert result.exit_code == 3
+    assert result.stderr.splitlines()[0] == "bench: nowhere.toml (WINCHKIT_BENCH)"
+    assert "(WINCHKIT_BENCH)" not in stop("-b", "nowhere.toml", WINCHKIT_BENCH="other.toml").stderr
+
+
 def test_the_variable_of_a_profile() -> None:
     result = CliRunner().invoke(main, ["ledger"], env={"WINCHKIT_PROFILE": "bench-spiral"})
     assert result.exit_code == 0

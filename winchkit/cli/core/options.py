@@ -64,13 +64,18 @@ TABLE = Readable("file", complete_file)
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
-def bench_by_default(ctx: click.Context, _param: click.Parameter, value: str | None) -> str | None:
+def bench_by_default(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """The bench that was given, else the one bench file of this folder.
 
-    Raises UsageError where the folder has none or several. The file that was chosen is reported
-    on stderr, since a command may move what it describes.
+    Raises UsageError where the folder has none or several. A file that the command line does not
+    name is reported on stderr, since a command may move what it describes.
     """
-    if value is not None or ctx.resilient_parsing:
+    if ctx.resilient_parsing:
+        return value
+    if value is not None:
+        source = ctx.get_parameter_source(param.name or "")
+        if source is click.core.ParameterSource.ENVIRONMENT:
+            note(f"bench: {value} ({BENCH_VARIABLE})")
         return value
     if (only := _only_bench()) is not None:
         return only
