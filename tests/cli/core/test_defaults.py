@@ -65,6 +65,7 @@ def test_the_variable_of_all_commands(folder: Path) -> None:
     assert stop(WINCHKIT_BENCH="there/lab.toml").exit_code == 0
     wrong = stop(WINCHKIT_BENCH="there/lab.toml", WINCHKIT_STOP_BENCH="nowhere.toml")
     assert wrong.exit_code == 3, "the command's own variable comes first"
+    assert wrong.stderr.splitlines()[0] == "bench: nowhere.toml (WINCHKIT_STOP_BENCH)"
     assert stop("--bench", "there/lab.toml", WINCHKIT_BENCH="nowhere.toml").exit_code == 0
 
 

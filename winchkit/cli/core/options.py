@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -75,7 +76,9 @@ def bench_by_default(ctx: click.Context, param: click.Parameter, value: str | No
     if value is not None:
         source = ctx.get_parameter_source(param.name or "")
         if source is click.core.ParameterSource.ENVIRONMENT:
-            note(f"bench: {value} ({BENCH_VARIABLE})")
+            names = [param.envvar] if isinstance(param.envvar, str) else param.envvar or ()
+            variable = next((name for name in names if os.environ.get(name)), "environment")
+            note(f"bench: {value} ({variable})")
         return value
     if (only := _only_bench()) is not None:
         return only
