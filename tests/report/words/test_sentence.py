@@ -86,6 +86,10 @@ def test_without_repeats_the_noise_is_a_residual() -> None:
     assert "noise floor" not in text
     adequate = sentence(diagnosis_of("adequate", outputs={"cable_length": unsure}))
     assert "an unknown effect cannot be excluded without repeats" in adequate
+    assert "too few or too short" not in adequate
+    far = replace(unsure, heldout_rms_after=2.5 * 0.3e-3)
+    adequate = sentence(diagnosis_of("adequate", outputs={"cable_length": far}))
+    assert "(cable length by a factor of 2.5): these runs are too few or too short" in adequate
 
 
 def test_adequate_has_errors_with_the_noise() -> None:

@@ -221,17 +221,22 @@ def worse_text(outputs: Mapping[str, OutputFit]) -> str:
 
 def still_text(outputs: Mapping[str, OutputFit]) -> str:
     """Outputs whose error remains well above their noise floor."""
+    texts = _above_noise(outputs)
+    return f"Still above the noise floor: {listed(texts)}." if texts else ""
+
+
+def _above_noise(outputs: Mapping[str, OutputFit]) -> list[str]:
+    """Outputs whose held-out error is well above the noise, with the factor."""
     above = {
         name: output.heldout_rms_after / output.noise_rms
         for name, output in outputs.items()
         if output.noise_rms
     }
-    texts = [
+    return [
         f"{OUTPUT_NAMES.get(name, name)} by a factor of {significant(ratio, 2)}"
         for name, ratio in above.items()
         if ratio > _ABOVE
     ]
-    return f"Still above the noise floor: {listed(texts)}." if texts else ""
 
 
 def doubtful(diagnosis: Diagnosis) -> str:
@@ -252,6 +257,11 @@ def _adequate(diagnosis: Diagnosis) -> tuple[str, str]:
     if _from_repeats(diagnosis):
         return "No effect is missing: the residual is at the noise floor.", errors
     known = "No known effect is missing; an unknown effect cannot be excluded without repeats."
+    if above := _above_noise(diagnosis.outputs):
+        known += (
+            f" The held-out error is above the residual that all known effects together leave "
+            f"({listed(above)}): these runs are too few or too short to name one."
+        )
     return known, errors
 
 
