@@ -216,12 +216,12 @@ def test_other_files_are_no_runs(tmp_path: Path) -> None:
     for path, part in (
         (tmp_path / "none.csv", "no such file"),
         (tmp_path / "run.txt", "use one of .csv, .mcap"),
-        (tmp_path, "no format"),
+        (tmp_path, "is a folder; name the runs in it"),
     ):
         with pytest.raises(RunError, match=part):
             read_run(path)
     (tmp_path / "dir.csv").mkdir()
-    with pytest.raises(RunError, match="directory"):
+    with pytest.raises(RunError, match="is a folder"):
         read_run(tmp_path / "dir.csv")
 
 

@@ -145,9 +145,12 @@ class ObjectDictionary:
 
         KeyError where there is no default either.
         """
-        value = self._values.get((index, sub), default)
+        key = index, sub
+        value = self._values.get(key, default)
         if value is None:
-            raise KeyError((index, sub))
+            raise KeyError(key)
+        if key in self.computed and key in self._entries:
+            return self.computed[key]()
         return value if isinstance(value, int) else int.from_bytes(value, "little")
 
     def put(self, index: int, sub: int, value: int) -> None:
