@@ -13,7 +13,7 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
-from winchkit.cli.core.terminal import cell, live_display, terminal_console
+from winchkit.cli.core.terminal import cell, live_table
 from winchkit.errors import one_line
 
 if TYPE_CHECKING:
@@ -78,18 +78,11 @@ def _print_lines(bench: str, pause: float, end: float | None) -> None:
 
 def _show_table(bench: str, pause: float, end: float | None) -> None:
     """A live table; empty while no process owns the bench."""
-    from rich.live import Live
     from rich.text import Text
 
     from winchkit.bench.remote.reconnection import watch
 
-    live = Live(
-        Text("connecting\n"),
-        console=terminal_console(),
-        redirect_stdout=False,
-        redirect_stderr=False,
-    )
-    with live_display(live):
+    with live_table(Text("connecting\n"), auto_refresh=True) as live:
 
         def show(station: Station) -> None:
             live.update(status_table(station.status()), refresh=True)

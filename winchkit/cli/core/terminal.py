@@ -21,7 +21,7 @@ from winchkit.cli.core.messages import detail, is_quiet, is_verbose
 from winchkit.errors import one_line, printable
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.console import Console, RenderableType
     from rich.live import Live
     from rich.table import Table
     from rich.text import Text
@@ -38,6 +38,7 @@ __all__ = [
     "escaped_output",
     "live_display",
     "live_sinks",
+    "live_table",
     "progress_bar",
     "screen",
     "status_line",
@@ -144,7 +145,7 @@ class _AboveDisplay(EscapedStream):
 
 @contextmanager
 def live_display(live: Live) -> Iterator[None]:
-    """Show a live display; what is printed meanwhile on the same terminal stands above it.
+    """Show a live display; text that is printed while it is shown appears above it.
 
     rich could redirect both streams itself, but click writes past it, into the display's line.
     """
@@ -160,6 +161,25 @@ def live_display(live: Live) -> Iterator[None]:
             yield
         finally:
             sys.stdout, sys.stderr = before
+
+
+@contextmanager
+def live_table(first: RenderableType = "", *, auto_refresh: bool = False) -> Iterator[Live]:
+    """A live display on standard error, whose content the caller replaces.
+
+    With ``auto_refresh`` it is redrawn four times a second, else by ``update(..., refresh=True)``.
+    """
+    from rich.live import Live
+
+    live = Live(
+        first,
+        console=terminal_console(),
+        auto_refresh=auto_refresh,
+        redirect_stdout=False,
+        redirect_stderr=False,
+    )
+    with live_display(live):
+        yield live
 
 
 def cell(text: str) -> Text:

@@ -267,19 +267,11 @@ def _counter_row(station: Station) -> Iterator[Callable[[], None]]:
     if not sys.stderr.isatty():
         yield lambda: None
         return
-    from rich.live import Live
-
-    from winchkit.cli.core.terminal import counter_table, live_display, terminal_console
+    from winchkit.cli.core.terminal import counter_table, live_table
 
     shown = 0.0
 
-    live = Live(
-        console=terminal_console(),
-        auto_refresh=False,
-        redirect_stdout=False,
-        redirect_stderr=False,
-    )
-    with live_display(live):
+    with live_table() as live:
 
         def show() -> None:
             nonlocal shown

@@ -60,19 +60,11 @@ def _table_unless(asked: list[LiveSink]) -> Iterator[list[LiveSink]]:
     if asked:
         yield asked
         return
-    from rich.live import Live
-
     from winchkit.cli.bench.monitor import status_table
-    from winchkit.cli.core.terminal import live_display, terminal_console
+    from winchkit.cli.core.terminal import live_table
 
     shown, last = 0.0, None
-    live = Live(
-        console=terminal_console(),
-        auto_refresh=False,
-        redirect_stdout=False,
-        redirect_stderr=False,
-    )
-    with live_display(live):
+    with live_table() as live:
 
         def show(status: Mapping[str, Any]) -> None:
             nonlocal shown, last
