@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+from typing import TextIO
 
 import can
 
@@ -43,7 +44,7 @@ class Bridge:
     def _to_bus(self) -> None:
         assert self._guest is not None
         with self._guest.makefile("r", encoding="ascii") as lines:
-            for line in lines:
+            while line := self._line(lines):
                 identifier, _, data = line.strip().partition("#")
                 message = can.Message(
                     arbitration_id=int(identifier, 16),
@@ -51,6 +52,19 @@ class Bridge:
                     is_extended_id=False,
                 )
                 self._bus.send(message)
+
+    def _line(self, lines: TextIO) -> str:
+        """Next line of the guest; empty at its end.
+
+        After ``close`` the guest may answer a frame that it had already read: TCP replies to
+        that with a reset, which is then the end of the connection like any other.
+        """
+        try:
+            return lines.readline()
+        except ConnectionResetError:
+            if not self._stopping.is_set():
+                raise
+            return ""
 
     def _from_bus(self) -> None:
         assert self._guest is not None
