@@ -122,8 +122,8 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     """Clear trips and drive faults, open buses that went down, set lost drives up again.
 
     Returns what was cleared, in words. Raises LimitTripped naming what still forbids any motion,
-    NotPermitted where the control loop has failed or the latch file cannot be written,
-    ConnectionLost.
+    or what tripped after the drives were found free of faults; NotPermitted where the control loop
+    has failed or the latch file cannot be written; ConnectionLost.
     """
     if wired.loop.broken is not None:
         raise NotPermitted(
@@ -166,13 +166,22 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     for axis in axes.values():
         axis.forget_alarms()
     loop.supervisor.acknowledge({name: axis.heartbeat.boot_ups for name, axis in axes.items()})
+    dealt_with = loop.supervisor.tripped
+    meanwhile = [trip for trip in dealt_with if trip not in seen.tripped]
+    cleared += [
+        str(trip) for trip in meanwhile if not (trip.kind in _UNHEARD and trip.winch in lost)
+    ]
     await_cycles(loop, clock, 3)
     still = [trip for trip in loop.snapshot.blocked if trip.blocks is Direction.BOTH]
     if still:
         raise LimitTripped("still not free to move: " + "; ".join(map(str, still)))
-    loop.clear_latch()
+    loop.clear_latch(dealt_with)
     loop.forget_warnings()
     await_cycles(loop, clock, 2)
+    if loop.snapshot.tripped:
+        raise LimitTripped(
+            "tripped anew during the reset: " + "; ".join(map(str, loop.snapshot.tripped))
+        )
     return cleared
 
 

@@ -8,8 +8,9 @@ expiry.
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from slave.held_key import HeldKey, jogging, observe, since
 from slave.rig import Rig
 from slave.wire import GENERIC
 from winchkit.bench.bench import Bench
+from winchkit.bench.control.snapshot import Trip
 from winchkit.errors import LimitTripped, MotionError
 
 _RAMP, _BRAKE = 628.0, 100.0
@@ -233,6 +235,42 @@ def test_a_reset_that_fails_leaves_the_latch(tmp_path: Path) -> None:
         bench.reset()
         rig.wait(1.0)
         bench.winch["A"].move_by(pay_out=0.02)
+
+
+def test_what_trips_during_a_reset_after_the_drives_were_looked_at_stays(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        rig.from_stranger(0x000, b"\x02\x01")
+        rig.wait(0.3)
+        supervisor = bench.loop.supervisor
+        acknowledge, late = supervisor.acknowledge, Trip("bus", "", "cannot send", latches=True)
+
+        def then_trip(boot_ups: Mapping[str, int]) -> None:
+            acknowledge(boot_ups)
+            rig.clock.call_at(rig.time + 0.006, lambda: supervisor.latch(late))
+
+        supervisor.acknowledge = then_trip  # type: ignore[method-assign]
+        with pytest.raises(LimitTripped, match="tripped anew during the reset: cannot send"):
+            bench.reset()
+        rig.wait(0.1)
+        assert bench.snapshot.tripped == (late,)
+        supervisor.acknowledge = acknowledge  # type: ignore[method-assign]
+        kept = json.loads(Path(bench.loop._latch.path).read_text(encoding="utf-8"))
+        assert [row["kind"] for row in kept["tripped"]] == ["bus"], "for later processes, too"
+        assert bench.reset() == ["cannot send"]
+        bench.winch["A"].move_by(pay_out=0.02)
+
+
+def test_a_reset_says_what_tripped_while_it_set_drives_up(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        rig.from_stranger(0x000, b"\x02\x01")
+        rig.wait(0.3)
+        late = Trip("bus", "", "cannot send", latches=True)
+        rig.clock.call_at(rig.time + 0.1, lambda: bench.loop.supervisor.latch(late))
+        cleared = bench.reset()
+        assert "cannot send" in cleared
+        assert not any("boot" in words for words in cleared), "of which the reset is the cause"
 
 
 def test_a_stall_of_this_computer_is_named(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -177,11 +177,14 @@ class ControlLoop:
             self.supervisor.latch(trip)
         self._kept = self.supervisor.tripped
 
-    def clear_latch(self) -> None:
-        """Clear the latch here and on disk; raises NotPermitted where that cannot be written."""
+    def clear_latch(self, dealt_with: Container[Trip]) -> None:
+        """Clear these trips here and on disk; others stay, and are written in the next cycle.
+
+        Raises NotPermitted where the latch file cannot be written.
+        """
         self._latch.clear()
-        self.supervisor.clear()
-        self._kept = self.supervisor.tripped
+        self.supervisor.clear(dealt_with)
+        self._kept = ()
 
     def _stop_all(self, reason: str) -> None:
         """Stop what moves, and what was ordered to."""
@@ -222,7 +225,8 @@ class ControlLoop:
         problem = self._latch.keep(trips, lost)
         if problem is not None:
             self.supervisor.latch(problem)
-        self._kept = self.supervisor.tripped
+            trips = self.supervisor.tripped
+        self._kept = trips
 
     def _sample(self, snapshot: BenchSnapshot) -> None:
         """Give the cycle to the recorders; one that fails is a warning and no stop."""

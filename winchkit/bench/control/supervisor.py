@@ -7,7 +7,8 @@ condition needs (debounce, rates, boot-ups) and the trips that it latched.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+import threading
+from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import product
 from operator import gt
 from typing import NamedTuple
@@ -48,6 +49,8 @@ class Supervisor:
         self.tripped: tuple[Trip, ...] = ()
         self.warnings: tuple[Trip, ...] = ()
         """Conditions that hold and forbid nothing."""
+        self._latching = threading.Lock()
+        """A trip that comes while others are cleared is not lost."""
         self._memory = {name: Memory(own) for name, own in winches.items()}
         self._rows = {name: _by_case(conditions, own) for name, own in winches.items()}
 
@@ -88,17 +91,19 @@ class Supervisor:
 
     def latch(self, trip: Trip) -> None:
         """Add a trip; the first of its kind on a winch stands."""
-        if not any((old.kind, old.winch) == (trip.kind, trip.winch) for old in self.tripped):
-            self.tripped = (*self.tripped, trip)
+        with self._latching:
+            if not any((old.kind, old.winch) == (trip.kind, trip.winch) for old in self.tripped):
+                self.tripped = (*self.tripped, trip)
 
     def acknowledge(self, boot_ups: Mapping[str, int]) -> None:
         """Forget what a reset has dealt with, boot-ups up to now; the latch stays."""
         for name, memory in self._memory.items():
             self._memory[name] = Memory(memory.own, boot_ups.get(name, memory.boot_ups))
 
-    def clear(self) -> None:
-        """Clear the latch."""
-        self.tripped = ()
+    def clear(self, dealt_with: Container[Trip]) -> None:
+        """Clear these trips; others stay."""
+        with self._latching:
+            self.tripped = tuple(trip for trip in self.tripped if trip not in dealt_with)
 
     def _stops(self, trip: Trip, inputs: Mapping[str, WinchInput]) -> bool:
         """Whether a motion under way is one that the trip forbids."""
