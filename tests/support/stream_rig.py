@@ -32,6 +32,7 @@ DEVICES = (
     "sartorius-sbi",
     "hx711-line",
     "generic-line",
+    "toledo-continuous",
 )
 TIMEOUT = 0.2
 

@@ -281,4 +281,4 @@ def test_the_makers_setting_is_named_where_nothing_answers() -> None:
 
 def test_the_rig_serves_the_line_that_ships() -> None:
     assert isinstance(Rig(device("flintec-ldu")).line, StreamLine)
-    assert len(ANSWERING) + 4 == len(DEVICES)
+    assert len(ANSWERING) + 5 == len(DEVICES)

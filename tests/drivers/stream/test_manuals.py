@@ -64,6 +64,14 @@ def meaning(name: str, data: bytes) -> Meaning:
         ("sartorius-sbi", b"+   123.56 g  \r\n", 0.12356 * G, GOOD),
         ("sartorius-sbi", b"N     +   123.56 g  \r\n", 0.12356 * G, GOOD),
         ("sartorius-sbi", b"N     -     0.10    \r\n", -1e-4 * G, UNSTABLE),
+        # Status words after Rice Lake's table: bits 0 to 2 of A for the point, 0 1 1 is x 0.1 and
+        # 1 1 0 is x 0.0001; of B bit 1 the sign, 3 motion, 4 kg. Bit 5 is 1 in each.
+        ("toledo-continuous", b"\x02\x2b\x30\x20000123000000\r", 12.3 * G, GOOD),
+        ("toledo-continuous", b"\x02\x2a\x32\x20   450     0\r", -450.0 * G, GOOD),
+        ("toledo-continuous", b"\x02\x2e\x3a\x20012345\r", -1.2345 * G, UNSTABLE),
+        ("toledo-continuous", b"\x02\x28\x30\x20000012000000\r", 1200.0 * G, GOOD),
+        # A pound is 0.45359237 kg; the check sum behind CR comes before the next frame.
+        ("toledo-continuous", b"Q\x02\x2b\x20\x20000100000000\r", 4.5359237 * G, GOOD),
         ("hx711-line", b"-12.34\r\n", -12.34, GOOD),
         ("hx711-line", b"7\n", 7.0, GOOD),
         ("generic-line", b"+00123.45\n", 123.45, GOOD),
@@ -221,3 +229,31 @@ def test_every_device_says_where_its_numbers_come_from(name: str) -> None:
     assert len(found.source) > 20
     assert found.trust in ("manual", "generic")
     assert found.description
+
+
+def test_the_tare_of_a_net_value_gives_the_gross_one() -> None:
+    found = heard("toledo-continuous", b"\x02\x2b\x33\x20000020000300\r")
+    assert found is not None
+    assert found.net
+    assert found.value == pytest.approx(-2.0 * G)
+    assert found.gross == pytest.approx(28.0 * G)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        b"\x02\x2b\x30\x21000123000000\r",  # grams, by word C
+        b"\x02\x2b\x30\x30000123000000\r",  # the display with ten times the resolution
+        b"\x02\x2b\x30\x200012.3000000\r",  # a point in the digits beside that of word A
+        b"\x02\x2b\x30\x20\r",
+    ],
+)
+def test_a_status_word_that_is_not_declared_gives_no_number(frame: bytes) -> None:
+    assert heard("toledo-continuous", frame) is None
+
+
+def test_out_of_range_is_no_number() -> None:
+    found = heard("toledo-continuous", b"\x02\x2b\x34\x20000123000000\r")
+    assert found is not None
+    assert math.isnan(found.value)
+    assert found.quality == Quality.OVERLOAD

@@ -12,7 +12,13 @@ from typing import NamedTuple
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.matcher import Match, Matcher, fits
 from winchkit.errors import Fault, FileError
-from winchkit.schema.devices.stream import ChecksumSpec, Says, StreamSpec
+from winchkit.schema.devices.stream import (
+    NUMBERS,
+    ChecksumSpec,
+    Says,
+    StatusBitsSpec,
+    StreamSpec,
+)
 from winchkit.schema.template import parts_of
 from winchkit.units import convert
 
@@ -61,6 +67,14 @@ class Heard(NamedTuple):
     text: str
     decoded: Decoded | None = None
     before: int = 0
+
+
+class _Status(NamedTuple):
+    """What is said beside the numbers: meanings, value of a digit, text of the unit."""
+
+    said: list[Says]
+    factor: float
+    unit: str
 
 
 NOTHING = Decoded(math.nan, math.nan, math.nan, Quality.GOOD)
@@ -148,18 +162,42 @@ class Decoder:
             if not bits.is_integer() or not 0 <= bits < 1 << 32:
                 return None
             said += self._in_bits(int(bits))
+        status = self._status(fields)
+        if status is None:
+            return None
         if "value" not in fields:
-            return NOTHING._replace(quality=self._quality(said))
-        return self._numbers(fields, said)
+            return NOTHING._replace(quality=self._quality(said + status.said))
+        return self._numbers(fields, status._replace(said=said + status.said))
 
-    def _numbers(self, fields: dict[str, str], said: list[Says]) -> Decoded | None:
-        words = [self._word(fields[name], fields) for name in ("value", "gross") if name in fields]
+    def _status(self, fields: dict[str, str]) -> _Status | None:
+        """What the bits of the status characters say, None where they say nothing that is known."""
+        found = _Status([], 1.0, fields.get("unit", "").strip())
+        for group in self._spec.status:
+            if group.field not in fields:
+                continue
+            item = _item(group, fields[group.field])
+            if group.says and (says := group.says[item]):
+                found.said.append(says)
+            elif group.factor and not any("." in fields.get(name, "") for name in NUMBERS):
+                found = found._replace(factor=found.factor * group.factor[item])
+            elif group.unit and group.unit[item]:
+                found = found._replace(unit=group.unit[item])
+            else:
+                return None
+        return found
+
+    def _numbers(self, fields: dict[str, str], status: _Status) -> Decoded | None:
+        said, factor, unit = status
+        words = [self._word(fields[name], fields) for name in NUMBERS if name in fields]
         said += [word for word in words if word is not None]
-        counts = _number(fields["value"])
-        gross = _number(fields.get("gross", fields["value"]))
+        counts = _number(fields["value"]) * (-factor if "negative" in said else factor)
+        gross = counts
+        if "gross" in fields:
+            gross = _number(fields["gross"]) * factor
+        elif "tare" in fields and "net" in said:
+            gross = counts + _number(fields["tare"]) * factor
         if self._quality(said).usable and not (math.isfinite(counts) and math.isfinite(gross)):
             return None
-        unit = fields.get("unit", "").strip()
         if self._spec.units and unit not in self._spec.units and self._quality(said).usable:
             return None
         return self._measured(said, counts, gross, unit)
@@ -215,6 +253,12 @@ def check_sum(spec: ChecksumSpec, text: str, digits: int) -> int:
         return reduce(xor, data, 0)
     total = sum(data) & 0xFF
     return total if spec.kind == "sum" else ~total & 0xFF
+
+
+def _item(group: StatusBitsSpec, character: str) -> int:
+    """The number that the bits of a status character make."""
+    code = ord(character)
+    return sum((code >> bit & 1) << place for place, bit in enumerate(group.bits))
 
 
 def _number(text: str) -> float:

@@ -30,6 +30,7 @@ __all__ = [
     "FreshSpec",
     "LinkSpec",
     "Says",
+    "StatusBitsSpec",
     "StreamSpec",
     "UnitSpec",
 ]
@@ -45,11 +46,12 @@ Says = Literal[
     "gross",
     "zero",
     "stale",
+    "negative",
     "busy",
     "refused",
 ]
 """Meanings of a status letter, a status bit, a word or a reply."""
-NUMBERS = ("value", "gross")
+NUMBERS = ("value", "gross", "tare")
 """Fields that hold a number in the device's unit."""
 _OWN = (*NUMBERS, "unit", "address", "checksum", "bits", "skip")
 
@@ -111,6 +113,34 @@ class UnitSpec(Table):
 
 
 @dataclass(frozen=True)
+class StatusBitsSpec(Table):
+    """Bits of a field of one character, and what each number that they make stands for.
+
+    Exactly one of ``says``, ``factor`` and ``unit``, with an item for each number from 0; a frame
+    with a number whose item is empty is invalid.
+    """
+
+    field: str
+    bits: tuple[Annotated[int, Whole(0, 7)], ...]
+    """From 0, the least significant first."""
+    says: tuple[Says | Literal[""], ...] = ()
+    factor: tuple[PositiveNumber, ...] = ()
+    """Of the numbers of the frame, which then have no decimal point."""
+    unit: tuple[str, ...] = ()
+    """Keys of the table ``units``."""
+
+    def rules(self) -> Iterator[Rule]:
+        """There is one kind of items, and one item for each number."""
+        given = [items for items in (self.says, self.factor, self.unit) if items]
+        if len(given) != 1:
+            yield "", "give exactly one of 'says', 'factor' and 'unit'"
+            return
+        wanted = 2 ** len(self.bits)
+        if not self.bits or len(set(self.bits)) < len(self.bits) or len(given[0]) != wanted:
+            yield "bits", f"{len(given[0])} items for {len(self.bits)} bits; give {wanted} items"
+
+
+@dataclass(frozen=True)
 class LinkSpec(Table):
     """The maker's settings of the line, printed when the device does not answer."""
 
@@ -152,6 +182,8 @@ class StreamSpec(Table):
     """Texts of a status field by the field's name; a frame with any other text is invalid."""
     bits: Mapping[Says, tuple[Annotated[int, Whole(0, 31)], ...]] = field(default_factory=dict)
     """Bits of the number in the field ``bits``, from 0."""
+    status: tuple[StatusBitsSpec, ...] = ()
+    """Bits of status characters."""
     start: tuple[AskSpec, ...] = ()
     """Sent at the first contact with the device, and again after a timeout."""
     stop: str = ""
@@ -184,6 +216,7 @@ class StreamSpec(Table):
         if self.capacity is not None and self.units:
             yield "capacity", "has no meaning where the frame names the unit"
         yield from self._broken_units()
+        yield from self._broken_status()
         yield from self._broken_templates()
         yield from self._broken_requests()
         yield from self._broken_example()
@@ -204,6 +237,17 @@ class StreamSpec(Table):
             yield "unit", f"{known}: unknown, or not of one dimension"
         if any(one.scale == 0.0 for one in self.units.values()) or self.scale == 0.0:
             yield "scale", "must not be zero"
+
+    def _broken_status(self) -> Iterator[Rule]:
+        for place, group in enumerate(self.status):
+            if group.field in (*_OWN, *self.letter):
+                yield f"status.{place}.field", f"'{group.field}' has another meaning; rename it"
+            for unit in group.unit:
+                if unit and unit not in self.units:
+                    known = ", ".join(self.units) or "there is none"
+                    yield f"status.{place}.unit", f"'{unit}' is no key of 'units': {known}"
+        if sum(bool(group.unit) for group in self.status) > 1:
+            yield "status", "two groups of bits give the unit; keep one"
 
     def _broken_templates(self) -> Iterator[Rule]:
         asked = [("fresh.frame", self.fresh.frame)] if self.fresh else []
@@ -259,14 +303,19 @@ class StreamSpec(Table):
             yield "example", f"'{self.example}' does not fit '{self.frame[0]}'"
 
     def _broken_fields(self, parts: tuple[Part, ...], names: set[str]) -> Iterator[str]:
-        for name in sorted(names - {"", *_OWN, *self.letter}):
-            near = suggest(name, [*_OWN, *self.letter])
+        status = {group.field for group in self.status}
+        for name in sorted(names - {"", *_OWN, *self.letter, *status}):
+            near = suggest(name, [*_OWN, *self.letter, *sorted(status)])
             yield f"{{{name}}} is unknown; use {', '.join(_OWN)} or a table letter.{name}{near}"
+        for part in parts:
+            if part.field in status and part.width != 1:
+                yield f"{{{part.field}}} has status bits; write {{{part.field}:1}}"
         if ("checksum" in names) != (self.checksum is not None) and "value" in names:
             yield "a field {checksum:2} and the table 'checksum' go together"
         if "unit" in names and not self.units:
             yield "{unit} needs the table 'units'"
-        if "value" in names and self.units and "unit" not in names:
+        named = "unit" in names or any(group.unit and group.field in names for group in self.status)
+        if "value" in names and self.units and not named:
             yield "there is a table 'units' and no field {unit}"
         length = length_of(parts)
         if length is not None and length > self.longest:

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from math import nan
 
 from winchkit.errors import UsageError
-from winchkit.schema.devices.stream import AskSpec, StreamSpec, UnitSpec
+from winchkit.schema.devices.stream import AskSpec, StreamSpec
 from winchkit.sim.instruments.instrument import SimulatedInstrument
-from winchkit.sim.instruments.stream_frames import Speech, State, example_fields
+from winchkit.sim.instruments.stream_frames import Speech, State, example_unit
 from winchkit.units import convert, dimension_of, factor
 
 __all__ = ["StreamInstrument", "shown_by"]
@@ -195,9 +195,7 @@ class _Digits:
 
 def shown_by(spec: StreamSpec, measure: Callable[[], float]) -> Callable[[], float]:
     """Convert a measurement in SI to counts of the device, in the unit of its example."""
-    one = UnitSpec(spec.scale, spec.unit)
-    if spec.units:
-        one = spec.units[example_fields(spec)["unit"].strip()]
+    one = example_unit(spec)
     dimension = dimension_of(one.unit)
     if dimension is None:
         raise UsageError(f"unknown unit '{one.unit}' of a simulated instrument")

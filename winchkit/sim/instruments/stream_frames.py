@@ -8,7 +8,13 @@ from math import isfinite
 from operator import xor
 
 from winchkit.errors import FileError
-from winchkit.schema.devices.stream import ChecksumSpec, Says, StreamSpec
+from winchkit.schema.devices.stream import (
+    ChecksumSpec,
+    Says,
+    StatusBitsSpec,
+    StreamSpec,
+    UnitSpec,
+)
 from winchkit.schema.template import Part, fields_of
 
 __all__ = [
@@ -16,6 +22,8 @@ __all__ = [
     "Speech",
     "State",
     "example_fields",
+    "example_unit",
+    "number_of",
     "style_of",
     "write_line",
 ]
@@ -70,6 +78,23 @@ def example_fields(spec: StreamSpec) -> dict[str, str]:
     if fields is None:
         raise FileError(f"the example '{spec.example}' does not fit '{spec.frame[0]}'")
     return fields
+
+
+def example_unit(spec: StreamSpec) -> UnitSpec:
+    """Scale and unit of the example's digits."""
+    if not spec.units:
+        return UnitSpec(spec.scale, spec.unit)
+    fields = example_fields(spec)
+    for group in spec.status:
+        if group.unit:
+            return spec.units[group.unit[number_of(group, fields[group.field])]]
+    return spec.units[fields["unit"].strip()]
+
+
+def number_of(group: StatusBitsSpec, character: str) -> int:
+    """Number in the bits of a status character."""
+    bits = f"{ord(character):08b}"[::-1]
+    return int("".join(bits[bit] for bit in reversed(group.bits)), 2)
 
 
 def write_line(
@@ -128,6 +153,11 @@ class Speech:
         """Raise FileError where the device file's example does not fit its frame."""
         self._spec = spec
         self._example = example_fields(spec) if spec.binary is None else {}
+        self._factor = 1.0
+        """One of the example's digits, by its status characters."""
+        for group in spec.status:
+            if group.factor:
+                self._factor *= group.factor[number_of(group, self._example[group.field])]
 
     def line(self, text: str) -> bytes:
         """A line of text."""
@@ -159,10 +189,12 @@ class Speech:
         return self.line(line)
 
     def _fields(self, state: State, truths: dict[Says, bool], said: Says | None) -> dict[str, str]:
-        fields = {}
-        for name, number in (("value", state.net), ("gross", state.gross)):
+        fields = self._status(truths)
+        net = abs(state.net) if self._can_say("negative") else state.net
+        tare = state.gross - state.net
+        for name, number in (("value", net), ("gross", state.gross), ("tare", tare)):
             if name in self._example:
-                fields[name] = self._digits(name, number, said)
+                fields[name] = self._digits(name, number / self._factor, said)
         for name, letters in self._spec.letter.items():
             fits = [text for text, says in letters.items() if truths.get(says, False)]
             fields[name] = fits[0] if fits else self._example.get(name, "")
@@ -171,6 +203,18 @@ class Speech:
         if "address" in self._example and state.address is not None:
             fields["address"] = f"{state.address:0{len(self._example['address'])}d}"
         return fields
+
+    def _status(self, truths: dict[Says, bool]) -> dict[str, str]:
+        """Status characters: those of the example, with the bits of what is true."""
+        characters: dict[str, str] = {}
+        for group in self._spec.status:
+            true = [place for place, says in enumerate(group.says) if says and truths.get(says)]
+            code = ord(characters.get(group.field, self._example[group.field]))
+            if true:
+                for place, bit in enumerate(group.bits):
+                    code = code & ~(1 << bit) | (true[0] >> place & 1) << bit
+            characters[group.field] = chr(code)
+        return characters
 
     def _digits(self, name: str, number: float, said: Says | None) -> str:
         width = next(part.width for part in self._spec.templates()[0] if part.field == name)
@@ -203,6 +247,7 @@ class Speech:
             "fault": state.broken and says_fault,
             "unstable": not stable and not alarm,
             "stable": stable and not alarm,
+            "negative": state.net < 0.0,
             "net": state.tared,
             "gross": not state.tared,
         }
@@ -210,11 +255,12 @@ class Speech:
     def _one_digit(self) -> float:
         if not self._example:
             return 1.0
-        return float(10.0 ** -len(self._example["value"].strip().partition(".")[2]))
+        return self._factor * 10.0 ** -len(self._example["value"].strip().partition(".")[2])
 
     def _can_say(self, says: Says) -> bool:
         spec = self._spec
         said = [*spec.words.values(), *spec.replies.values(), *spec.bits]
+        said += [says for group in spec.status for says in group.says if says]
         return says in said or any(says in one.values() for one in spec.letter.values())
 
     def _bits(self, truths: dict[Says, bool]) -> int:
