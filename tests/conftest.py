@@ -72,6 +72,8 @@ SLOW = frozenset(
 """Files and folders whose tests the default run leaves out: diagnoses of many runs, campaigns, and
 sessions of the pages."""
 _WATCH = pytest.StashKey[StallWatch]()
+_EARLIER = pytest.StashKey[dict[str, float]]()
+"""Of the session: by fixture of a module, the largest stall (s) in the tests that used it."""
 _ASLEEP = re.compile(
     r"this computer stood still for [\d.]+ s(?!.* computed for).*\(between two cycles\)"
 )
@@ -101,12 +103,16 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of ``SLOW``."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the tests of ``SLOW``, and leave campaigns to those who ask for them."""
     for item in items:
         place = item.path.relative_to(Path(__file__).parent)
         if place in SLOW or SLOW.intersection(place.parents):
             item.add_marker(pytest.mark.slow)
+    if "campaign" not in config.option.markexpr:
+        left = [item for item in items if item.get_closest_marker("campaign")]
+        items[:] = [item for item in items if not item.get_closest_marker("campaign")]
+        config.hook.pytest_deselected(items=left)
 
 
 def pytest_terminal_summary(
@@ -116,7 +122,8 @@ def pytest_terminal_summary(
     if config.option.markexpr == DEFAULT and not hasattr(config, "workerinput"):
         terminalreporter.write_line(
             'Not run: long tests, pytest -m "slow and not realtime"; '
-            "tests in real time, on a quiet computer, pytest -m realtime."
+            "tests in real time, on a quiet computer, pytest -m realtime; "
+            "further cases of campaigns, pytest -m campaign."
         )
 
 
@@ -127,7 +134,19 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object
         return (yield)
     with StallWatch() as watch:
         item.stash[_WATCH] = watch
-        return (yield)
+        result = yield
+    earlier = item.session.stash.setdefault(_EARLIER, {})
+    for place in _shared(item):
+        earlier[place] = max(earlier.get(place, 0.0), watch.largest)
+    return result
+
+
+def _shared(item: pytest.Item) -> list[str]:
+    """The test's fixtures that outlive it: those of its module."""
+    if not isinstance(item, pytest.Function):
+        return []
+    found = item._fixtureinfo.name2fixturedefs.items()
+    return [f"{item.path}:{name}" for name, (*_, used) in found if used.scope == "module"]
 
 
 @pytest.hookimpl(wrapper=True)
@@ -155,12 +174,17 @@ def pytest_runtest_makereport(
         report.longrepr = (path, (line or 0) + 1, f"Skipped: decides nothing: {found[0]}")
         return report
     watch.sample()
-    stall = watch.largest
+    stall, when = watch.largest, ""
+    if stall <= TOLERATED:
+        # What outlives a test (a peer, a served bench) may have been stalled in an earlier one.
+        earlier = item.session.stash.get(_EARLIER, {})
+        stall = max((earlier.get(place, 0.0) for place in _shared(item)), default=0.0)
+        when = " in an earlier test with the same fixture"
     if stall <= TOLERATED or "from pytest-timeout" in str(call.excinfo.value):
         return report
     reason = (
         f"Skipped: decides nothing: this computer did not run the test's processes for "
-        f"{stall:.3f} s (tolerated {TOLERATED:g} s), and then: {call.excinfo.exconly()[:500]}"
+        f"{stall:.3f} s{when} (tolerated {TOLERATED:g} s), and then: {call.excinfo.exconly()[:500]}"
     )
     report.outcome = "skipped"
     report.longrepr = (path, (line or 0) + 1, reason)

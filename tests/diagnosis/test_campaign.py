@@ -1,4 +1,7 @@
-"""A miniature of benchmarks/diagnosis_campaign.py: cases made by another physics than the model."""
+"""A miniature of benchmarks/diagnosis_campaign.py: cases made by another physics than the model.
+
+Those marked as cases of a campaign are run by ``pytest -m campaign``.
+"""
 
 from pathlib import Path
 
@@ -9,21 +12,29 @@ from campaign.logger_case import LoggerPlan, answer, make_logger_case
 from campaign.run import run_case
 from campaign.sizes import CATALOGUE, RECENT
 
-NOTHING = (101, 102, 103, 104, 105, 106)
-ONE = {
-    "layer-thickness": 201,
-    "drum-eccentricity": 202,
-    "frame-compliance": 203,
-    "length-time-offset": 204,
-    "pulley-coulomb": 205,
-    "cell-gain": 206,
-    "cell-drift": 207,
-    "torque-constant": 208,
-    "motor-coulomb": 209,
-    "cable-elongation-linear": 210,
-}
-STRANGE = {"outside-harmonic": 301, "outside-sticky-place": 302, "outside-wander": 303}
-NAMED_SINCE = {"outside-crosstalk": 303, "outside-clipping": 304}
+CAMPAIGN = pytest.mark.campaign
+NOTHING = (101, 103, 105, *(pytest.param(seed, marks=CAMPAIGN) for seed in (102, 104, 106)))
+ONE = (
+    ("frame-compliance", 203),
+    ("length-time-offset", 204),
+    ("cell-drift", 207),
+    ("torque-constant", 208),
+    pytest.param("layer-thickness", 201, marks=CAMPAIGN),
+    pytest.param("drum-eccentricity", 202, marks=CAMPAIGN),
+    pytest.param("pulley-coulomb", 205, marks=CAMPAIGN),
+    pytest.param("cell-gain", 206, marks=CAMPAIGN),
+    pytest.param("motor-coulomb", 209, marks=CAMPAIGN),
+    pytest.param("cable-elongation-linear", 210, marks=CAMPAIGN),
+)
+STRANGE = (
+    ("outside-harmonic", 301),
+    pytest.param("outside-sticky-place", 302, marks=CAMPAIGN),
+    pytest.param("outside-wander", 303, marks=CAMPAIGN),
+)
+NAMED_SINCE = (
+    ("outside-crosstalk", 303),
+    pytest.param("outside-clipping", 304, marks=CAMPAIGN),
+)
 
 
 @pytest.mark.parametrize("seed", NOTHING)
@@ -34,7 +45,7 @@ def test_nothing_hidden_nothing_named(seed: int, tmp_path: Path) -> None:
     assert score.steps == ()
 
 
-@pytest.mark.parametrize(("effect", "seed"), ONE.items())
+@pytest.mark.parametrize(("effect", "seed"), ONE)
 def test_one_effect_is_in_the_first_set(effect: str, seed: int, tmp_path: Path) -> None:
     score = run_case(seed, Plan("single", 3.0, (effect,), small=True), tmp_path)
     assert score is not None
@@ -43,7 +54,7 @@ def test_one_effect_is_in_the_first_set(effect: str, seed: int, tmp_path: Path) 
     assert len(score.steps) == 1
 
 
-@pytest.mark.parametrize(("kind", "seed"), STRANGE.items())
+@pytest.mark.parametrize(("kind", "seed"), STRANGE)
 def test_what_no_effect_explains_gets_no_name(kind: str, seed: int, tmp_path: Path) -> None:
     score = run_case(seed, Plan("outside", 3.0, (kind,), small=True), tmp_path)
     assert score is not None
@@ -51,7 +62,7 @@ def test_what_no_effect_explains_gets_no_name(kind: str, seed: int, tmp_path: Pa
     assert score.steps == ()
 
 
-@pytest.mark.parametrize(("kind", "seed"), NAMED_SINCE.items())
+@pytest.mark.parametrize(("kind", "seed"), NAMED_SINCE)
 def test_what_the_catalogue_has_got_since_is_named(kind: str, seed: int, tmp_path: Path) -> None:
     score = run_case(seed, Plan("outside", 3.0, (kind,), small=True), tmp_path)
     assert score is not None
@@ -63,31 +74,23 @@ def test_what_the_catalogue_has_got_since_is_named(kind: str, seed: int, tmp_pat
     ("kind", "effects", "drawn", "seed"),
     [
         # Its lag is so long that five terms of the wrong sign imitate it better.
-        ("single", ("torque-lag",), 42, 2100082),
+        pytest.param("single", ("torque-lag",), 42, 2100082, id="wrong signs"),
         # The delay shows in few blocks, but in every group of runs.
-        ("pair", (), 42, 2300010),
+        pytest.param("pair", (), 42, 2300010, id="few blocks"),
         # An offset stands for both until the second is there.
-        ("pair", (), 42, 2300004),
+        pytest.param("pair", (), 42, 2300004, id="one for two", marks=CAMPAIGN),
         # Creep with a tenth of the speed does nearly what a creep and an offset do.
-        ("pair", (), 44, 12800032),
+        pytest.param("pair", (), 44, 12800032, id="slower", marks=CAMPAIGN),
         # Coulomb's friction does so for a Stribeck curve and grease, each at another shape.
-        ("pair", (), 44, 12700028),
+        pytest.param("pair", (), 44, 12700028, id="other shape"),
         # Without the loop its rounding is fitted beyond all measure, and the loop from there.
-        ("single", ("cell-hysteresis",), 44, 12700062),
+        pytest.param(
+            "single", ("cell-hysteresis",), 44, 12700062, id="wild rounding", marks=CAMPAIGN
+        ),
         # What an engaging tooth leaves is taken for more than the small loss beside it.
-        ("pair", (), 44, 12700044),
+        pytest.param("pair", (), 44, 12700044, id="teeth", marks=CAMPAIGN),
         # Its transients of a load exceed its other contribution.
-        ("single", ("gear-backlash",), 44, 13100008),
-    ],
-    ids=[
-        "wrong signs",
-        "few blocks",
-        "one for two",
-        "slower",
-        "other shape",
-        "wild rounding",
-        "teeth",
-        "jerk",
+        pytest.param("single", ("gear-backlash",), 44, 13100008, id="jerk", marks=CAMPAIGN),
     ],
 )
 def test_what_searches_once_missed(
@@ -111,7 +114,7 @@ def test_what_searches_once_missed(
     [
         # Rounded to several times the noise: the error follows the signal, as repeats do.
         ("quantised", 90300004, 0.0, ""),
-        ("quantised", 90300014, 3.0, "frame-compliance"),
+        pytest.param("quantised", 90300014, 3.0, "frame-compliance", marks=CAMPAIGN),
         # One direction at one speed: no run alone separates its weight from friction.
         ("wrong-unit", 90300019, 10.0, "cell-nonlinearity"),
         ("wrong-unit", 90300013, 1.0, "pulley-capstan"),

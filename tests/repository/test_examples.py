@@ -86,9 +86,19 @@ def test_the_heave_follows_the_waves(tmp_path: Path, capsys: pytest.CaptureFixtu
     ("bench", "effect", "before"),
     [
         # The simulator's declarations; what a straight calculation says of the error at 10 kg.
-        ("demo-elastic-rope", 'id = "cable-elongation-linear"\naxial_stiffness = "300 kN"', 0.8e-3),
+        pytest.param(
+            "demo-elastic-rope",
+            'id = "cable-elongation-linear"\naxial_stiffness = "300 kN"',
+            0.8e-3,
+            marks=pytest.mark.campaign,
+        ),
         ("soft-frame", 'id = "frame-compliance"\nstiffness = "60 kN/m"', 1.6e-3),
-        ("demo-fat-drum", 'id = "drum-radius"\nradius_error = "0.15 mm"', 2.5e-3),
+        pytest.param(
+            "demo-fat-drum",
+            'id = "drum-radius"\nradius_error = "0.15 mm"',
+            2.5e-3,
+            marks=pytest.mark.campaign,
+        ),
     ],
 )
 def test_a_winch_ends_where_it_was_sent_once_its_profile_knows(

@@ -107,6 +107,18 @@ def trip(cause: str, where: str = "between two cycles") -> str:
     return f"LimitTripped: this computer stood still for 0.41 s (limit 0.40 s): {cause} ({where})"
 
 
+def configure(pytester: pytest.Pytester, sample: str) -> None:
+    """This project's conftest.py, whose watch samples what is given."""
+    pytester.makepyprojecttoml("[tool.pytest.ini_options]\nmarkers = ['realtime']\n")
+    text = (TESTS / "conftest.py").read_text()
+    pytester.makeconftest(
+        text.replace(
+            "from stalls import", f"sys.path.insert(0, {str(SUPPORT)!r})\nfrom stalls import"
+        )
+        + f"\nStallWatch.sample = lambda self, seen=[]: {sample}\n"
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("stall", "body", "outcome"),
@@ -124,14 +136,7 @@ def trip(cause: str, where: str = "between two cycles") -> str:
 def test_what_a_stall_makes_of_a_test(
     pytester: pytest.Pytester, stall: float, body: str, outcome: str
 ) -> None:
-    pytester.makepyprojecttoml("[tool.pytest.ini_options]\nmarkers = ['realtime']\n")
-    text = (TESTS / "conftest.py").read_text()
-    pytester.makeconftest(
-        text.replace(
-            "from stalls import", f"sys.path.insert(0, {str(SUPPORT)!r})\nfrom stalls import"
-        )
-        + f"\nStallWatch.sample = lambda self: setattr(self, 'largest', {stall})\n"
-    )
+    configure(pytester, f"setattr(self, 'largest', {stall})")
     pytester.makepyfile(
         f"import pytest\n@pytest.mark.realtime\ndef test_it():\n    {body}\n"
         "def test_of_no_real_time():\n    assert not 'wrong'\n"
@@ -143,3 +148,25 @@ def test_what_a_stall_makes_of_a_test(
         assert counts.pop(outcome) == 1
     if outcome == "skipped" and stall:
         result.stdout.fnmatch_lines(["*did not run the test's processes for 0.200 s*wrong*"])
+
+
+@pytest.mark.slow
+def test_what_outlives_a_test_may_have_been_stalled_in_an_earlier_one(
+    pytester: pytest.Pytester,
+) -> None:
+    """The first of three tests is stalled; the second shares a fixture with it."""
+    first = "seen[0] is self"
+    configure(pytester, f"(seen.append(self), setattr(self, 'largest', 0.2 if {first} else 0.0))")
+    pytester.makepyfile(
+        "import pytest\n"
+        "pytestmark = pytest.mark.realtime\n"
+        "@pytest.fixture(scope='module')\ndef peer():\n    return []\n"
+        "def test_stalled(peer):\n    pass\n"
+        "def test_with_the_peer(peer):\n    assert not 'wrong'\n"
+        "def test_alone():\n    assert not 'wrong'\n"
+    )
+    result = pytester.runpytest_subprocess("-rs", "-p", "no:cacheprovider")
+    result.assert_outcomes(passed=1, skipped=1, failed=1)
+    result.stdout.fnmatch_lines(
+        ["*___ test_alone ___*", "*for 0.200 s in an earlier test with the same fixture*"]
+    )

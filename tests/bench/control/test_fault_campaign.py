@@ -19,6 +19,8 @@ from fault_cases.judge import judge
 from fault_cases.kinds import KINDS
 from fault_cases.play import play
 
+CAMPAIGN = pytest.mark.campaign
+
 
 def case(kind: str, **changes: object) -> Case:
     """A jog that one lasting fault meets."""
@@ -40,15 +42,15 @@ def case(kind: str, **changes: object) -> Case:
     [
         ("enable input open", True, True),
         ("second master: 6040h = 00h", False, False),
-        ("stranger: NMT pre-operational", True, False),
-        ("TPDOs lost", True, True),
-        ("SYNC lost", False, False),
-        ("cut wire", True, False),
         ("cell silent", False, True),
-        ("over-tension", False, False),
         ("computer stalls 0.5 s", True, False),
         ("exception in the loop", True, False),
-        ("released", True, False),
+        pytest.param("stranger: NMT pre-operational", True, False, marks=CAMPAIGN),
+        pytest.param("TPDOs lost", True, True, marks=CAMPAIGN),
+        pytest.param("SYNC lost", False, False, marks=CAMPAIGN),
+        pytest.param("cut wire", True, False, marks=CAMPAIGN),
+        pytest.param("over-tension", False, False, marks=CAMPAIGN),
+        pytest.param("released", True, False, marks=CAMPAIGN),
     ],
 )
 def test_a_fault_stops_the_winch_and_nothing_moves_again(
@@ -71,7 +73,7 @@ def test_a_winch_that_goes_on_is_found() -> None:
     assert verdict.cause == "nothing was told"
 
 
-@pytest.mark.parametrize("independent", [True, False])
+@pytest.mark.parametrize("independent", [True, pytest.param(False, marks=CAMPAIGN)])
 def test_a_frame_that_no_drive_receives_is_received_by_the_host(independent: bool) -> None:
     """A drive that is off the bus for 20 ms (case 172/138) stays operational; the host stops it."""
     kind = "stranger: NMT pre-operational"
@@ -95,7 +97,7 @@ def test_a_case_is_the_same_whenever_it_is_played() -> None:
 
 
 def test_processes_give_the_same_verdicts_in_the_same_order() -> None:
-    found = [case("cut wire"), case("released"), case("drive silent", independent=True)]
+    found = [case("cut wire"), case("released")]
     alone, together = list(fault_campaign.each(found, 1)), list(fault_campaign.each(found, 2))
     assert [repr(item) for item in together] == [repr(item) for item in alone]
     assert [item[0] for item in together] == found

@@ -20,6 +20,7 @@ def test_cases_are_drawn_over_instruments_and_effects_and_repeat_with_the_seed()
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_a_small_run_is_right(tmp_path: Path) -> None:
     rows = []
     for n, hidden in enumerate(drawn(3, 31)):
@@ -34,6 +35,6 @@ def test_a_small_run_is_right(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_random_frames_never_crash() -> None:
-    told = random_frames(10, 3)
+    told = random_frames(4, 3)
     assert told["crashed"] == 0
     assert told["largest_error_mm"] < 1.0

@@ -161,10 +161,10 @@ def test_nothing_is_written_where_the_starting_profile_predicts_better(tmp_path:
 
 @pytest.mark.slow
 def test_random_frames_and_offsets_end_in_words_or_in_a_calibration() -> None:
-    """Forty of the thousand frames and offsets of benchmarks/robot_metrology.py."""
+    """A dozen of the thousand frames and offsets of benchmarks/robot_metrology.py."""
     rng = np.random.default_rng(18)
     made = rows(40, 11, noise=EXACT)
-    for _ in range(40):
+    for _ in range(12):
         axis, shift, offset = rng.normal(size=(3, 3))
         station = Station(
             float(10 ** rng.uniform(-2, 2.25)),

@@ -96,6 +96,8 @@ CASES = {
         "cable_length",
     ),
 }
+SHORTEST = "layers or radius"
+"""The case that ``.ci/run`` has; the others are run by ``pytest -m campaign``."""
 
 
 def record(programme: Path, physics: str, folder: Path, seed: int) -> list[str]:
@@ -135,7 +137,13 @@ def advance(plant: WinchPlant, cable: CableMap, angle: float) -> None:
     cable.feel(Sample(plant.time, plant.motor_angle, plant.motor_velocity, cell=seen.tension))
 
 
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+@pytest.mark.parametrize(
+    "case",
+    [
+        pytest.param(case, id=name, marks=() if name == SHORTEST else pytest.mark.campaign)
+        for name, case in CASES.items()
+    ],
+)
 def test_the_loop_ends_in_one_name_and_a_winch_that_ends_where_it_is_sent(
     case: Case, tmp_path: Path
 ) -> None:

@@ -45,7 +45,7 @@ def coloured(random: np.random.Generator, count: int) -> Array:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", [white, coloured])
+@pytest.mark.parametrize("kind", [pytest.param(white, marks=pytest.mark.campaign), coloured])
 def test_intervals_cover_the_truth_in_95_of_100_cases(
     kind: Callable[[np.random.Generator, int], Array],
 ) -> None:
@@ -275,8 +275,17 @@ def test_a_part_with_little_information_widens_an_interval_by_its_contradiction_
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("runs", [2, 6, 20, 60])
-@pytest.mark.parametrize("between", [0.0, 3.0])
+@pytest.mark.parametrize(
+    ("runs", "between"),
+    [
+        pytest.param(
+            runs, between,
+            marks=() if (runs, between) in {(2, 3.0), (6, 0.0), (6, 3.0)} else pytest.mark.campaign,
+        )
+        for between in (0.0, 3.0)
+        for runs in (2, 6, 20, 60)
+    ],
+)  # fmt: skip
 def test_intervals_of_many_programmes_cover_the_truth(runs: int, between: float) -> None:
     """The gain of a cell, each run another programme, the gain the same or another in each."""
     ride = Ride(samples=100, rate=10.0)

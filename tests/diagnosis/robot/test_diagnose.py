@@ -44,7 +44,13 @@ def named(found: dict[str, Any]) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "case", ["elastic ropes", "exit point", "payload mass", "home length"], ids=str.split
+    "case",
+    [
+        "exit point",
+        "payload mass",
+        pytest.param("elastic ropes", marks=pytest.mark.campaign),
+        pytest.param("home length", marks=pytest.mark.campaign),
+    ],
 )
 def test_what_is_hidden_is_named_and_the_held_out_error_falls(case: str, tmp_path: Path) -> None:
     profile, run = files(tmp_path, case)
@@ -67,6 +73,7 @@ def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
     assert 1e-6 < range_of_runs["home-length"] < 1e-4
 
 
+@pytest.mark.campaign  # in .ci/run it is tests/report/pages/test_robot.py's
 def test_what_no_effect_explains_is_unknown(tmp_path: Path) -> None:
     profile, run = files(tmp_path, "outside: waves")
     found = answered("diagnose", run, "--profile", profile)

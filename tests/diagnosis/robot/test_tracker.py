@@ -54,8 +54,14 @@ def files(folder: Path, case: str, station: Station, **how: Any) -> tuple[Path, 
         ("none", Station(reflector=(0.01, 0.005, 0.025)), [{"reflector-offset"}]),
         ("none", Station(ppm=500.0), [{"tracker-scale"}]),
         ("home length", SMALL, [{"tracker-frame"}, {"home-length/4"}]),
-        ("exit point", Station(37.0), [{"tracker-frame"}, {"exit-point/3"}]),
-        ("drum radius", about(0.2), [{"tracker-frame"}, {"drum-radius/2", "gear-ratio/2"}]),
+        pytest.param(
+            *("exit point", Station(37.0), [{"tracker-frame"}, {"exit-point/3"}]),
+            marks=pytest.mark.campaign,
+        ),
+        pytest.param(
+            *("drum radius", about(0.2), [{"tracker-frame"}, {"drum-radius/2", "gear-ratio/2"}]),
+            marks=pytest.mark.campaign,
+        ),
     ],
     ids=["small", "37 deg", "reflector", "scale", "home length", "exit point", "drum radius"],
 )

@@ -70,6 +70,18 @@ def test_frames_come_and_go(bus: CanBus) -> None:
         assert witness.stdout.readline().split()[-1] == "201#0F00"
 
 
+def test_remote_frames_are_sent_and_are_no_data(bus: CanBus) -> None:
+    heard: list[bytes] = []
+    bus.on(HEARD, lambda data, _time: heard.append(data))
+    cansend(f"{HEARD:03X}#R")
+    cansend(f"{HEARD:03X}#02")
+    until(lambda: heard == [b"\x02"])
+    with other_side() as other:
+        bus.remote(0x705)
+        identifier, length, _ = PACKED.unpack(other.recv(PACKED.size))
+    assert (identifier, length) == (0x705 | socket.CAN_RTR_FLAG, 1)
+
+
 def test_times_are_the_kernels_and_not_those_of_the_reading(bus: CanBus) -> None:
     """A receive thread that is held up must not make a frame look younger than it is."""
     times: list[float] = []
