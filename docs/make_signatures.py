@@ -36,9 +36,10 @@ RESULTS = {
     "winchkit.diagnosis.diagnose": ("WinchAnswer",),
     "winchkit.diagnosis.plan": ("Plan",),
     "winchkit.diagnosis.residuals.traces": ("PoseTrace", "Trace"),
+    "winchkit.diagnosis.residuals.attribution": ("Attribution",),
     "winchkit.diagnosis.results": (
         *("CandidateScore", "Closest", "Combination", "Comparison", "Detectable", "Diagnosis"),
-        *("Estimate", "NextRun", "OutputError", "OutputFit", "RobotDiagnosis", "Step", "Where"),
+        *("Estimate", "NextRun", "OutputError", "OutputFit", "RobotDiagnosis", "Step"),
     ),
     "winchkit.diagnosis.robot.diagnose": ("RobotAnswer",),
     "winchkit.fit_statistics": ("Correlation", "FitStatistics", "FittedParameter"),

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.drivers.counters import Tally
+from winchkit.drivers.frozen_counts import FrozenDetector
 from winchkit.drivers.host_scale import HostScale
 from winchkit.drivers.publisher import Publisher, Sampled
 from winchkit.drivers.reading import Quality, Reading
-from winchkit.drivers.stillness import Stillness
 
 GOOD = Quality.GOOD
 NEAR = st.floats(-1000, 1000)
@@ -77,8 +77,8 @@ def test_the_moment_of_sampling_lies_between_its_limits() -> None:
 
 
 def watch(counts: list[float], moving: bool = False) -> list[bool]:
-    stillness = Stillness()
-    return [stillness.frozen(item, 1.0, moving) for item in counts]
+    detector = FrozenDetector()
+    return [detector.frozen(item, 1.0, moving) for item in counts]
 
 
 def test_a_noisy_cell_that_stops_is_frozen() -> None:
@@ -137,12 +137,12 @@ def test_a_noisy_cell_that_stops_while_the_winch_moves_is_frozen() -> None:
 
 
 def test_polling_faster_than_it_converts_is_not_frozen() -> None:
-    random, stillness = Random(4), Stillness()
+    random, detector = Random(4), FrozenDetector()
     value, told = 0.0, []
     for k in range(20_000):
         if k % 50 == 0:
             value = float(round(random.gauss(1000, 3)))
-        told.append(stillness.frozen(value, 1 / 50, False))
+        told.append(detector.frozen(value, 1 / 50, False))
     assert not any(told)
 
 

@@ -47,6 +47,13 @@ def test_a_file_adds_its_effects_to_the_catalogue(tmp_path: Path) -> None:
         ("x = 1\n", "has no"),
         (MINE.replace('"m", null', '"furlong", null'), "unknown unit 'furlong'"),
         (MINE.replace("null=0.0", "null=0.0, low=1.0"), "null 0 lies outside"),
+        (
+            MINE.replace("what=", 'needs=("rope-force",), what='),
+            "needs: unknown name 'rope-force'; known are cable,",
+        ),
+        (MINE.replace("what=", 'needs="load", what='), "needs = 'load': must be a tuple of names"),
+        (MINE.replace('("cable_length",)', '("length",)'), "outputs: unknown name 'length'"),
+        (MINE.replace('("cable_length",)', "()"), "outputs: empty"),
     ],
 )
 def test_a_broken_file_is_named_with_what_is_wrong(tmp_path: Path, text: str, said: str) -> None:

@@ -147,7 +147,7 @@ def test_our_reader_reads_and_tares_libmodbus(bus: BusSpec) -> None:
         assert instrument.tared is False
         slow.command(instrument, "tare")
         assert instrument.tared is True
-        with pytest.raises(DeviceRefused, match="did not obey"):
+        with pytest.raises(DeviceRefused, match="did not confirm it"):
             slow.command(instrument, "gross")
         counters = instrument.counters
         assert counters.crc == counters.timeouts == counters.malformed == counters.late == 0

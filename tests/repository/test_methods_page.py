@@ -12,6 +12,9 @@ from snippets import ROOT
 
 PAGE = ROOT / "docs" / "methods.md"
 _MODULE = re.compile(r"`(\w+/\w+\.py)`")
+_CITED = re.compile(
+    r"([A-ZŠ][\w']+)(?:(?:, | & | and )(?:[A-Z]\. )?[A-Z][\w']+)*(?: et al\.)?,? ((?:19|20)\d\d)\b"
+)
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +45,18 @@ def test_values_are_those_of_the_code(page: str, constants: Constants) -> None:
 def test_modules_that_the_page_names_exist(page: str) -> None:
     package = ROOT / "winchkit" / "diagnosis"
     assert not [name for name in _MODULE.findall(page) if not (package / name).is_file()]
+
+
+def test_every_citation_is_in_the_list_of_references(page: str) -> None:
+    text, references = page.split("## References")
+    cited = set(_CITED.findall(text))
+    assert len(cited) > 40
+    missing = [
+        f"{name} {year}"
+        for name, year in sorted(cited)
+        if not re.search(rf"^- (?:von )?{re.escape(name)}, .*\({year}\)", references, re.MULTILINE)
+    ]
+    assert not missing
 
 
 def test_numbers_of_a_module_are_found_in_every_form(tmp_path: Path) -> None:

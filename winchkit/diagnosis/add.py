@@ -32,12 +32,12 @@ from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = [
     "Addition",
-    "Grown",
+    "FittedAddition",
     "Removal",
     "add",
+    "fitted_addition",
+    "fitted_addition_to",
     "fitted_json",
-    "grow",
-    "grow_prepared",
     "remove",
 ]
 
@@ -98,8 +98,8 @@ def fitted_json(
 
 
 @dataclass(frozen=True)
-class Grown:
-    """An addition with everything that it was derived from, for reports.
+class FittedAddition:
+    """An addition with the fits that it was derived from, for reports.
 
     Attributes
     ----------
@@ -153,27 +153,27 @@ def add(
     RunError
         With every fault of every run.
     """
-    return grow(effect_id, runs, profile, catalogue, band).addition
+    return fitted_addition(effect_id, runs, profile, catalogue, band).addition
 
 
-def grow(
+def fitted_addition(
     effect_id: str,
     runs: Sequence[Run],
     profile: WinchProfile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
-) -> Grown:
+) -> FittedAddition:
     """The same as :func:`add`, with the fits."""
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")
     catalogue = catalogue or load_catalogue()
     _require_absent(catalogue[effect_id], profile)
     dataset = prepare(runs, profile, band, decimate=True, fast=True, catalogue=catalogue)
-    return grow_prepared(effect_id, dataset, catalogue)
+    return fitted_addition_to(effect_id, dataset, catalogue)
 
 
-def grow_prepared(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> Grown:
-    """The same as :func:`grow` on a prepared data set, that of the diagnosis of these runs."""
+def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedAddition:
+    """The same as :func:`fitted_addition` on a prepared data set, as that of a diagnosis."""
     effect = catalogue[effect_id]
     _require_absent(effect, dataset.profile)
     candidates = Catalogue([*catalogue, _placed(effect, dataset)])
@@ -193,7 +193,9 @@ def grow_prepared(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> Gro
     outputs = output_fits(engine, (initial_model, noise), (best.fit, best.noise))
     terms = tuple(estimates(engine.regression, best.fit, spread))
     notes = (*engine.regression.dataset.notes, *best.notes)
-    return Grown(engine.regression, initial_model, best.fit, Addition(outputs, terms, notes))
+    return FittedAddition(
+        engine.regression, initial_model, best.fit, Addition(outputs, terms, notes)
+    )
 
 
 def _require_absent(effect: Effect, profile: WinchProfile) -> None:

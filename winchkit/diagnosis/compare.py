@@ -93,7 +93,7 @@ def compared(
     noise = replicate_rms(regression, residual)
     outputs = {}
     for output in regression.dataset.outputs:
-        error = _error(regression, residual, output)
+        error = regression.compared_samples(residual, output)
         own = [s for s in regression.segments if s.output == output]
         outputs[output] = OutputError(
             unit=OUTPUT_UNITS[output],
@@ -161,13 +161,3 @@ def _of_length(regression: TimeSeriesRegression, columns: Array) -> NDArray[np.b
 
 def _order(found: Attribution) -> int:
     return found.order or 1
-
-
-def _error(regression: TimeSeriesRegression, residual: Array, output: str) -> Array:
-    """Residual of one output in time, compared samples of all runs."""
-    parts = [
-        time[regression.dataset.recordings[s.run].valid[output]]
-        for s, time in zip(regression.segments, regression.in_time(residual), strict=True)
-        if s.output == output
-    ]
-    return np.concatenate(parts)

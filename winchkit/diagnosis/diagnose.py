@@ -17,13 +17,12 @@ from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import attributions, harmonics
+from winchkit.diagnosis.residuals.attribution import Attribution, attributions, harmonics
 from winchkit.diagnosis.residuals.traces import Trace, trace_columns, traces_of
 from winchkit.diagnosis.results import (
     Closest,
     Diagnosis,
     Step,
-    Where,
 )
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
@@ -228,9 +227,9 @@ def diagnose_prepared(
         if offset is not None:
             other = selection_engine(offset, catalogue)
             other.on_trial = _Trials(progress, "with an offset per run, fitting", _SEARCH)
-            anew = stepwise_selection(other)
-            if _predicts_better((other, anew), (engine, result)):
-                dataset, engine, result = offset, other, anew
+            searched = stepwise_selection(other)
+            if _predicts_better((other, searched), (engine, result)):
+                dataset, engine, result = offset, other, searched
         reduced = without_impacts(dataset, result.last_model)
         if reduced is not None:
             engine = selection_engine(reduced, catalogue)
@@ -476,7 +475,7 @@ def selection_engine(
     return TimeSeriesSelection(regression, initial_model, absent)
 
 
-def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[Where, ...]:
+def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[Attribution, ...]:
     """Variables, orders and the frequency band with the largest shares of the residual.
 
     Of the residual of the final model, or of the initial one where the final one has no lack of
@@ -485,13 +484,12 @@ def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[W
     fitted, lack_of_fit_test = result.final, result.lack_of_fit_test
     if not result.lack_of_fit:
         fitted, lack_of_fit_test = result.initial_model, result.initial_lack_of_fit_test
-    places = [*harmonics(regression, fitted.residual), *attributions(regression, fitted.residual)]
-    out = [Where(f.output, f.variable, f.share, f.order) for f in places]
+    out = [*harmonics(regression, fitted.residual), *attributions(regression, fitted.residual)]
     excess_power = lack_of_fit_test.excess_power
     if excess_power.size and excess_power.max() > 0:
         largest = int(np.argmax(excess_power))
         output, low, high = regression.bands[largest]
         middle = low if not np.isfinite(high) else (low + high) / 2
         share = float(excess_power[largest] / np.sum(np.maximum(excess_power, 0)))
-        out.append(Where(output, "time", share, frequency=middle))
+        out.append(Attribution(output, "time", share, frequency=middle))
     return tuple(sorted(out, key=lambda w: -w.share)[:_WHERE])

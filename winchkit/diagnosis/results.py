@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from math import isnan
 from typing import Any, ClassVar, Literal
 
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.maps import ResidualMap
 from winchkit.diagnosis.residuals.traces import PoseTrace, Trace, trace_columns
 from winchkit.effects.empirical import empirical_id
@@ -30,7 +31,6 @@ __all__ = [
     "RobotDiagnosis",
     "RunOffset",
     "Step",
-    "Where",
     "effect_and_line",
     "plain_step",
     "series_orders",
@@ -241,23 +241,6 @@ class Detectable:
 
 
 @dataclass(frozen=True)
-class Where:
-    """One line of the residual attribution."""
-
-    output: str
-    variable: str
-    share: float
-    order: int | None = None
-    frequency: float | None = None
-    line: str | None = None
-    """Line of a robot, or axis of its platform, that has most of the share."""
-
-    def to_json(self) -> dict[str, Any]:
-        """Dictionary that the command prints: order, frequency and line only where present."""
-        return {key: value for key, value in vars(self).items() if value is not None}
-
-
-@dataclass(frozen=True)
 class NextRun:
     """A motion programme that separates two effects, with its power."""
 
@@ -279,7 +262,7 @@ class Diagnosis(Plotted, Tabular):
     candidates: tuple[CandidateScore, ...]
     detectable: tuple[Detectable, ...]
     unexplained_share: float
-    where: tuple[Where, ...]
+    where: tuple[Attribution, ...]
     next_runs: tuple[NextRun, ...]
     notes: tuple[str, ...] = ()
     sanity: tuple[Finding, ...] = ()

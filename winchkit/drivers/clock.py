@@ -1,4 +1,4 @@
-"""Time is handed in, so that timeouts and faults are tested in simulated time."""
+"""Clock protocol: time is an argument, so that timeouts and faults are tested in simulated time."""
 
 from __future__ import annotations
 

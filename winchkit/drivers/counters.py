@@ -1,4 +1,4 @@
-"""What was counted on the way to the readings, and how long the answers took."""
+"""Counters of an instrument's line, and its response times."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Counters:
 
 @dataclass(slots=True)
 class Tally:
-    """Counts for one instrument; for one thread. :meth:`counters` is the picture for others."""
+    """Counts of one instrument, written by one thread; others read :meth:`counters`."""
 
     readings: int = 0
     duplicates: int = 0

@@ -1,6 +1,6 @@
-"""What the host does to a value of an instrument: a calibration, then a tare. The device keeps out.
+"""Scaling of an instrument's value by the host: calibration, then tare.
 
-The device's own zero and tare are in the device, the calibration is in a file, the host's tare is
+Zero and tare of the device are in the device, the calibration is in a file, the tare of the host is
 here: they are independent of each other.
 """
 

@@ -1,4 +1,4 @@
-"""Turns what a device says into readings: calibrated, judged, counted and handed out."""
+"""Readings of an instrument from its raw values: calibration, quality flags, counts, listeners."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Tally
+from winchkit.drivers.frozen_counts import FrozenDetector
 from winchkit.drivers.host_scale import HostScale
 from winchkit.drivers.reading import Counters, Quality, Reading
-from winchkit.drivers.stillness import Stillness
 
-__all__ = ["Publisher", "Publishing", "Sampled"]
+__all__ = ["InstrumentReadings", "Publisher", "Sampled"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,14 +36,14 @@ class Publisher:
         """``rate`` is the device's, in conversions a second."""
         self.tally = Tally()
         self.scale = HostScale()
-        """What the host makes of the device's value; may be replaced at any time."""
+        """Calibration and tare by the host; may be replaced at any time."""
         self.moving: Callable[[], bool] = _never
         """Whether the winch moves now, so that the counts should move as well."""
         self.latest: Reading | None = None
         self.listeners: list[Callable[[Reading], None]] = []
         self.rate = rate
         """Of the device, conversions a second."""
-        self._stillness = Stillness()
+        self._frozen_detector = FrozenDetector()
 
     def publish(
         self, value: float, gross: float, counts: float, quality: Quality, when: Sampled
@@ -83,11 +83,11 @@ class Publisher:
         if before is None or not math.isfinite(counts):
             return False
         conversions = (when.t_receive - before.t_receive) * self.rate
-        return self._stillness.frozen(counts, conversions, self.moving())
+        return self._frozen_detector.frozen(counts, conversions, self.moving())
 
 
-class Publishing:
-    """An instrument's face to the rest: what its publisher has made. All may be read anywhere."""
+class InstrumentReadings:
+    """Readings and counters of an instrument, from its publisher; readable on every thread."""
 
     publisher: Publisher
     _clock: Clock

@@ -1,4 +1,4 @@
-"""What an instrument says: a reading with its flags, and how the bench sees any instrument."""
+"""Reading of an instrument with its quality flags, and the interface of any instrument."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ The device file's number is from a manual; a converter on the way adds a delay o
 
 
 class Quality(Flag):
-    """What is to be said against a reading; GOOD is nothing."""
+    """Quality flags of a reading; GOOD is none."""
 
     GOOD = 0
     OVERLOAD = auto()
@@ -31,9 +31,9 @@ class Quality(Flag):
     LATE = auto()
     """The reply took so long that the moment of sampling is uncertain."""
     STALE = auto()
-    """The device itself says that it has no new value."""
+    """The device reports that it has no new value."""
     FROZEN = auto()
-    """The raw counts stand still while they should not."""
+    """The raw counts are frozen."""
     MISMATCH = auto()
     """Status and value contradict each other, e.g. for a wrong word order in the device file."""
     AMBIGUOUS = auto()

@@ -1,4 +1,4 @@
-"""Whose turn it is on a line, and what rates the line allows: reckoned at first, then measured."""
+"""Scheduling of the instruments on a line: order of polling, and rates (max-min fair share)."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ P = TypeVar("P", bound=Polled)
 
 
 def next_of(instruments: Sequence[P], now: float, due: Callable[[P], float]) -> P:
-    """Who is asked next: of those that are due the one that has waited longest, else the next due.
+    """Instrument to poll next: of those that are due the one that has waited longest.
 
-    On a line that is full everybody thus gets what it wants, or as much as everybody else who does
-    not: the shares of :func:`fair_rates`.
+    On a fully used line the rates are then those of :func:`fair_rates`.
     """
     waiting = [item for item in instruments if due(item) <= now]
     if waiting:
@@ -43,7 +42,7 @@ def next_of(instruments: Sequence[P], now: float, due: Callable[[P], float]) -> 
 
 
 class LineShare:
-    """What rates a line allows its instruments, as it is seen how long their readings take."""
+    """Rates that a line allows its instruments, by the measured times of their readings."""
 
     def __init__(
         self, wanted: Sequence[float], times: Sequence[float], least: float = _TICK
@@ -80,7 +79,7 @@ class LineShare:
         return True
 
     def room_for(self, index: int) -> float:
-        """Readings a second that the line has room for, were this instrument's wish no limit."""
+        """Rate that the line has room for, whatever rate the instrument wants, 1/s."""
         wanted = [inf if k == index else rate for k, rate in enumerate(self._wanted)]
         return fair_rates(wanted, self._times)[index]
 
@@ -92,8 +91,8 @@ class LineShare:
 def fair_rates(wanted: Sequence[float], times: Sequence[float]) -> tuple[float, ...]:
     """Rates (1/s) for instruments on one line, each of which takes ``times`` s for a reading.
 
-    Everybody gets what it wants or the same as everybody else who does not, so that the line is
-    full: the max-min fair share.
+    Each gets the rate that it wants, or the same as all others that do not get theirs, so that the
+    line is fully used: the max-min fair share.
     """
     rates = [0.0] * len(wanted)
     free, left = _USE, sorted(range(len(wanted)), key=lambda k: wanted[k])

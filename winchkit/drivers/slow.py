@@ -18,13 +18,13 @@ _COMMAND_TIME = 5.0
 
 
 class SlowLine(Protocol):
-    """One line with what hangs on it; its coroutines run on the thread of the slow devices."""
+    """One line with its instruments; its coroutines run on the thread of the slow devices."""
 
     name: str
 
     @property
     def sensors(self) -> Sequence[Sensor]:
-        """What hangs on it."""
+        """Its instruments."""
 
     async def serve(self) -> None:
         """Keep the readings of its sensors new until cancelled or closed."""
@@ -33,12 +33,12 @@ class SlowLine(Protocol):
         """Send a command of the device file, e.g. ``tare``, and wait for the device's answer."""
 
     def close(self) -> None:
-        """Let the port go; ``serve`` returns soon."""
+        """Close the port; ``serve`` returns soon."""
 
 
 @runtime_checkable
 class Identifying(Protocol):
-    """A line whose instruments can say who they are."""
+    """A line whose instruments can be identified."""
 
     async def identify(self, sensor: Sensor) -> dict[str, float]:
         """Serial number and the like, by name."""
@@ -72,7 +72,7 @@ class SlowDevices:
         self._wait(self._line_of[id(sensor)].command(sensor, name), sensor)
 
     def identify(self, sensor: Sensor) -> dict[str, float]:
-        """What an instrument says of itself, e.g. its serial number; raises as ``command``."""
+        """Identity of an instrument, e.g. its serial number; raises as ``command``."""
         line = self._line_of[id(sensor)]
         if not isinstance(line, Identifying):
             return {}

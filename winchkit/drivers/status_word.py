@@ -1,4 +1,4 @@
-"""What the bits of an instrument's status word mean, and what they say of a reading."""
+"""Bits of an instrument's status word, and the quality flags that follow from them."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.effect import NEED_WORDS, Effect, Parameter, Values
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.effects.reference_robot import robot_changes
 from winchkit.effects.term import Term
@@ -152,7 +152,7 @@ def card(effect: Effect) -> str:
         ("Formula", effect.formula),
         ("Source", effect.source),
         ("Changes", ", ".join(effect.outputs)),
-        ("Needs", ", ".join(effect.needs) or "only the motor angle"),
+        ("Needs", "; ".join(NEED_WORDS[need] for need in effect.needs) or "only the motor angle"),
         ("On a robot", ", ".join(_PLACES[p] for p in sorted(effect.on_robot))),
         ("Family", effect.family),
         ("Contains", ", ".join(effect.contains)),

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from pkgutil import iter_modules
 
-from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.errors import Fault, FileError, UsageError
+from winchkit.model.stages import OUTPUTS
 from winchkit.units import UNITS, dimension_of, suggest
 
 __all__ = ["Catalogue", "load_catalogue"]
@@ -118,17 +119,42 @@ def _effects_in(thing: object, where: str) -> list[Effect]:
     if not effects:
         raise FileError(Fault("has no object of class winchkit.effects.effect.Effect", where))
     faults = [
-        Fault(f"effect '{effect.id}': {parameter.name}: {wrong}", where)
+        Fault(f"effect '{effect.id}': {wrong}", where)
         for effect in effects
-        for parameter in effect.parameters
-        if (wrong := _wrong_with(parameter))
+        for wrong in _wrong_with(effect)
     ]
     if faults:
         raise FileError(faults)
     return effects
 
 
-def _wrong_with(parameter: Parameter) -> str:
+def _wrong_with(effect: Effect) -> list[str]:
+    """Contradictions in the declaration of an effect."""
+    lists: tuple[tuple[str, object, Collection[str]], ...] = (
+        ("needs", effect.needs, NEED_WORDS),
+        ("outputs", effect.outputs, OUTPUTS),
+    )
+    wrong = []
+    for name, given, known in lists:
+        if isinstance(given, str) or not isinstance(given, Collection):
+            wrong.append(f"{name} = {given!r}: must be a tuple of names, such as ({given!r},)")
+            continue
+        names = list(known)
+        wrong += [
+            f"{name}: unknown name '{item}'; known are {', '.join(names)}{suggest(item, names)}"
+            for item in map(str, given)
+            if item not in known
+        ]
+    if not effect.outputs:
+        wrong.append(f"outputs: empty; one at least of {', '.join(OUTPUTS)}")
+    return wrong + [
+        f"{parameter.name}: {text}"
+        for parameter in effect.parameters
+        if (text := _wrong_with_parameter(parameter))
+    ]
+
+
+def _wrong_with_parameter(parameter: Parameter) -> str:
     """Contradiction in the declaration of a parameter; empty without one."""
     if dimension_of(parameter.unit) is None:
         known = ", ".join(dict.fromkeys(next(iter(table)) for table in UNITS.values()))

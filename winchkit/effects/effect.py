@@ -19,6 +19,7 @@ from winchkit.units import suggest
 
 __all__ = [
     "MOTOR_ORDERS",
+    "NEED_WORDS",
     "Effect",
     "Need",
     "Parameter",
@@ -32,8 +33,23 @@ __all__ = [
 Values = Mapping[str, float]
 Need = Literal[
     "cable", "layers", "guide", "pulley", "temperature", "load", "rope_force", "gearing", "robot",
-    "axis", "drum", "whole_turns", "torque",
+    "axis", "whole_turns", "torque",
 ]  # fmt: skip
+NEED_WORDS: Mapping[Need, str] = {
+    "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
+    "layers": "a drum that winds in layers (spiral or archimedean)",
+    "guide": "a [guide] in the profile",
+    "pulley": "a [[pulley]] in the profile",
+    "temperature": "a temperature channel in every run",
+    "load": "a load channel or load_mass",
+    "rope_force": "a load, load_mass or tension",
+    "gearing": "a gearbox",
+    "robot": "a robot's profile",
+    "axis": "a profile of kind 'axis', or runs without any force in a cable",
+    "whole_turns": "a run in which the drum turns once at least",
+    "torque": "a motor_torque channel",
+}
+"""What an effect may need, in words: parts of the profile, channels, and range of motion."""
 Output = Literal["cable_length", "tension", "motor_torque"]
 Placement = Literal["one", "all", "platform"]
 

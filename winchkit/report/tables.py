@@ -54,17 +54,17 @@ def output_scale(output: OutputFit) -> Scale:
 
 def figures(diagnosis: Diagnosis) -> Markup:
     """Held-out error before and after, and noise, per output."""
-    grown = bool(diagnosis.steps)
-    head = ["output", "today" if grown else "error"]
-    head += ["with it"] if grown else []
+    extended = bool(diagnosis.steps)
+    head = ["output", "today" if extended else "error"]
+    head += ["with it"] if extended else []
     rows = []
     for name in worst_outputs(diagnosis.outputs):
         output = diagnosis.outputs[name]
         scale = output_scale(output)
-        last = output.heldout_rms_after if grown else output.heldout_rms_before
+        last = output.heldout_rms_after if extended else output.heldout_rms_before
         cells: list[str] = [OUTPUT_NAMES.get(name, name)]
         cells.append(element("span", scale.text(output.heldout_rms_before), class_="before"))
-        if grown:
+        if extended:
             cells.append(element("span", scale.text(last), class_="after"))
         noise = output.noise_rms
         cells.append("unknown" if noise is None else scale.text(noise))

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
-from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset, Where
+from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset
 from winchkit.effects.card import sparkline
 from winchkit.effects.placement import HOME
 from winchkit.profile_edit.history import LADDER_UNITS
@@ -65,7 +66,7 @@ def report_text(answer: Answer) -> str:
         [_head(diagnosis), *paragraph(sentence(diagnosis))],
         error_lines(
             diagnosis.outputs,
-            grown=bool(diagnosis.steps),
+            extended=bool(diagnosis.steps),
             data=diagnosis.data,
             offsets=diagnosis.run_offsets,
         ),
@@ -143,7 +144,7 @@ def addition_text(addition: Addition | Removal) -> str:
         fitted += [["", f"{parameter_name(n)} {text}"] for n, text in sure.items() if text]
     blocks = [
         ["fitted", *hanging(fitted)] if fitted else [],
-        error_lines(addition.outputs, grown=True),
+        error_lines(addition.outputs, extended=True),
         _notes(addition.notes),
     ]
     return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
@@ -152,7 +153,7 @@ def addition_text(addition: Addition | Removal) -> str:
 def error_lines(
     outputs: Mapping[str, OutputFit],
     *,
-    grown: bool,
+    extended: bool,
     data: str = "runs",
     offsets: Sequence[RunOffset] = (),
 ) -> list[str]:
@@ -162,7 +163,7 @@ def error_lines(
     ----------
     outputs : mapping of str to OutputFit
         Errors by output.
-    grown : bool
+    extended : bool
         Whether the model was changed, so that there are errors before and after.
     data : str
         Kind of data, ``runs`` or ``poses``.
@@ -175,11 +176,11 @@ def error_lines(
         Lines of at most 80 characters.
     """
     head = ["held-out error, rms", "before", "after", "noise"]
-    rows = [head if grown else [head[0], "error", "noise"]]
+    rows = [head if extended else [head[0], "error", "noise"]]
     for name, output in outputs.items():
         scale = scale_for(output.heldout_rms_before, output.unit)
         noise = "unknown" if output.noise_rms is None else scale.text(output.noise_rms)
-        after = [scale.text(output.heldout_rms_after)] if grown else []
+        after = [scale.text(output.heldout_rms_after)] if extended else []
         before = scale.text(output.heldout_rms_before)
         rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
     held_out = f"held out: each group of {data} is predicted with values fitted without it"
@@ -303,7 +304,7 @@ def _places(answer: Answer) -> list[str]:
     return ["unexplained residual", *lines]
 
 
-def _shape(answer: Answer, where: Where) -> str:
+def _shape(answer: Answer, where: Attribution) -> str:
     """The mean residual over its variable, as bars from its lowest to its highest value."""
     _, mean = unexplained_curve(answer, where)
     low, high = float(mean.min()), float(mean.max())

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from winchkit.diagnosis.add import grow_prepared
+from winchkit.diagnosis.add import fitted_addition_to
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.results import OutputFit
@@ -48,11 +48,11 @@ def refit(state: State, effect: str, dataset: Dataset, catalogue: Catalogue, fol
         raise UsageError("nothing is diagnosed yet")
     if effect not in catalogue:
         raise UsageError(f"there is no effect '{effect}'")
-    grown = grow_prepared(effect, dataset, catalogue)
+    fitted = fitted_addition_to(effect, dataset, catalogue)
     path = folder / f"version-{len(state.versions)}.toml"
     names = [item.name for item in state.used]
-    write_addition(state.versions[-1].path, grown.addition, names, path)
-    outputs = grown.addition.outputs
+    write_addition(state.versions[-1].path, fitted.addition, names, path)
+    outputs = fitted.addition.outputs
     before = {name: out.heldout_rms_before for name, out in outputs.items()}
     label = (
         "Profile as loaded"
@@ -72,7 +72,7 @@ def refit(state: State, effect: str, dataset: Dataset, catalogue: Catalogue, fol
         said=_said(outputs),
         answer=WinchAnswer(answer.engine, answer.result, shown),
         refitted=True,
-        curves=curves_of(grown.regression, grown.final.residual, noise),
+        curves=curves_of(fitted.regression, fitted.final.residual, noise),
         before=(answer, state.curves),
         faults=(),
     )

@@ -367,11 +367,11 @@ class Workspace:
     def _add(self, effect: str) -> None:
         state = self._state
         dataset = self._dataset(read_winch_or_axis(state.profile))
-        grown = refit(state, effect, dataset, self.catalogue, self.folder)
-        self._cards, self._state = {}, grown
+        extended = refit(state, effect, dataset, self.catalogue, self.folder)
+        self._cards, self._state = {}, extended
         self.changed()
         try:
-            answer, curves = self._diagnosed(read_winch_or_axis(grown.profile))
+            answer, curves = self._diagnosed(read_winch_or_axis(extended.profile))
         except BaseException:
             self._cards, self._state = {}, state
             raise

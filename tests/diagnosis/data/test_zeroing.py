@@ -11,7 +11,7 @@ from scipy.stats import ttest_1samp
 from diagnosis_runs import GROOVED, SPIRAL, Ride, made, recorded, term, with_channel
 from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.data.zeroing import wanders, zeroed_anew
+from winchkit.diagnosis.data.zeroing import is_random_walk, zeroed_anew
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.runs.run import ANGLE_INTEGRATED, Run
@@ -52,14 +52,14 @@ def test_a_level_beside_a_walk_is_taken_for_one_in_a_hundredth_of_cases(walk: fl
     steps = random.normal(0, 1, (400, 3, 8 * 20)).cumsum(axis=2).reshape(400, 3, 8, 20)
     white, walked = random.normal(0, 1, (400, 3, 8)), steps.mean(axis=3) / np.sqrt(20)
     means = walked if np.isinf(walk) else white + np.sqrt(walk) * walked
-    assert sum(not wanders(one) for one in means) <= 11
+    assert sum(not is_random_walk(one) for one in means) <= 11
 
 
 def test_levels_of_white_block_means_are_no_wander() -> None:
     """Levels of two standard deviations of a block, of both signs: all blocks show them."""
     random = np.random.default_rng(6)
     levels = 2.0 * np.array([[1.0], [-1.0], [1.0], [-1.0], [1.0], [-1.0]])
-    drawn = [wanders(levels + random.normal(0, 1, (6, 8))) for _ in range(100)]
+    drawn = [is_random_walk(levels + random.normal(0, 1, (6, 8))) for _ in range(100)]
     assert sum(drawn) <= 5
 
 

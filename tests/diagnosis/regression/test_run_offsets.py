@@ -73,7 +73,7 @@ def test_noise_alone_has_offsets_at_the_level_of_the_test(monkeypatch: pytest.Mo
     ]
     assert not any(offset_between_runs(regression, drawn, "motor_torque") for drawn in draws)
     monkeypatch.setattr(run_offsets, "LEVEL", 0.05)
-    monkeypatch.setattr(run_offsets, "wanders", lambda means: False)
+    monkeypatch.setattr(run_offsets, "is_random_walk", lambda means: False)
     found = sum(
         offset_between_runs(regression, drawn, "motor_torque") is not None for drawn in draws
     )
@@ -82,7 +82,7 @@ def test_noise_alone_has_offsets_at_the_level_of_the_test(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("kind", ["load", "wander"])
 def test_what_may_be_something_else_is_no_new_zero(kind: str) -> None:
-    """An unknown effect of the load, and an instrument that wanders from a common zero."""
+    """An unknown effect of the load, and an instrument that is_random_walk from a common zero."""
     random = np.random.default_rng(2)
     if kind == "load":
         masses = (10.0, 25.0, 40.0)

@@ -67,9 +67,9 @@ def test_evidence_is_the_decrease_of_chi_square_beyond_penalty_and_threshold() -
 
 def test_the_variance_of_one_amplitude_is_that_of_its_interval() -> None:
     engine = engine_of((DRAG,))
-    final, noise, spread = fitted_with(engine, (DRAG,))
+    final, _, spread = fitted_with(engine, (DRAG,))
     index = engine.regression.nuisance_columns.shape[1]
-    inflation = variance_inflation(engine.regression, final, noise, spread, 0)
+    inflation = variance_inflation(engine.regression, final, spread, 0)
     assert inflation == pytest.approx(float(spread.widening[index]) ** 2)
     assert inflation > 1.0
 
@@ -79,7 +79,7 @@ def test_amplitudes_are_judged_together() -> None:
     line = term("spring-balancer", stiffness=0.0, torque=0.02)
     engine = engine_of((line,))
     final, noise, spread = fitted_with(engine, (line,), 3.0)
-    assert variance_inflation(engine.regression, final, noise, spread, 0) == pytest.approx(9.0)
+    assert variance_inflation(engine.regression, final, spread, 0) == pytest.approx(9.0)
     undetermined = replace(spread, widening=np.full(len(final.vector), np.inf))
-    assert variance_inflation(engine.regression, final, noise, undetermined, 0) == np.inf
+    assert variance_inflation(engine.regression, final, undetermined, 0) == np.inf
     assert excess_evidence(engine, final, noise, undetermined, 0, threshold=0.0) < 0.0

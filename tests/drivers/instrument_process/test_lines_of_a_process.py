@@ -179,7 +179,7 @@ def test_commands_are_obeyed_refused_and_forbidden(how: str) -> None:
             assert cell.latest.t_request > sent
             with pytest.raises(NotPermitted, match=r"no command .weigh.; its device file has tare"):
                 slow.command(cell, "weigh")
-            with pytest.raises(DeviceRefused, match=r"did not obey within 1 s.*'net' to go"):
+            with pytest.raises(DeviceRefused, match=r"did not confirm it within 1 s.*'net' to go"):
                 slow.command(cell, "gross")
             with pytest.raises(NotPermitted, match="EEPROM"):
                 slow.command(cell, "store")

@@ -223,7 +223,7 @@ def test_a_command_that_is_taken_and_not_obeyed_is_reported() -> None:
         weigh(peer, 1000)
         with polled(peer, instrument, timeout=PATIENT) as slow:
             until(lambda: instrument.latest is not None)
-            with pytest.raises(DeviceRefused, match=r"did not obey within 1 s.*'net' to come"):
+            with pytest.raises(DeviceRefused, match=r"not confirm it within 1 s.*'net' to come"):
                 slow.command(instrument, "tare")
 
 

@@ -22,14 +22,14 @@ def heard(name: str, data: bytes, address: int | None = None) -> Decoded | None:
     parser.begin()
     items = parser.feed(data)
     assert len(items) < 2
-    return items[0].heard.decoded if items else None
+    return items[0].frame.decoded if items else None
 
 
 def meaning(name: str, data: bytes) -> Meaning:
     parser = StreamParser(device(name))
     parser.begin()
     (item,) = parser.feed(data)
-    return item.heard.meaning
+    return item.frame.meaning
 
 
 @pytest.mark.parametrize(
@@ -194,13 +194,13 @@ def test_mantracourt_says_by_a_bit_that_its_value_is_old() -> None:
     parser = StreamParser(asking_whether_fresh(device("mantracourt-dsc-ascii")))
     parser.begin()
     old, new, over = parser.feed(b"8192\r0\r512\r")
-    assert old.heard.meaning is Meaning.STATUS
-    assert old.heard.decoded is not None
-    assert new.heard.decoded is not None
-    assert over.heard.decoded is not None
-    assert Quality.STALE in old.heard.decoded.quality
-    assert new.heard.decoded.quality == GOOD
-    assert over.heard.decoded.quality == Quality.OVERLOAD
+    assert old.frame.meaning is Meaning.STATUS
+    assert old.frame.decoded is not None
+    assert new.frame.decoded is not None
+    assert over.frame.decoded is not None
+    assert Quality.STALE in old.frame.decoded.quality
+    assert new.frame.decoded.quality == GOOD
+    assert over.frame.decoded.quality == Quality.OVERLOAD
 
 
 @pytest.mark.parametrize(

@@ -25,12 +25,12 @@ def test_the_line_of_your_own_is_read(tmp_path: Path) -> None:
     good, moving, over = parser.feed(
         b"scale: 12.34 kg, ok\nscale: -0.5 kg, moving\nscale: 412.34 kg, over\nscale: 1 lb, ok\n"
     )
-    assert good.heard.decoded is not None
-    assert moving.heard.decoded is not None
-    assert over.heard.decoded is not None
-    assert good.heard.decoded.value == pytest.approx(12.34 * 9.80665)
-    assert moving.heard.decoded.quality == Quality.UNSTABLE
-    assert over.heard.decoded.quality == Quality.OVERLOAD
+    assert good.frame.decoded is not None
+    assert moving.frame.decoded is not None
+    assert over.frame.decoded is not None
+    assert good.frame.decoded.value == pytest.approx(12.34 * 9.80665)
+    assert moving.frame.decoded.quality == Quality.UNSTABLE
+    assert over.frame.decoded.quality == Quality.OVERLOAD
     assert parser.counts.malformed == 1
 
 

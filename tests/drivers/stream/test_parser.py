@@ -81,8 +81,8 @@ def test_any_cutting_into_chunks_says_the_same(name: str, data: st.DataObject) -
     cuts = data.draw(CUTS)
     begun = data.draw(st.booleans())
     whole, parts = parser(name, begun=begun), parser(name, begun=begun)
-    first = [item.heard for item in whole.feed(sent)]
-    second = [item.heard for item in in_chunks(parts, sent, cuts)]
+    first = [item.frame for item in whole.feed(sent)]
+    second = [item.frame for item in in_chunks(parts, sent, cuts)]
     assert repr(first) == repr(second)
     assert asdict(whole.counts) == asdict(parts.counts)
 
@@ -100,10 +100,10 @@ def test_whatever_comes_every_byte_is_accounted_for(name: str, data: st.DataObje
     assert sum(item.size for item in items) == counts.framed
     assert found.pending <= max(stream(name).longest, 8) + len(stream(name).terminator)
     for item in items:
-        decoded = item.heard.decoded
+        decoded = item.frame.decoded
         if decoded is not None and decoded.quality.usable:
             value = decoded.value
-            assert math.isfinite(value) or item.heard.meaning is Meaning.STATUS
+            assert math.isfinite(value) or item.frame.meaning is Meaning.STATUS
         elif decoded is not None:
             assert math.isnan(decoded.value)
 
@@ -113,9 +113,9 @@ def test_whatever_comes_every_byte_is_accounted_for(name: str, data: st.DataObje
 @given(number=NUMBERS)
 def test_what_the_simulator_writes_is_what_is_read(name: str, number: int) -> None:
     (item,) = parser(name, begun=True).feed(said(name, number))
-    assert item.heard.decoded is not None
-    if item.heard.decoded.quality.usable:
-        assert item.heard.decoded.counts == number
+    assert item.frame.decoded is not None
+    if item.frame.decoded.quality.usable:
+        assert item.frame.decoded.counts == number
     else:
         assert abs(number) > (stream(name).capacity or math.inf)
 
@@ -130,7 +130,7 @@ def test_after_garbage_it_is_in_step_again_by_the_second_frame(
     """Whatever came before, at most the frame that the garbage runs into is lost."""
     found = parser(name)
     items = found.feed(first + b"".join(said(name, number) for number in numbers))
-    values = [one.heard.decoded.counts for one in items if one.heard.decoded is not None]
+    values = [one.frame.decoded.counts for one in items if one.frame.decoded is not None]
     expected = [float(number) for number in numbers[1:]]
     assert values[len(values) - len(expected) :] == expected
 
@@ -147,8 +147,8 @@ def test_a_lost_byte_or_one_put_in_is_no_other_number(
     put_in = frame[:at] + bytes([byte]) + frame[at:]
     spoilt = data.draw(st.sampled_from([frame[:at] + frame[at + 1 :], put_in]))
     for item in parser(name, begun=True).feed(spoilt):
-        if item.heard.decoded is not None and item.heard.decoded.quality.usable:
-            assert item.heard.decoded.counts == number
+        if item.frame.decoded is not None and item.frame.decoded.quality.usable:
+            assert item.frame.decoded.counts == number
 
 
 @settings(deadline=None)
@@ -159,23 +159,23 @@ def test_a_changed_byte_of_a_guarded_frame_is_no_other_number(
     frame = bytearray(said("laumas-tlb-ascii", number))
     frame[at % len(frame)] = byte
     for item in parser("laumas-tlb-ascii", begun=True).feed(bytes(frame)):
-        if item.heard.decoded is not None and item.heard.decoded.quality.usable:
-            assert item.heard.decoded.counts == number
+        if item.frame.decoded is not None and item.frame.decoded.quality.usable:
+            assert item.frame.decoded.counts == number
 
 
 def test_half_a_line_at_the_start_is_never_a_number() -> None:
     """The end of +00123.45 is 23.45, a number too; it is dropped, the next one is read."""
     found = parser("generic-line")
     items = found.feed(b"23.45\n+00123.45\n")
-    assert [item.heard.text for item in items] == ["+00123.45"]
+    assert [item.frame.text for item in items] == ["+00123.45"]
     assert found.counts.resynchronised == 6
 
 
 def test_garbage_before_a_frame_that_begins_with_a_mark_does_not_spoil_it() -> None:
     found = parser("laumas-tlb-ascii", begun=True)
     (item,) = found.feed(b"\xff\x00&T01&T012345P012345\\04\r")
-    assert item.heard.decoded is not None
-    assert item.heard.decoded.value == 123.45
+    assert item.frame.decoded is not None
+    assert item.frame.decoded.value == 123.45
     assert found.counts.resynchronised == 6
     assert item.size == 19
 
@@ -191,7 +191,7 @@ def test_a_line_without_end_takes_no_memory_and_is_counted() -> None:
     for _ in range(100):
         assert found.feed(b"9" * 1000) == []
     assert found.pending <= 32
-    assert found.feed(b"\n1.5\n")[0].heard.text == "1.5"
+    assert found.feed(b"\n1.5\n")[0].frame.text == "1.5"
     assert found.counts.resynchronised == 100_001
 
 
@@ -203,8 +203,8 @@ def test_how_far_behind_the_end_of_a_chunk_a_frame_was() -> None:
 def test_a_binary_frame_is_counted_never_searched() -> None:
     found = parser("hbm-aed-binary", begun=True)
     (item,) = found.feed(b"\r\n\r\n\r\n")
-    assert item.heard.decoded is not None
-    assert item.heard.decoded.counts == 0x0D0A0D
+    assert item.frame.decoded is not None
+    assert item.frame.decoded.counts == 0x0D0A0D
     assert found.feed(b"\x4e\x20\x00\x08\r\n") == [], "a frame that nobody asked for"
     assert found.counts.resynchronised == 6
 

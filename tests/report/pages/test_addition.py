@@ -12,7 +12,7 @@ import pytest
 from report_answers import AT_NOISE, FRICTIONAL, NOISY, recorded
 from report_parsed import HOSTILE, Page
 from winchkit.catalog import find
-from winchkit.diagnosis.add import Addition, Grown, add, grow
+from winchkit.diagnosis.add import Addition, FittedAddition, add, fitted_addition
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.term import Term
@@ -29,8 +29,8 @@ def profile() -> WinchProfile:
 
 
 @cache
-def grown(effect: str = ELASTIC) -> Grown:
-    return grow(effect, recorded("demo-elastic-rope"), profile())
+def grown(effect: str = ELASTIC) -> FittedAddition:
+    return fitted_addition(effect, recorded("demo-elastic-rope"), profile())
 
 
 @cache

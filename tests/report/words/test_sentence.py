@@ -15,7 +15,7 @@ from report_answers import (
     NOISY,
     diagnosis_of,
 )
-from winchkit.diagnosis.results import Estimate, Step, Where
+from winchkit.diagnosis.results import Attribution, Estimate, Step
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.report.words.sentence import main_patterns, sentence, where_text
 from winchkit.report.words.vocabulary import clause, estimate_text, kind, listed
@@ -158,17 +158,20 @@ def test_every_effect_of_the_catalogue_has_its_own_words() -> None:
 @pytest.mark.parametrize(
     ("where", "text"),
     [
-        (Where("tension", "drum_angle", 0.5, order=1), "tension, 1 period per drum turn (50 % of"),
         (
-            Where("cable_length", "motor_angle", 0.3, order=4),
+            Attribution("tension", "drum_angle", 0.5, order=1),
+            "tension, 1 period per drum turn (50 % of",
+        ),
+        (
+            Attribution("cable_length", "motor_angle", 0.3, order=4),
             "cable length, 4 periods per motor turn",
         ),
-        (Where("tension", "reversal_distance", 0.2), "a function of distance since reversal"),
-        (Where("tension", "time", 0.2, frequency=0.314), "tension, around 0.31 Hz"),
-        (Where("sag", "moon_phase", 0.2), "sag, as a function of moon_phase"),
+        (Attribution("tension", "reversal_distance", 0.2), "a function of distance since reversal"),
+        (Attribution("tension", "time", 0.2, frequency=0.314), "tension, around 0.31 Hz"),
+        (Attribution("sag", "moon_phase", 0.2), "sag, as a function of moon_phase"),
     ],
 )
-def test_attributions_in_words(where: Where, text: str) -> None:
+def test_attributions_in_words(where: Attribution, text: str) -> None:
     assert text in where_text(where)
 
 

@@ -8,7 +8,7 @@ from functools import cache
 
 from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
-from winchkit.diagnosis.results import Diagnosis, Estimate, OutputFit, Step, Where
+from winchkit.diagnosis.results import Attribution, Diagnosis, Estimate, OutputFit, Step
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_profile, read_programme, read_simbench
 from winchkit.sim.bench import profiles_of, programme_path
@@ -32,9 +32,9 @@ FRICTION = Step(
     {"pulley-capstan": 0.002},
 )
 FIVE_CORNERS = (
-    Where("tension", "time", 0.64, frequency=8.2),
-    Where("motor_torque", "drum_angle", 0.49),
-    Where("tension", "drum_angle", 0.44, order=5),
+    Attribution("tension", "time", 0.64, frequency=8.2),
+    Attribution("motor_torque", "drum_angle", 0.49),
+    Attribution("tension", "drum_angle", 0.44, order=5),
 )
 
 

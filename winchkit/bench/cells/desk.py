@@ -10,7 +10,7 @@ from typing import Protocol, runtime_checkable
 from winchkit.bench.cells.instruments import device_of, refs_of
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.publisher import Publisher, Publishing
+from winchkit.drivers.publisher import InstrumentReadings, Publisher
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import NoReply, NotPermitted, UsageError
@@ -152,7 +152,7 @@ class CellDesk:
     def publisher(self, name: str) -> Publisher:
         """What turns the device's values into readings, with the host's calibration and tare."""
         sensor = self.sensors[name]
-        assert isinstance(sensor, Publishing), "every instrument of a bench publishes this way"
+        assert isinstance(sensor, InstrumentReadings), "as every instrument of a bench"
         return sensor.publisher
 
     def identify(self, name: str) -> dict[str, float]:

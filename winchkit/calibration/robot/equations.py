@@ -38,12 +38,12 @@ from winchkit.model.robot.constraints import (
 from winchkit.model.robot.elongation import strain_of
 from winchkit.model.robot.identification.bundle_adjustment import Rows, State
 from winchkit.model.robot.identification.tracker import Tracker, tracked_position, tracked_rotation
+from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.runs.poses import Measured
 from winchkit.schema.profiles.robot import PlatformSpec
 
 __all__ = ["Equations"]
 
-_FREEDOMS = 6
 _RATIO_STEP = 1e-6
 """Relative step of a gear ratio for its derivative."""
 
@@ -98,7 +98,7 @@ class Equations:
     @property
     def hangs(self) -> bool:
         """Whether measured cable forces and a known weight determine where the platform stands."""
-        few = len(self.robot.names) < _FREEDOMS and self.robot.platform.mass > 0
+        few = len(self.robot.names) < PLATFORM_DOF and self.robot.platform.mass > 0
         return few and bool(np.any(np.all(np.isfinite(self.measured.tension), axis=1)))
 
     @property

@@ -13,7 +13,6 @@ from winchkit.model.robot import Pose, Robot, angles_of, lengths, robot_of
 from winchkit.model.robot.forward import forward
 from winchkit.model.robot.identification.bundle_adjustment import State, linearise
 from winchkit.model.robot.identification.pose_design import (
-    FREEDOMS,
     chosen_in_turn,
     determinant_gain,
     in_box,
@@ -21,6 +20,7 @@ from winchkit.model.robot.identification.pose_design import (
     middle_and_half,
     random_poses,
 )
+from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.runs.poses import Measured
 
 __all__ = ["NextPose", "next_poses"]
@@ -98,7 +98,7 @@ def _candidates(found: Calibrated) -> Pose:
     geometry = found.equations.geometry(found.values)
     position = spread(pose.position, _LEAST_BOX)
     pose = random_poses(geometry, position, spread(angles_of(pose.rotation), _LEAST_TILT))
-    if len(geometry.exit_point) >= FREEDOMS:
+    if len(geometry.exit_point) >= PLATFORM_DOF:
         return pose
     # A hanging platform comes to rest near these poses, not at them.
     length = lengths(geometry, pose.position, pose.rotation)

@@ -72,7 +72,7 @@ def command(
     deviation, the runs and the date.
     """
     from winchkit.cli.model.options import declared_profile, refuse_options
-    from winchkit.diagnosis.add import grow
+    from winchkit.diagnosis.add import fitted_addition
     from winchkit.diagnosis.write import write_addition
     from winchkit.schema.profiles.robot import RobotProfile
 
@@ -85,21 +85,21 @@ def command(
     with progress_bar() as progress:
         own = asked.runs(runs)
         progress(f"fitting {effect}", None)
-        grown = grow(effect, own, declared, catalogue, asked.band)
-    write_addition(asked.source, grown.addition, names, Path(output))
-    _tell(grown.addition, output, as_json)
+        fitted = fitted_addition(effect, own, declared, catalogue, asked.band)
+    write_addition(asked.source, fitted.addition, names, Path(output))
+    _tell(fitted.addition, output, as_json)
     if html:
         from winchkit.report.pages.pages import addition_html
 
         title = page_title(declared.name, runs, effect)
-        page = addition_html(grown, title, asked.profile, output, options=asked.options)
+        page = addition_html(fitted, title, asked.profile, output, options=asked.options)
         write_page(html, page)
     if figures:
         from winchkit.report.pages.pages import addition_figures
         from winchkit.report.reproducibility import Command
 
-        source = Command(grown.regression.dataset, asked.profile).source
-        write_figures(figures, addition_figures(grown, source))
+        source = Command(fitted.regression.dataset, asked.profile).source
+        write_figures(figures, addition_figures(fitted, source))
     suggest_with("compare", asked, runs, profile=output)
 
 
@@ -114,7 +114,7 @@ def _to_robot(
     figures: str | None,
 ) -> None:
     """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
-    from winchkit.diagnosis.robot.add import grow_robot
+    from winchkit.diagnosis.robot.add import fitted_robot_addition
     from winchkit.diagnosis.write import write_addition
 
     name, _, place = effect.partition("/")
@@ -122,22 +122,22 @@ def _to_robot(
     with progress_bar() as progress:
         measured = read_all(runs)
         progress(f"fitting {effect}", None)
-        grown = grow_robot(name, measured, declared, line, asked.catalogue)
-    write_addition(asked.source, grown.addition, [Path(r).name for r in runs], Path(output))
-    _tell(grown.addition, output, as_json)
+        fitted = fitted_robot_addition(name, measured, declared, line, asked.catalogue)
+    write_addition(asked.source, fitted.addition, [Path(r).name for r in runs], Path(output))
+    _tell(fitted.addition, output, as_json)
     if html:
         from winchkit.report.pages.robot import robot_addition_html
 
         title = page_title(declared.name, runs, effect)
         options = asked.options
-        page = robot_addition_html(grown, title, asked.profile, output, options=options)
+        page = robot_addition_html(fitted, title, asked.profile, output, options=options)
         write_page(html, page)
     if figures:
         from winchkit.report.pages.robot import robot_addition_figures
         from winchkit.report.reproducibility import Command
 
-        source = Command(grown.regression.dataset, asked.profile).source
-        write_figures(figures, robot_addition_figures(grown, source))
+        source = Command(fitted.regression.dataset, asked.profile).source
+        write_figures(figures, robot_addition_figures(fitted, source))
     suggest_with("compare", asked, runs, profile=output)
 
 

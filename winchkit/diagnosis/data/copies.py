@@ -15,7 +15,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.sampling import bridged
+from winchkit.diagnosis.data.sampling import bridged, bridged_channel
 from winchkit.model.line import Line
 from winchkit.model.stages import OUTPUTS, Signals
 from winchkit.runs.run import Run
@@ -55,10 +55,10 @@ class _Recorded:
     def noise(self) -> dict[str, float]:
         """The same, or that of the residual if it is smaller; of outputs finer than their noise."""
         line = Line(self.profile)
-        load = _known(self.run, "load")
+        load = bridged_channel(self.run, "load")
         mass = self.run.load_mass if load is None else None
         angle = bridged(self.run["motor_angle"])
-        signals = Signals(self.run.time, angle, load, mass, _known(self.run, "tension"))
+        signals = Signals(self.run.time, angle, load, mass, bridged_channel(self.run, "tension"))
         nominal = line.predict(line.motion(signals))
         out = {}
         for name, values in self.outputs.items():
@@ -68,10 +68,6 @@ class _Recorded:
             if own > resolution(values) and len(np.unique(values)) >= _LEAST_ROWS:
                 out[name] = own
         return out
-
-
-def _known(run: Run, name: str) -> Array | None:
-    return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
 
 
 def without_copies(

@@ -20,7 +20,7 @@ from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
 from winchkit.diagnosis.data.motor_current import with_torques
 from winchkit.diagnosis.data.outlying_repeats import outlying_repeat
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
-from winchkit.diagnosis.data.sampling import away_from, bridged, even_instants
+from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, even_instants
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, without_outliers
 from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
 from winchkit.diagnosis.data.statics import prepared_statics
@@ -389,7 +389,7 @@ def _nothing_predicted(run: Run, profile: WinchProfile) -> Fault:
 
 def _clock(run: Run) -> Clock:
     return Clock(
-        run.time - run.time[0], bridged(run["motor_angle"]), _channel(run, "motor_velocity")
+        run.time - run.time[0], bridged(run["motor_angle"]), bridged_channel(run, "motor_velocity")
     )
 
 
@@ -399,10 +399,6 @@ def _fastest(clock: Clock) -> float:
     return float(np.max(np.abs(clock.gradient(clock.angle))))
 
 
-def _channel(run: Run, name: str) -> Array | None:
-    return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
-
-
 def _signals(
     run: Run, profile: WinchProfile, fastest: float, clock: Clock | None = None
 ) -> Signals:
@@ -410,12 +406,12 @@ def _signals(
     return Signals(
         time=run.time,
         motor_angle=bridged(run["motor_angle"]),
-        load=_channel(run, "load") if has_cable else None,
+        load=bridged_channel(run, "load") if has_cable else None,
         load_mass=run.load_mass if has_cable else None,
-        tension=_channel(run, "tension") if has_cable else None,
-        temperature=_channel(run, "temperature"),
-        motor_velocity=_channel(run, "motor_velocity"),
-        motor_torque=_channel(run, "motor_torque"),
+        tension=bridged_channel(run, "tension") if has_cable else None,
+        temperature=bridged_channel(run, "temperature"),
+        motor_velocity=bridged_channel(run, "motor_velocity"),
+        motor_torque=bridged_channel(run, "motor_torque"),
         fastest=fastest,
         clock=clock,
     )

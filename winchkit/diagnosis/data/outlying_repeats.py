@@ -63,19 +63,19 @@ def outlying_repeat(errors: Array) -> Outlying | None:
     if count < _LEAST_REPEATS:
         return None
     own = np.array([_mean_square(error)[0] for error in errors])
-    nearest, freedom = np.full(count, np.inf), np.ones(count)
+    nearest, dof = np.full(count, np.inf), np.ones(count)
     for i in range(count):
         for j in range(count):
-            square, dof = _mean_square(errors[i] - errors[j]) if i != j else (np.inf, 1.0)
+            square, own_dof = _mean_square(errors[i] - errors[j]) if i != j else (np.inf, 1.0)
             if square < nearest[i]:
-                nearest[i], freedom[i] = square, dof
+                nearest[i], dof[i] = square, own_dof
     index = int(np.argmax(nearest))
     others = np.delete(np.arange(count), index)
     usual = others[np.argsort(nearest[others])[len(others) // 2]]
     if nearest[index] < own[index] or nearest[index] <= _LEAST_RATIO * nearest[usual]:
         return None
     ratio = nearest[index] / max(nearest[usual], np.finfo(float).tiny)
-    if count * float(fdtrc(freedom[index], freedom[usual], ratio)) > _LEVEL:
+    if count * float(fdtrc(dof[index], dof[usual], ratio)) > _LEVEL:
         return None
     return Outlying(index, float(np.sqrt(nearest[index])), float(np.sqrt(nearest[usual])))
 
@@ -88,5 +88,5 @@ def _mean_square(values: Array) -> tuple[float, float]:
     centred = np.where(known, values - np.mean(values[known]), 0.0)
     squares = np.asarray(dct(centred, type=2, norm="ortho")) ** 2
     total = float(np.sum(squares))
-    freedom = 3 * total**2 / float(np.sum(squares**2)) if total > 0 else 1.0
-    return total / np.count_nonzero(known), max(1.0, freedom)
+    dof = 3 * total**2 / float(np.sum(squares**2)) if total > 0 else 1.0
+    return total / np.count_nonzero(known), max(1.0, dof)

@@ -7,27 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.effects.effect import Effect
+from winchkit.effects.effect import NEED_WORDS, Effect
 from winchkit.model.stages import Stage
 from winchkit.schema.profiles.axis import AxisProfile
 
 __all__ = ["excites", "missing_needs"]
 
 _PERIODS = 2
-_NEEDED = {
-    "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
-    "layers": "a drum that winds in layers (spiral or archimedean)",
-    "guide": "a [guide] in the profile",
-    "pulley": "a [[pulley]] in the profile",
-    "temperature": "a temperature channel in every run",
-    "load": "a load channel or load_mass",
-    "rope_force": "a load, load_mass or tension",
-    "gearing": "a gearbox",
-    "robot": "a robot's profile",
-    "axis": "a profile of kind 'axis', or runs without any force in a cable",
-    "whole_turns": "a run in which the drum turns once at least",
-    "torque": "a motor_torque channel",
-}
 
 
 def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
@@ -40,13 +26,16 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         measured = set(effect.outputs) & set(dataset.outputs)
         return [] if measured else ["a measured " + " or ".join(effect.outputs)]
     cable = profile.cable
-    roped = cable.diameter or cable.dead_length or profile.pulley
+    has_cable = (
+        bool(cable.diameter or cable.dead_length or profile.pulley)
+        or profile.reference.cable_length is not None
+    )
     turns_whole = not is_axis and _turns(dataset) >= 1
     rope_force = any(bool(r.raw.at.tension.any()) for r in recordings)
     # Without a cable force a winch's drum that never turns once is what a joint is.
     is_joint = set(dataset.outputs) == {"motor_torque"} and not rope_force and not turns_whole
     have = {
-        "cable": bool(roped) or profile.reference.cable_length is not None,
+        "cable": has_cable,
         "layers": profile.drum.kind in {"spiral", "archimedean"},
         "guide": profile.guide is not None,
         "pulley": bool(profile.pulley),
@@ -59,7 +48,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "whole_turns": turns_whole,
         "torque": "motor_torque" in dataset.outputs,
     }
-    lacking = [_NEEDED[need] for need in effect.needs if not have[need]]
+    lacking = [NEED_WORDS[need] for need in effect.needs if not have[need]]
     if not set(effect.outputs) & set(dataset.outputs):
         lacking.append("a measured " + " or ".join(effect.outputs))
     return lacking
@@ -72,8 +61,7 @@ def _turns(dataset: Dataset) -> float:
 
 def excites(shape: Mapping[str, float], dataset: Dataset) -> bool:
     """Whether the motor turns through two periods of the shape's order in at least one run."""
-    orders = [shape["order"]] if "order" in shape else []
-    if not orders:
+    if "order" not in shape:
         return True
     stroke = max(float(np.ptp(r.signals.motor_angle)) for r in dataset.recordings)
-    return all(order * stroke >= _PERIODS * 2 * np.pi for order in orders)
+    return shape["order"] * stroke >= _PERIODS * 2 * np.pi

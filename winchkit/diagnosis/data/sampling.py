@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.model.derivatives import Clock
 from winchkit.model.smoothing_spline import SmoothingSpline
+from winchkit.runs.run import Run
 
-__all__ = ["away_from", "bridged", "even_instants", "gaps"]
+__all__ = ["away_from", "bridged", "bridged_channel", "even_instants", "gaps"]
 
 Mask = NDArray[np.bool_]
 
@@ -45,6 +46,11 @@ def bridged(values: Array) -> Array:
         return values
     index = np.arange(len(values))
     return np.interp(index, index[known], values[known])
+
+
+def bridged_channel(run: Run, name: str) -> Array | None:
+    """A channel of a run with missing values interpolated, (n,); None without any value."""
+    return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
 
 
 def gaps(time: Array) -> NDArray[np.intp]:

@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.sampling import bridged
+from winchkit.diagnosis.data.sampling import bridged, bridged_channel
 from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.model.line import Line
@@ -279,15 +279,12 @@ def _passivity(run: Run, profile: WinchProfile) -> Iterator[Finding]:
 def _signals(run: Run, profile: WinchProfile) -> Signals:
     has_cable = not isinstance(profile, AxisProfile)
 
-    def channel(name: str) -> Array | None:
-        return bridged(run[name]) if name in run and np.isfinite(run[name]).any() else None
-
     return Signals(
         time=run.time,
         motor_angle=bridged(run["motor_angle"]),
-        load=channel("load") if has_cable else None,
+        load=bridged_channel(run, "load") if has_cable else None,
         load_mass=run.load_mass if has_cable else None,
-        tension=channel("tension") if has_cable else None,
+        tension=bridged_channel(run, "tension") if has_cable else None,
     )
 
 

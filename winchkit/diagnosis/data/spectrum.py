@@ -115,10 +115,10 @@ def highest_frequency(values: Array, rate: float, signals: int = 1) -> float:
         return 0.0
     frequency, power = np.arange(length // 2 + 1) * rate / length, _welch(bridged(values), length)
     upper = power[frequency > rate / 4]
-    freedom = 2 * (2 * len(values) / length - 1)
-    noise = float(np.median(upper) * freedom / chdtri(freedom, 0.5))
+    dof = 2 * (2 * len(values) / length - 1)
+    noise = float(np.median(upper) * dof / chdtri(dof, 0.5))
     level = _LEVEL / (signals * len(frequency))
-    limit = noise * float(fdtri(freedom, freedom * len(upper) / np.pi, 1 - level))
+    limit = noise * float(fdtri(dof, dof * len(upper) / np.pi, 1 - level))
     power_above = np.cumsum(np.where(power > limit, power - noise, 0.0)[::-1])[::-1]
     if not power_above[0]:
         return 0.0
@@ -245,10 +245,8 @@ def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
     -------
     (n,) array
     """
-    full = np.asarray(dct(signal, type=2, norm="ortho"))
-    frequency = np.arange(len(signal)) * rate / (2 * len(signal))
-    gain = 1 / (1 + (frequency / cut_off) ** (2 * _BUTTERWORTH_ORDER))
-    return np.asarray(idct(full * gain, type=2, norm="ortho"))
+    band = Band(len(signal), rate, cut_off, kept_cut_offs=np.inf)
+    return to_time(to_frequency(signal, band), band)
 
 
 def narrow_edges(frequency: Array) -> Array:
@@ -288,7 +286,7 @@ def smoothed(power: Array, dof: Array, order: int = 2) -> tuple[Array, Array]:
 
     Returns
     -------
-    power, freedom : (bands,) arrays
+    power, dof : (bands,) arrays
         Smoothed power, and 2 / Var(ln power).
 
     Notes

@@ -3,10 +3,9 @@
 Repeats have equal predictions, so that their difference is noise, and a constant where the
 instrument was zeroed in between. The mean of every difference is tested against its variation over
 blocks of time (batch means, one F test per output), and against a random walk of the instrument
-beside white noise (local level model), so that a slow wander is none. Repeats at different
-temperatures
-may differ by what a temperature does: a straight line over it, and over its product with the
-output, is fitted beside.
+beside white noise (local level model), so that a slow drift is none. Repeats at different
+temperatures may differ by thermal effects: a straight line over the temperature, and over its
+product with the output, is fitted beside.
 
 References
 ----------
@@ -30,7 +29,14 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import size
 
-__all__ = ["BLOCKS", "LEVEL", "anew", "angles_from_zero", "wanders", "zeroed_anew"]
+__all__ = [
+    "BLOCKS",
+    "LEVEL",
+    "angles_from_zero",
+    "is_random_walk",
+    "zeroed_anew",
+    "zeroed_finding",
+]
 
 BLOCKS = 8
 LEVEL = 1e-4
@@ -72,25 +78,25 @@ def zeroed_anew(
         return None
     observed, regressors = np.array(means), np.concatenate(known)
     offsets = np.repeat(np.eye(len(means)), BLOCKS, axis=0)
-    without, rank = _left(observed.ravel(), regressors)
-    left, whole = _left(observed.ravel(), np.hstack([regressors, offsets]))
-    freedom = whole - rank, observed.size - whole
-    within = float(left @ left) / max(freedom[1], 1)
+    without, rank = _residual_and_rank(observed.ravel(), regressors)
+    left, whole = _residual_and_rank(observed.ravel(), np.hstack([regressors, offsets]))
+    dof = whole - rank, observed.size - whole
+    within = float(left @ left) / max(dof[1], 1)
     rounding = observed.size * float(np.finfo(float).eps * np.linalg.norm(observed))
-    if freedom[0] == 0 or np.linalg.norm(left) <= rounding:
+    if dof[0] == 0 or np.linalg.norm(left) <= rounding:
         return None
-    between = float(without @ without - left @ left) / freedom[0]
-    p_value = float(fdtrc(*freedom, between / within))
-    if p_value >= LEVEL or wanders(without.reshape(observed.shape)):
+    between = float(without @ without - left @ left) / dof[0]
+    p_value = float(fdtrc(*dof, between / within))
+    if p_value >= LEVEL or is_random_walk(without.reshape(observed.shape)):
         return None
-    return anew(output, float(np.sqrt((between - within) / BLOCKS)), p_value, "repeats")
+    return zeroed_finding(output, float(np.sqrt((between - within) / BLOCKS)), p_value, "repeats")
 
 
 def _block_means(values: Array) -> Array:
     return np.array([float(part.mean()) for part in np.array_split(values, BLOCKS)])
 
 
-def _left(values: Array, columns: Array) -> tuple[Array, int]:
+def _residual_and_rank(values: Array, columns: Array) -> tuple[Array, int]:
     """Values without what columns explain, and the rank of these."""
     size = np.sqrt(np.sum(columns**2, axis=0))
     unit = columns[:, size > 0] / size[size > 0]
@@ -98,7 +104,7 @@ def _left(values: Array, columns: Array) -> tuple[Array, int]:
     return np.asarray(values - unit @ amplitudes), int(rank)
 
 
-def anew(output: str, spread: float, p_value: float, between: str) -> Finding:
+def zeroed_finding(output: str, spread: float, p_value: float, between: str) -> Finding:
     """Finding ``zeroed-anew``: an offset with this standard deviation between repeats or runs."""
     limit = (
         ""
@@ -129,7 +135,7 @@ def angles_from_zero(runs: Sequence[Run]) -> list[Finding]:
     return [Finding("zeroed-anew", "", "cable_length", float("nan"), text)]
 
 
-def wanders(means: Array) -> bool:
+def is_random_walk(means: Array) -> bool:
     """Whether a random walk from zero, beside white noise, explains the level of block means.
 
     Parameters
@@ -155,12 +161,10 @@ def wanders(means: Array) -> bool:
     levels = weights @ means.T / information[:, None]
     squares = np.einsum("ni,rij,nj->r", means, inverse, means)
     left = squares - information * np.sum(levels**2, axis=1)
-    freedom = count * (BLOCKS - 1)
+    dof = count * (BLOCKS - 1)
     if np.any(left <= 0.0):
         return False
-    deviance = freedom * np.log(left) + count * (
-        np.linalg.slogdet(covariance)[1] + np.log(information)
-    )
-    statistic = np.mean(levels**2, axis=1) * information * freedom / left
-    p_values = fdtrc(count, freedom, statistic[deviance <= deviance.min() + _REGION])
+    deviance = dof * np.log(left) + count * (np.linalg.slogdet(covariance)[1] + np.log(information))
+    statistic = np.mean(levels**2, axis=1) * information * dof / left
+    p_values = fdtrc(count, dof, statistic[deviance <= deviance.min() + _REGION])
     return float(np.max(p_values)) >= _LEVEL_OF_WANDER

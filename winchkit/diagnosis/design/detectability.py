@@ -26,12 +26,12 @@ class DetectionThreshold:
     """1 % level of the largest score under noise alone."""
 
     def required_ss(self, n_parameters: int) -> float:
-        """Decrease of χ² that an effect of ``freedom`` parameters must reach."""
+        """Decrease of χ² that an effect with this number of parameters must reach."""
         return max(self.score_threshold, 0.0) + self.penalty_per_parameter * n_parameters
 
-    def power(self, strength: float, n_parameters: int) -> float:
+    def power(self, noncentrality: float, n_parameters: int) -> float:
         """Probability that an effect of noncentrality λ reaches it."""
-        return power_of(strength, self.required_ss(n_parameters))
+        return power_of(noncentrality, self.required_ss(n_parameters))
 
 
 def detectable(scores: tuple[Score, ...], threshold: DetectionThreshold) -> tuple[Detectable, ...]:

@@ -75,8 +75,8 @@ def next_runs(
         offers, known = [], information_of(regression, first, second, noise)
         for kind, programme in simulated_programmes:
             minutes = sum(r.signals.time[-1] for r in programme.dataset.recordings) / 60
-            strength = separation(programme, first, second, noise, known=known)
-            offers.append((strength / minutes, power_of(strength), kind.name))
+            noncentrality = separation(programme, first, second, noise, known=known)
+            offers.append((noncentrality / minutes, power_of(noncentrality), kind.name))
         # Of programmes with equal power the one with the largest λ per minute comes first.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
@@ -88,12 +88,12 @@ def next_runs(
     return tuple(out)
 
 
-def power_of(strength: float, required: float = SEPARATED_AT) -> float:
+def power_of(noncentrality: float, required: float = SEPARATED_AT) -> float:
     """Power of a χ² test with one degree of freedom.
 
     Parameters
     ----------
-    strength
+    noncentrality
         Noncentrality λ.
     required
         χ² that is required.
@@ -101,9 +101,9 @@ def power_of(strength: float, required: float = SEPARATED_AT) -> float:
     Returns
     -------
     float
-        P(χ²'(1, λ) > needed).
+        P(χ²'(1, λ) > required).
     """
-    return float(1 - chndtr(required, 1, max(strength, 0.0)))
+    return float(1 - chndtr(required, 1, max(noncentrality, 0.0)))
 
 
 def separation(
@@ -189,6 +189,6 @@ def _rows(
 
 
 def _residual_ss(columns: Array, signature: Array) -> float:
-    """Sum of squares of ``shown`` after regression on ``columns``."""
-    residual_ss = signature - columns @ np.linalg.lstsq(columns, signature, rcond=1e-10)[0]
-    return float(residual_ss @ residual_ss)
+    """Sum of squares of ``signature`` after regression on ``columns``."""
+    residual = signature - columns @ np.linalg.lstsq(columns, signature, rcond=1e-10)[0]
+    return float(residual @ residual)

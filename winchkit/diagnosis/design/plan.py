@@ -137,9 +137,9 @@ def offers(
     return sorted(out, key=lambda offer: offer.worth, reverse=True)
 
 
-def _is_detected(threshold: DetectionThreshold, term: Term, strength: float) -> bool:
+def _is_detected(threshold: DetectionThreshold, term: Term, noncentrality: float) -> bool:
     """Whether an effect of noncentrality λ is detected with at least 90 % power."""
-    return threshold.power(strength, Coordinates(term.effect).n_parameters) >= _HIGH_POWER
+    return threshold.power(noncentrality, Coordinates(term.effect).n_parameters) >= _HIGH_POWER
 
 
 def inseparable(

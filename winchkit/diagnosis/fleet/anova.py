@@ -89,12 +89,9 @@ class SharedError:
 def errors_of(compared: Compared) -> dict[str, WinchErrors]:
     """Errors per output of one winch, decimated to at most about 50,000 samples."""
     regression, out = compared.regression, {}
-    times = regression.in_time(compared.residual)
     for output, compared_output in compared.comparison.outputs.items():
-        own = [
-            (s, t) for s, t in zip(regression.segments, times, strict=True) if s.output == output
-        ]
-        recordings = [regression.dataset.recordings[s.run] for s, _ in own]
+        runs = [s.run for s in regression.segments if s.output == output]
+        recordings = [regression.dataset.recordings[run] for run in runs]
         valid = [recording.valid[output] for recording in recordings]
         step = max(1, compared_output.samples // _MOST_SAMPLES)
         known = [variables_of(recording) for recording in recordings]
@@ -105,7 +102,7 @@ def errors_of(compared: Compared) -> dict[str, WinchErrors]:
             for name in known[0]
             if all(name in run for run in known)
         }
-        error = np.concatenate([t[v] for (_, t), v in zip(own, valid, strict=True)])[::step]
+        error = regression.compared_samples(compared.residual, output)[::step]
         kept = min(len(error), kept_rows(regression, output))
         out[output] = WinchErrors(
             compared_output.unit, compared_output.rms**2, error, variables, kept

@@ -10,8 +10,9 @@ only: :class:`~winchkit.diagnosis.regression.time_series.TimeSeriesRegression` a
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -222,6 +223,15 @@ class Regression(ABC):
     def rows_of(self, outputs: Container[str]) -> list[slice]:
         """Rows of every segment of some outputs."""
         return [s.rows for s in self.segments if s.output in outputs]
+
+    def rows_by_band(self) -> Iterator[tuple[int, slice]]:
+        """Number of a noise band and contiguous rows of it, segment by segment."""
+        for segment in self.segments:
+            bands = self.band_of_row[segment.rows]
+            edges = np.flatnonzero(np.diff(bands, prepend=-1, append=-1))
+            for low, high in pairwise(edges.tolist()):
+                first = segment.rows.start
+                yield int(bands[low]), slice(first + low, first + high)
 
     def residual(self, hypothesis: Hypothesis) -> Array:
         """Measured minus predicted, shape (n_rows,)."""

@@ -3,8 +3,8 @@
 A fit from several starting values is first made on the coarse regression, whose predictions cost a
 tenth, and then, from its best points, on all samples. Samples are taken without a low-pass: the
 model is evaluated at the same instants as the measurement, so that neither loses a frequency to
-which an effect belongs. The coarse fit only chooses starting values; its own deviation, that of
-differences over longer steps included, is removed by the fit on all samples.
+which an effect belongs. The coarse fit only chooses starting values; its error, that of differences
+over longer steps included, is removed by the fit on all samples.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ def coarse_regression(regression: TimeSeriesRegression) -> CoarseTimeSeries | No
     step = min(sum(counts) // _SAMPLES, min(counts) // _LEAST_SAMPLES)
     if step < 2:
         return None
-    recordings = tuple(_thinned(dataset.recordings[run], step) for run in chosen)
+    recordings = tuple(_subsampled(dataset.recordings[run], step) for run in chosen)
     repeats = tuple(
         Repeats((index,), (np.arange(len(recording.signals.time)),))
         for index, recording in enumerate(recordings)
@@ -118,7 +118,7 @@ class CoarseTimeSeries(Coarse):
         return ids
 
 
-def _thinned(recording: Recording, step: int) -> Recording:
+def _subsampled(recording: Recording, step: int) -> Recording:
     """Every ``step``-th sample of a run."""
 
     def each(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -133,14 +133,14 @@ def _thinned(recording: Recording, step: int) -> Recording:
             output: Band(-(-band.count // step), band.rate / step, band.cut_off)
             for output, band in recording.bands.items()
         },
-        raw=_thinned_motion(recording.raw, step),
-        smooth=_thinned_motion(recording.smooth, step),
+        raw=_subsampled_motion(recording.raw, step),
+        smooth=_subsampled_motion(recording.smooth, step),
         nominal=each(recording.nominal),
         nominal_smooth=each(recording.nominal_smooth),
     )
 
 
-def _thinned_motion(motion: Motion, step: int) -> Motion:
+def _subsampled_motion(motion: Motion, step: int) -> Motion:
     at = _every(motion.at, step)
     return replace(_every(motion, step), at=at, clock=Clock(at.time))
 

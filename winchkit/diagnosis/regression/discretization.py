@@ -190,7 +190,7 @@ def _force_correction(recording: Recording, line: Line) -> Array:
     hanging = line.motion(replace(signals, load=None, tension=None, load_mass=1.0))
     assert hanging.load is not None
     assert hanging.discretization is not None
-    inverse_sigma = hanging.load - hanging.load.mean()
-    size = float(inverse_sigma @ inverse_sigma)
-    mass = float(inverse_sigma @ tension) / size if size else 0.0
+    unit_force = hanging.load - hanging.load.mean()
+    size = float(unit_force @ unit_force)
+    mass = float(unit_force @ tension) / size if size else 0.0
     return -mass * hanging.discretization / 12

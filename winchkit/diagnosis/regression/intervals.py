@@ -169,12 +169,15 @@ class Spread:
     widening : ndarray of shape (n_unknowns,)
         Standard deviation over that of the likelihood; infinite where the runs do not determine the
         unknown.
+    covariance : ndarray of shape (n_unknowns, n_unknowns)
+        Covariance of the linearised fit by the likelihood alone.
     """
 
     std: Array
     low: Array
     high: Array
     widening: Array
+    covariance: Array
 
 
 def whitened_jacobian(regression: Regression, fit: Fit, noise: Noise) -> Array:
@@ -198,7 +201,8 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
     """
     inverse_sigma = noise.inverse_sigma(regression)
     whitened = whitened_jacobian(regression, fit, noise)
-    covariance = inverse_normal(whitened)
+    covariance_by_likelihood = inverse_normal(whitened)
+    covariance = covariance_by_likelihood.copy()
     likelihood = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     statistical = np.maximum(likelihood, _jackknife(regression, fit, noise, blocks))
     unknown = (statistical > _UNDETERMINED) | ~np.any(whitened, axis=0)
@@ -229,6 +233,7 @@ def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> 
         fit.vector - stretch * np.hypot(below, systematic),
         fit.vector + stretch * np.hypot(above, systematic),
         np.divide(std, likelihood, out=np.full_like(std, np.inf), where=likelihood > 0.0),
+        covariance_by_likelihood,
     )
 
 

@@ -21,7 +21,10 @@ from winchkit.diagnosis.regression.noise import (
 )
 from winchkit.diagnosis.regression.projection import orthonormal
 
-__all__ = ["LackOfFitTest", "lack_of_fit_test"]
+__all__ = ["BAND_LEVEL", "LackOfFitTest", "lack_of_fit_test"]
+
+BAND_LEVEL = 0.05
+"""Level of the rejection of a band, Bonferroni over all bands."""
 
 
 @dataclass(frozen=True)
@@ -85,4 +88,4 @@ def lack_of_fit_test(
     p = np.asarray(fdtrc(dof, noise.dof, ratio))
     tested = max(count, 1)
     worst = float(min(1.0, p.min() * tested)) if count else 1.0
-    return LackOfFitTest(worst, total / noise.power - dof, p * tested < 0.05)
+    return LackOfFitTest(worst, total / noise.power - dof, p * tested < BAND_LEVEL)

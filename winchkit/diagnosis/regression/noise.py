@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.data.spectrum import smoothed
 from winchkit.diagnosis.regression.base import Regression
-from winchkit.diagnosis.regression.projection import orthonormal
+from winchkit.diagnosis.regression.projection import LEAST_EIGENVALUE, orthonormal
 
 __all__ = [
     "Noise",
@@ -42,7 +41,6 @@ _KNOWN_DIFFERENCES = 6
 _NOTICEABLE = 0.02
 _REWEIGHTED = 3
 _ROWS_EACH = 4
-_LEAST_EIGENVALUE = 1e-8
 
 
 @dataclass(frozen=True)
@@ -196,14 +194,10 @@ def _inner_products(
     """Inner products of columns per band, (n_bands, p, p), and with the residual, (n_bands, p)."""
     p, count = sum(part.shape[1] for part in columns), len(regression.bands)
     gram, products = np.zeros((count, p, p)), np.zeros((count, p))
-    for segment in regression.segments:
-        ids = regression.band_of_row[segment.rows]
-        edges = np.flatnonzero(np.diff(ids, prepend=-1, append=-1))
-        for low, high in pairwise((segment.rows.start + edges).tolist()):
-            band = int(regression.band_of_row[low])
-            own = np.hstack([part[low:high] for part in columns])
-            gram[band] += own.T @ own
-            products[band] += own.T @ residual[low:high]
+    for band, rows in regression.rows_by_band():
+        own = np.hstack([part[rows] for part in columns])
+        gram[band] += own.T @ own
+        products[band] += own.T @ residual[rows]
     return gram, products
 
 
@@ -218,7 +212,7 @@ def _orthonormalizing(inner: Array, most: int) -> Array:
         return np.zeros((len(inner), 0))
     scaled = inner[np.ix_(present, present)] / np.outer(size[present], size[present])
     values, vectors = np.linalg.eigh(scaled)
-    kept = values > _LEAST_EIGENVALUE * values[-1]
+    kept = values > LEAST_EIGENVALUE * values[-1]
     kept[: max(0, len(values) - most)] = False
     out = np.zeros((len(inner), int(np.count_nonzero(kept))))
     out[present] = (vectors[:, kept] / np.sqrt(values[kept])) / size[present, None]

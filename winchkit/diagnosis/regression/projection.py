@@ -7,6 +7,7 @@ import numpy as np
 from winchkit.arrays import Array
 
 __all__ = [
+    "LEAST_EIGENVALUE",
     "explained_ss",
     "explained_ss_of_sets",
     "inverse_information",
@@ -16,6 +17,8 @@ __all__ = [
 ]
 
 _UNIDENTIFIABLE = 1e-12
+LEAST_EIGENVALUE = 1e-8
+"""Eigenvalues of scaled inner products below this share of the largest are no direction."""
 
 
 def explained_ss(inner: Array, products: Array, least: float) -> float:
@@ -62,7 +65,7 @@ def orthonormal(columns: Array, most: int | None = None) -> Array:
     if not scaled.shape[1]:
         return np.zeros((len(columns), 0))
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    kept = values > 1e-8 * values[-1]
+    kept = values > LEAST_EIGENVALUE * values[-1]
     if most is not None:
         kept[: max(0, len(values) - most)] = False
     return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))

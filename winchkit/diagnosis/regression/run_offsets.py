@@ -25,7 +25,7 @@ from scipy.special import fdtrc
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import mean_load
-from winchkit.diagnosis.data.zeroing import BLOCKS, LEVEL, anew, wanders
+from winchkit.diagnosis.data.zeroing import BLOCKS, LEVEL, is_random_walk, zeroed_finding
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -84,8 +84,8 @@ def offset_between_runs(regression: TimeSeriesRegression, fit: Fit, output: str)
     -------
     Finding or None
         None with fewer than two runs, or where the offsets are within the variation over eight
-        blocks of time of every run, F(k, 7 G) for k contrasts of G runs, or no larger than a wander
-        from a common zero makes them.
+        blocks of time of every run, F(k, 7 G) for k contrasts of G runs, or no larger than a random
+        walk from a common zero makes them.
     """
     dataset = regression.dataset
     own = [s for s in regression.segments if s.output == output]
@@ -126,9 +126,9 @@ def offset_between_runs(regression: TimeSeriesRegression, fit: Fit, output: str)
     shifts = np.array(
         [float((rest + directions @ amplitudes)[run == k].mean()) for k in range(len(own))]
     )
-    if p_value >= LEVEL or wanders(means + (shifts - shifts.mean())[:, None]):
+    if p_value >= LEVEL or is_random_walk(means + (shifts - shifts.mean())[:, None]):
         return None
-    return anew(output, float(np.std(shifts, ddof=1)), p_value, "runs")
+    return zeroed_finding(output, float(np.std(shifts, ddof=1)), p_value, "runs")
 
 
 def run_offsets(

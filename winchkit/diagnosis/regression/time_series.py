@@ -153,6 +153,17 @@ class TimeSeriesRegression(Regression):
         """Inverse transform of the rows, one array of samples per segment."""
         return [to_time(rows[s.rows], s.band) for s in self.segments]
 
+    def compared_samples(self, rows: Array, output: str) -> Array:
+        """Rows (n_rows,) of one output as samples in time, those compared, runs in sequence."""
+        recordings = self.dataset.recordings
+        return np.concatenate(
+            [
+                to_time(rows[s.rows], s.band)[recordings[s.run].valid[output]]
+                for s in self.segments
+                if s.output == output
+            ]
+        )
+
     def signal_rms(self, output: str) -> float:
         """Rms of a measured output within the band of the comparison, SI."""
         squares, count = 0.0, 0

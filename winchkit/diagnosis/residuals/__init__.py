@@ -1,5 +1,6 @@
 """Residual analysis: what remains after the fit.
 
-Errors per output (``error_statistics``), their attribution to variables and orders by the
-correlation ratio η² (``attribution``), and their means over two variables (``maps``).
+Its power above the low-pass filter's cut-off (``stop_band_leakage``), its attribution to variables
+and orders by the correlation ratio η² (``attribution``), its means over two variables (``maps``),
+and its values over time (``traces``).
 """

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ __all__ = [
     "quantile_bins",
     "ranked",
     "strongest_harmonic",
+    "sums_by_order",
     "variables_of",
 ]
 
@@ -62,8 +63,13 @@ class Attribution:
     order: int | None = None
     """Periods per turn, where the variable is an angle."""
     frequency: float | None = None
+    """Middle of the band, Hz, where the variable is the time."""
     line: str | None = None
     """Line of a robot, or axis of its platform, that has most of the share."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Dictionary that the command prints: order, frequency and line only where present."""
+        return {key: value for key, value in vars(self).items() if value is not None}
 
 
 class _HasShare(Protocol):
@@ -106,20 +112,17 @@ def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attr
     list of Attribution
         Those whose share exceeds 2 % and three standard deviations of its null distribution.
     """
-    times = regression.in_time(residual)
     out: list[Attribution] = []
     known = [variables_of(recording) for recording in regression.dataset.recordings]
     for output in regression.dataset.outputs:
-        own = [
-            (s, t) for s, t in zip(regression.segments, times, strict=True) if s.output == output
-        ]
-        valid = [regression.dataset.recordings[s.run].valid[output] for s, _ in own]
-        error = np.concatenate([t[v] for (_, t), v in zip(own, valid, strict=True)])
+        runs = [s.run for s in regression.segments if s.output == output]
+        valid = [regression.dataset.recordings[run].valid[output] for run in runs]
+        error = regression.compared_samples(residual, output)
         found, kept = [], kept_rows(regression, output)
-        for name in known[own[0][0].run]:
-            if any(name not in known[s.run] for s, _ in own):
+        for name in known[runs[0]]:
+            if any(name not in known[run] for run in runs):
                 continue
-            values = [known[s.run][name][v] for (s, _), v in zip(own, valid, strict=True)]
+            values = [known[run][name][v] for run, v in zip(runs, valid, strict=True)]
             share = binned_share(np.concatenate(values), error, kept)
             if share > chance_share(BINS, kept):
                 found.append(Attribution(output, name, share))
@@ -236,6 +239,32 @@ def half_of_samples_per_turn(angles: Iterable[Array]) -> int:
     return int(min(_TURN / step[last] / 2, _MOST_ORDERS))
 
 
+def sums_by_order(
+    angle: Array, values: Array, resolved: int, highest: int
+) -> NDArray[np.complex128]:
+    """Sums Σ x exp(ikθ) over samples, for the orders k from 1 to ``highest``, (highest,).
+
+    Parameters
+    ----------
+    angle, values : (n,) arrays
+        Angles θ, rad, and what is summed, x.
+    resolved : int
+        Order of whose period a cell is a thirty-second.
+    highest : int
+        Highest order.
+
+    Notes
+    -----
+    The samples are summed within equal cells of the turn, and these by one Fourier transform; the
+    phase of a sample is that of the middle of its cell.
+    """
+    cells = _CELLS * resolved
+    cell = np.floor(angle * (cells / _TURN)).astype(np.int64) % cells
+    middle = np.exp(0.5j * _TURN / cells * np.arange(1, highest + 1))
+    sums = np.fft.rfft(np.bincount(cell, values, cells))[1 : highest + 1]
+    return np.asarray(np.conj(sums) * middle)
+
+
 def strongest_harmonic(angle: Array, error: Array, orders: int) -> tuple[int, float] | None:
     """The order from 1 to ``orders`` whose sine explains most of a residual, and its share.
 
@@ -253,18 +282,13 @@ def strongest_harmonic(angle: Array, error: Array, orders: int) -> tuple[int, fl
 
     Notes
     -----
-    All orders are compared by Fourier transforms of the samples within cells of the turn, of a
-    thirty-second of the shortest period each; the share of the best one is exact.
+    All orders are compared by :func:`sums_by_order`; the share of the best one is exact.
     """
     total = float(error @ error)
     if total == 0.0 or not orders:
         return None
-    cells = _CELLS * orders
-    cell = np.floor(angle * (cells / _TURN)).astype(np.int64) % cells
-    middle = np.exp(0.5j * _TURN / cells * np.arange(1, 2 * orders + 1))
     toward, sums = (
-        np.conj(np.fft.rfft(np.bincount(cell, weights, cells))[1 : 2 * orders + 1]) * middle
-        for weights in (error, np.ones(len(error)))
+        sums_by_order(angle, values, orders, 2 * orders) for values in (error, np.ones(len(error)))
     )
     explained = _explained(toward[:orders], sums[1::2], len(angle))
     best = int(np.argmax(explained))
@@ -275,7 +299,7 @@ def strongest_harmonic(angle: Array, error: Array, orders: int) -> tuple[int, fl
     return best + 1, float(exact[0]) / total
 
 
-def _explained(toward: Array, twice: Array, count: int) -> Array:
+def _explained(toward: NDArray[np.complex128], twice: NDArray[np.complex128], count: int) -> Array:
     """Sum of squares that cosine and sine of each order explain; zero where not identifiable.
 
     From the sums of e exp(ikθ) and of exp(2ikθ) over ``count`` samples, complex, (orders,).

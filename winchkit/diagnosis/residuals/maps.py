@@ -86,7 +86,7 @@ def residual_maps(regression: TimeSeriesRegression, residual: Array) -> list[Res
     known = [variables_of(recording) for recording in regression.dataset.recordings]
     out: list[ResidualMap] = []
     for output in regression.dataset.outputs:
-        error, kept = _errors(regression, residual, output), kept_rows(regression, output)
+        error, kept = regression.compared_samples(residual, output), kept_rows(regression, output)
         found = [
             drawn
             for pair in PAIRS
@@ -104,7 +104,7 @@ def same_cells(
     """Map of another residual of the same problem over the cells of ``like``."""
     known = [variables_of(recording) for recording in regression.dataset.recordings]
     places = _places(regression, known, like.output, like.over)
-    error = _errors(regression, residual, like.output)
+    error = regression.compared_samples(residual, like.output)
     kept = kept_rows(regression, like.output)
     return None if places is None else _map_of(like.output, places, error, kept)
 
@@ -143,19 +143,6 @@ def _name(name: str, known: Mapping[str, Array]) -> str:
 
 def _within_turn(name: str, values: Array) -> Array:
     return np.mod(values, 2 * np.pi) if name in ANGLES else values
-
-
-def _errors(regression: TimeSeriesRegression, residual: Array, output: str) -> Array:
-    """Residual of an output at its compared samples, runs in sequence."""
-    times = regression.in_time(residual)
-    recordings = regression.dataset.recordings
-    return np.concatenate(
-        [
-            time[recordings[s.run].valid[output]]
-            for s, time in zip(regression.segments, times, strict=True)
-            if s.output == output
-        ]
-    )
 
 
 def _map_of(output: str, places: _Places, error: Array, kept: int) -> ResidualMap | None:

@@ -22,15 +22,15 @@ from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
 __all__ = [
-    "RobotGrown",
+    "FittedRobotAddition",
     "add_to_robot",
-    "grow_robot",
+    "fitted_robot_addition",
     "remove_from_robot",
 ]
 
 
 @dataclass(frozen=True)
-class RobotGrown:
+class FittedRobotAddition:
     """An addition with everything that it was derived from, for reports.
 
     Attributes
@@ -83,16 +83,16 @@ def add_to_robot(
     RunError
         With every fault of every run.
     """
-    return grow_robot(effect_id, runs, profile, line, catalogue).addition
+    return fitted_robot_addition(effect_id, runs, profile, line, catalogue).addition
 
 
-def grow_robot(
+def fitted_robot_addition(
     effect_id: str,
     runs: Sequence[Run],
     profile: RobotProfile,
     line: str | None = None,
     catalogue: Catalogue | None = None,
-) -> RobotGrown:
+) -> FittedRobotAddition:
     """The same as :func:`add_to_robot`, with the errors at every pose."""
     require_types(runs, Run, "runs")
     require_type(profile, RobotProfile, "profile")
@@ -127,7 +127,7 @@ def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
     return at_line(effect, line)
 
 
-def _added(preparation: Preparation, effect: Effect) -> RobotGrown:
+def _added(preparation: Preparation, effect: Effect) -> FittedRobotAddition:
     engine = preparation.file_geometry()
     initial_model, noise = engine.fit_with_noise(engine.initial_model)
     scores = [s for s in engine.scores(initial_model, noise) if s.candidate.effect.id == effect.id]
@@ -152,7 +152,7 @@ def _added(preparation: Preparation, effect: Effect) -> RobotGrown:
     addition = Addition(
         output_fits_of(before, after, preparation.noise), terms, preparation.dataset.notes
     )
-    return RobotGrown(regression, (was, now), addition)
+    return FittedRobotAddition(regression, (was, now), addition)
 
 
 def remove_from_robot(

@@ -14,6 +14,7 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.trajectory import Trajectory, trajectory_of
 from winchkit.errors import Fault, RunError
+from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.runs.poses import Measured, read_poses, read_trajectory
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
@@ -21,7 +22,6 @@ from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["RobotDataset", "prepare_poses"]
 
-_FREEDOMS = 6
 _LEAST_POSES = 10
 """Least number of poses (rule of thumb)."""
 _ANGLE_TOLERANCE = 0.02
@@ -68,7 +68,7 @@ class RobotDataset(Dataset):
     @property
     def hangs(self) -> bool:
         """Whether cable forces and the weight determine where the platform stands."""
-        few = len(self.names) < _FREEDOMS and self.robot.platform.mass > 0
+        few = len(self.names) < PLATFORM_DOF and self.robot.platform.mass > 0
         return few and self.has_balance
 
     @property
@@ -115,7 +115,7 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
         )
     kinds = (measured.motor_angle, measured.position, measured.angles)
     spare = sum(int(np.isfinite(values).sum()) for values in kinds) - 6 * len(measured)
-    if len(robot.line) < _FREEDOMS and robot.platform.mass > 0:
+    if len(robot.line) < PLATFORM_DOF and robot.platform.mass > 0:
         spare += 6 * int(np.isfinite(measured.tension).all(axis=1).sum())
     for values in (measured.swivel, measured.cable_length):
         # Each line's instrument has a zero of its own.

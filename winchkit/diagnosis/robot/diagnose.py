@@ -24,8 +24,9 @@ from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.traces import PoseTrace, pose_traces
-from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, Where, plain_step
+from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, plain_step
 from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.candidates import GEOMETRY
 from winchkit.diagnosis.robot.engine import PoseSelection
@@ -260,10 +261,9 @@ def _registered_steps(
     )
 
 
-def _places(selection: RobotSelection) -> tuple[Where, ...]:
+def _places(selection: RobotSelection) -> tuple[Attribution, ...]:
     """Variables that explain the unexplained residual, the largest share first."""
-    result = pose_attributions(*selection.rest)
-    places = [Where(f.output, f.variable, f.share, line=f.line) for f in result]
+    places = pose_attributions(*selection.rest)
     return tuple(sorted(places, key=lambda w: -w.share)[:_MOST_PLACES])
 
 

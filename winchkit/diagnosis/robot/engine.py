@@ -13,7 +13,7 @@ from winchkit.diagnosis.data.spectrum import smoothed
 from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
+from winchkit.diagnosis.regression.lack_of_fit import BAND_LEVEL, LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise, noise_saturated
 from winchkit.diagnosis.robot.candidates import BALANCING
 from winchkit.diagnosis.robot.errors import FittedModel, held_out_rms
@@ -87,7 +87,7 @@ class PoseSelection(SelectionEngine):
         dof = np.maximum(np.bincount(bands[real], minlength=count) - taken, 1.0)
         p = np.asarray(fdtrc(dof, noise.dof, total / dof))
         worst = float(min(1.0, p.min() * count))
-        return LackOfFitTest(worst, total - dof, p * count < 0.05)
+        return LackOfFitTest(worst, total - dof, p * count < BAND_LEVEL)
 
 
 class TrajectorySelection(PoseSelection):

@@ -25,6 +25,7 @@ from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.diagnosis.robot.equations import POSED
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.variance_components import PoseNoise
+from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.model.robot.rotation import rotation_by, skew
 
 __all__ = [
@@ -41,7 +42,6 @@ __all__ = [
 
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
-_DEGREES_OF_FREEDOM = 6
 _LEAST_SINGULAR_VALUE = 1e-9
 
 
@@ -81,7 +81,7 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
     out = {"cable_length": np.where(np.isfinite(closure), -length, np.nan)}
-    if regression.dataset.measured.motor_angle.shape[1] >= _DEGREES_OF_FREEDOM:
+    if regression.dataset.measured.motor_angle.shape[1] >= PLATFORM_DOF:
         whole = np.isfinite(residuals["rope"]).all(axis=1, keepdims=True)
         known_closure = np.where(whole, np.nan_to_num(residuals["rope"]), np.nan)
         found = residuals["position"] - (to_place @ known_closure[..., None])[..., 0]

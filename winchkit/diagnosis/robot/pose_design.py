@@ -290,9 +290,9 @@ def pose_offers(
     for kind, measured, pose in simulated:
         own = slice(begin, begin + len(measured))
         begin = own.stop
-        chosen, strength = _chosen([part[own] for part in parts], base, required, count)
+        chosen, noncentralities = _chosen([part[own] for part in parts], base, required, count)
         at = Pose(pose.position[chosen], pose.rotation[chosen])
-        powers = _powers(strength, required)
+        powers = _powers(noncentralities, required)
         out.append(
             PoseOffer(
                 kind,
@@ -306,9 +306,9 @@ def pose_offers(
     return out
 
 
-def _powers(strength: Sequence[float], required: Sequence[float]) -> tuple[float, ...]:
+def _powers(noncentralities: Sequence[float], required: Sequence[float]) -> tuple[float, ...]:
     """Power for each question."""
-    return tuple(power_of(*both) for both in zip(strength, required, strict=True))
+    return tuple(power_of(*both) for both in zip(noncentralities, required, strict=True))
 
 
 def reach(offer: PoseOffer) -> tuple[float, float]:

@@ -27,6 +27,7 @@ from winchkit.model.robot.identification.tracker import (
     registered,
 )
 from winchkit.model.robot.identification.variance_components import START
+from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.model.robot.rotation import rotation_by, rotation_vector
 from winchkit.schema.profiles.instruments import ImuSpec
 
@@ -152,13 +153,10 @@ def _predicted(dataset: RobotDataset, robot: Robot) -> Pose:
     measured = dataset.measured
     tension = np.where(np.isfinite(measured.tension), measured.tension, 0.0)
     warm = np.where(np.isfinite(measured.temperature), measured.temperature, 20.0)
-    if len(robot.names) < _FREEDOMS and not robot.platform.mass > 0:
+    if len(robot.names) < PLATFORM_DOF and not robot.platform.mass > 0:
         nothing = np.full((len(measured), 3), np.nan)
         return Pose(nothing, np.full((len(measured), 3, 3), np.nan))
     return robot.poses_at(measured.motor_angle, tension=tension, temperature=warm).pose
-
-
-_FREEDOMS = 6
 
 
 def _error(tracker: Tracker, pose: Pose, seen: Array) -> float:

@@ -296,8 +296,8 @@ class PoseRegression(Regression):
         self._keep = {"cable_length": keep}
         for p in np.flatnonzero(~known.all(axis=1)):
             free = left[p][known[p]][:, keep[p]]
-            own, strength, _ = np.linalg.svd(free, full_matrices=False)
-            count = int(np.sum(strength > 0.5))
+            own, singular_values, _ = np.linalg.svd(free, full_matrices=False)
+            count = int(np.sum(singular_values > 0.5))
             self._basis[p] = 0.0
             place = np.ix_(np.flatnonzero(known[p]), np.arange(count))
             self._basis[p][place] = own[:, :count]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.input_denoising import contrasts
+from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.robot.equations import POSED
 from winchkit.model.robot.identification.variance_components import START as COMMON
 from winchkit.model.robot.identification.variance_components import re_estimated
@@ -168,11 +169,6 @@ def _pose_basis(slope: Array) -> Array:
 def _strongest(columns: Array, most: int) -> Array:
     """Orthonormal basis of the ``most`` strongest directions of columns scaled to length one."""
     size = np.sqrt(np.sum(columns**2, axis=0))
+    # Columns of rounding errors would be scaled to length one too.
     there = size > 1e-9 * max(float(size.max(initial=0.0)), 1e-300)
-    scaled = columns[:, there] / size[there]
-    if not scaled.shape[1]:
-        return np.zeros((len(columns), 0))
-    values, vectors = np.linalg.eigh(scaled.T @ scaled)
-    kept = values > 1e-8 * values[-1]
-    kept[: max(0, len(values) - most)] = False
-    return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
+    return orthonormal(columns[:, there], most)

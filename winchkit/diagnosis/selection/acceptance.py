@@ -45,7 +45,7 @@ def best_accepted(
 def is_accepted(
     engine: SelectionEngine,
     present: Fit,
-    grown: Fit,
+    larger: Fit,
     noise: Noise,
     largest_ratio: float = RELEVANT_RATIO,
 ) -> bool:
@@ -55,7 +55,7 @@ def is_accepted(
     ----------
     engine
         Selection engine.
-    present, grown
+    present, larger
         Fits of the smaller and the larger model.
     noise
         Noise variance.
@@ -72,27 +72,29 @@ def is_accepted(
     regression = engine.regression
     blocks = regression.blocks
     before = held_out(regression, present, noise, blocks)
-    after = held_out(regression, grown, noise, blocks)
-    groups = engine.folds(grown, noise)
-    gain = held_out(regression, present, noise, groups) - held_out(regression, grown, noise, groups)
+    after = held_out(regression, larger, noise, blocks)
+    groups = engine.folds(larger, noise)
+    gain = held_out(regression, present, noise, groups) - held_out(
+        regression, larger, noise, groups
+    )
     gains_in_every_group = engine.grouped(groups) and bool(
-        np.min(gain) > engine.penalty_per_parameter * _added(present, grown)
+        np.min(gain) > engine.penalty_per_parameter * _added(present, larger)
     )
     if np.sum(before - after) <= 0 or (
         signed_rank_p_value(before, after) > _LEVEL and not gains_in_every_group
     ):
         return False
     was = held_out_rms(regression, present, noise, groups)
-    now = held_out_rms(regression, grown, noise, groups)
+    now = held_out_rms(regression, larger, noise, groups)
     ratios = [now[output] / was[output] for output in regression.outputs]
     # A significant but irrelevant effect, such as a clock offset of 1 ms, is not added.
     return bool(np.sum(gain) > 0 and min(ratios) < largest_ratio and max(ratios) < _NO_WORSE)
 
 
-def _added(present: Fit, grown: Fit) -> int:
+def _added(present: Fit, larger: Fit) -> int:
     """Number of parameters that the larger model has more, at least one."""
     after, before = (
         sum(Coordinates(term.effect).n_parameters for term in fitted.hypothesis.terms)
-        for fitted in (grown, present)
+        for fitted in (larger, present)
     )
     return max(1, after - before)

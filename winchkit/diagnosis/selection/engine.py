@@ -89,16 +89,16 @@ def _is_feasible(item: Score) -> bool:
     return bool(np.any(start_values != coordinates.vector(base)[amplitudes]))
 
 
-Answer = TypeVar("Answer")
+Kept = TypeVar("Kept")
 
 
-class LastValue(Generic[Answer]):
+class LastValue(Generic[Kept]):
     """Value computed for a fit and a noise, kept until another fit or noise is given."""
 
     def __init__(self) -> None:
-        self._kept: tuple[Fit, Noise, Answer] | None = None
+        self._kept: tuple[Fit, Noise, Kept] | None = None
 
-    def of(self, fit: Fit, noise: Noise, compute: Callable[[], Answer]) -> Answer:
+    def of(self, fit: Fit, noise: Noise, compute: Callable[[], Kept]) -> Kept:
         """The kept value, or a new one where the fit or the noise is another object."""
         if self._kept is None or self._kept[0] is not fit or self._kept[1] is not noise:
             self._kept = fit, noise, compute()
@@ -231,11 +231,11 @@ class SelectionEngine(ABC):
         return self.coarse_problem(noise) if nonlinear or len(starts) > 1 else None
 
     def folds(self, fitted: Fit, noise: Noise) -> Folds:
-        """Folds for leave-group-out cross-validation of a fit; the last answer is kept."""
+        """Folds for leave-group-out cross-validation of a fit; the last result is kept."""
         return self._last_folds.of(fitted, noise, lambda: self._choose_folds(fitted, noise))
 
     def lack_of_fit_test(self, present: Fit, noise: Noise) -> LackOfFitTest:
-        """Lack-of-fit test of a fit; the last answer is kept."""
+        """Lack-of-fit test of a fit; the last result is kept."""
         return self._last_lack_of_fit_test.of(
             present, noise, lambda: self._test_lack_of_fit(present, noise)
         )
@@ -278,11 +278,13 @@ class SelectionEngine(ABC):
         """
         self._last_projected = LastValue()
         effects = self._absent() if self._new_orders(present) else []
-        grown = updated_signatures(self.regression, present, self.signatures, effects, self.coarse)
-        if grown is None:
+        updated = updated_signatures(
+            self.regression, present, self.signatures, effects, self.coarse
+        )
+        if updated is None:
             del self.signatures  # Both together would double the peak memory.
-            grown = self._signatures(present)
-        self.signatures = grown
+            updated = self._signatures(present)
+        self.signatures = updated
 
     def fit_with_noise(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
         """Fit a hypothesis and estimate the noise from its residual.
@@ -312,7 +314,7 @@ class SelectionEngine(ABC):
         return second, noise
 
     def projected(self, present: Fit, noise: Noise) -> Projected:
-        """Signatures with the unknowns of a fit partialled out; the last answer is kept."""
+        """Signatures with the unknowns of a fit partialled out; the last result is kept."""
 
         def compute() -> Projected:
             return Projected(self.regression, self.signatures, present.jacobian, noise)
@@ -362,7 +364,7 @@ class SelectionEngine(ABC):
         item: Score,
         noise: Noise,
         *,
-        anew: bool = False,
+        all_starts: bool = False,
         target: float | None = None,
         aim: float | None = None,
     ) -> Trial:
@@ -380,7 +382,7 @@ class SelectionEngine(ABC):
             Score of the candidate, with its starting amplitudes.
         noise
             Noise variance.
-        anew
+        all_starts
             Whether to search from all starting values in any case.
         target
             χ² that the trial has to reach: its fit is abandoned where that is out of reach.
@@ -398,7 +400,7 @@ class SelectionEngine(ABC):
         best: Trial | None = None
         for law in truncated_series(effect):
             key = _key(hypothesis, law, item)
-            if not anew and key in self._optima:
+            if not all_starts and key in self._optima:
                 fitted = fit_from(
                     self.regression,
                     [self._optima[key]],
@@ -421,7 +423,7 @@ class SelectionEngine(ABC):
                     goal,
                     aim=aim,
                 )
-            if not anew:
+            if not all_starts:
                 self._optima[key] = fitted.hypothesis
             longer = Trial(fitted, self._criterion_of_trial(fitted, hypothesis, present, noise))
             if best is not None and not longer.criterion < best.criterion:
@@ -455,7 +457,7 @@ class SelectionEngine(ABC):
         places = starting_points(self.regression, hypothesis, present, item, inverse_sigma)
         terms = [Term(item.candidate.effect, values) for values in places]
         starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
-        return starts + [anew for start in starts for anew in self._without_discretization(start)]
+        return starts + [one for start in starts for one in self._without_discretization(start)]
 
     def without_minor_orders(self, fitted: Fit, noise: Noise) -> Fit:
         """A fit without the orders of its series that decrease χ² by less than their penalty.
@@ -533,7 +535,7 @@ class SelectionEngine(ABC):
         )
 
     def refit(self, hypothesis: Hypothesis, noise: Noise, aim: float = np.inf) -> Fit:
-        """Fit a hypothesis under a given noise; the last answers are kept.
+        """Fit a hypothesis under a given noise; the last results are kept.
 
         It starts from the values found for the same effects before, where these fit better.
 

@@ -87,7 +87,7 @@ class Exchange:
         if rival_beside is None or least_held - rival_beside.explained_ss > limit:
             return first_trial
         second_trial = self._engine.trial(
-            held, rival_beside, self._noise, anew=True, target=least, aim=target
+            held, rival_beside, self._noise, all_starts=True, target=least, aim=target
         )
         return min(
             first_trial, second_trial, key=lambda trial: (trial.criterion, trial.fit.chi_square)
@@ -143,8 +143,8 @@ def _better(
         # New effects first: one that explained both would keep its old values.
         first, second = sorted(pair.scores, key=lambda item: item.candidate.effect.id in removed)
         goal = present.chi_square
-        begun = engine.trial(base, first, noise, aim=goal).fit
-        trial = engine.trial(begun, second, noise, target=goal)
+        with_first = engine.trial(base, first, noise, aim=goal).fit
+        trial = engine.trial(with_first, second, noise, target=goal)
         if trial.criterion < engine.criterion(present) - MIN_GAIN:
             return trial.fit
     return None

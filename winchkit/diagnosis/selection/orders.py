@@ -26,7 +26,7 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import half_of_samples_per_turn
+from winchkit.diagnosis.residuals.attribution import half_of_samples_per_turn, sums_by_order
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.effects.parametrization import Coordinates
@@ -37,7 +37,6 @@ __all__ = ["Periodogram", "further_orders", "has_orders", "periodogram", "with_o
 
 _LEVEL = 0.01
 _MOST_IN_SERIES = 24
-_CELLS = 32
 _LEAST_WITHIN = 0.1
 _RATES = 200
 _TURN = 2 * np.pi
@@ -141,18 +140,10 @@ def periodogram(
 def _products(
     regression: TimeSeriesRegression, segment: Segment, weighted: Array, envelope: Array, count: int
 ) -> NDArray[np.complex128]:
-    """Inner products of weighted rows of one segment with E exp(ikθ), k from 1 to ``count``.
-
-    The samples are summed within cells of the turn, a small part of the shortest period each.
-    """
+    """Inner products of weighted rows of one segment with E exp(ikθ), k from 1 to ``count``."""
     angle = regression.dataset.recordings[segment.run].signals.motor_angle
-    cells = _CELLS * count
-    cell = np.floor(angle * (cells / _TURN)).astype(np.int64) % cells
-    summed = np.bincount(
-        cell, to_time(segment.band.gain * weighted, segment.band) * envelope, cells
-    )
-    middle = np.exp(0.5j * _TURN / cells * np.arange(1, count + 1))
-    return np.asarray(np.conj(np.fft.rfft(summed)[1 : count + 1]) * middle)
+    samples = to_time(segment.band.gain * weighted, segment.band) * envelope
+    return sums_by_order(angle, samples, count, count)
 
 
 def _squared_lengths(

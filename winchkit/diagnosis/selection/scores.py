@@ -23,7 +23,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.projection import inverse_information
-from winchkit.diagnosis.selection.signatures import Candidate, Signatures, pieces
+from winchkit.diagnosis.selection.signatures import Candidate, Signatures
 
 __all__ = ["Projected", "Score", "null_maxima", "score", "zero_score"]
 
@@ -185,7 +185,7 @@ def _cross(regression: Regression, jacobian: Array, signatures: Signatures) -> t
     """Inner products of unknowns with columns and among unknowns, per band."""
     count, q = len(regression.bands), jacobian.shape[1]
     cross, normal = np.zeros((count, q, signatures.count)), np.zeros((count, q, q))
-    for band, rows in pieces(regression) if q else ():
+    for band, rows in regression.rows_by_band() if q else ():
         output = regression.bands[band][0]
         columns = signatures.rows_of(output, rows)
         cross[band][:, signatures.reached[output]] += jacobian[rows].T @ columns.T

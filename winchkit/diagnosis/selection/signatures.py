@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["Candidate", "Signatures", "pieces", "signatures", "updated_signatures"]
+__all__ = ["Candidate", "Signatures", "signatures", "updated_signatures"]
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ class Signatures:
         return out
 
 
-class _Canvas:
+class _ColumnWriter:
     """Writes the columns of effects beside one model, for some outputs."""
 
     def __init__(
@@ -136,7 +135,7 @@ class _Canvas:
         self._present = present
         self._here = regression.change(present, outputs)
 
-    def draw(self, column: NDArray[np.float32], term: Term, outputs: Collection[str]) -> bool:
+    def write(self, column: NDArray[np.float32], term: Term, outputs: Collection[str]) -> bool:
         """Write the change by a term into its rows of some outputs; False where there is none."""
         if not outputs:
             return False
@@ -172,7 +171,7 @@ def signatures(
     coarse
         Coarse regression, on which later changes of the columns are noticed; None for none.
     """
-    canvas = _Canvas(regression, present, regression.outputs)
+    writer = _ColumnWriter(regression, present, regression.outputs)
     tried = list(points(regression, effects))
     candidates: list[Candidate] = []
     without_signature: list[Absent] = []
@@ -185,7 +184,7 @@ def signatures(
         reached = regression.outputs_of(effect.stage)
         for usual_step in usual_steps:
             term = Term(effect, {**effect.null, **shape, **usual_step})
-            if canvas.draw(memory[count], term, reached):
+            if writer.write(memory[count], term, reached):
                 own.append(usual_step)
                 count += 1
             else:
@@ -205,9 +204,9 @@ def signatures(
     _multiply(found, regression, dict.fromkeys(regression.outputs))
     if coarse is None:
         return found
-    sketch = np.zeros((most, coarse.regression.n_rows), np.float32)
-    _draw(coarse.regression, coarse.reduced(present), candidates, sketch)
-    return replace(found, coarse=sketch)
+    on_coarse = np.zeros((most, coarse.regression.n_rows), np.float32)
+    _write_columns(coarse.regression, coarse.reduced(present), candidates, on_coarse)
+    return replace(found, coarse=on_coarse)
 
 
 def updated_signatures(
@@ -246,24 +245,24 @@ def updated_signatures(
         for effect, shape, steps in points(regression, effects)
         if (effect.id, shape) not in known
     ]
-    grown = _with_new_candidates(regression, present, previous, touched, new_points)
-    if grown is None:
+    updated = _with_new_candidates(regression, present, previous, touched, new_points)
+    if updated is None:
         return None
-    found, new = grown
+    found, new = updated
     again = _changed_columns(found, present, touched, coarse)
     again[new] = True
-    canvas = _Canvas(regression, present, touched)
+    writer = _ColumnWriter(regression, present, touched)
     for candidate in previous.candidates:
         reached = touched & regression.outputs_of(candidate.effect.stage)
         for index, term in _terms(candidate):
             if again[index]:
-                canvas.draw(found.memory[index], term, reached)
-    drawn = {
+                writer.write(found.memory[index], term, reached)
+    written = {
         output: np.flatnonzero(again[found.reached[output]])
         for output in regression.outputs
         if output in touched or len(new)
     }
-    _multiply(found, regression, drawn)
+    _multiply(found, regression, written)
     return found
 
 
@@ -278,12 +277,12 @@ def _with_new_candidates(
 
     None where a candidate that has columns gets a further one, or where there is no room.
     """
-    canvas, spare = (
-        _Canvas(regression, present, touched),
+    writer, spare = (
+        _ColumnWriter(regression, present, touched),
         np.empty(regression.n_rows, np.float32),
     )
     known = [(candidate.effect.id, candidate.shape) for candidate in previous.candidates]
-    complete: _Canvas | None = None
+    complete: _ColumnWriter | None = None
     candidates, left, count = list(previous.candidates), [], previous.count
     for place, (effect, shape, usual_steps) in enumerate(
         (*previous.without_signature, *new_points)
@@ -291,15 +290,15 @@ def _with_new_candidates(
         stage = regression.outputs_of(effect.stage)
         terms = [Term(effect, {**effect.null, **shape, **step}) for step in usual_steps]
         before = place < len(previous.without_signature)
-        if before and not any(canvas.draw(spare, term, set(touched) & stage) for term in terms):
+        if before and not any(writer.write(spare, term, set(touched) & stage) for term in terms):
             left.append((effect, shape, usual_steps))
             continue
         if (effect.id, shape) in known or count + len(terms) > len(previous.memory):
             return None
-        complete = complete or _Canvas(regression, present, regression.outputs)
+        complete = complete or _ColumnWriter(regression, present, regression.outputs)
         own: list[dict[str, float]] = []
         for term, step in zip(terms, usual_steps, strict=True):
-            if complete.draw(previous.memory[count], term, stage):
+            if complete.write(previous.memory[count], term, stage):
                 own.append(step)
                 count += 1
         if own:
@@ -338,18 +337,18 @@ def _reached(
     return {output: np.array(own, dtype=np.intp) for output, own in out.items()}
 
 
-def _draw(
+def _write_columns(
     regression: Regression,
     present: Hypothesis,
     candidates: Iterable[Candidate],
     memory: NDArray[np.float32],
 ) -> None:
     """Write the columns of candidates beside a model."""
-    canvas = _Canvas(regression, present, regression.outputs)
+    writer = _ColumnWriter(regression, present, regression.outputs)
     for candidate in candidates:
         reached = regression.outputs_of(candidate.effect.stage)
         for index, term in _terms(candidate):
-            canvas.draw(memory[index], term, reached)
+            writer.write(memory[index], term, reached)
 
 
 def _changed_columns(
@@ -363,7 +362,7 @@ def _changed_columns(
     if coarse is None or found.coarse is None:
         return np.ones(count, dtype=bool)
     here = np.zeros((count, coarse.regression.n_rows), np.float32)
-    _draw(coarse.regression, coarse.reduced(present), found.candidates, here)
+    _write_columns(coarse.regression, coarse.reduced(present), found.candidates, here)
     out = np.zeros(count, dtype=bool)
     for rows in coarse.regression.rows_of(touched):
         before, after = found.coarse[:count, rows], here[:, rows]
@@ -377,36 +376,27 @@ def _changed_columns(
 def _multiply(
     found: Signatures,
     regression: Regression,
-    drawn: Mapping[str, NDArray[np.intp] | None],
+    written: Mapping[str, NDArray[np.intp] | None],
 ) -> None:
     """Inner products per noise band of some outputs, written into ``gram``.
 
     Parameters
     ----------
-    drawn
+    written
         By output, places of the new columns among those that reach it; None for all.
     """
     for band, (output, _, _) in enumerate(regression.bands):
         own = found.reached[output]
-        new = own if drawn.get(output, ()) is None else own[drawn.get(output, np.arange(0))]
+        new = own if written.get(output, ()) is None else own[written.get(output, np.arange(0))]
         found.gram[band][np.ix_(new, own)] = found.gram[band][np.ix_(own, new)] = 0.0
-    for band, rows in pieces(regression):
+    for band, rows in regression.rows_by_band():
         output = regression.bands[band][0]
-        if output not in drawn:
+        if output not in written:
             continue
-        places, own, columns = drawn[output], found.reached[output], found.rows_of(output, rows)
+        places, own, columns = written[output], found.reached[output], found.rows_of(output, rows)
         if places is None:
             found.gram[band][np.ix_(own, own)] += columns @ columns.T
         elif len(places):
             products, old = columns[places] @ columns.T, np.setdiff1d(np.arange(len(own)), places)
             found.gram[band][np.ix_(own[places], own)] += products
             found.gram[band][np.ix_(own[old], own[places])] += products[:, old].T
-
-
-def pieces(regression: Regression) -> Iterator[tuple[int, slice]]:
-    """Contiguous rows of one noise band, with its number."""
-    for segment in regression.segments:
-        ids = regression.band_of_row[segment.rows]
-        edges = np.flatnonzero(np.diff(ids, prepend=-1, append=-1))
-        for low, high in pairwise(edges.tolist()):
-            yield int(ids[low]), slice(segment.rows.start + low, segment.rows.start + high)

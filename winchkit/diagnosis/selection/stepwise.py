@@ -157,19 +157,19 @@ def _forward_selection(
     seen: set[tuple[str, ...]] = set()
     while present.labels not in seen:
         seen.add(present.labels)
-        grown = None
+        larger = None
         if scores and scores[0].net_gain > threshold:
             trials = _short_list(engine, present, noise, scores)
-            grown = best_accepted(engine, present, noise, trials)
-            if grown is None and any(trial.fit.abandoned for trial in trials):
+            larger = best_accepted(engine, present, noise, trials)
+            if larger is None and any(trial.fit.abandoned for trial in trials):
                 trials = _short_list(engine, present, noise, scores, complete=True)
-                grown = best_accepted(engine, present, noise, trials)
+                larger = best_accepted(engine, present, noise, trials)
             tried = tried or _fits(trials)
-        grown = grown or _best_pair(engine, present, noise)
-        if grown is None:
+        larger = larger or _best_pair(engine, present, noise)
+        if larger is None:
             break
-        engine.update_signatures(grown.hypothesis)
-        present, noise = engine.fit_with_noise(grown.hypothesis, noise)
+        engine.update_signatures(larger.hypothesis)
+        present, noise = engine.fit_with_noise(larger.hypothesis, noise)
         present, noise = _exchange_and_eliminate(engine, present, noise)
         scores = engine.scores(present, noise)
     return present, noise, tried
@@ -266,8 +266,8 @@ def _best_pair(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | Non
     trials = []
     for pair in best:
         first, second = pair.scores
-        begun = engine.trial(present, first, noise, aim=present.chi_square - pair.explained_ss)
-        trials.append(engine.trial(begun.fit, second, noise))
+        with_first = engine.trial(present, first, noise, aim=present.chi_square - pair.explained_ss)
+        trials.append(engine.trial(with_first.fit, second, noise))
     return best_accepted(engine, present, noise, trials)
 
 

@@ -116,7 +116,7 @@ class TimeSeriesSelection(SelectionEngine):
             residual = partialled_out(unknowns, residual)
         noise = noise_saturated(regression, residual, np.zeros((regression.n_rows, 0)))
         inverse_sigma = noise.inverse_sigma(regression)
-        grown = {}
+        extended = {}
         for effect in orders:
             scan = periodogram(regression, present, effect, residual, inverse_sigma)
             new = set(
@@ -125,9 +125,9 @@ class TimeSeriesSelection(SelectionEngine):
                 ]
             )
             if not new <= set(map(int, effect.parameter("order").grid)):
-                grown[effect.id] = with_orders(effect, new)
-        self._candidates = tuple(grown.get(e.id, e) for e in self._candidates)
-        return bool(grown)
+                extended[effect.id] = with_orders(effect, new)
+        self._candidates = tuple(extended.get(e.id, e) for e in self._candidates)
+        return bool(extended)
 
     def further_orders(self, fitted: Fit, effect: Effect, noise: Noise) -> tuple[Term, ...]:
         """Further orders of a fit's last effect that its residual contains."""

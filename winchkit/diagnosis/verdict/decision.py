@@ -11,7 +11,7 @@ from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.residuals.error_statistics import StopBandLeakage
+from winchkit.diagnosis.residuals.stop_band_leakage import StopBandLeakage
 from winchkit.diagnosis.results import OutputFit, Verdict
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult

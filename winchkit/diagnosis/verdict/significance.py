@@ -21,9 +21,8 @@ import numpy as np
 
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.intervals import Spread, spread_of, whitened_jacobian
+from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
@@ -121,13 +120,11 @@ def excess_evidence(
     without = fitted.hypothesis.without(index)
     penalty = engine.penalty(fitted.hypothesis) - engine.penalty(without)
     decrease = engine.refit(without, noise).chi_square - fitted.chi_square
-    inflation = variance_inflation(engine.regression, fitted, noise, spread, index)
+    inflation = variance_inflation(engine.regression, fitted, spread, index)
     return decrease / inflation - penalty - threshold
 
 
-def variance_inflation(
-    regression: Regression, fit: Fit, noise: Noise, spread: Spread, index: int
-) -> float:
+def variance_inflation(regression: Regression, fit: Fit, spread: Spread, index: int) -> float:
     """Variance of an effect's size over that of the likelihood.
 
     Parameters
@@ -136,8 +133,6 @@ def variance_inflation(
         The data and the model.
     fit
         Fitted model.
-    noise
-        Noise variance.
     spread
         Uncertainty of the unknowns.
     index
@@ -159,7 +154,7 @@ def variance_inflation(
     own = np.flatnonzero(regression.unknowns_of(index, fit.hypothesis))[: len(amplitudes)]
     if not own.size:
         return 1.0
-    covariance = inverse_normal(whitened_jacobian(regression, fit, noise))[np.ix_(own, own)]
+    covariance = spread.covariance[np.ix_(own, own)]
     length = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     inverse = np.linalg.pinv(
         covariance / np.outer(length, length), rcond=_UNIDENTIFIABLE, hermitian=True

@@ -24,7 +24,6 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Segment
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.selection.signatures import pieces
 from winchkit.diagnosis.verdict.curve_fits import UNIDENTIFIABLE, BasisProducts, PartialRegression
 from winchkit.diagnosis.verdict.spline_alternatives import CurveFamily
 
@@ -136,7 +135,7 @@ class _Design:
         rounding: dict[str, Array] = {}
         rows_of = {s.rows.start: s for s in self._regression.segments}
         segment, columns = self._regression.segments[0], np.zeros((0, n_columns))
-        for band, rows in pieces(self._regression):
+        for band, rows in self._regression.rows_by_band():
             if rows.start in rows_of:
                 segment = rows_of[rows.start]
                 columns = self._columns(segment)

@@ -13,7 +13,7 @@ from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec, parse_object
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id, codecs, set_up
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.publisher import Publisher, Publishing, Sampled
+from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import Quality, Sensor
 from winchkit.drivers.status_word import StatusWord
 from winchkit.errors import ConnectionLost, DeviceRefused, Fault, FileError, NoReply, NotPermitted
@@ -32,7 +32,7 @@ _TINIEST = 1e-30
 
 
 class ProcessDecoder:
-    """Reads what one kind of CANopen instrument says."""
+    """Decoder of the process value and status of one type of CANopen instrument (CiA 404)."""
 
     def __init__(self, device: DeviceSpec, node: SdoNode) -> None:
         """Raise FileError where the device file contradicts itself or its EDS."""
@@ -56,14 +56,14 @@ class ProcessDecoder:
         quality = self.status.quality(status)
         if not math.isfinite(counts):
             quality |= Quality.FAULT
-        elif quality.usable and self._strange(counts):
+        elif quality.usable and self._is_implausible(counts):
             quality |= Quality.MISMATCH
         if not quality.usable:
             return math.nan, counts, quality
         return convert(counts * self.spec.scale, self.spec.unit, self._dimension), counts, quality
 
-    def _strange(self, counts: float) -> bool:
-        """Whether no device in good order shows this number."""
+    def _is_implausible(self, counts: float) -> bool:
+        """Whether no intact device shows this number."""
         beyond = self.spec.limit is not None and abs(counts) > self.spec.limit
         return beyond or (self.spec.type == "f32" and 0 < abs(counts) < _TINIEST)
 
@@ -76,7 +76,7 @@ _FRAME = 135 / 1e6
 _SERIAL = (0x1018, 4)
 
 
-class ProcessInstrument(Publishing):
+class ProcessInstrument(InstrumentReadings):
     """An instrument on an open CAN bus. ``latest`` is what other threads read."""
 
     def __init__(self, name: str, device: DeviceSpec, node: int, bus: CanBus, clock: Clock) -> None:
@@ -146,7 +146,7 @@ class ProcessInstrument(Publishing):
         self.problem = error
 
     def fell_silent(self) -> NoReply:
-        """The error that says so."""
+        """Error of an instrument that sends nothing."""
         return NoReply(
             f"{self.name}: no process value for {self.max_age:g} s; check power, wiring, node id "
             "and that the node has not been stopped"
@@ -180,7 +180,8 @@ class ProcessInstrument(Publishing):
             if reading is not None and reading.t_request > sent and came and gone:
                 return
         raise DeviceRefused(
-            f"{self.name} took the command '{name}' but did not obey within {command.within:g} s"
+            f"{self.name} accepted the command '{name}' but did not confirm it within "
+            f"{command.within:g} s"
         )
 
     def identify(self) -> dict[str, float]:
@@ -218,7 +219,7 @@ class ProcessLine:
     """The instruments of one CAN bus; a line of :class:`~winchkit.drivers.slow.SlowDevices`."""
 
     def __init__(self, name: str, instruments: tuple[ProcessInstrument, ...], clock: Clock) -> None:
-        """Remember what hangs on the bus, which somebody else opens and closes."""
+        """Take the instruments of a bus, which its owner opens and closes."""
         self.name = name
         self.sensors: Sequence[ProcessInstrument] = instruments
         self._clock = clock
@@ -229,7 +230,7 @@ class ProcessLine:
         await asyncio.gather(*(self._serve(one) for one in self.sensors))
 
     async def command(self, sensor: Sensor, name: str) -> None:
-        """Send a command to one of its instruments, and see it obeyed."""
+        """Send a command to one of its instruments, and wait for its confirmation."""
         instrument = self._own(sensor)
         await asyncio.to_thread(instrument.command, name)
         await instrument.confirm(name)
@@ -239,7 +240,7 @@ class ProcessLine:
         return await asyncio.to_thread(self._own(sensor).identify)
 
     def close(self) -> None:
-        """Ask no more; the bus is its owner's."""
+        """End the polling; the owner closes the bus."""
         self._closing = True
 
     def _own(self, sensor: Sensor) -> ProcessInstrument:

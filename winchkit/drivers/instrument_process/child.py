@@ -25,7 +25,7 @@ from winchkit.drivers.instrument_process.messages import (
     COUNTS,
     Kind,
     Messages,
-    Said,
+    RawReading,
     State,
     json_message,
     message,
@@ -154,7 +154,7 @@ class _Reporter:
     ) -> Callable[..., None]:
         def forward(*said: Any) -> None:
             self._state(number, instrument)
-            self._out.add(reading_message(Said(number, *said)))
+            self._out.add(reading_message(RawReading(number, *said)))
 
         return forward
 
@@ -196,7 +196,7 @@ def _serve(requests: Iterator[bytes], outbox: _Outbox) -> None:
     lines = tuple(line_of(one, clock) for one in pickle.loads(declared))
     reporter = _Reporter([item for line in lines for item in line.sensors], outbox)
     slow = SlowDevices((*lines, reporter), clock)
-    desk = _Desk(slow, lines, reporter)
+    desk = _RequestHandler(slow, lines, reporter)
     for content in requests:
         # One thread each, as every caller in the bench has one.
         threading.Thread(target=desk.answer, args=json.loads(content), daemon=True).start()
@@ -212,7 +212,7 @@ def _requests(descriptor: int) -> Iterator[bytes]:
             yield content
 
 
-class _Desk:
+class _RequestHandler:
     """Answers requests."""
 
     def __init__(self, slow: SlowDevices, lines: Sequence[Line], reporter: _Reporter) -> None:

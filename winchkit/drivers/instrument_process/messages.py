@@ -18,12 +18,12 @@ __all__ = [
     "COUNTS",
     "Kind",
     "Messages",
-    "Said",
+    "RawReading",
     "State",
     "json_message",
     "message",
+    "raw_reading_of",
     "reading_message",
-    "said_by",
 ]
 
 _HEAD = struct.Struct("<BI")
@@ -43,7 +43,7 @@ COUNTS = (
 
 
 class Kind(IntEnum):
-    """What a message is."""
+    """Type of a message."""
 
     READY = 1
     """The lines are being served."""
@@ -60,8 +60,8 @@ class Kind(IntEnum):
     """From the bench; the only one in this direction."""
 
 
-class Said(NamedTuple):
-    """What an instrument said in one answer, before any judgement; SI."""
+class RawReading(NamedTuple):
+    """Raw values of one answer of an instrument, before any test of them; SI."""
 
     instrument: int
     """Its number among those of the process."""
@@ -96,16 +96,16 @@ def json_message(kind: Kind, content: Any) -> bytes:
     return message(kind, json.dumps(content).encode())
 
 
-def reading_message(said: Said) -> bytes:
+def reading_message(said: RawReading) -> bytes:
     """A message of one reading."""
     content = _READING.pack(*said[:4], said.quality.value, *_times(said.when))
     return message(Kind.READING, content)
 
 
-def said_by(content: bytes) -> Said:
+def raw_reading_of(content: bytes) -> RawReading:
     """The reading in the content of a message."""
     instrument, value, gross, counts, flags, *times = _READING.unpack(content)
-    return Said(instrument, value, gross, counts, Quality(flags), Sampled(*times))
+    return RawReading(instrument, value, gross, counts, Quality(flags), Sampled(*times))
 
 
 class Messages:

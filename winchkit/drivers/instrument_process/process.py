@@ -26,7 +26,7 @@ from winchkit.drivers.instrument_process.messages import (
     State,
     json_message,
     message,
-    said_by,
+    raw_reading_of,
 )
 from winchkit.drivers.instrument_process.separate import SeparateInstrument, SeparateLine
 from winchkit.errors import ConnectionLost, WinchkitError, error_of
@@ -201,7 +201,7 @@ class InstrumentProcess:
 
     def _take(self, kind: Kind, content: bytes) -> None:
         if kind is Kind.READING:
-            said = said_by(content)
+            said = raw_reading_of(content)
             self._instruments[said.instrument].publisher.publish(*said[1:])
         elif kind is Kind.STATE:
             number, *state = json.loads(content)

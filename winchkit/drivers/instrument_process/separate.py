@@ -10,7 +10,7 @@ from typing import Any, Protocol
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.instrument_process.messages import COUNTS, State
 from winchkit.drivers.modbus.instrument import Instrument
-from winchkit.drivers.publisher import Publishing
+from winchkit.drivers.publisher import InstrumentReadings
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.errors import ConnectionLost, error_of
@@ -38,7 +38,7 @@ class Serving(Protocol):
         """
 
 
-class SeparateInstrument(Publishing):
+class SeparateInstrument(InstrumentReadings):
     """An instrument whose line another process serves."""
 
     def __init__(self, made: Instrument | StreamInstrument, serving: Serving, clock: Clock) -> None:
@@ -98,7 +98,7 @@ class SeparateLine:
         return found
 
     def room_for(self, sensor: Sensor) -> float:
-        """Readings a second that the line has room for, were this instrument's wish no limit."""
+        """Rate that the line has room for, whatever rate the instrument wants, 1/s."""
         return float(self._ask(sensor, "room_for"))
 
     def time_of(self, sensor: Sensor) -> float:

@@ -41,7 +41,7 @@ async def send(client: ModbusClient, instrument: Instrument, command: CommandSpe
 
 
 async def confirm(instrument: Instrument, name: str, sent: float, clock: Clock) -> None:
-    """Wait for readings whose status says that a command sent at ``sent`` was obeyed.
+    """Wait for readings whose status says that a command sent at ``sent`` is confirmed.
 
     Raises DeviceRefused where none says so in time.
     """
@@ -51,11 +51,11 @@ async def confirm(instrument: Instrument, name: str, sent: float, clock: Clock) 
     while clock.now() < sent + command.within:
         await asyncio.sleep(instrument.period / 2)
         reading = instrument.latest
-        if reading is not None and reading.t_request > sent and _obeyed(instrument, command):
+        if reading is not None and reading.t_request > sent and _confirmed(instrument, command):
             return
     wanted = f"'{command.comes}' to come" if command.comes else f"'{command.goes}' to go"
     raise DeviceRefused(
-        f"{instrument.name} took the command '{name}' but did not obey within "
+        f"{instrument.name} accepted the command '{name}' but did not confirm it within "
         f"{command.within:g} s: its status shows no sign of {wanted}; check that the reading is "
         "stable and within the device's range for it"
     )
@@ -76,7 +76,7 @@ async def identity(client: ModbusClient, instrument: Instrument) -> dict[str, fl
     return found
 
 
-def _obeyed(instrument: Instrument, command: CommandSpec) -> bool:
+def _confirmed(instrument: Instrument, command: CommandSpec) -> bool:
     has, status = instrument.decoder.status.has, instrument.status
     came = command.comes is None or has(command.comes, status)
     return came and not (command.goes is not None and has(command.goes, status))

@@ -27,7 +27,7 @@ _NEAR_ZERO = 1.0
 
 
 class Decoded(NamedTuple):
-    """What one block of registers says."""
+    """Content of one block of registers."""
 
     value: float
     gross: float
@@ -37,7 +37,7 @@ class Decoded(NamedTuple):
 
 
 class Decoder:
-    """Reads the measurement of one kind of device out of its block of registers."""
+    """Decoder of the registers of one type of device."""
 
     def __init__(self, device: DeviceSpec) -> None:
         """Raise FileError where the device file contradicts itself."""
@@ -65,7 +65,7 @@ class Decoder:
         status = self._status(words)
         counts = self._counts(self.field, words, status)
         gross = self._counts(self._gross, words, status)
-        quality = self.status.quality(status) | self._doubt(counts, gross, status)
+        quality = self.status.quality(status) | self._plausibility(counts, gross, status)
         if not quality.usable:
             return Decoded(math.nan, math.nan, counts, quality, status)
         return Decoded(
@@ -92,18 +92,19 @@ class Decoder:
             None if not orders else False if False in orders else True if True in orders else None
         )
 
-    def _doubt(self, counts: float, gross: float, status: int) -> Quality:
-        """What the numbers say against themselves, or against a status that finds them good."""
+    def _plausibility(self, counts: float, gross: float, status: int) -> Quality:
+        """Flags of numbers that contradict each other, or a status that declares them valid."""
         if not (math.isfinite(counts) and math.isfinite(gross)):
             return Quality.FAULT
         if not self.status.quality(status).usable:
             return Quality.GOOD
-        strange = any(
-            _strange(item, number) for item, number in ((self.field, counts), (self._gross, gross))
+        implausible = any(
+            _is_implausible(item, number)
+            for item, number in ((self.field, counts), (self._gross, gross))
         )
         if self.status.has("zero", status) and self._gross.type != "f32":
-            strange |= abs(gross) > _NEAR_ZERO
-        return Quality.MISMATCH if strange else Quality.GOOD
+            implausible |= abs(gross) > _NEAR_ZERO
+        return Quality.MISMATCH if implausible else Quality.GOOD
 
     def _status(self, words: Mapping[int, int]) -> int:
         at = self.spec.status_register
@@ -129,8 +130,8 @@ def _placed(block: ReadBlock | None, registers: Sequence[int]) -> dict[int, int]
     return {} if block is None else dict(enumerate(registers, block.start))
 
 
-def _strange(item: FieldSpec, counts: float) -> bool:
-    """Whether no device in good order shows this number."""
+def _is_implausible(item: FieldSpec, counts: float) -> bool:
+    """Whether no intact device shows this number."""
     if item.limit is not None and abs(counts) > item.limit:
         return True
     tiniest = _TINIEST if item.limit is None else _TINIEST_SHARE * item.limit

@@ -11,7 +11,7 @@ from winchkit.drivers.modbus.client import ModbusClient
 from winchkit.drivers.modbus.consistency import Consistency
 from winchkit.drivers.modbus.decoder import Decoded, Decoder
 from winchkit.drivers.modbus.late_replies import LISTENING, LateReplies
-from winchkit.drivers.publisher import Publisher, Publishing, Sampled
+from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import Quality
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.devices.device import DeviceSpec
@@ -36,7 +36,7 @@ class _Withheld(NoReply):
     """An outstanding reply could not be distinguished from the answer: nothing is asked."""
 
 
-class Instrument(Publishing):
+class Instrument(InstrumentReadings):
     """A Modbus instrument. ``latest`` is what other threads read."""
 
     def __init__(

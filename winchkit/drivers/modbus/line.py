@@ -31,7 +31,7 @@ class ModbusLine:
     def __init__(
         self, name: str, spec: BusSpec, instruments: tuple[Instrument, ...], clock: Clock
     ) -> None:
-        """Remember what hangs on the line; ``serve`` opens it."""
+        """Take the instruments of a line, which ``serve`` opens."""
         self.name = name
         self.sensors = instruments
         self._spec = spec
@@ -65,7 +65,7 @@ class ModbusLine:
                 await self._poll(instrument)
 
     async def command(self, sensor: Sensor, name: str) -> None:
-        """Send a command to one of its instruments between two polls, and see it obeyed."""
+        """Send a command to an instrument between two polls, and wait for its confirmation."""
         instrument = self._own(sensor)
         command = command_of(instrument, name)
         await self._wait_until_open()
@@ -81,7 +81,7 @@ class ModbusLine:
             return await identity(self._client, self._own(sensor))
 
     def room_for(self, sensor: Sensor) -> float:
-        """Readings a second that the line has room for, were this instrument's wish no limit."""
+        """Rate that the line has room for, whatever rate the instrument wants, 1/s."""
         return self._share.room_for(self._place(sensor))
 
     def time_of(self, sensor: Sensor) -> float:

@@ -1,7 +1,7 @@
-"""What is said on an open serial line: requests, answers, and silence after a lost answer.
+"""Exchanges on an open serial line: requests, answers, and silence after a lost answer.
 
-An answer that comes too late must never be taken for the next one. Before every request what lies
-there is thrown away; after a failure the line stays silent until no answer can come any more.
+An answer that comes too late must never be taken for the next one. Before every request the input
+is discarded; after a failure the line stays silent until no answer can come any more.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from contextlib import suppress
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Counters
 from winchkit.drivers.reading import Quality
-from winchkit.drivers.stream.decoder import Heard, Meaning
+from winchkit.drivers.stream.decoder import Meaning, ParsedFrame
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.drivers.stream.parser import Item, StreamParser
 from winchkit.drivers.stream.port import Chunk, Port
@@ -23,7 +23,7 @@ __all__ = ["Conversation", "exchange_time"]
 
 _COMMAND_TIME = 2.0
 """A balance tares when it has come to rest, s."""
-_HUSHES = 3
+_STOP_TRIES = 3
 """Times in which an instrument may have come to an end after it was stopped."""
 _FLOOD = 0.5
 """So long after its time a wait ends although bytes keep coming, s."""
@@ -82,7 +82,7 @@ class Conversation:
 
     async def start(self, instrument: StreamInstrument) -> None:
         """Send the start command of an instrument."""
-        await self._hush(instrument)
+        await self._stop_sending(instrument)
         for ask in instrument.spec.start:
             await self._exchange(instrument, ask, self._spec.timeout)
         instrument.started = True
@@ -93,7 +93,7 @@ class Conversation:
         if chunk is None:
             return False
         found = instrument.parser.feed(chunk.data)
-        readings = [item for item in found if item.heard.meaning is Meaning.READING]
+        readings = [item for item in found if item.frame.meaning is Meaning.READING]
         instrument.sent(readings, chunk.time, self)
         return bool(readings)
 
@@ -107,8 +107,8 @@ class Conversation:
             return
         t_request = self._clock.now()
         item, time = await self._ask(instrument, spec.poll, instrument.parser)
-        if item.heard.meaning is not Meaning.READING:
-            raise self._refusal(instrument, item.heard)
+        if item.frame.meaning is not Meaning.READING:
+            raise self._refusal(instrument, item.frame)
         instrument.answered(item, t_request, time, self)
 
     async def command(self, instrument: StreamInstrument, name: str) -> None:
@@ -120,12 +120,12 @@ class Conversation:
             raise NotPermitted(
                 f"{instrument.name} has no command '{name}'; its device file has {known}"
             )
-        await self._hush(instrument)
+        await self._stop_sending(instrument)
         await self._select(instrument)
         await self._exchange(instrument, command, _COMMAND_TIME)
 
     def silent(self, instrument: StreamInstrument) -> NoReply:
-        """The error for a device that says nothing."""
+        """Error of a device that does not answer."""
         spec, link = self._spec, instrument.spec.link
         ours = f"{spec.baudrate} {spec.bytesize}{spec.parity}{spec.stopbits}"
         theirs = f" (its maker's setting is {link})" if link and str(link) != ours else ""
@@ -142,9 +142,9 @@ class Conversation:
         assert fresh is not None, "asked of devices that have the question"
         assert parser is not None, "asked of devices that have the question"
         item, _ = await self._ask(instrument, fresh.send, parser)
-        decoded = item.heard.decoded
+        decoded = item.frame.decoded
         if decoded is None:
-            raise self._refusal(instrument, item.heard)
+            raise self._refusal(instrument, item.frame)
         if decoded.quality & Quality.STALE:
             wait = 1.0 / instrument.spec.rate / _FRESH_TRIES
             instrument.due = self._clock.now() + wait
@@ -152,14 +152,14 @@ class Conversation:
         instrument.took(decoded)
         return True
 
-    async def _hush(self, instrument: StreamInstrument) -> None:
+    async def _stop_sending(self, instrument: StreamInstrument) -> None:
         """Stop an instrument that sends by itself; it must be started again."""
         spec = instrument.spec
         if not spec.stop:
             return
         instrument.started = False
         self.port.write(instrument.text(spec.stop))
-        for _ in range(_HUSHES):
+        for _ in range(_STOP_TRIES):
             if not await self.idle(self._clock.now() + spec.longest_reply, instrument):
                 instrument.parser.begin()
                 return
@@ -193,13 +193,13 @@ class Conversation:
                 raise self.silent(instrument)
             found = parser.feed(chunk.data)
             if by_itself:
-                readings = [item for item in found if item.heard.meaning is Meaning.READING]
+                readings = [item for item in found if item.frame.meaning is Meaning.READING]
                 instrument.sent(readings, chunk.time, self)
             for item in found:
-                if item.heard.meaning is Meaning.ANSWER:
+                if item.frame.meaning is Meaning.ANSWER:
                     return
-                if item.heard.meaning in (Meaning.BUSY, Meaning.REFUSED):
-                    raise self._refusal(instrument, item.heard)
+                if item.frame.meaning in (Meaning.BUSY, Meaning.REFUSED):
+                    raise self._refusal(instrument, item.frame)
 
     async def _ask(
         self, instrument: StreamInstrument, send: str, parser: StreamParser
@@ -228,9 +228,9 @@ class Conversation:
             "check cable, baud rate and device file"
         )
 
-    def _refusal(self, instrument: StreamInstrument, heard: Heard) -> DeviceRefused:
-        said = heard.text.strip()
-        why = "is busy" if heard.meaning is Meaning.BUSY else "refuses"
+    def _refusal(self, instrument: StreamInstrument, frame: ParsedFrame) -> DeviceRefused:
+        said = frame.text.strip()
+        why = "is busy" if frame.meaning is Meaning.BUSY else "refuses"
         return DeviceRefused(f"{self._where}: {instrument.name} {why}: it answers '{said}'")
 
 

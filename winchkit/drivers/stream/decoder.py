@@ -22,7 +22,7 @@ from winchkit.schema.devices.stream import (
 from winchkit.schema.template import parts_of
 from winchkit.units import convert
 
-__all__ = ["Decoded", "Decoder", "Heard", "Meaning", "check_sum"]
+__all__ = ["Decoded", "Decoder", "Meaning", "ParsedFrame", "check_sum"]
 
 _NUMBER = re.compile(r" *[+-]? *(?:[0-9]+\.?[0-9]*|\.[0-9]+) *")
 _PADDING = " _"
@@ -36,7 +36,7 @@ _FLAGS: dict[Says, Quality] = {
 
 
 class Meaning(Enum):
-    """What a frame was."""
+    """Type of a frame."""
 
     READING = auto()
     STATUS = auto()
@@ -50,7 +50,7 @@ class Meaning(Enum):
 
 
 class Decoded(NamedTuple):
-    """What a frame says."""
+    """Content of a frame."""
 
     value: float
     gross: float
@@ -60,8 +60,8 @@ class Decoded(NamedTuple):
     """Whether it is a net value, None where the frame does not say."""
 
 
-class Heard(NamedTuple):
-    """A frame and what it was; ``before`` are the bytes of garbage in front of it."""
+class ParsedFrame(NamedTuple):
+    """A frame with its type; ``before`` are the bytes of garbage in front of it."""
 
     meaning: Meaning
     text: str
@@ -81,7 +81,7 @@ NOTHING = Decoded(math.nan, math.nan, math.nan, Quality.GOOD)
 
 
 class Decoder:
-    """Reads the frames of one kind of device."""
+    """Decoder of the frames of one type of device."""
 
     def __init__(
         self, spec: StreamSpec, path: str, *, address: int | None = None, frames: tuple[str, ...]
@@ -99,16 +99,16 @@ class Decoder:
         self.dimension = dimension
         self._masks = {says: sum(1 << bit for bit in bits) for says, bits in spec.bits.items()}
 
-    def binary(self, data: bytes) -> Heard:
+    def binary(self, data: bytes) -> ParsedFrame:
         """A frame of bytes."""
         layout = self._spec.binary
         assert layout is not None, "the schema gives a binary frame its layout"
         first, size = layout.value
         counts = float(int.from_bytes(data[first : first + size], layout.order, signed=True))
         said: list[Says] = [] if layout.bits is None else self._in_bits(data[layout.bits])
-        return Heard(Meaning.READING, data.hex(), self._measured(said, counts, counts, ""))
+        return ParsedFrame(Meaning.READING, data.hex(), self._measured(said, counts, counts, ""))
 
-    def line(self, data: bytes) -> Heard:
+    def line(self, data: bytes) -> ParsedFrame:
         """A line of text."""
         text = data.decode("latin-1")
         bare = text.strip()
@@ -116,7 +116,7 @@ class Decoder:
         if reply is not None:
             return self._reply(bare, self._spec.replies[reply])
         if fits(bare, self._answers) is not None:
-            return Heard(Meaning.ANSWER, bare)
+            return ParsedFrame(Meaning.ANSWER, bare)
         spoilt = Meaning.MALFORMED
         for matcher in self._matchers:
             match = matcher.match(text)
@@ -128,15 +128,15 @@ class Decoder:
             decoded = self._fields(match.fields)
             if decoded is not None:
                 kind = Meaning.READING if "value" in match.fields else Meaning.STATUS
-                return Heard(kind, match.text, decoded, match.before)
-        return Heard(spoilt, text)
+                return ParsedFrame(kind, match.text, decoded, match.before)
+        return ParsedFrame(spoilt, text)
 
-    def _reply(self, text: str, says: Says) -> Heard:
+    def _reply(self, text: str, says: Says) -> ParsedFrame:
         if says == "busy":
-            return Heard(Meaning.BUSY, text)
+            return ParsedFrame(Meaning.BUSY, text)
         if says == "refused":
-            return Heard(Meaning.REFUSED, text)
-        return Heard(Meaning.READING, text, NOTHING._replace(quality=self._quality([says])))
+            return ParsedFrame(Meaning.REFUSED, text)
+        return ParsedFrame(Meaning.READING, text, NOTHING._replace(quality=self._quality([says])))
 
     def _is_whole(self, match: Match) -> bool:
         spec = self._spec.checksum

@@ -1,4 +1,4 @@
-"""One instrument on a serial line: what it says becomes readings, and is counted."""
+"""One instrument on a serial line: readings from its frames, and counts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Protocol
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Tally
-from winchkit.drivers.publisher import Publisher, Publishing, Sampled
+from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import REPLY_HORIZON, Quality
 from winchkit.drivers.stream.decoder import Decoded
 from winchkit.drivers.stream.parser import (
@@ -43,7 +43,7 @@ class Wire(Protocol):
         """How late the port hands bytes over."""
 
 
-class StreamInstrument(Publishing):
+class StreamInstrument(InstrumentReadings):
     """An instrument that sends frames. ``latest`` is what other threads read."""
 
     def __init__(
@@ -80,7 +80,7 @@ class StreamInstrument(Publishing):
         self._clock = clock
         self._failures = 0
         self._outstanding = False
-        """Whether a reply was not heard that may come and be taken for the next answer."""
+        """Whether a reply is outstanding that could be taken for the next answer."""
         self._net: bool | None = None
         self._flags = Quality.GOOD
         self._chunk_at = clock.now()
@@ -155,7 +155,7 @@ class StreamInstrument(Publishing):
         return Sampled(t_request, t_receive, earliest - delay, latest - delay)
 
     def _publish(self, item: Item, when: Sampled, late: Quality) -> None:
-        decoded = item.heard.decoded
+        decoded = item.frame.decoded
         assert decoded is not None, "a frame that is a reading says something"
         quality = decoded.quality | self._flags | late
         self._flags = Quality.GOOD

@@ -37,7 +37,7 @@ class StreamLine:
         opener: Opener = open_serial,
         pause: Callable[[float], Awaitable[None]] = asyncio.sleep,
     ) -> None:
-        """Remember what hangs on the line; ``serve`` opens it.
+        """Take the instruments of a line, which ``serve`` opens.
 
         ``opener`` opens the port, ``pause`` waits while there is none. Raises FileError where a
         device that sends by itself is not alone.
@@ -65,7 +65,7 @@ class StreamLine:
         self._share_out()
 
     def room_for(self, sensor: Sensor) -> float:
-        """Readings a second that the line has room for, were this instrument's wish no limit."""
+        """Rate that the line has room for, whatever rate the instrument wants, 1/s."""
         return self._share.room_for(self._place(sensor))
 
     def time_of(self, sensor: Sensor) -> float:

@@ -1,11 +1,11 @@
-"""Bytes in, what they say out: incremental, and the same for any cutting into chunks."""
+"""Incremental parser of the bytes of a device: the same result for any division into chunks."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from winchkit.drivers.stream.decoder import Decoder, Heard, Meaning
+from winchkit.drivers.stream.decoder import Decoder, Meaning, ParsedFrame
 from winchkit.drivers.stream.framing import framing_of
 from winchkit.errors import Fault, FileError
 from winchkit.schema.devices.device import DeviceSpec
@@ -38,9 +38,9 @@ class ParserCounts:
 
 
 class Item(NamedTuple):
-    """A frame that said something."""
+    """A frame with content."""
 
-    heard: Heard
+    frame: ParsedFrame
     behind: int
     """Bytes of the same chunk that came after it."""
     size: int
@@ -76,27 +76,27 @@ class StreamParser:
         found = []
         for piece in self._framing.feed(data):
             if piece.broken:
-                heard = Heard(Meaning.MALFORMED, piece.data.hex())
+                frame = ParsedFrame(Meaning.MALFORMED, piece.data.hex())
             elif self.spec.binary is not None:
-                heard = self.decoder.binary(piece.data)
+                frame = self.decoder.binary(piece.data)
             else:
-                heard = self.decoder.line(piece.data)
-            if self._count(heard, piece.size):
-                found.append(Item(heard, piece.behind, piece.size - heard.before))
+                frame = self.decoder.line(piece.data)
+            if self._count(frame, piece.size):
+                found.append(Item(frame, piece.behind, piece.size - frame.before))
         self._count_skipped()
         return found
 
-    def _count(self, heard: Heard, size: int) -> bool:
+    def _count(self, frame: ParsedFrame, size: int) -> bool:
         """Whether the frame says something."""
         counts = self.counts
-        if heard.meaning in (Meaning.MALFORMED, Meaning.BAD_CHECKSUM):
+        if frame.meaning in (Meaning.MALFORMED, Meaning.BAD_CHECKSUM):
             counts.spoilt += size
-            counts.malformed += heard.meaning is Meaning.MALFORMED
-            counts.bad_checksums += heard.meaning is Meaning.BAD_CHECKSUM
+            counts.malformed += frame.meaning is Meaning.MALFORMED
+            counts.bad_checksums += frame.meaning is Meaning.BAD_CHECKSUM
             return False
-        self._before += heard.before
-        counts.framed += size - heard.before
-        counts.words += heard.decoded is not None and not heard.decoded.quality.usable
+        self._before += frame.before
+        counts.framed += size - frame.before
+        counts.words += frame.decoded is not None and not frame.decoded.quality.usable
         return True
 
     def _count_skipped(self) -> None:

@@ -49,7 +49,7 @@ class Port(Protocol):
         """Send bytes; raises ConnectionLost."""
 
     def close(self) -> None:
-        """Let the port go."""
+        """Close the port."""
 
 
 async def open_serial(spec: BusSpec, name: str, clock: Clock) -> Port:
@@ -106,7 +106,7 @@ class SerialPort:
             raise ConnectionLost(f"{self.where}: cannot send: {error}") from error
 
     def close(self) -> None:
-        """Let the port go."""
+        """Close the port."""
         self._closing.set()
         self._thread.join(timeout=3 * _POLL)
         self._serial.close()
@@ -121,12 +121,12 @@ class SerialPort:
                     data += self._serial.read(self._serial.in_waiting)
             except failures as error:
                 # An unplugged port raises a SerialException, a bare OSError or a termios.error.
-                self._tell(Chunk(b"", self._clock.now()), error)
+                self._deliver(Chunk(b"", self._clock.now()), error)
                 return
             if data:
-                self._tell(Chunk(data, self._clock.now()))
+                self._deliver(Chunk(data, self._clock.now()))
 
-    def _tell(self, chunk: Chunk, failure: Exception | None = None) -> None:
+    def _deliver(self, chunk: Chunk, failure: Exception | None = None) -> None:
         if not self._closing.is_set() and not self._loop.is_closed():
             self._loop.call_soon_threadsafe(self._arrived, chunk, failure)
 

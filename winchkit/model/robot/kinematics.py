@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from winchkit.schema.profiles.robot import RobotProfile
 
 __all__ = [
+    "PLATFORM_DOF",
     "Geometry",
     "Pose",
     "Sensitivities",
@@ -40,6 +41,8 @@ __all__ = [
     "wrap_angle",
 ]
 
+PLATFORM_DOF = 6
+"""Degrees of freedom of a platform; fewer cables leave it hanging."""
 _CHUNK = 1024
 _BEHIND = -1e-6
 

@@ -33,7 +33,7 @@ class _Row:
 def error_ladder(
     outputs: Mapping[str, OutputError] | Mapping[str, OutputFit],
     *,
-    grown: bool = False,
+    extended: bool = False,
     changed: str = "with the effect",
     source: str = "",
 ) -> Figure | None:
@@ -43,7 +43,7 @@ def error_ladder(
     ----------
     outputs : mapping
         Errors by output.
-    grown : bool
+    extended : bool
         Whether the model was changed, so that there is an error after it.
     changed : str
         Name of the changed model.
@@ -63,7 +63,7 @@ def error_ladder(
         return None
     held = isinstance(next(iter(outputs.values())), OutputFit)
     title = f"{'Held-out error' if held else 'Error'} over the noise"
-    return _figure("errors", title, rows, changed if grown else "", source)
+    return _figure("errors", title, rows, changed if extended else "", source)
 
 
 def fleet_ladders(
@@ -80,9 +80,9 @@ def fleet_ladders(
         ]
         if rows:
             name = OUTPUT_NAMES.get(output, output)
-            grown = any(_named(one) for one in found.values())
+            extended = any(_named(one) for one in found.values())
             title = capital(f"{name}: error over the noise")
-            changed = "with named effects" if grown else ""
+            changed = "with named effects" if extended else ""
             worst = max(row.before for row in rows)
             out.append((worst, _figure(f"errors-{output}", title, rows, changed, source)))
     return [figure for _, figure in sorted(out, key=lambda item: -item[0])]
@@ -92,13 +92,13 @@ def _named(one: Comparison | Diagnosis) -> bool:
     return isinstance(one, Diagnosis) and bool(one.steps)
 
 
-def _row(name: str, output: OutputError | OutputFit, grown: bool = True) -> _Row | None:
+def _row(name: str, output: OutputError | OutputFit, extended: bool = True) -> _Row | None:
     """Errors over the noise; None where the noise is unknown."""
     if not output.noise_rms:
         return None
     if isinstance(output, OutputFit):
         before, after = output.heldout_rms_before, output.heldout_rms_after
-        return _Row(name, before / output.noise_rms, after / output.noise_rms if grown else nan)
+        return _Row(name, before / output.noise_rms, after / output.noise_rms if extended else nan)
     return _Row(name, output.rms / output.noise_rms, nan)
 
 

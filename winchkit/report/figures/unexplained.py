@@ -5,7 +5,6 @@ from __future__ import annotations
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
-from winchkit.diagnosis.results import Where
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.profile_edit.history import LADDER_UNITS
 from winchkit.report.figures.axes import reading
@@ -22,15 +21,14 @@ __all__ = [
 ]
 
 
-def unexplained_curve(answer: Answer, where: Where) -> tuple[Array, Array]:
+def unexplained_curve(answer: Answer, where: Attribution) -> tuple[Array, Array]:
     """Mean of the variable and of the residual in every bin, (bins,) each, SI."""
-    over = Attribution(where.output, where.variable, where.share, where.order, line=where.line)
     if isinstance(answer, RobotAnswer):
         regression, errors = answer.selection.rest
-        trace = trace_over(regression, over, errors)
+        trace = trace_over(regression, where, errors)
         return trace.means(trace.before)
     assert isinstance(answer, WinchAnswer)
-    curve = curve_of(answer.engine.regression, answer.result.final.residual, over)
+    curve = curve_of(answer.engine.regression, answer.result.final.residual, where)
     return curve.x, curve.mean
 
 
@@ -42,7 +40,7 @@ def unexplained_figures(answer: Answer, source: str = "") -> list[Figure]:
     return [_figure(answer, where, source) for where in places]
 
 
-def _figure(answer: Answer, where: Where, source: str) -> Figure:
+def _figure(answer: Answer, where: Attribution, source: str) -> Figure:
     at, residual = unexplained_curve(answer, where)
     how = reading(where.variable, within_turn=where.order is not None)
     scale = scale_for(3 * float(abs(residual).max()), LADDER_UNITS[where.output])

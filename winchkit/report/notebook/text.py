@@ -115,7 +115,7 @@ def diagnosis_screen(diagnosis: Diagnosis) -> str:
     lines = [head, *paragraph(sentence(diagnosis)), ""]
     lines += error_lines(
         diagnosis.outputs,
-        grown=bool(diagnosis.steps),
+        extended=bool(diagnosis.steps),
         data=diagnosis.data,
         offsets=diagnosis.run_offsets,
     )

@@ -8,7 +8,7 @@ from math import inf, isfinite
 import numpy as np
 
 from winchkit.effects.card import Signature, in_control, parameter_kind, signature
-from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.reduction import decimated
@@ -66,12 +66,11 @@ def _contents(effects: Sequence[Effect]) -> Markup:
 
 
 def _card(effect: Effect, drawing: Sequence[Markup]) -> Markup:
-    needs = [need.replace("_", " ") for need in effect.needs]
     pairs = [
         ("formula", element("span", effect.formula, class_="formula")),
         ("source", effect.source),
         ("changes", listed([OUTPUT_NAMES.get(name, name) for name in effect.outputs])),
-        ("needs", listed(needs) or "only the motor angle"),
+        ("needs", "; ".join(NEED_WORDS[need] for need in effect.needs) or "only the motor angle"),
         ("family", effect.family),
         ("contains", listed(list(effect.contains))),
         ("looks like", effect.looks_like),

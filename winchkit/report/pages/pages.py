@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.diagnosis.add import Grown
+from winchkit.diagnosis.add import FittedAddition
 from winchkit.diagnosis.compare import Compared
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.profile_edit.naming import extended_name
@@ -72,7 +72,7 @@ def report_html(
     patterns = unexplained_figures(answer, command.source)
     ladder = error_ladder(
         answer.diagnosis.outputs,
-        grown=residuals.after is not None,
+        extended=residuals.after is not None,
         changed=residuals.changed,
         source=command.source,
     )
@@ -88,7 +88,7 @@ def report_figures(answer: WinchAnswer, source: str = "") -> list[Figure]:
     drawn, _ = _cards(residuals, {})
     ladder = error_ladder(
         answer.diagnosis.outputs,
-        grown=residuals.after is not None,
+        extended=residuals.after is not None,
         changed=residuals.changed,
         source=source,
     )
@@ -124,15 +124,15 @@ def residuals_of_comparison(compared: Compared, source: str = "") -> Residuals:
     )
 
 
-def residuals_of_addition(grown: Grown, source: str = "") -> Residuals:
+def residuals_of_addition(fitted: FittedAddition, source: str = "") -> Residuals:
     """Residuals on the page of an addition."""
-    outputs = grown.addition.outputs
+    outputs = fitted.addition.outputs
     return Residuals(
-        grown.regression,
-        grown.initial_model.residual,
-        grown.final.residual,
+        fitted.regression,
+        fitted.initial_model.residual,
+        fitted.final.residual,
         {name: output.noise_rms for name, output in outputs.items()},
-        _changed([grown.addition.added[0].label]),
+        _changed([fitted.addition.added[0].label]),
         source,
         tuple(worst_outputs(outputs)),
     )
@@ -178,13 +178,18 @@ def comparison_figures(compared: Compared, source: str = "") -> list[Figure]:
 
 
 def addition_html(
-    grown: Grown, title: str, profile: str = "", better: str = "", *, options: Sequence[str] = ()
+    fitted: FittedAddition,
+    title: str,
+    profile: str = "",
+    better: str = "",
+    *,
+    options: Sequence[str] = (),
 ) -> str:
     """The page of an added effect; ``better`` is the written profile, the others as above.
 
     Parameters
     ----------
-    grown : Grown
+    fitted : FittedAddition
         The addition, with its residuals.
     title : str
         Title of the page.
@@ -200,20 +205,20 @@ def addition_html(
     str
         HTML, self-contained.
     """
-    command = Command(grown.regression.dataset, profile, options)
-    outputs, residuals = grown.addition.outputs, residuals_of_addition(grown, command.source)
+    command = Command(fitted.regression.dataset, profile, options)
+    outputs, residuals = fitted.addition.outputs, residuals_of_addition(fitted, command.source)
     drawn, cards = _cards(residuals, size_texts(outputs))
-    ladder = error_ladder(outputs, grown=True, changed=residuals.changed, source=command.source)
-    better = better or extended_name(command.profile, grown.addition.added[0].effect.id)
-    content = addition_sections(grown.addition, cards, command, better, title=title, ladder=ladder)
+    ladder = error_ladder(outputs, extended=True, changed=residuals.changed, source=command.source)
+    better = better or extended_name(command.profile, fitted.addition.added[0].effect.id)
+    content = addition_sections(fitted.addition, cards, command, better, title=title, ladder=ladder)
     return page(title, [*present(ladder), *drawn], content, headed=False)
 
 
-def addition_figures(grown: Grown, source: str = "") -> list[Figure]:
+def addition_figures(fitted: FittedAddition, source: str = "") -> list[Figure]:
     """The figures of the page of an addition, the worst output first."""
-    residuals = residuals_of_addition(grown, source)
+    residuals = residuals_of_addition(fitted, source)
     ladder = error_ladder(
-        grown.addition.outputs, grown=True, changed=residuals.changed, source=source
+        fitted.addition.outputs, extended=True, changed=residuals.changed, source=source
     )
     return [*present(ladder), *_cards(residuals, {})[0]]
 

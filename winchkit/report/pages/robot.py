@@ -10,8 +10,7 @@ from typing import Literal
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.results import Where
-from winchkit.diagnosis.robot.add import RobotGrown
+from winchkit.diagnosis.robot.add import FittedRobotAddition
 from winchkit.diagnosis.robot.attribution import AXES, on_cables
 from winchkit.diagnosis.robot.compare import RobotCompared
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
@@ -146,7 +145,7 @@ def _caption(trace: Trace, noise: float | None) -> str:
         name = OUTPUT_NAMES.get(over.output, over.output)
         text = f"{name}; no measured variable explains its error"
     else:
-        text = where_text(Where(over.output, over.variable, over.share, line=over.line))
+        text = where_text(over)
     if trace.line is not None and over.line is None:
         where = "along" if over.output == "platform_position" else "of line"
         text += f", drawn {where} {trace.line}, with the largest share"
@@ -223,9 +222,9 @@ def robot_report_html(
     command = Command(selection.preparation.dataset, profile, options)
     drawn = _report_figures(answer, command.source)
     before, after = selection.errors
-    grown = after if diagnosis.steps else None
+    fitted = after if diagnosis.steps else None
     regression = selection.final.regression
-    cards = _cards(regression, drawn, before, grown, size_texts(diagnosis.outputs))
+    cards = _cards(regression, drawn, before, fitted, size_texts(diagnosis.outputs))
     patterns = unexplained_figures(answer, command.source)
     ladder = _report_ladder(answer, command.source)
     content = sections(
@@ -245,7 +244,7 @@ def _report_ladder(answer: RobotAnswer, source: str) -> Figure | None:
     diagnosis = answer.diagnosis
     return error_ladder(
         diagnosis.outputs,
-        grown=bool(diagnosis.steps),
+        extended=bool(diagnosis.steps),
         changed=_changed(answer),
         source=source,
     )
@@ -264,11 +263,11 @@ def _report_figures(answer: RobotAnswer, source: str) -> dict[str, Figure]:
     before, after = selection.errors
     noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
     order = worst_outputs(diagnosis.outputs)
-    grown = after if diagnosis.steps else None
+    fitted = after if diagnosis.steps else None
     return pose_figures(
         selection.final.regression,
         before,
-        grown,
+        fitted,
         noise,
         order=order,
         changed=_changed(answer),
@@ -325,7 +324,7 @@ def _comparison_figures(compared: RobotCompared, source: str) -> dict[str, Figur
 
 
 def robot_addition_html(
-    grown: RobotGrown,
+    fitted: FittedRobotAddition,
     title: str,
     profile: str = "",
     better: str = "",
@@ -336,7 +335,7 @@ def robot_addition_html(
 
     Parameters
     ----------
-    grown : RobotGrown
+    fitted : FittedRobotAddition
         The addition, with its residuals.
     title : str
         Title of the page.
@@ -352,33 +351,33 @@ def robot_addition_html(
     str
         HTML, self-contained.
     """
-    command = Command(grown.regression.dataset, profile, options)
-    drawn = _addition_figures(grown, command.source)
-    sizes = size_texts(grown.addition.outputs)
-    cards = _cards(grown.regression, drawn, *grown.errors, sizes)
-    better = better or extended_name(command.profile, grown.addition.added[0].effect.id)
-    ladder = _addition_ladder(grown, command.source)
-    content = addition_sections(grown.addition, cards, command, better, title=title, ladder=ladder)
+    command = Command(fitted.regression.dataset, profile, options)
+    drawn = _addition_figures(fitted, command.source)
+    sizes = size_texts(fitted.addition.outputs)
+    cards = _cards(fitted.regression, drawn, *fitted.errors, sizes)
+    better = better or extended_name(command.profile, fitted.addition.added[0].effect.id)
+    ladder = _addition_ladder(fitted, command.source)
+    content = addition_sections(fitted.addition, cards, command, better, title=title, ladder=ladder)
     return page(title, [*present(ladder), *drawn.values()], content, headed=False)
 
 
-def robot_addition_figures(grown: RobotGrown, source: str = "") -> list[Figure]:
+def robot_addition_figures(fitted: FittedRobotAddition, source: str = "") -> list[Figure]:
     """The figures of the page of an effect added to a robot."""
-    ladder = _addition_ladder(grown, source)
-    return [*present(ladder), *_addition_figures(grown, source).values()]
+    ladder = _addition_ladder(fitted, source)
+    return [*present(ladder), *_addition_figures(fitted, source).values()]
 
 
-def _addition_ladder(grown: RobotGrown, source: str) -> Figure | None:
-    changed = f"with {grown.addition.added[0].label}"
-    return error_ladder(grown.addition.outputs, grown=True, changed=changed, source=source)
+def _addition_ladder(fitted: FittedRobotAddition, source: str) -> Figure | None:
+    changed = f"with {fitted.addition.added[0].label}"
+    return error_ladder(fitted.addition.outputs, extended=True, changed=changed, source=source)
 
 
-def _addition_figures(grown: RobotGrown, source: str) -> dict[str, Figure]:
-    outputs = grown.addition.outputs
+def _addition_figures(fitted: FittedRobotAddition, source: str) -> dict[str, Figure]:
+    outputs = fitted.addition.outputs
     noise = {name: output.noise_rms for name, output in outputs.items()}
-    before, after = grown.errors
-    changed = f"with {grown.addition.added[0].label}"
+    before, after = fitted.errors
+    changed = f"with {fitted.addition.added[0].label}"
     order = worst_outputs(outputs)
     return pose_figures(
-        grown.regression, before, after, noise, order=order, changed=changed, source=source
+        fitted.regression, before, after, noise, order=order, changed=changed, source=source
     )

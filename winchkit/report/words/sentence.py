@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.data.sanity import ALARMING
-from winchkit.diagnosis.results import Diagnosis, OutputFit, Step, Where
+from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.results import Diagnosis, OutputFit, Step
 from winchkit.report.words.numbers import percent, quantity, significant
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
@@ -138,7 +139,7 @@ def changes_text(diagnosis: Diagnosis) -> str:
     )
 
 
-def where_text(where: Where) -> str:
+def where_text(where: Attribution) -> str:
     """Residual attribution: ``tension, 5 periods per drum turn (46 % of its variance)``."""
     output = OUTPUT_NAMES.get(where.output, where.output)
     if where.line is not None:
@@ -165,7 +166,7 @@ def often_per_turn(angle: str, order: int) -> str:
     return f"{order} period{'' if order == 1 else 's'} per {turn} turn"
 
 
-def main_patterns(places: Sequence[Where]) -> list[Where]:
+def main_patterns(places: Sequence[Attribution]) -> list[Attribution]:
     """The most specific attribution of each output, the most specific output first.
 
     A clear order within a turn precedes a trend, and a trend a constant of a robot's line.
@@ -178,7 +179,7 @@ def main_patterns(places: Sequence[Where]) -> list[Where]:
             w.frequency is not None,
         ),
     )
-    first: dict[str, Where] = {}
+    first: dict[str, Attribution] = {}
     for place in ranked:
         first.setdefault(place.output, place)
     return list(first.values())

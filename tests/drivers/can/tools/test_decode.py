@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from functools import cache
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -30,7 +31,7 @@ def nodes() -> dict[int, KnownNode]:
     ("identifier", "data", "kind", "text"),
     [
         (0x000, "01 03", "NMT", "winch C: start"),
-        (0x000, "81 00", "NMT", "all nodes: reset"),
+        (0x000, "81 00", "NMT", "all nodes: reset node"),
         (0x080, "", "SYNC", "SYNC"),
         (0x083, "30 81 11 00 00 00 00 00", "EMCY", "8130h"),
         (0x77F, "05", "heartbeat", "host: operational"),
@@ -62,6 +63,19 @@ def test_values_of_a_pdo(nodes: dict[int, KnownNode]) -> None:
     assert rpdo.values == {"6040h": 0x0F, "60FFh": -10_000}
     unknown = decode(0x205, struct.pack("<Hi", 0x0F, -10_000), nodes)
     assert unknown.values == {}
+
+
+def test_a_signed_object_that_an_eds_declares_unsigned_is_signed(tmp_path: Path) -> None:
+    """As 60FFh of some manufacturers, by CiA 402-2; the axis reads and writes it so too."""
+    source = catalog.find("devices", "generic-cia402")
+    for file in source.parent.iterdir():
+        text = file.read_text(encoding="latin-1")
+        head, mark, rest = text.partition("[60FF]")
+        unsigned = head + mark + rest.replace("DataType=0x0004", "DataType=0x0007", 1)
+        (tmp_path / file.name).write_text(unsigned, encoding="latin-1")
+    node = known_node("winch C", read_device(tmp_path / source.name), 3)
+    rpdo = decode(0x203, struct.pack("<Hi", 0x0F, -10_000), {3: node})
+    assert rpdo.values["60FFh"] == -10_000
 
 
 @given(identifier=st.integers(0, 0x7FF), data=st.binary(max_size=8))

@@ -44,11 +44,11 @@ _OLDEST = 0.1
 
 
 class FrameTime:
-    """Finds the offset between two steady clocks from the frames themselves.
+    """Offset between the interface's clock and the bench's, estimated from the frames.
 
     A frame is handed over some time after its stamp, and sometimes at once: the least difference
-    seen is the offset, which may grow only as slowly as clocks drift. What comes out is never
-    later than the reception.
+    is the offset, which may grow only as fast as clocks drift. The time of a frame is never later
+    than its reception.
     """
 
     def __init__(self) -> None:
@@ -102,7 +102,7 @@ for _library in ("canopen", "can"):
 
 
 class CanBus:
-    """An open bus. ``fault`` says why it died, once it has; :meth:`reopen` gives it new life.
+    """An open bus. ``fault`` is the reason why it ended; :meth:`reopen` opens it again.
 
     Handlers check what they are given and raise nothing: they run on the receive thread. One that
     raises ends reception, and ``fault`` names its exception.
@@ -123,7 +123,7 @@ class CanBus:
         self.sync_held = self.heartbeat_held = False
         """Whether :meth:`sync` or :meth:`heartbeat` send nothing, while a drive is to miss them."""
         self.tap: FrameTap | None = None
-        """Who watches the frames; taken off where it has expired."""
+        """Collector of the frames for a viewer; removed once it has expired."""
         self.network = _Network(self._show_sent)
         self._spec = spec
         self._foreign: dict[int, list[Handler]] = {}
@@ -141,7 +141,7 @@ class CanBus:
         self._open()
 
     def close(self) -> None:
-        """Stop receiving and let the interface go."""
+        """Stop receiving and close the interface."""
         self._stopping.set()
         self._thread.join(timeout=2.0)
         self._dropped += self._port.dropped
@@ -170,7 +170,7 @@ class CanBus:
 
     @property
     def health(self) -> BusHealth:
-        """What happened since it was opened first."""
+        """State and counts since the bus was first opened."""
         tally, down = self._errors, self.fault is not None and not self._thread.is_alive()
         return BusHealth(
             state=BusState.DOWN if down else tally.state,
@@ -189,7 +189,7 @@ class CanBus:
 
     @property
     def nodes(self) -> frozenset[int]:
-        """Nodes that are known here, or whose heartbeat was heard."""
+        """Nodes that are known here, or whose heartbeat was received."""
         known = (identifier - _HEARTBEAT for identifier in tuple(self._handlers))
         return frozenset(self._heard.union(node for node in known if 0 < node <= _LAST_NODE))
 
@@ -229,7 +229,7 @@ class CanBus:
         self.on(identifier, receive)
 
     def off(self, identifier: int) -> None:
-        """Let frames with this identifier pass again."""
+        """Remove the handler of an identifier."""
         self._handlers.pop(identifier, None)
 
     def pass_on(self, identifier: int, data: bytes, now: float) -> None:
@@ -258,7 +258,7 @@ class CanBus:
         return True
 
     def gather(self) -> None:
-        """Let the frames of :meth:`post` wait for :meth:`send_gathered`; for the control loop."""
+        """Queue the frames of :meth:`post` until :meth:`send_gathered`; for the control loop."""
         self._gathered = []
 
     def post(self, identifier: int, data: bytes) -> None:
@@ -272,7 +272,7 @@ class CanBus:
             self._gathered.append((identifier, data))
 
     def withdraw(self, identifier: int) -> None:
-        """Take back what waits with this identifier; for a stop, which nothing may follow."""
+        """Remove queued frames with this identifier: no target may follow a stop."""
         waiting = self._gathered
         if waiting:
             waiting[:] = [frame for frame in waiting if frame[0] != identifier]
@@ -294,7 +294,7 @@ class CanBus:
             raise lost
 
     def _sent_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
-        """How many of the first of these frames one call has sent."""
+        """Number of the first of these frames that one call has sent."""
         if not frames:
             return 0
         with self.network.send_lock:

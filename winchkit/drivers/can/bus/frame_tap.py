@@ -1,4 +1,4 @@
-"""Frames of a CAN bus for somebody who watches: the newest of each identifier, the last ones."""
+"""Trace of a CAN bus for a viewer: newest frame of each identifier, and the last frames."""
 
 from __future__ import annotations
 

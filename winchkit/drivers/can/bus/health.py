@@ -1,4 +1,4 @@
-"""What a CAN bus counts of its own troubles: error frames read, and the picture of all counts."""
+"""Error state and counts of a CAN bus, from its error frames."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _WARNING, _PASSIVE, _ACTIVE = 0x0C, 0x30, 0x40
 
 
 class BusState(Enum):
-    """State of the CAN controller, as its error counters make it."""
+    """Error state of the CAN controller (ISO 11898-1)."""
 
     ACTIVE = "error active"
     WARNING = "error warning"
@@ -25,7 +25,7 @@ class BusState(Enum):
 
 @dataclass(frozen=True, slots=True)
 class BusHealth:
-    """What happened on a bus since it was opened; a snapshot."""
+    """State and counts of a bus since it was opened; a snapshot."""
 
     state: BusState = BusState.ACTIVE
     received: int = 0
@@ -102,7 +102,7 @@ class ErrorTally:
             self.enter(BusState.ACTIVE)
 
     def enter(self, state: BusState) -> None:
-        """Take a state of the controller, from whichever source."""
+        """Take a state of the controller."""
         if state is self.state:
             return
         self.state = state

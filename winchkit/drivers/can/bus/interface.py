@@ -61,16 +61,16 @@ class Interface(Protocol):
         """Send a data frame of 11 bits; raises can.CanError or OSError."""
 
     def send_together(self, frames: Sequence[tuple[int, bytes]]) -> int:
-        """Send the first of these frames in one call; how many, 0 without such a call."""
+        """Send the first of these frames in one call; returns how many, 0 without such a call."""
 
     def send_remote(self, identifier: int) -> None:
         """Send a remote frame of 11 bits for one byte; raises can.CanError or OSError."""
 
     def state(self) -> BusState | None:
-        """What the controller says of itself; None where only error frames do."""
+        """State of the controller; None where only error frames report it."""
 
     def close(self) -> None:
-        """Let it go; does not fail."""
+        """Close it; raises nothing."""
 
 
 class _Library:
@@ -191,7 +191,7 @@ def simulated_interface(spec: BusSpec, clock: Clock) -> Interface | None:
 
 
 def open_interface(spec: BusSpec, name: str) -> Interface:
-    """Open what a bench file names; raises ConnectionLost saying what was tried."""
+    """Open the interface of a bench file; raises ConnectionLost."""
     options: dict[str, Any] = {"interface": spec.interface, "channel": spec.channel}
     if spec.interface not in _NO_BITRATE:
         options["bitrate"] = spec.bitrate

@@ -1,4 +1,4 @@
-"""Worst-case load of a CAN bus by frames that are sent every SYNC or every so often."""
+"""Worst-case load of a CAN bus by frames sent at every n-th SYNC or periodically."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class FrameKind:
 
 @dataclass(frozen=True)
 class Load:
-    """What a bus has to carry."""
+    """Traffic of a bus."""
 
     bitrate: int
     cycle: float

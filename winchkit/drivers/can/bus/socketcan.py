@@ -116,7 +116,7 @@ class SocketCan:
         return None
 
     def close(self) -> None:
-        """Let it go."""
+        """Close it."""
         with suppress(can.CanError, OSError):
             self.library.shutdown()
 

@@ -16,7 +16,7 @@ _IDENTIFIER = 0x1FFFFFFF
 
 
 def set_communication(node: SdoNode) -> tuple[str, ...]:
-    """Let a drive take the host's SYNC, send none itself, and send EMCY.
+    """Configure a drive as SYNC consumer and EMCY producer by the predefined connection set.
 
     Returns what was changed, in words. A drive may lack both objects, or keep them constant.
     Raises NotPermitted where it goes on sending SYNC or listens to another identifier, NoReply.

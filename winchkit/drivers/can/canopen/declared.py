@@ -6,7 +6,14 @@ from typing import Any
 
 from canopen.objectdictionary import datatypes
 
-__all__ = ["declared", "fixed_mapping", "mapped_objects", "said", "unmappable", "writable"]
+__all__ = [
+    "configured_value",
+    "declared",
+    "fixed_mapping",
+    "mapped_objects",
+    "unmappable",
+    "writable",
+]
 
 _RPDO, _TPDO, _MAPPING = 0x1400, 0x1800, 0x200
 
@@ -21,7 +28,7 @@ def declared(dictionary: Any, index: int, sub: int = 0) -> Any:
 
 
 def unmappable(variable: Any, *, receive: bool, real: bool = False) -> str:
-    """Why an object cannot stand in a PDO; empty where it can. ``real``: real numbers can too."""
+    """Reason why an object cannot be mapped into a PDO; empty where it can, `real`: REAL32 too."""
     if variable.data_type not in datatypes.INTEGER_TYPES and not (
         real and variable.data_type in datatypes.FLOAT_TYPES
     ):
@@ -48,12 +55,14 @@ def fixed_mapping(dictionary: Any, receive: bool, number: int) -> tuple[str, ...
 
 def mapped_objects(dictionary: Any, mapping: int) -> tuple[str, ...]:
     """Objects of a mapping record by its default values, or a DCF's own."""
-    count = said(declared(dictionary, mapping)) or 0
-    entries = (said(declared(dictionary, mapping, sub)) or 0 for sub in range(1, count + 1))
+    count = configured_value(declared(dictionary, mapping)) or 0
+    entries = (
+        configured_value(declared(dictionary, mapping, sub)) or 0 for sub in range(1, count + 1)
+    )
     return tuple(_object_text(entry >> 16, entry >> 8 & 0xFF) for entry in entries if entry)
 
 
-def said(variable: Any) -> int | None:
+def configured_value(variable: Any) -> int | None:
     """Value of an object: a DCF's own, else the default; None where the file has none."""
     if variable is None:
         return None

@@ -1,4 +1,4 @@
-"""What an EDS or DCF says of a drive before it is opened: modes, PDOs, loss of the host, options.
+"""Description of a drive by its EDS or DCF: modes, PDOs, host-loss mechanisms, option codes.
 
 An EDS declares objects; whether the drive acts on them is proved at commissioning only.
 """
@@ -12,10 +12,10 @@ from typing import Any
 from canopen.objectdictionary import datatypes
 
 from winchkit.drivers.can.canopen.declared import (
+    configured_value,
     declared,
     fixed_mapping,
     mapped_objects,
-    said,
     unmappable,
     writable,
 )
@@ -89,18 +89,18 @@ class OptionEntry:
 
 @dataclass(frozen=True)
 class HostLoss:
-    """A way for a drive to notice that the host is dead, by the objects of its EDS."""
+    """A mechanism by which a drive detects a lost host, by the objects of its EDS."""
 
     way: str
     """As ``host_loss`` in a device file: heartbeat, guarding, rpdo-timeout, sync-loss."""
     objects: tuple[str, ...]
     reaction: str
-    """What the drive does then, as far as the EDS says."""
+    """Reaction of the drive, as far as the EDS declares it."""
 
 
 @dataclass(frozen=True)
 class DriveDescription:
-    """What an EDS says that matters for moving the drive."""
+    """Content of an EDS that matters for moving the drive."""
 
     maker: str
     product: str
@@ -112,7 +112,7 @@ class DriveDescription:
     values: tuple[str, ...]
     """Of a device that is no drive: objects that a TPDO can carry, the maker's own last."""
     modes: tuple[str, ...]
-    """Whose objects the EDS has."""
+    """Modes whose objects the EDS has."""
     motion_modes: tuple[str, ...]
     """Those of them that the bench can move it in."""
     feedback: dict[str, bool]
@@ -161,7 +161,7 @@ def describe(dictionary: Any) -> DriveDescription:
 
 
 def _profile(dictionary: Any) -> int | None:
-    kind = said(declared(dictionary, 0x1000))
+    kind = configured_value(declared(dictionary, 0x1000))
     return None if not kind else kind & 0xFFFF
 
 
@@ -188,7 +188,7 @@ def _values(dictionary: Any) -> Iterator[str]:
 
 
 def host_loss_ways(dictionary: Any) -> tuple[HostLoss, ...]:
-    """The ways in which the drive might notice a dead host, best first; each needs its proof."""
+    """Mechanisms by which the drive may detect a lost host, best first; each needs its proof."""
     return tuple(_host_loss(dictionary))
 
 
@@ -212,7 +212,7 @@ def _host_loss(dictionary: Any) -> Iterator[HostLoss]:
 
 
 def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
-    """What the drive does when it misses a heartbeat or guarding, and which object says so."""
+    """Reaction to a missing heartbeat or guarding poll, and the object that declares it."""
     lost = declared(dictionary, 0x6007)
     if lost is not None:
         row = OPTIONS["connection_lost"]
@@ -282,7 +282,7 @@ def _options(dictionary: Any) -> Iterator[OptionEntry]:
     for row in OPTIONS.values():
         variable = declared(dictionary, row.index)
         if variable is not None:
-            value = said(variable)
+            value = configured_value(variable)
             meaning = "" if value is None else row.meanings.get(value, "of the maker's own")
             yield OptionEntry(
                 f"{row.index:04X}h", row.occasion, bool(variable.writable), value, meaning
@@ -298,8 +298,8 @@ def _obstacles(
 ) -> Iterator[str]:
     if not _is_drive(dictionary):
         profile = _profile(dictionary)
-        said_so = "no device profile" if profile is None else f"device profile {profile}, not 402"
-        yield f"it is no servo drive: 1000h says {said_so}, and 6040h and 6041h are not both there"
+        stated = "no device profile" if profile is None else f"device profile {profile}, not 402"
+        yield f"it is no servo drive: 1000h says {stated}, and 6040h and 6041h are not both there"
         return
     for index in ALWAYS:
         if index not in dictionary:
@@ -333,7 +333,7 @@ def _obstacles(
 
 
 def _no_room(dictionary: Any, entries: tuple[PdoEntry, ...], keys: list[Any]) -> str:
-    """What of these objects no PDO can take beside the others; empty where each has its place."""
+    """Object that no PDO has room for beside the others; empty where all have room."""
     first = [entry for entry in entries if entry.number <= _FIRST_PDOS]
     held = {name for entry in first if entry.fixed for name in entry.objects}
     free = [_PDO_BITS for entry in first if not entry.fixed]
@@ -383,13 +383,13 @@ def _differences(
         )
     if 0x6502 not in dictionary:
         yield "6502h (supported modes) is missing: the modes of the device file count"
-    elif not said(declared(dictionary, 0x6502)):
+    elif not configured_value(declared(dictionary, 0x6502)):
         yield (
             "6502h (supported modes) has no value in the EDS: modes are those whose objects are "
             "there, `winchkit info` reads the drive's"
         )
     yield from _pdo_differences(receive, transmit)
-    if (sync := said(declared(dictionary, 0x1005)) or 0) & 1 << 30:
+    if (sync := configured_value(declared(dictionary, 0x1005)) or 0) & 1 << 30:
         yield f"1005h is {sync:X}h: the drive produces SYNC itself, which is switched off"
     if dictionary.device_information.vendor_number in (None, 0):
         yield "the vendor number is missing: the drive cannot be recognised by its identity"

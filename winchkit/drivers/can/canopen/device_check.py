@@ -9,7 +9,12 @@ from typing import Any
 
 from canopen.objectdictionary import datatypes
 
-from winchkit.drivers.can.canopen.declared import declared, fixed_mapping, said, unmappable
+from winchkit.drivers.can.canopen.declared import (
+    configured_value,
+    declared,
+    fixed_mapping,
+    unmappable,
+)
 from winchkit.drivers.can.canopen.description import (
     ALWAYS,
     HostLoss,
@@ -78,12 +83,12 @@ def check_drive(device: DeviceSpec) -> EdsReport:
     ):
         faults.append(source.fault(("servo", "home_offset"), "is no object of the EDS"))
     ways = host_loss_ways(dictionary)
-    doubt = host_loss_problem(ways, servo.host_loss) or _not_watched(dictionary, servo)
-    told = source.fault(("servo",), doubt) if doubt else None
-    if told is not None and ways:
-        faults.append(told)
-    elif told is not None:
-        warnings = (*warnings, told)
+    problem = host_loss_problem(ways, servo.host_loss) or _not_watched(dictionary, servo)
+    fault = source.fault(("servo",), problem) if problem else None
+    if fault is not None and ways:
+        faults.append(fault)
+    elif fault is not None:
+        warnings = (*warnings, fault)
     return EdsReport(tuple(faults), warnings, ways)
 
 
@@ -207,7 +212,7 @@ def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec, *, real: bool = False
 def _communication_faults(dictionary: Any, record: int, kind: str, spec: PdoSpec) -> Iterator[str]:
     """Identifier and transmission type that the EDS does not let change and that differ."""
     identifier, type_ = (declared(dictionary, record, sub) for sub in (1, 2))
-    kept = said(identifier)
+    kept = configured_value(identifier)
     wanted = cob_id("rpdo" if kind == "rpdo" else "tpdo", spec.number, _NODE)
     if identifier is not None and not identifier.writable and kept is not None:
         if kept & _INVALID:
@@ -218,7 +223,7 @@ def _communication_faults(dictionary: Any, record: int, kind: str, spec: PdoSpec
                 f"{_NODE}, which cannot be written, not {wanted:03X}h of the predefined "
                 "connection set"
             )
-    kept = said(type_)
+    kept = configured_value(type_)
     if type_ is not None and not type_.writable and kept not in (None, spec.transmission):
         yield (
             f"{kind} {spec.number} has the transmission type {kept}, which cannot be written: "

@@ -1,4 +1,4 @@
-"""Heartbeats: those received and the one sent; the caller gives the time to both."""
+"""Heartbeat protocol of CiA 301: consumer and producer; the caller gives the time to both."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = ["NMT_STATES", "HeartbeatProducer", "HeartbeatWatch", "NmtState"]
+__all__ = ["NMT_STATES", "HeartbeatProducer", "HeartbeatWatch", "NmtState", "state_text"]
 
 
 class NmtState(IntEnum):
-    """State byte of a heartbeat."""
+    """NMT state, as the state byte of a heartbeat has it."""
 
     BOOT_UP = 0
     STOPPED = 4
@@ -22,12 +22,17 @@ class NmtState(IntEnum):
 
 
 NMT_STATES = frozenset(int(state) for state in NmtState)
-"""State bytes that the standard knows."""
+"""State bytes of CiA 301."""
+
+
+def state_text(state: int) -> str:
+    """NMT state of a heartbeat in words; the number of one that CiA 301 does not have."""
+    return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
 
 
 @dataclass
 class HeartbeatWatch:
-    """Listens to one node; like a drive's own consumer it arms on the first heartbeat."""
+    """Heartbeat consumer of one node; as in CiA 301, monitoring begins with the first heartbeat."""
 
     timeout: float
     """s."""
@@ -45,7 +50,7 @@ class HeartbeatWatch:
             self.boot_ups += 1
 
     def forget(self) -> None:
-        """Count nothing that was received so far."""
+        """Discard what was received so far; monitoring begins again."""
         self.last = self.state = None
 
     def age(self, now: float) -> float | None:
@@ -60,9 +65,9 @@ class HeartbeatWatch:
 
 @dataclass
 class HeartbeatProducer:
-    """Says when the host's heartbeat is due.
+    """Times of the host's heartbeat.
 
-    The control loop asks once a cycle, so the beat stops when the loop hangs.
+    The control loop evaluates it once per cycle, so that the heartbeat ends with the loop.
     """
 
     period: float

@@ -1,4 +1,4 @@
-"""One CANopen node by SDO: typed reads and writes, one at a time, with every answer checked."""
+"""SDO client of one CANopen node: typed reads and writes, one at a time, every answer checked."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from winchkit.drivers.scheduling import lock_of
 from winchkit.errors import DeviceRefused, FileError, NoReply, NotPermitted
 
 __all__ = [
+    "ABSENT",
     "ObjectPort",
     "Objects",
     "SdoNode",
@@ -116,7 +117,8 @@ def object_name(index: int, sub: int = 0) -> str:
     return f"{index:04X}h:{sub}" if sub else f"{index:04X}h"
 
 
-_ABSENT = {0x06020000, 0x06090011}
+ABSENT = frozenset({0x06020000, 0x06090011})
+"""SDO abort codes of an object or sub-index that does not exist (CiA 301)."""
 _TIMEOUT = 0.5
 _FULL_TRIES, _FULL_PAUSE = 20, 0.005
 """How often, and after which pause (s), a full queue of the interface is tried again."""
@@ -173,7 +175,7 @@ class SdoNode:
             return self.upload(index, sub)
         except DeviceRefused as error:
             cause = error.__cause__
-            if isinstance(cause, canopen.SdoAbortedError) and cause.code in _ABSENT:
+            if isinstance(cause, canopen.SdoAbortedError) and cause.code in ABSENT:
                 return None
             raise
 

@@ -1,4 +1,4 @@
-"""Writes PDO parameters in the order that the standard asks for, and reads them back."""
+"""PDO parameters: written in the order that CiA 301 requires, and read back."""
 
 from __future__ import annotations
 
@@ -144,7 +144,7 @@ def _set_timers(node: SdoNode, record: int, spec: PdoSpec) -> None:
 
 
 def _verify_identifier(node: SdoNode, record: int, identifier: int) -> None:
-    """Compare the COB-ID, letting a device keep its own mind about the RTR bit."""
+    """Compare the COB-ID, apart from the RTR bit, which some devices keep."""
     kept = node.read(record, 1)
     if (kept ^ identifier) & ~_NO_RTR:
         node.write_verified(record, 1, identifier)

@@ -64,13 +64,13 @@ class Cia402Axis:
         self.servo = device.servo
         self.emergencies = EmergencyLog()
         self.drive: Commissioned | None = None
-        """What it agreed to; None before it is commissioned."""
+        """Confirmed set-up; None before the axis is commissioned."""
         self._mode = MODES[device.servo.motion_mode]
         self._bus, self._clock, self._watch = bus, clock, watch
         self._node = SdoNode(bus, node, Path(device.path).parent / device.servo.eds)
         terms = Terms(watch.host, watch.timeout, watch.heartbeat, watch.cycle)
         self.host = HostWatch(self._node, device.servo, terms, clock, watch.hardware)
-        """How the drive watches the host; its ``silent`` ends the life signs, to stop it."""
+        """Host-loss mechanism of the drive; its ``silent`` ends the life signs, to stop it."""
         self.heartbeat = self.host.heartbeat
         self._position = MotorPosition(device.servo, watch.speed)
         self._gathering: Gathering | None = None
@@ -156,7 +156,7 @@ class Cia402Axis:
         self._bus.nmt(_NMT_STOP, self._node.node)
 
     def end_stop(self) -> None:
-        """The stop by SDO is over: its replies are the confirmed client's again."""
+        """End the stop by SDO: its replies go to the confirmed client again."""
         self._sdo_stop.end()
 
     @property
@@ -205,7 +205,7 @@ class Cia402Axis:
         return self.emergencies.standing
 
     def forget_alarms(self) -> None:
-        """A reset has dealt with them; those that still hold are sent again."""
+        """Clear the emergency codes at a reset; the drive sends again those that still hold."""
         self.emergencies.in_force.clear()
 
     @property
@@ -237,7 +237,7 @@ class Cia402Axis:
         self._position.lose()
 
     def disarm(self) -> None:
-        """Let the drive, at rest, stop watching the host; raises ConnectionLost."""
+        """Switch the host-loss mechanism of the drive, at rest, off; raises ConnectionLost."""
         self.host.disarm()
 
     def fall_silent(self) -> bool:
@@ -255,7 +255,7 @@ class Cia402Axis:
 
     @property
     def feedback(self) -> AxisFeedback | None:
-        """What its newest complete answer to a SYNC said."""
+        """Feedback of the newest complete answer to a SYNC."""
         gathering = self._gathering
         return None if gathering is None else gathering.feedback
 
@@ -283,13 +283,13 @@ class Cia402Axis:
 
     @property
     def operational(self) -> bool:
-        """Whether its heartbeat says that its PDOs run."""
+        """Whether its heartbeat shows the NMT state operational."""
         state = self.heartbeat.state
         return state is None or state == NmtState.OPERATIONAL
 
     @property
     def mapping_lost(self) -> bool:
-        """Whether it has booted since it was commissioned, and forgotten its PDOs."""
+        """Whether it has booted since it was commissioned, and lost its PDO mapping."""
         return self.heartbeat.boot_ups != self._boot_ups
 
     @property
@@ -299,7 +299,7 @@ class Cia402Axis:
 
     @property
     def state(self) -> State:
-        """Its power state as far as it is certain: UNKNOWN once what it said is stale."""
+        """Power state by the newest feedback; UNKNOWN once that is stale."""
         return self._certain(self.feedback)
 
     def _certain(self, feedback: AxisFeedback | None) -> State:
@@ -314,7 +314,7 @@ class Cia402Axis:
 
     @property
     def homing(self) -> Homing:
-        """How far a homing is, by the newest feedback; for the mode HM, once it was started."""
+        """State of the homing by the newest feedback; for the mode HM, once it was started."""
         return Homing.INTERRUPTED if self.feedback is None else homing_state(self.feedback.status)
 
     @property
@@ -444,7 +444,7 @@ class Cia402Axis:
         self._quick_stop = wanted
 
     def _note_life_sign(self) -> bool:
-        """Look whether the drive has had a life sign of the host; once it has, it is kept."""
+        """Whether the drive has had a life sign of the host since it was commissioned."""
         self._watched = self.host.begun(self._bus.beats[self._watch.host] - self._beats)
         return self._watched
 

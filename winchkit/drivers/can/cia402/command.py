@@ -1,4 +1,4 @@
-"""One cycle's command to a drive: targets in its own counts, packed into its RPDOs."""
+"""Command of one cycle to a drive: targets in its counts, packed into its RPDOs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class _Step(Enum):
 
 
 class SetPoint:
-    """Hands targets over one at a time, each by a rising edge that the drive acknowledges.
+    """Set-point handshake of profile position mode: each target by an acknowledged edge of bit 4.
 
     The target stands on the bus a cycle before bit 4 rises, and until that is acknowledged: the
     two may travel in different PDOs, and no drive may take an edge with the target before.
@@ -72,7 +72,7 @@ _MOVES = (Wish.ENABLE, Wish.RUN_DOWN)
 
 
 class Command(NamedTuple):
-    """What is asked of the drive in a cycle; SI at the motor shaft."""
+    """Requested state and targets of one cycle; SI at the motor shaft."""
 
     wish: Wish
     velocity: float = 0.0

@@ -1,4 +1,4 @@
-"""Brings a CiA 402 drive from power-on to operational, disabled, checked and watched over."""
+"""Commissioning of a CiA 402 drive: from power-on to operational, disabled and supervised."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _MISSED_BEATS = 2.5
 
 @dataclass(frozen=True)
 class WatchSpec:
-    """Who watches whom, how often, and what the drive itself has to keep to."""
+    """Supervision, limits and option codes that commissioning sets up."""
 
     host: int
     """Node id of the host."""
@@ -73,7 +73,7 @@ class WatchSpec:
 
 @dataclass(frozen=True)
 class Commissioned:
-    """What the drive said and agreed to."""
+    """Set-up of a drive as read back."""
 
     mode: str
     modes: tuple[str, ...]
@@ -91,13 +91,13 @@ class Commissioned:
     """1029h:1, what it does with its network state when the host is gone: 0 pre-operational,
     1 nothing, 2 stopped; None where it has no such object."""
     proof: Proof | None = None
-    """How it noticed a silent host; None where that was not asked for."""
+    """Proof of the host-loss mechanism; None where it was not requested."""
     host_loss: HostLoss = field(default_factory=HostLoss)
-    """How it notices a dead host, and what is known of its reaction while it is enabled."""
+    """Host-loss mechanism, and the known reaction of the enabled drive."""
     stops_on_nmt: bool = False
     """Whether it was seen to leave operation enabled on NMT stopped; False where unknown."""
     notes: tuple[str, ...] = ()
-    """What was found and changed, for whoever opens the bench to read."""
+    """Findings and changes, for the user who opens the bench."""
 
 
 def commission(

@@ -1,4 +1,4 @@
-"""What a drive's TPDOs say, put together by SYNC: complete, of one moment, and counted."""
+"""Feedback of a drive from its TPDOs: complete sets, each sampled at one SYNC, with counts."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _KEPT = 3
 
 
 class AxisFeedback(NamedTuple):
-    """What a drive said at one SYNC; SI at the motor shaft.
+    """Feedback of a drive at one SYNC; SI at the motor shaft.
 
     A named tuple, since one is made of every drive in every cycle: a frozen dataclass takes six
     times as long to make.
@@ -102,7 +102,7 @@ class FeedbackHealth:
 
 
 class Gathering:
-    """Puts together the TPDOs that answer one SYNC; :meth:`receiver` takes their frames.
+    """Collects the TPDOs that answer one SYNC; :meth:`receiver` takes their frames.
 
     TPDOs of transmission type 1 are a set: they count only together, and in their order, so that
     none of them can be left over from the SYNC before. The order is that of their numbers until

@@ -1,4 +1,4 @@
-"""Limits that the drive itself keeps, the second barrier behind the bench's own."""
+"""Limits in the drive itself, a second barrier behind those of the bench."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def status_words(mode: str, status: int) -> tuple[str, ...]:
 
 
 class Homing(Enum):
-    """How far a homing is, by status bits 13, 12 and 10."""
+    """State of a homing, by bits 13, 12 and 10 of the statusword."""
 
     RUNNING = "running"
     INTERRUPTED = "interrupted or not started"

@@ -1,4 +1,4 @@
-"""What an axis remembers of its motor's position: turns counted, and whether it stands still."""
+"""Position of a motor over many turns of its counter, and its standstill."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a drive does when it stops, faults or loses its host: 605Ah to 605Eh and 6007h."""
+"""Option codes of CiA 402-2: reaction to stops, faults and a lost host (605Ah to 605Eh, 6007h)."""
 
 from __future__ import annotations
 

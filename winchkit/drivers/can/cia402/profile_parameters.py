@@ -1,4 +1,4 @@
-"""Speeds and ramps that a drive makes itself, in profile modes and homing."""
+"""Profile velocities, ramps and homing parameters of a drive (6081h to 6085h, 6098h to 609Ah)."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _SIZE = 8
 
 
 class SdoStop:
-    """Stops one drive by its object 6040h and asks what came of it."""
+    """Quick stop of one drive by SDO (6040h), and its state read back (6041h)."""
 
     def __init__(self, bus: CanBus, node: int) -> None:
         """Nothing is sent yet."""

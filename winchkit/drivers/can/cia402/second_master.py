@@ -34,7 +34,7 @@ _COMMANDS = {
 
 
 class SecondMaster:
-    """What somebody else commanded one drive to do, on the bus of a bench.
+    """Commands to one drive from another master on the bus of a bench.
 
     It listens from the beginning on; no interface hands back what is sent from here.
     """

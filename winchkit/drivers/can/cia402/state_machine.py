@@ -1,6 +1,6 @@
-"""The power state machine of CiA 402-2 as tables, and the control word for a wish.
+"""Power drive system state machine of CiA 402-2 as tables, and the controlword for a request.
 
-Pure: nothing here talks to a bus. Every way to stop uses quick stop (02h) and disable voltage
+No communication. Every way to stop uses quick stop (02h) and disable voltage
 (00h) only and can therefore never energise a drive, whatever state it is in.
 """
 
@@ -62,7 +62,7 @@ class StatusBit(IntEnum):
 
 
 class Wish(Enum):
-    """What the bench wants of the drive's power state."""
+    """Requested state of a drive."""
 
     ENABLE = "enable"
     RUN_DOWN = "run down"

@@ -1,4 +1,4 @@
-"""A drive's own units against SI at the motor shaft."""
+"""Conversion between a drive's units and SI at the motor shaft."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _counts(value: float, unit: float, most: int, name: str, symbol: str) -> int
 
 @dataclass(frozen=True)
 class Units:
-    """What a drive says of its units; None where it has no such object or it stands at zero."""
+    """Objects of a drive that define its units; None where it has none, or it is zero."""
 
     encoder: float | None = None
     """608Fh: increments a motor turn."""

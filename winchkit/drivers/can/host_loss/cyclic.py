@@ -38,7 +38,7 @@ class RpdoTimeout(Mechanism):
 
     def withhold(self) -> float:
         """A few RPDOs with disable voltage, each before a SYNC, then none."""
-        self._give(self._send, self.terms.cycle)
+        self._send_life_signs(self._send, self.terms.cycle)
         return self.limit
 
     def disarm(self) -> None:
@@ -93,7 +93,7 @@ class SyncLoss(Mechanism):
         """SYNC at its period for a while, then none; a running control loop is held back."""
         self.node.bus.sync_held = True
         count = max(LIFE_SIGNS, round(self.limit / self.terms.cycle))
-        self._give(lambda: self.node.bus.send(0x080, b""), self.terms.cycle, count)
+        self._send_life_signs(lambda: self.node.bus.send(0x080, b""), self.terms.cycle, count)
         return self.limit
 
     def release(self) -> None:

@@ -96,7 +96,7 @@ class Guarding(Mechanism):
         """Poll a few times with life guarding on, then no more."""
         self._switch_on()
         before = self.watch.replies
-        self._give(self.poll, self.guard_time)
+        self._send_life_signs(self.poll, self.guard_time)
         self.clock.sleep(self.guard_time / 2)
         if self.watch.replies == before:
             raise NotPermitted(

@@ -1,4 +1,4 @@
-"""The mechanisms by which a drive notices a dead host: objects, set-up, and how each is silenced.
+"""Mechanisms by which a drive detects a lost host: objects, set-up, and the frames that cease.
 
 A mechanism is set up while the drive is pre-operational. ``withhold`` gives the drive the life
 signs that it watches and then ends them, on a disabled drive; ``restore`` leaves the mechanism
@@ -36,7 +36,7 @@ _MS = 1e-3
 
 
 class Silence(Enum):
-    """Which frames of the host a drive watches: the last way to stop it is to end them."""
+    """Frames of the host that a drive monitors; the last way to stop it is to end them."""
 
     HEARTBEAT = "heartbeat"
     GUARDING = "guarding"
@@ -44,12 +44,12 @@ class Silence(Enum):
     SYNC = "sync"
     ALL = "all"
     NOTHING = "nothing"
-    """It watches none; hardware beside the drive stops the winch."""
+    """None is monitored; hardware beside the drive stops the winch."""
 
 
 @dataclass(frozen=True)
 class Terms:
-    """Who watches whom, and how long."""
+    """Times of the mutual supervision of host and drive."""
 
     host: int
     """Node id of the host."""
@@ -62,7 +62,7 @@ class Terms:
 
 
 class Mechanism:
-    """The base of all, and what is used where hardware beside the drive stops the winch."""
+    """Base class of the mechanisms, itself used where hardware beside the drive stops the winch."""
 
     name = "hardware"
     silence = Silence.NOTHING
@@ -107,7 +107,9 @@ class Mechanism:
     def disarm(self) -> None:
         """Switch it off; raises ConnectionLost."""
 
-    def _give(self, life_sign: Callable[[], object], every: float, count: int = LIFE_SIGNS) -> None:
+    def _send_life_signs(
+        self, life_sign: Callable[[], object], every: float, count: int = LIFE_SIGNS
+    ) -> None:
         for number in range(count):
             if number:
                 self.clock.sleep(every)
@@ -126,23 +128,23 @@ class Heartbeat(Mechanism):
         return "" if there else "it has no 1016h and cannot watch the host's heartbeat"
 
     def set_up(self) -> None:
-        """Let the drive watch the host."""
+        """Enter the host into the heartbeat consumer list (1016h)."""
         self.node.write_verified(0x1016, 1, consumer_entry(self.terms.host, self.limit))
 
     def withhold(self) -> float:
         """One heartbeat of a node id that is not in use: its absence affects no other drive."""
         limit = min(self.limit, _PROOF_TIME)
-        stranger = self._free_node()
-        self.node.write_verified(0x1016, 1, consumer_entry(stranger, limit))
-        self.node.bus.heartbeat(stranger, NmtState.OPERATIONAL)
+        unused = self._free_node()
+        self.node.write_verified(0x1016, 1, consumer_entry(unused, limit))
+        self.node.bus.heartbeat(unused, NmtState.OPERATIONAL)
         return limit
 
     def restore(self) -> None:
-        """Watch the host again."""
+        """Enter the host again."""
         self.set_up()
 
     def disarm(self) -> None:
-        """Watch no node."""
+        """Monitor no node."""
         self.node.write(0x1016, 1, 0)
 
     def _free_node(self) -> int:

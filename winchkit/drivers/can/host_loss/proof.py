@@ -1,4 +1,4 @@
-"""The proof that a disabled drive notices a silent host, and what an enabled one then does."""
+"""Proof that a disabled drive detects a silent host, and the known reaction of an enabled one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _STOPPING = (1, 2, 3)
 
 @dataclass(frozen=True)
 class Proof:
-    """How a disabled drive noticed that the host fell silent."""
+    """Reaction of a disabled drive to a silent host."""
 
     emergency: Emergency | None
     """The EMCY that said so, where it sent one."""
@@ -49,18 +49,18 @@ class Proof:
 
 @dataclass(frozen=True)
 class HostLoss:
-    """How a drive notices a dead host, and whether it is known to stop then."""
+    """Mechanism by which a drive detects a lost host, and whether it is known to stop then."""
 
     mechanism: str = "heartbeat"
     """As declared: heartbeat, guarding, rpdo-timeout, sync-loss, vendor:NAME, hardware."""
     silence: Silence = Silence.HEARTBEAT
     """Which frames of the host have to end for the drive to notice."""
     limit: float = 0.0
-    """What the drive tolerates, s."""
+    """Time without a life sign that the drive tolerates, s."""
     certain: bool = True
     """Whether an enabled drive is known to leave *operation enabled* when it notices."""
     words: str = ""
-    """What was proved, and what is left to ``winchkit commission``."""
+    """What was proved, and what ``winchkit commission`` has to show."""
 
 
 def prove(
@@ -79,7 +79,7 @@ def prove(
     try:
         limit = mechanism.withhold()
         start = mechanism.clock.now()
-        proof = _await_complaint(mechanism, watch, emergencies, start, limit, faultless=faultless)
+        proof = _await_reaction(mechanism, watch, emergencies, start, limit, faultless=faultless)
     finally:
         mechanism.release()
         # A drive that stopped (1029h:1 = 2) answers SDO only once it is pre-operational.
@@ -126,7 +126,7 @@ def reaction(
 
 
 def bring_back(node: SdoNode, clock: Clock, *, clears: bool) -> None:
-    """Clear the fault that it made of the silence, without enabling, and start it again."""
+    """Reset the fault that the silence caused, without enabling, and start the node again."""
     if state_of(node.read(0x6041)) is State.FAULT_REACTION_ACTIVE:
         _await_state(node, clock, State.FAULT)
     if clears and state_of(node.read(0x6041)) is State.FAULT:
@@ -137,7 +137,7 @@ def bring_back(node: SdoNode, clock: Clock, *, clears: bool) -> None:
     node.bus.nmt(_START, node.node)
 
 
-def _await_complaint(
+def _await_reaction(
     mechanism: Mechanism,
     watch: HeartbeatWatch,
     emergencies: Collection[Emergency],

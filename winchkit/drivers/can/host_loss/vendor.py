@@ -43,7 +43,7 @@ class VendorWatch(RpdoTimeout):
         bus.sync_held = silence in (Silence.SYNC, Silence.ALL)
         bus.heartbeat_held = silence in (Silence.HEARTBEAT, Silence.ALL)
         cycle = self.terms.cycle
-        self._give(self._life_sign, cycle, max(LIFE_SIGNS, round(self.limit / cycle)))
+        self._send_life_signs(self._life_sign, cycle, max(LIFE_SIGNS, round(self.limit / cycle)))
         return self.limit
 
     def release(self) -> None:

@@ -32,7 +32,7 @@ _KINDS: dict[str, type[Mechanism]] = {
 
 
 class HostWatch:
-    """Which mechanism a drive has against a dead host; ``heartbeat`` supervises the drive."""
+    """Host-loss mechanism of one drive; ``heartbeat`` supervises the drive in turn."""
 
     def __init__(
         self, node: SdoNode, servo: ServoSpec, terms: Terms, clock: Clock, hardware: str = ""
@@ -97,7 +97,7 @@ class HostWatch:
             self._polls = HeartbeatProducer(self.mechanism.guard_time)
 
     def settle(self) -> None:
-        """Undo what the drive did when another's proof made the host fall silent."""
+        """Bring the drive back after the proof of another drive, in which the host was silent."""
         bring_back(self._node, self._clock, clears=True)
         self.heartbeat.forget()
         self.await_operational()

@@ -1,7 +1,7 @@
-"""The settings of a drive: read as a whole, compared, written and stored in its memory.
+"""Settings of a drive: read as a whole, compared, written, and stored in its memory.
 
-Settings are what an engineer sets and the drive keeps. What a bench sets at every opening (PDOs,
-heartbeats), commands, targets and measured values are none of them.
+Settings are parameters that an engineer sets and the drive keeps. Values that a bench writes at
+every opening (PDOs, heartbeats), commands, targets and measured values are not among them.
 """
 
 from __future__ import annotations
@@ -262,12 +262,12 @@ def write_config(config: Config, objects: Objects) -> list[Difference]:
 
 
 def store(objects: Objects) -> None:
-    """Let the drive keep its settings (1010h); raises NotPermitted, DeviceRefused."""
+    """Store the settings in the drive (1010h); raises NotPermitted, DeviceRefused."""
     _sign(objects, *STORE, "store its parameters")
 
 
 def restore(objects: Objects) -> None:
-    """Let the drive take the maker's settings at its next start (1011h)."""
+    """Restore the manufacturer's settings at the next start of the drive (1011h)."""
     _sign(objects, *RESTORE, "restore the maker's parameters")
 
 

@@ -1,4 +1,4 @@
-"""CAN frames in words, for people who want to see what is, or would be, on the bus."""
+"""CAN frames in words: what is, or would be, on the bus."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import Any
 import canopen
 
 from winchkit.drivers.can.canopen.emergency import parse_emergency
-from winchkit.drivers.can.canopen.nmt import NmtState
-from winchkit.drivers.can.canopen.node import object_name, read_dictionary
+from winchkit.drivers.can.canopen.nmt import state_text
+from winchkit.drivers.can.canopen.node import is_signed, object_name, read_dictionary
 from winchkit.drivers.can.canopen.pdo import MappedObject, PdoCodec, parse_object
 from winchkit.drivers.can.cia402.state_machine import FAULT_RESET, HALT, state_of
 from winchkit.schema.devices.device import DeviceSpec
@@ -24,7 +24,7 @@ _NMT = {
     0x01: "start",
     0x02: "stop",
     0x80: "enter pre-operational",
-    0x81: "reset",
+    0x81: "reset node",
     0x82: "reset communication",
 }
 _CONTROL = {
@@ -95,7 +95,7 @@ def known_node(name: str, device: DeviceSpec, node: int) -> KnownNode:
 
 
 def decode(identifier: int, data: bytes, nodes: Mapping[int, KnownNode]) -> Decoded:
-    """Say what a frame means; frames that make no sense are shown as bytes."""
+    """Meaning of a frame; one that is not understood is shown as bytes."""
     if identifier == 0x000 and len(data) == 2:
         return _nmt(data, nodes)
     if identifier == 0x080:
@@ -127,8 +127,7 @@ def _of_node(base: int, data: bytes, known: KnownNode) -> tuple[str, str]:
     if base == 0x080:
         return "EMCY", str(parse_emergency(data, 0.0) or raw)
     if base == _HEARTBEAT:
-        states = {state.value: state.name.lower().replace("_", "-") for state in NmtState}
-        return "heartbeat", states.get(data[0] & 0x7F, raw) if data else raw
+        return "heartbeat", state_text(data[0] & 0x7F) if data else raw
     if base in (_SDO_REQUEST, _SDO_REPLY) and len(data) == 8:
         words = _request if base == _SDO_REQUEST else _reply
         return "SDO", words(data, known.dictionary)
@@ -157,8 +156,7 @@ def _codec(spec: PdoSpec, dictionary: Any) -> PdoCodec:
     for text in spec.objects:
         index, sub = parse_object(text)
         variable = dictionary.get_variable(index, sub)
-        signed = variable.data_type in canopen.objectdictionary.datatypes.SIGNED_TYPES
-        objects.append(MappedObject(index, sub, len(variable), signed))
+        objects.append(MappedObject(index, sub, len(variable), is_signed(variable)))
     return PdoCodec(spec, objects)
 
 

@@ -1,4 +1,4 @@
-"""What a drive says of itself, read by SDO and put into words; writes nothing."""
+"""Identity, state, errors and parameters of a drive, read by SDO; writes nothing."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class Noted:
 
 @dataclass(frozen=True)
 class DriveInfo:
-    """What a drive says of itself."""
+    """Identity, state, errors and parameters of a drive."""
 
     identity: Identity
     name: str

@@ -1,4 +1,4 @@
-"""Who is on a CAN bus: every node that answers, its identity, and what its heartbeat says."""
+"""Scan of a CAN bus: nodes that answer, their identity objects, and their heartbeats."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ import canopen
 
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.identity import Identity, fitting_device
-from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
-from winchkit.drivers.can.canopen.node import ObjectPort
+from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState, state_text
+from winchkit.drivers.can.canopen.node import ABSENT, ObjectPort
 from winchkit.drivers.can.canopen.sdo_client import sdo_client
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.clock import Clock
@@ -27,7 +27,7 @@ _DEVICE_TYPE, _SERIAL = b"\x00\x10\x00", b"\x18\x10\x04"
 """Index and sub-index of 1000h and 1018h:4 as SDO carries them."""
 _UPLOAD_DEVICE_TYPE, _UPLOAD_SERIAL = (b"\x40" + key + bytes(4) for key in (_DEVICE_TYPE, _SERIAL))
 _SDO_SIZE = 8
-_TWIN_TIME = 0.05
+_DUPLICATE_TIME = 0.05
 """For a second answer to one request, s."""
 _TOO_MANY = 1.5
 """Times the heartbeats that 1017h makes."""
@@ -35,7 +35,6 @@ _SDO_REQUEST, _SDO_REPLY, _HEARTBEAT = 0x600, 0x580, 0x700
 _PACE_BITS = 1000
 """Of bus time from one question to the next, so that no adapter's queue overflows."""
 _TIMEOUT = 0.3
-_ABSENT = {0x06020000, 0x06090011}
 _DICTIONARY: Any = canopen.ObjectDictionary
 
 
@@ -51,7 +50,7 @@ class Found:
     name: str
     """1008h."""
     heartbeat: str
-    """What its heartbeat says, in words."""
+    """NMT state of its heartbeat, in words."""
     device: str
     """Shipped device file that fits; empty where none does."""
     winch: str = ""
@@ -61,7 +60,7 @@ class Found:
 
 
 class RawNode:
-    """A node of which nothing but its number is known."""
+    """A node of which only the node id is known."""
 
     def __init__(self, bus: CanBus, node: int) -> None:
         self._place = f"bus '{bus.name}' node {node}"
@@ -75,7 +74,7 @@ class RawNode:
         try:
             return bytes(self._sdo.upload(index, sub))
         except canopen.SdoAbortedError as error:
-            if error.code in _ABSENT:
+            if error.code in ABSENT:
                 return None
             raise DeviceRefused(f"{self._place} {index:04X}h:{sub}: {error}") from error
         except (canopen.SdoCommunicationError, can.CanError, OSError) as error:
@@ -108,29 +107,29 @@ def scan(
     other's answers. Raises ConnectionLost.
     """
     own = own or {}
-    ears = {node: _Ear(bus, node, clock, listen) for node in NODES if node not in own}
-    for node, ear in ears.items():
-        bus.on(_HEARTBEAT + node, ear.beat)
-        bus.on(_SDO_REPLY + node, ear.reply)
+    listeners = {node: _NodeListener(bus, node, clock, listen) for node in NODES if node not in own}
+    for node, listener in listeners.items():
+        bus.on(_HEARTBEAT + node, listener.beat)
+        bus.on(_SDO_REPLY + node, listener.reply)
         bus.send(_SDO_REQUEST + node, _UPLOAD_DEVICE_TYPE)
         clock.sleep(_PACE_BITS / spec.bitrate)
     clock.sleep(listen)
-    there = {node for node, ear in ears.items() if ear.heard}
+    there = {node for node, listener in listeners.items() if listener.answered}
     found = []
     for node in sorted((there | set(own)) - {spec.node}):
         if node in own:
             asked = _ask(bus, node, own[node].objects)
             found.append(replace(asked, heartbeat=_words(own[node].heartbeat)))
         else:
-            found.append(_reported(ears[node]))
-    for node in ears:
+            found.append(_reported(listeners[node]))
+    for node in listeners:
         bus.off(_HEARTBEAT + node)
         bus.off(_SDO_REPLY + node)
     return found
 
 
-class _Ear:
-    """What one node number says while it is scanned."""
+class _NodeListener:
+    """Frames of one node id during the scan."""
 
     def __init__(self, bus: CanBus, node: int, clock: Clock, listen: float) -> None:
         self.bus, self.node, self.clock = bus, node, clock
@@ -141,8 +140,8 @@ class _Ear:
         """Replies by their index and sub-index."""
 
     @property
-    def heard(self) -> bool:
-        """Whether anything was heard of the node."""
+    def answered(self) -> bool:
+        """Whether any frame of the node was received."""
         return bool(self.replies) or self.watch.last is not None
 
     def beat(self, data: bytes, now: float) -> None:
@@ -157,25 +156,25 @@ class _Ear:
             self.bus.pass_on(_SDO_REPLY + self.node, data, now)
 
 
-def _reported(ear: _Ear) -> Found:
+def _reported(listener: _NodeListener) -> Found:
     """A node that this host does not drive, with what is wrong with it."""
-    if not ear.replies:
+    if not listener.replies:
         # It may have been booting when it was asked.
-        ear.bus.send(_SDO_REQUEST + ear.node, _UPLOAD_DEVICE_TYPE)
-        ear.clock.sleep(_TWIN_TIME)
-    answers = ear.replies[_DEVICE_TYPE]
-    port = RawNode(ear.bus, ear.node) if ear.replies else None
-    found = replace(_ask(ear.bus, ear.node, port), heartbeat=_words(ear.watch))
+        listener.bus.send(_SDO_REQUEST + listener.node, _UPLOAD_DEVICE_TYPE)
+        listener.clock.sleep(_DUPLICATE_TIME)
+    answers = listener.replies[_DEVICE_TYPE]
+    port = RawNode(listener.bus, listener.node) if listener.replies else None
+    found = replace(_ask(listener.bus, listener.node, port), heartbeat=_words(listener.watch))
     if port is None:
-        stopped = ear.watch.state == NmtState.STOPPED
+        stopped = listener.watch.state == NmtState.STOPPED
         said = "it is NMT stopped, which ends SDO" if stopped else "it answers no SDO"
         return replace(found, problem=said)
-    twins = _twins(ear, port, answers)
-    return replace(found, problem="; ".join(filter(None, (twins, found.problem))))
+    duplicates = _duplicates(listener, port, answers)
+    return replace(found, problem="; ".join(filter(None, (duplicates, found.problem))))
 
 
-def _twins(ear: _Ear, port: ObjectPort, answers: int) -> str:
-    """That two nodes have this number, and what shows it; empty where nothing does.
+def _duplicates(listener: _NodeListener, port: ObjectPort, answers: int) -> str:
+    """Evidence that two nodes have this node id; empty where there is none.
 
     One request has one reply: two nodes both answer. Nodes that answer in the same instant with the
     same bytes are one frame on the wire, so the serial number is asked for too, and twice. Two
@@ -184,15 +183,15 @@ def _twins(ear: _Ear, port: ObjectPort, answers: int) -> str:
     said = ""
     if answers > 1:
         said = f"{answers} answers to one request (1000h)"
-    ear.replies.clear()
-    ear.bus.send(_SDO_REQUEST + ear.node, _UPLOAD_SERIAL)
-    ear.clock.sleep(_TWIN_TIME)
-    if not said and ear.replies[_SERIAL] > 1:
-        said = f"{ear.replies[_SERIAL]} answers to one request (1018h:4)"
+    listener.replies.clear()
+    listener.bus.send(_SDO_REQUEST + listener.node, _UPLOAD_SERIAL)
+    listener.clock.sleep(_DUPLICATE_TIME)
+    if not said and listener.replies[_SERIAL] > 1:
+        said = f"{listener.replies[_SERIAL]} answers to one request (1018h:4)"
     if not said and (period := _safely(port, 0x1017) or 0):
-        due = (ear.clock.now() - ear.start) * 1e3 / period
-        if ear.beats > _TOO_MANY * due + 2:
-            said = f"{ear.beats} heartbeats where 1017h ({period} ms) makes {due:.0f}"
+        due = (listener.clock.now() - listener.start) * 1e3 / period
+        if listener.beats > _TOO_MANY * due + 2:
+            said = f"{listener.beats} heartbeats where 1017h ({period} ms) makes {due:.0f}"
     return f"two nodes have this number: {said}; switch one off and give it another" if said else ""
 
 
@@ -210,7 +209,7 @@ def named_after(spec: BenchSpec, found: list[Found]) -> list[Found]:
 
 
 def _ask(bus: CanBus, node: int, port: ObjectPort | None) -> Found:
-    """What a node says of itself, as far as it says it."""
+    """Device type, identity and name of a node, as far as it answers."""
     found = Found(bus.name, node, Identity(), None, "", "", "")
     if port is None:
         return found
@@ -244,5 +243,4 @@ def _number(port: ObjectPort, index: int, sub: int = 0) -> int | None:
 def _words(watch: HeartbeatWatch) -> str:
     if watch.state is None:
         return "no heartbeat"
-    known = {state.value: state.name.lower().replace("_", "-") for state in NmtState}
-    return known.get(watch.state, f"state {watch.state:02X}h")
+    return state_text(watch.state)

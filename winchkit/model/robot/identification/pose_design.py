@@ -19,12 +19,18 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.robot.force_distribution import ForceLimits, wrench_feasibility
-from winchkit.model.robot.kinematics import Geometry, Pose, lengths, rotation_of, structure_matrix
+from winchkit.model.robot.kinematics import (
+    PLATFORM_DOF,
+    Geometry,
+    Pose,
+    lengths,
+    rotation_of,
+    structure_matrix,
+)
 from winchkit.model.robot.wrench import gravity_wrench
 from winchkit.schema.profiles.robot import PlatformSpec
 
 __all__ = [
-    "FREEDOMS",
     "chosen_in_turn",
     "determinant_gain",
     "in_box",
@@ -35,8 +41,6 @@ __all__ = [
     "random_poses",
 ]
 
-FREEDOMS = 6
-"""Degrees of freedom of a platform; fewer cables leave it hanging."""
 _PULLING = ForceLimits(0.0, float("inf"))
 _RIDGE = 1e-9
 """Added to the information of whitened, scaled nuisance columns, which may be collinear."""
@@ -126,7 +130,7 @@ def is_held(geometry: Geometry, platform: PlatformSpec, pose: Pose) -> NDArray[n
     (p,) array of bool
         Whether each pose is held.
     """
-    if len(geometry.exit_point) < FREEDOMS:
+    if len(geometry.exit_point) < PLATFORM_DOF:
         return np.ones(len(pose.position), dtype=bool)
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     pairs = zip(structure, gravity_wrench(platform, pose.rotation), strict=True)

@@ -1,8 +1,8 @@
 """Detects a stuck (frozen) instrument by its raw counts.
 
-Counts that stand still prove nothing by themselves: a good cell at rest shows the same number for
-minutes. They prove something where this very instrument, in this very state (at rest or moving),
-has never been so quiet before.
+Constant counts alone are no evidence: a good cell at rest shows the same number for minutes. They
+are evidence where this instrument, in this state (at rest or moving), has never been constant for
+so long before.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-__all__ = ["Stillness"]
+__all__ = ["FrozenDetector"]
 
 _BLOCK = 40
 """Trials in a block. With a noise of one step a block alike throughout has a chance of 4e-16."""
@@ -27,16 +27,16 @@ class _State:
     """What is known of the counts in one state, at rest or moving."""
 
     noisy: int = 0
-    """Blocks seen, every one of them noisy."""
+    """Number of blocks, all of them noisy."""
     quiet: bool = False
-    """Whether a block was ever quiet and ended by itself."""
+    """Whether a block was ever constant and ended by itself."""
     step: float = math.inf
     """Smallest change of the counts."""
     squares: float = 0.0
     trials: float = 0.0
 
-    def learn(self, change: float, run: float) -> None:
-        """Take in a change of the counts after a run of ``run`` trials alike."""
+    def add(self, change: float, run: float) -> None:
+        """Take a change of the counts after ``run`` equal trials."""
         self.step = min(self.step, abs(change))
         self.quiet |= run >= _BLOCK
         self.squares += change * change / 2
@@ -50,13 +50,13 @@ class _State:
         self.squares = self.trials = 0.0
 
     def too_long(self, run: float) -> bool:
-        """Whether so many trials alike cannot be."""
+        """Whether so many equal trials are too many for a live instrument."""
         return not self.quiet and self.noisy >= _BLOCKS and run >= _BLOCK
 
 
 @dataclass(slots=True)
-class Stillness:
-    """Fed with every count; says whether they stand still while they should not."""
+class FrozenDetector:
+    """Detector of frozen counts; takes every count of one instrument."""
 
     _states: dict[bool, _State] = field(default_factory=lambda: {True: _State(), False: _State()})
     _last: float | None = None
@@ -64,7 +64,7 @@ class Stillness:
     _moving: bool = False
 
     def frozen(self, counts: float, conversions: float, moving: bool) -> bool:
-        """Take in the next counts, ``conversions`` after the ones before them.
+        """Whether the counts are frozen, with the next ones, ``conversions`` after those before.
 
         Several readings of one conversion count as one trial, conversions that were not read not
         at all.
@@ -74,7 +74,7 @@ class Stillness:
             self._moving, self._run = moving, 0.0
         if self._last is None or counts != self._last:
             if self._last is not None:
-                self._states[moving].learn(counts - self._last, self._run + trial)
+                self._states[moving].add(counts - self._last, self._run + trial)
             self._last, self._run = counts, 0.0
             return False
         self._run += trial
