@@ -6,11 +6,13 @@ deep in a computation.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from winchkit.errors import UsageError, one_line
 
-__all__ = ["require_each", "require_type", "require_types"]
+__all__ = ["path_of", "require_each", "require_type", "require_types"]
 
 _CALLS = {
     "Addition": "add(effect, runs, profile)",
@@ -113,6 +115,31 @@ def require_each(winches: object, kind: type, name: str) -> None:
         )
     for key, values in winches.items():
         require_types(values, kind, f"{name}[{key!r}]")
+
+
+def path_of(value: object, name: str = "path") -> Path:
+    """Argument that names a file or a folder.
+
+    Parameters
+    ----------
+    value
+        Argument of a call.
+    name
+        Of the argument.
+
+    Returns
+    -------
+    Path
+        The path.
+
+    Raises
+    ------
+    UsageError
+        For anything that is neither text nor a path.
+    """
+    if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
+        raise UsageError(f"{name} is {_shown(value)}; pass the path of a file or folder")
+    return Path(value)
 
 
 def _shown(value: object) -> str:

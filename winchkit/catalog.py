@@ -6,7 +6,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from winchkit.errors import FileError, suggest
+from winchkit.arguments import path_of
+from winchkit.errors import FileError, UsageError, suggest
 from winchkit.regular_file import file_kind
 
 __all__ = ["Kind", "find", "folder", "names"]
@@ -55,7 +56,12 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
     ------
     FileError
         With the known names where there is none.
+    UsageError
+        For another kind, or a name that is not text.
     """
+    if kind not in _SINGULAR:
+        raise UsageError(f"kind is {kind!r}; pass one of {', '.join(_SINGULAR)}")
+    name = str(path_of(name, "name"))
     leaf = "device.toml" if kind == "devices" else ""
     base = Path(beside).parent if beside else Path()
     for candidate in (base / name, base / f"{name}.toml", Path(name)):

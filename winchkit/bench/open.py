@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+from winchkit.arguments import path_of
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.realtime import Request
 from winchkit.bench.remote.server import StationServer
@@ -58,7 +59,7 @@ def open_bench(
     NotPermitted
         Another program owns the bench, or real-time settings are demanded and refused.
     """
-    spec = bench if isinstance(bench, BenchSpec) else read_bench(bench)
+    spec = bench if isinstance(bench, BenchSpec) else read_bench(path_of(bench, "bench"))
     return Bench(
         spec.with_effects(effects),
         clock or MonotonicClock(),

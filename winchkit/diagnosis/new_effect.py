@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from winchkit.arguments import require_type, require_types
+from winchkit.arguments import path_of, require_type, require_types
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import ProgressCallback, diagnose, no_progress
 from winchkit.diagnosis.results import Diagnosis
@@ -66,7 +66,7 @@ def new_effect(
     """
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")
-    catalogue, file = catalogue or load_catalogue(), Path(path)
+    catalogue, file = catalogue or load_catalogue(), path_of(path)
     name = effect_id or file.stem.replace("_", "-")
     check_own(name, file, catalogue)
     if curve is None:

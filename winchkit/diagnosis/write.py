@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from winchkit.arguments import require_type, require_types
+from winchkit.arguments import path_of, require_type, require_types
 from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.effects.series import single_orders
@@ -39,7 +39,7 @@ def write_addition(
     require_type(addition, Addition, "addition")
     require_types(runs, str, "runs")
     fitted, judged = _provenance(addition.terms, addition.outputs, runs)
-    write_fitted(Path(source), fitted, Path(out), judged)
+    write_fitted(path_of(source, "source"), fitted, path_of(out, "out"), judged)
 
 
 def write_removal(
@@ -68,7 +68,7 @@ def write_removal(
     require_types(runs, str, "runs")
     terms, outputs = (removal.terms, removal.outputs) if removal is not None else ((), {})
     fitted, judged = _provenance(terms, outputs, runs)
-    write_without(Path(source), effect, fitted, Path(out), judged)
+    write_without(path_of(source, "source"), effect, fitted, path_of(out, "out"), judged)
 
 
 def _provenance(

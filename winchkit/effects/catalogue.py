@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from pkgutil import iter_modules
 
+from winchkit.arguments import require_types
 from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.errors import Fault, FileError, UsageError
@@ -48,12 +49,12 @@ class Catalogue:
         return found
 
 
-def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:
+def load_catalogue(files: Sequence[str | Path] = ()) -> Catalogue:
     """Load all effects: of the package, of entry points ``winchkit.effects``, then of files.
 
     Parameters
     ----------
-    files : iterable of str or Path, optional
+    files : sequence of str or Path, optional
         Python files with user effects.
 
     Returns
@@ -67,6 +68,7 @@ def load_catalogue(files: Iterable[str | Path] = ()) -> Catalogue:
         For a file that cannot be loaded or has no effect, and for an effect that changes its input
         at the null or returns no finite value.
     """
+    require_types(files, (str, Path), "files")
     found: list[Effect] = []
     for room in _ROOMS:
         package = import_module(f"winchkit.effects.{room}")

@@ -13,6 +13,7 @@ from itertools import product
 
 import numpy as np
 
+from winchkit.arguments import require_types
 from winchkit.arrays import Array
 from winchkit.errors import RunError, UsageError
 from winchkit.estimation.groups import PulleyGroup, flat_pulleys
@@ -203,6 +204,7 @@ def identify_dahl(
     """
     from scipy.optimize import least_squares
 
+    require_types(records, Record, "records")
     samples = sum(len(record.cell) for record in records)
     if samples < _LEAST_SAMPLES or not wraps:
         raise UsageError(

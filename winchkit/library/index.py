@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError
 from winchkit.library.description import ProfileOfRuns, described
 from winchkit.library.files import RunFile, run_files
@@ -73,7 +74,7 @@ def indexed(folder: str | Path) -> Partitions:
     folder : str or Path
         Folder of the runs.
     """
-    if not Path(folder).is_dir():
+    if not path_of(folder, "folder").is_dir():
         raise FileError(Fault("no such folder of runs", str(folder)))
     tables = Partitions(Path(folder))
     if not tables.files("runs"):
@@ -132,7 +133,7 @@ def index_library(
     A file is read again where its size or date of change differs, where it had a fault, or where
     its profile changed. Another writer waits until this one has ended, and then finds the rows.
     """
-    library = Path(folder)
+    library = path_of(folder, "folder")
     if not library.is_dir():
         raise FileError(Fault("no such folder of runs", str(folder)))
     tables = Partitions(library)

@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 import tomlkit
 
+from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError
 from winchkit.profile_edit.document import (
     effect_tables,
@@ -74,7 +75,7 @@ def undo(source: Path, out: Path) -> str:
     FileError
         Where the ledger is empty or a file cannot be read or written.
     """
-    document = read_document(source)
+    document = read_document(path_of(source, "source"))
     steps = tables(document, "ledger")
     if not len(steps):
         raise FileError(Fault("has no ledger: there is nothing to undo", str(source)))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from winchkit.arguments import path_of
+
 __all__ = ["extended_name"]
 
 
@@ -25,5 +27,6 @@ def extended_name(profile: str | Path, *effects: str) -> str:
     str
         Name without a folder.
     """
-    stem = Path(profile).stem if str(profile).endswith(".toml") else Path(profile).name
+    path = path_of(profile, "profile")
+    stem = path.stem if path.suffix == ".toml" else path.name
     return "-".join([stem, *(effect.replace("/", "-") for effect in effects)]) + ".toml"

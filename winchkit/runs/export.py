@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from winchkit.arguments import require_types
+from winchkit.arguments import path_of, require_types
 from winchkit.errors import RunError, UsageError
 from winchkit.runs.log import aligned, log_of_run
 from winchkit.runs.read import read_log, read_run
@@ -43,7 +43,7 @@ def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> 
     require_types(paths, (str, Path), "paths")
     if not paths:
         raise RunError("no log given")
-    suffix = Path(output).suffix.lower()
+    suffix = path_of(output, "output").suffix.lower()
     if suffix not in FORMATS:
         raise UsageError(f"{output}: '{suffix}' is no format of a run; use {', '.join(FORMATS)}")
     if any(Path(path).resolve() == Path(output).resolve() for path in paths):

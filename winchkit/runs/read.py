@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from winchkit.arguments import require_types
+from winchkit.arguments import path_of, require_types
 from winchkit.errors import Fault, RunError
 from winchkit.runs.formats.csv_read import read_bytes, read_csv, read_events
 from winchkit.runs.log import Log, aligned, joined, log_of_run
@@ -104,7 +104,7 @@ def _has_begun(path: Path) -> bool:
 
 
 def _format_of(path: str | Path) -> str:
-    suffix = Path(path).suffix.lower()
+    suffix = path_of(path).suffix.lower()
     if Path(path).is_dir():
         runs = Path(path) / "*.csv"
         raise RunError(Fault(f"is a folder; name the runs in it, such as {runs}", str(path)))

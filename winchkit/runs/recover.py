@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from winchkit.arguments import path_of
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.files import write_whole
 from winchkit.runs.formats.csv_read import read_bytes
@@ -81,8 +82,8 @@ def recover(
     UsageError
         Where the output is the file itself, or exists and is not to be replaced.
     """
-    source = Path(path)
-    target = Path(output) if output else recovered_path(source)
+    source = path_of(path)
+    target = path_of(output, "output") if output else recovered_path(source)
     suffix = source.suffix.lower()
     if target.resolve() == source.resolve():
         raise UsageError(f"{target}: would replace the file that is to be recovered; name another")

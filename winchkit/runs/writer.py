@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 
-from winchkit.arguments import require_type
+from winchkit.arguments import path_of, require_type
 from winchkit.errors import UsageError
 from winchkit.runs.formats.csv_write import CsvWriter
 from winchkit.runs.read import SUFFIXES
@@ -61,7 +61,7 @@ def open_writer(
         For an unknown suffix, an existing file without ``replace``, and a file that is being
         written.
     """
-    begin = partial(create, Path(path), replace=replace)
+    begin = partial(create, path_of(path), replace=replace)
     return kind_for(path)(Path(path), columns, metadata or {}, clock, begin)
 
 
@@ -117,16 +117,16 @@ def write_mcap(run: Run, path: str | Path) -> None:
 def _write(run: Run, path: str | Path, kind: type[RunWriter]) -> None:
     columns = [("time", "s"), *((name, channel.unit) for name, channel in run.channels.items())]
     series = [run.time.tolist(), *(channel.values.tolist() for channel in run.channels.values())]
-    begin = partial(create, Path(path), replace=True)
+    begin = partial(create, path_of(path), replace=True)
     clock = time.monotonic
-    with kind(Path(path), columns, run.metadata, clock, begin, is_streamed=False) as writer:
+    with kind(path_of(path), columns, run.metadata, clock, begin, is_streamed=False) as writer:
         for row in zip(*series, strict=True):
             writer.append_values(row)
 
 
 def kind_for(path: str | Path) -> type[RunWriter]:
     """The writer of the format that a file's suffix names; raises UsageError."""
-    suffix = Path(path).suffix.lower()
+    suffix = path_of(path).suffix.lower()
     if suffix == ".csv":
         return CsvWriter
     if suffix == ".mcap":

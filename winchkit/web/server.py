@@ -11,7 +11,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from winchkit.arguments import require_types
+from winchkit.arguments import path_of, require_types
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -70,6 +70,7 @@ def serve(
         Where the port is in use, or the extra ``web`` is not installed.
     """
     require_types(runs, str, "runs")
+    folder = path_of(folder, "folder")
     try:
         import uvicorn
 
@@ -100,7 +101,7 @@ def serve(
                 BenchView(bench, effects, allow_motion=allow_motion, folder=own)
             )
         robot = RobotWork(own)
-        app = application(workspace, token, Library(Path(folder)), robot, view)
+        app = application(workspace, token, Library(folder), robot, view)
         of_robot = profile is not None and is_robot(profile)
         if mystery is not None:
             workspace.mystery(mystery)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
+from winchkit.arguments import path_of
 from winchkit.bench.commissioning.dialogue import AnswerFile, Dialogue, TypedAnswers
 from winchkit.bench.commissioning.procedure import commission_bench
 from winchkit.bench.commissioning.record import Record
@@ -43,6 +44,8 @@ def commission(bench: str | Path, answers: str | Path | None = None) -> Record:
         print(text, file=sys.stderr)  # noqa: T201 - questions to a person
 
     dialogue: Dialogue = (
-        TypedAnswers(say, sys.stdin.readline) if answers is None else AnswerFile(answers, say)
+        TypedAnswers(say, sys.stdin.readline)
+        if answers is None
+        else AnswerFile(path_of(answers, "answers"), say)
     )
-    return commission_bench(read_bench(bench), dialogue, MonotonicClock())
+    return commission_bench(read_bench(path_of(bench, "bench")), dialogue, MonotonicClock())

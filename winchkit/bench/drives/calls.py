@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from winchkit.arguments import path_of
 from winchkit.bench.drives.bus_load import loads
 from winchkit.bench.drives.node_access import bus_only, drive_at, free_bus, nodes_on
 from winchkit.drivers.can.bus.load import Load
@@ -310,7 +311,7 @@ def bus_load(bench: str | Path | BenchSpec) -> dict[str, Load]:
 
 
 def _spec(bench: Wiring) -> BenchSpec:
-    return bench if isinstance(bench, BenchSpec) else read_bench(bench)
+    return bench if isinstance(bench, BenchSpec) else read_bench(path_of(bench, "bench"))
 
 
 def _select(line: LssLine, identity: Identity | None) -> Identity:

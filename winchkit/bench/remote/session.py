@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from winchkit.arguments import path_of
 from winchkit.bench.commissioning.hardware import tell_hardware
 from winchkit.bench.ownership import digest_of
 from winchkit.bench.remote.client import RemoteStation
@@ -87,7 +88,7 @@ def at_station(
     """
     from winchkit.schema.read import read_bench
 
-    spec = bench if isinstance(bench, BenchSpec) else read_bench(bench)
+    spec = bench if isinstance(bench, BenchSpec) else read_bench(path_of(bench, "bench"))
     name = client_name(client or None)
     remote = _attached(spec, effects, name, observer=observer)
     if remote is not None:

@@ -11,6 +11,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.regular_file import regular
 from winchkit.runs.files import write_whole
@@ -126,7 +127,7 @@ def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
         With every fault and its line.
     """
     try:
-        with open(path, newline="", encoding="utf-8-sig", opener=regular) as file:
+        with open(path_of(path), newline="", encoding="utf-8-sig", opener=regular) as file:
             table = csv.reader(file)
             rows = [(table.line_num, row) for row in table if row and row[0][:1] != "#"]
     except FileNotFoundError:

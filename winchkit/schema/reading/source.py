@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError
 from winchkit.regular_file import regular
 from winchkit.schema.reading.lines import Key, line_of, lines_of_keys
@@ -69,7 +70,7 @@ def open_source(path: str | Path) -> Source:
     Source
         Values with their lines.
     """
-    text = _text(Path(path))
+    text = _text(path_of(path))
     if not text.strip():
         raise FileError(Fault("the file is empty; a declaration starts with schema = 1", str(path)))
     try:
