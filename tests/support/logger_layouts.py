@@ -537,6 +537,48 @@ def _layouts() -> list[Layout]:
     ]  # fmt: skip
 
 
+_JSON_KEYS = ("time [s]", "position [rad]", "speed [rad/s]", "torque [Nm]", "force [N]")
+
+
+def _json_records(path: Path) -> None:
+    rows = [dict(zip(_JSON_KEYS, map(float, row), strict=True))
+            for row in zip(*_standard(), strict=True)]  # fmt: skip
+    whole = {"motor": "m7", "kp": 32, "vin": 7.4, "gains": [1, 2, 3], "entries": rows}
+    path.write_text(json.dumps(whole))
+
+
+def _json_lines(path: Path) -> None:
+    rows = zip(_stamps("iso"), *_standard()[1:], strict=True)
+    lines = [json.dumps({"timestamp": t, "drive": {"position [rad]": a, "speed [rad/s]": v},
+                         "torque [Nm]": q, "force [N]": f}) for t, a, v, q, f in rows]  # fmt: skip
+    path.write_text("\n".join(lines) + "\n")
+
+
+def _json_lists(path: Path) -> None:
+    path.write_text(json.dumps(dict(zip(_JSON_KEYS, map(list, _standard()), strict=True))))
+
+
+def _json_rows(path: Path) -> None:
+    rows = [list(row) for row in zip(*_standard(), strict=True)]
+    path.write_text(json.dumps({"data": rows, "dt": 0.01, "force units": "N"}))
+
+
+def _json_layouts() -> list[Layout]:
+    rows = tuple(
+        f"{channel}=data[{n}] [{unit}]"
+        for n, (channel, unit) in enumerate(
+            zip(Layout("", "", _json_rows).channels, ("rad", "rad/s", "N m", "N"), strict=True),
+            start=1,
+        )
+    )
+    return [
+        Layout("json-records", ".json", _json_records),
+        Layout("json-lines", ".jsonl", _json_lines),
+        Layout("json-lists", ".json", _json_lists),
+        Layout("json-rows", ".json", _json_rows, {"columns": rows}),
+    ]
+
+
 def _unusual() -> list[Layout]:
     """Layouts of no certain program: what people and scripts write."""
     m = motion()
@@ -586,4 +628,4 @@ def _unusual() -> list[Layout]:
     ]  # fmt: skip
 
 
-LAYOUTS: list[Layout] = [*_layouts(), *_unusual()]
+LAYOUTS: list[Layout] = [*_layouts(), *_json_layouts(), *_unusual()]

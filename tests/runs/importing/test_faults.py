@@ -246,3 +246,44 @@ def test_times_of_faults_are_those_of_the_file(tmp_path: Path) -> None:
     (fault,) = caught.value.faults
     assert fault.line == 3
     assert fault.message.startswith("time goes back from 2.445 s to 0 s; rows must come in order")
+
+
+def test_json_that_is_cut_off_damaged_or_without_lists_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    record = '{"t": 0.1, "angle [deg]": 3}'
+    for text, message in (
+        (f'{{"entries": [{record}, {record}, {{"t"', "is the file cut off"),
+        ('{"kp": 3, "name": "m7"}', "JSON without a list of records"),
+        (f"{record}\n{record}\nnothing\n{record}\n", "no record of JSON"),
+        ("{ this is no JSON }", "no rows of numbers"),
+    ):
+        path.write_text(text)
+        with pytest.raises(RunError, match=message):
+            read_table(path)
+    path.write_text(f'{record}\n{record}\n{{"t": 0.3')
+    table = read_table(path)
+    assert [len(column) for column in table.columns] == [2, 2]
+    assert "cut off" in table.notes[0]
+
+
+def test_records_may_lack_fields_and_rows_be_of_unequal_length(tmp_path: Path) -> None:
+    path = tmp_path / "log.json"
+    path.write_text('[{"t": 0, "a": 1}, {"t": 1, "b": null}, {"t": 2, "a": true}]')
+    columns = {c.name: c.values.tolist() for c in read_table(path).columns}
+    assert columns["t"] == [0.0, 1.0, 2.0]
+    assert columns["a"][::2] == [1.0, 1.0]
+    assert np.isnan(columns["a"][1])
+    path.write_text("[[0, 1, 2], [1, 1], [2, 5, 6]]")
+    assert [len(c) for c in read_table(path).columns] == [3, 3]
+
+
+def test_empty_rows_below_a_sheet_are_left_out(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.append(["time [s]", "angle [deg]"])
+    for k in range(20):
+        sheet.append([0.1 * k, 3.0 * k])
+    sheet.cell(row=900, column=5).number_format = "0.00"
+    book.save(tmp_path / "log.xlsx")
+    assert [len(c) for c in read_table(tmp_path / "log.xlsx").columns] == [20, 20]

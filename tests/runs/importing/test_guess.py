@@ -427,7 +427,7 @@ def test_axes_of_an_odrive_are_in_turns(tmp_path: Path) -> None:
         "time": time,
         "ODrive 0 Position": turns,
         "ODrive 0 Velocity": np.cos(time),
-        "ODrive 0 Current": np.sign(turns),
+        "ODrive 0 Current": 1.25 * np.sign(turns),
     }
     found = guess(tmp_path / "a.csv", columns, Answers(torque_constant=8.27 / 150))
     assert found.questions == ()
@@ -514,3 +514,155 @@ def test_the_last_part_of_a_name_counts_where_the_whole_says_nothing(name: str) 
     meaning = meaning_of(name)
     assert meaning is not None
     assert meaning.channel == "time"
+
+
+def joints(gain: float = 1.0) -> dict[str, np.ndarray]:
+    """Three joints of one robot: the first moves, the second follows it, the third is locked."""
+    m = motion()
+    moved = {"1": 1.0, "2": 0.5, "3": 0.0}
+    columns = {"time [s]": m.time}
+    columns |= {f"Position{k}": gain * m.angle * share for k, share in moved.items()}
+    columns |= {f"Velocity{k}": gain * m.velocity * share for k, share in moved.items()}
+    columns |= {f"PositionCmptd{k}": gain * m.angle * share for k, share in moved.items()}
+    columns |= {f"Torque{k}": m.torque * (1 + share) for k, share in moved.items()}
+    columns |= {f"TorqueCur{k}": m.torque * (1.1 + share) for k, share in moved.items()}
+    return columns
+
+
+def test_one_answer_holds_for_the_columns_of_all_joints_that_are_named_alike(
+    tmp_path: Path,
+) -> None:
+    found = guess(tmp_path / "log.csv", joints())
+    assert [q.text.split("?")[0].split(" has")[0] for q in found.questions] == [
+        "which column is 1.motor_torque",
+        "'Position1' (1.motor_angle)",
+        "'Velocity1' (1.motor_velocity)",
+    ]
+    texts = ("1.motor_angle=Position1 [rad]", "1.motor_torque=TorqueCur1 [N m]")
+    answers = Answers(columns=tuple(map(read_column, texts)))
+    answered = guess(tmp_path / "log.csv", joints(), answers)
+    assert not answered.questions
+    for winch in "123":
+        assert of(answered, f"{winch}.motor_angle").source == f"Position{winch}"
+        assert of(answered, f"{winch}.motor_torque").source == f"TorqueCur{winch}"
+        velocity = of(answered, f"{winch}.motor_velocity")
+        assert (velocity.unit, velocity.factor) == ("rad/s", 1.0)
+
+
+def test_a_joint_that_the_user_names_brings_its_other_columns(tmp_path: Path) -> None:
+    texts = ("motor_angle=Position2 [deg]", "motor_torque=TorqueCur2 [N m]")
+    answers = Answers(columns=tuple(map(read_column, texts)))
+    found = guess(tmp_path / "log.csv", joints(180 / math.pi), answers)
+    assert not found.questions
+    assert {item.channel: item.source for item in found.used} == {
+        "time": "time",
+        "motor_angle": "Position2",
+        "motor_velocity": "Velocity2",
+        "motor_torque": "TorqueCur2",
+    }
+    assert of(found, "motor_velocity").unit == "deg/s"
+
+
+def test_a_constant_column_is_no_channel_of_a_motor_that_moves(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"time [s]": m.time, "position [rad]": m.angle, "torque enable": m.time * 0 + 1}
+    still = {"time [s]": m.time, "position [rad]": m.time * 0 + 2.5, "torque [Nm]": m.torque}
+    assert {i.channel for i in guess(tmp_path / "a.csv", columns).used} == {"time", "motor_angle"}
+    # A locked drive has a constant angle and a torque.
+    assert {i.channel for i in guess(tmp_path / "b.csv", still).used} == {
+        "time",
+        "motor_angle",
+        "motor_torque",
+    }
+    speed = {"time [s]": m.time, "position [rad]": m.time * 0, "speed [rad/s]": m.velocity}
+    assert {i.channel for i in guess(tmp_path / "c.csv", speed).used} == {"time", "motor_velocity"}
+
+
+def test_a_number_in_round_brackets_is_a_name_and_no_unit(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"time [s]": m.time}
+    for k in "123":
+        columns |= {f"pos ({k}) [rad]": m.angle, f"current ({k}) [A]": m.torque}
+    columns = {name.replace(" [rad]", ""): values for name, values in columns.items()}
+    columns = {name.replace(" [A]", ""): values for name, values in columns.items()}
+    answers = Answers(columns=(read_column("1.motor_angle=pos (1) [rad]"),), torque_constant=0.1)
+    found = guess(tmp_path / "log.csv", columns, answers)
+    assert not found.questions
+    assert {item.channel for item in found.used} == {
+        "time",
+        *(f"{k}.{base}" for k in "123" for base in ("motor_angle", "motor_torque")),
+    }
+
+
+def test_a_current_without_a_unit_needs_consent_and_whole_numbers_a_unit(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"time [s]": m.time, "position [rad]": m.angle, "current": m.torque / 0.12}
+    found = guess(tmp_path / "a.csv", columns, Answers(torque_constant=0.12))
+    assert of(found, "motor_torque").confidence == "assumed"
+    assert not found.is_certain
+    columns["current"] = np.round(m.torque / 0.12 / 6.5e-3)
+    found = guess(tmp_path / "b.csv", columns, Answers(torque_constant=0.12))
+    assert [q.options for q in found.questions] == [
+        ('--column "motor_torque=current*FACTOR [N m]"', '--column "motor_current=current [mA]"')
+    ]
+    mended = Answers(columns=(read_column("motor_torque=current*0.00078 [N m]"),))
+    assert not guess(tmp_path / "b.csv", columns, mended).questions
+
+
+def test_whole_numbers_of_less_than_a_turn_may_be_counts(tmp_path: Path) -> None:
+    m = motion()
+    small = np.round(2048 + 60 * np.sin(m.time))
+    columns = {"time [s]": m.time, "pos": small}
+    (question,) = guess(tmp_path / "log.csv", columns).questions
+    assert question.key == "counts_per_turn"
+    found = guess(tmp_path / "log.csv", columns, Answers(counts_per_turn=4096))
+    assert of(found, "motor_angle").factor == pytest.approx(TURN / 4096)
+
+
+def test_a_number_of_the_row_is_no_time_beside_an_even_clock(tmp_path: Path) -> None:
+    m = motion()
+    path = tmp_path / "log.csv"
+    rows = enumerate(zip(m.time, m.angle, strict=True))
+    path.write_text("".join(f"{n},{t:.6f},{a:.9g}\n" for n, (t, a) in rows))
+    found = guess_columns(read_table(path))
+    assert of(found, "time").source == "2"
+    # The only column that increases evenly may be a time in steps of one.
+    path.write_text("".join(f"{n},{a:.9g}\n" for n, a in enumerate(m.angle)))
+    assert of(guess_columns(read_table(path)), "time").source == "1"
+
+
+def test_a_name_that_ends_with_time_is_a_clock_where_it_increases(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"motor_pos [rad]": m.angle, "motor_time [ms]": m.time * 0 + 5,
+               "sensor_time [ms]": m.time * 1e3}  # fmt: skip
+    assert of(guess(tmp_path / "log.csv", columns), "time").source == "sensor_time"
+
+
+def test_numbers_are_no_date_by_the_name_data(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"time [s]": m.time, "field.data [N]": m.tension, "data": m.torque}
+    found = guess(tmp_path / "log.csv", columns)
+    assert of(found, "tension").source == "field.data"
+    assert [i.reason for i in found.assignments if i.source == "data"] == ["unknown name"]
+
+
+def test_the_current_of_a_winch_is_kept_for_that_winch(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"time [s]": m.time, "m1_pos [rad]": m.angle, "m2_pos [rad]": m.angle,
+               "m1_current [A]": m.torque, "m2_current [A]": m.torque}  # fmt: skip
+    (question,) = guess(tmp_path / "log.csv", columns).questions
+    assert question.options[1] == '--column "1.motor_current=m1_current [A]"'
+    answers = Answers(columns=(read_column("1.motor_current=m1_current [A]"),))
+    found = guess(tmp_path / "log.csv", columns, answers)
+    assert not found.questions
+    assert of(found, "2.motor_current").source == "m2_current"
+
+
+def test_a_channel_that_one_winch_does_not_have_is_asked_for_no_other(tmp_path: Path) -> None:
+    m = motion()
+    columns = {"time [s]": m.time, "m1_pos [rad]": m.angle, "m2_pos [rad]": m.angle,
+               "m1_load": m.torque, "m2_load": m.torque}  # fmt: skip
+    (question,) = guess(tmp_path / "log.csv", columns).questions
+    assert '--column "1.tension="' in question.text
+    answers = Answers(columns=(read_column("1.tension="),))
+    assert not guess(tmp_path / "log.csv", columns, answers).questions

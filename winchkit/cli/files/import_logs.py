@@ -124,8 +124,8 @@ def command(
 ) -> None:
     """Import recordings of other programs as runs in DIR, one for each FILE.
 
-    Reads text (any delimiter and decimal sign), XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF,
-    TDMS and exports of trackers. Guesses columns and units, shows the guess, and asks what it
+    Reads text (any delimiter and decimal sign), JSON, XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP,
+    MDF, TDMS and exports of trackers. Guesses columns and units, shows the guess, and asks what it
     cannot know; without a terminal it ends with 2 and names the options that answer. The mapping
     that it saves makes the next import silent. A FILE without a motor angle is joined to the one
     that has it, by its time stamps or by cross-correlation (docs/howto/logger.md).

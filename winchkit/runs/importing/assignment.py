@@ -1,14 +1,29 @@
-"""Assignment of a column to a channel, with its unit, factor and confidence."""
+"""Assignment of a column to a channel, with its unit, factor and confidence; its candidates."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.names import words_of
+from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.unit_spelling import SpelledUnit
 
-__all__ = ["Assignment", "Confidence", "Guess", "Question"]
+__all__ = ["Assignment", "Candidate", "Choice", "Confidence", "Guess", "Question"]
 
+_PREFERRED = {
+    "actual",
+    "act",
+    "ist",
+    "measured",
+    "meas",
+    "motor",
+    "mot",
+    "feedback",
+    "fb",
+    "estimate",
+}
+_AVOIDED = {"output", "abtrieb", "raw", "filtered", "filt", "error", "gear", "phase", "bus", "dc"}
 Confidence = Literal["given", "named", "derived", "assumed", "unused"]
 """``given`` by the user or a mapping, ``named`` by name and unit in the file, ``derived`` from the
 unit alone or from other columns, ``assumed`` by convention, ``unused``."""
@@ -73,3 +88,34 @@ class Guess:
         """Whether every used column is given or named, and nothing is asked."""
         sure = {"given", "named"}
         return not self.questions and all(item.confidence in sure for item in self.used)
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """A column and the channel that it may be."""
+
+    column: Column
+    channel: str
+    """Empty where it is not used."""
+    rank: int = 0
+    unit: SpelledUnit | None = None
+    reason: str = ""
+
+    @property
+    def order(self) -> tuple[int, bool, int]:
+        """Sort key: the best candidate first."""
+        words = set(words_of(" ".join((*self.column.labels, self.column.name))).split())
+        is_current = self.unit is not None and self.unit.dimension == "current"
+        preference = len(words & _AVOIDED) - len(words & _PREFERRED)
+        return self.rank, is_current, preference
+
+
+@dataclass
+class Choice:
+    """Chosen columns by channel, and why others were not."""
+
+    chosen: list[Candidate] = field(default_factory=list)
+    """Candidates with their final channel."""
+    unused: list[Candidate] = field(default_factory=list)
+    questions: list[Question] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from winchkit.runs.columns import POSE_DIMENSIONS, column_dimension
 from winchkit.runs.importing.answers import permitted
-from winchkit.runs.importing.assignment import Question
+from winchkit.runs.importing.assignment import Candidate, Choice, Question
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
-from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of, words_of
+from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of
 from winchkit.runs.importing.pose_columns import (
     body_of,
     chosen_body,
@@ -25,9 +26,10 @@ from winchkit.runs.importing.unit_spelling import (
     SpelledUnit,
     read_unit,
 )
+from winchkit.runs.importing.winches import FEWEST, choose_channels
 from winchkit.schema.mapping import DATE, MATRIX
 
-__all__ = ["Candidate", "Choice", "choose"]
+__all__ = ["choose"]
 
 _BY_DIMENSION = {
     "time": "time",
@@ -42,60 +44,11 @@ _BY_DIMENSION = {
     "temperature": "temperature",
     "current": "motor_torque",
 }
-_PREFERRED = {
-    "actual",
-    "act",
-    "ist",
-    "measured",
-    "meas",
-    "motor",
-    "mot",
-    "feedback",
-    "fb",
-    "estimate",
-}
-_AVOIDED = {"output", "abtrieb", "raw", "filtered", "filt", "error", "gear", "phase", "bus", "dc"}
-_SIDES = ({"left", "right"}, {"links", "rechts"}, {"gauche", "droite"}, {"front", "rear"})
 _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
 _UNKNOWN = "unknown name"
 _NOT_USED = "set point, error, state, counter, constant or a quantity of another body"
-_FEW = 20
-"""Values below which an even increase may be chance."""
 _UNEVEN = 0.5
 """Range of the steps of a clock over their median."""
-_SINGLE = ("motor_angle", "motor_torque", "tension", "cable_length", "load")
-"""Channels whose column is asked for where several fit equally well; others are left out."""
-
-
-@dataclass(frozen=True, eq=False)
-class Candidate:
-    """A column and the channel that it may be."""
-
-    column: Column
-    channel: str
-    """Empty where it is not used."""
-    rank: int = 0
-    unit: SpelledUnit | None = None
-    reason: str = ""
-
-    @property
-    def order(self) -> tuple[int, bool, int]:
-        """Sort key: the best candidate first."""
-        words = set(words_of(" ".join((*self.column.labels, self.column.name))).split())
-        is_current = self.unit is not None and self.unit.dimension == "current"
-        preference = len(words & _AVOIDED) - len(words & _PREFERRED)
-        return self.rank, is_current, preference
-
-
-@dataclass
-class Choice:
-    """Chosen columns by channel, and why others were not."""
-
-    chosen: list[Candidate] = field(default_factory=list)
-    """Candidates with their final channel."""
-    unused: list[Candidate] = field(default_factory=list)
-    questions: list[Question] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
 
 
 def choose(
@@ -135,8 +88,12 @@ def choose(
     free = _left_after(taken, free, choice)
     free = _left_after(without, free, choice, "has no column, by --column")
     times = [item for item in free if item.channel in {"time", DATE}]
-    if not times and "time" not in {*taken, *without}:
-        times = _even_clock(choice)
+    if "time" not in {*taken, *without} and all(_counts_rows(item) for item in times):
+        even = _even_clock(choice)
+        if even:
+            free = [item for item in free if item not in times]
+            choice.unused += [replace(i, channel="", reason="number of the row") for i in times]
+        times = even or times
     poses = [item for item in free if item.channel in (*POSE_DIMENSIONS, *MATRIX)]
     exact = [item for item in free if item.rank == 0 and item not in times]
     others = [i for i in free if i not in times and i not in poses and i not in exact]
@@ -144,7 +101,7 @@ def choose(
     _choose_pose([*poses], body, choice)
     choice.chosen += [item for item in exact if item not in poses]
     others = _left_after({item.channel for item in choice.chosen}, others, choice)
-    _choose_channels(others, choice)
+    choose_channels(others, choice, without)
     return choice
 
 
@@ -179,16 +136,25 @@ def _by_name(column: Column, meaning: Meaning, unit: SpelledUnit | None) -> Cand
     if base == IGNORED:
         return Candidate(column, "", reason=f"'{meaning.text}': {_NOT_USED}")
     if base == CURRENT:
-        base, unit = "motor_torque", unit or read_unit("A")
+        base, unit = "motor_torque", unit or _current_unit(column)
     channel = base if meaning.channel == CURRENT else meaning.channel
     dimension = column_dimension(base)
     fits = unit is None or unit.dimension in permitted(base) or dimension == "ratio"
     if base == "time" and not _is_clock(column):
         return Candidate(column, "", reason=f"'{meaning.text}', and no clock")
+    if base == DATE:
+        return _by_unit(column, unit)
     if fits:
         return Candidate(column, channel, meaning.rank, unit, f"'{meaning.text}'")
     found = _by_unit(column, unit)
     return replace(found, rank=_BY_RANK) if found.channel else found
+
+
+def _current_unit(column: Column) -> SpelledUnit | None:
+    """A for a current without a unit; of an unknown size where the numbers are whole."""
+    values = column.values[np.isfinite(column.values)]
+    is_whole = bool(np.all(values == np.round(values)))
+    return SpelledUnit("", "current", math.nan) if is_whole else read_unit("A")
 
 
 def _by_unit(column: Column, unit: SpelledUnit | None) -> Candidate:
@@ -229,10 +195,15 @@ def _even_clock(choice: Choice) -> list[Candidate]:
     return [replace(found[0], channel="time", rank=_BY_ORDER, reason="increases evenly")]
 
 
+def _counts_rows(item: Candidate) -> bool:
+    """Whether a first column without a name is a number of the row and may be no time."""
+    return item.rank == _BY_ORDER and bool(np.all(np.diff(item.column.values) == 1))
+
+
 def _increases_evenly(item: Candidate) -> bool:
     """Whether an unnamed column may be a clock: whole numbers are counters as well."""
     values = item.column.values
-    if item.unit is not None or item.column.texts is not None or len(values) < _FEW:
+    if item.unit is not None or item.column.texts is not None or len(values) < FEWEST:
         return False
     if not item.reason.startswith(_UNKNOWN) or not np.all(np.isfinite(values)):
         return False
@@ -323,71 +294,3 @@ def _choose_pose(poses: list[Candidate], body: str | None, choice: Choice) -> No
             is_own = body_of(item.column) == chosen
             reason = "not a complete pose" if is_own else f"of another body than '{chosen}'"
             choice.unused.append(replace(item, channel="", reason=reason))
-
-
-def _choose_channels(others: Sequence[Candidate], choice: Choice) -> None:
-    labels = _winch_labels(others)
-    by_channel: dict[str, list[Candidate]] = {}
-    for item in others:
-        label = _label_of(item, labels)
-        name = f"{label}.{item.channel}" if label else item.channel
-        by_channel.setdefault(name, []).append(item)
-    for channel, items in by_channel.items():
-        items.sort(key=lambda item: item.order)
-        best = [item for item in items if item.order == items[0].order]
-        base = channel.rpartition(".")[2]
-        if len(best) > 1:
-            names = [item.column.source for item in best]
-            if base in _SINGLE:
-                choice.questions.append(
-                    Question(
-                        f"which column is {channel}? {' and '.join(map(repr, names))} fit equally",
-                        tuple(f'--column "{channel}={name}"' for name in names),
-                    )
-                )
-            reason = f"one of several: --column {channel}=…"
-            choice.unused += [replace(item, channel="", reason=reason) for item in items]
-            continue
-        choice.chosen.append(replace(items[0], channel=channel))
-        choice.unused += [
-            replace(item, channel="", reason=f"'{items[0].column.source}' is {channel}")
-            for item in items[1:]
-        ]
-
-
-def _winch_labels(others: Sequence[Candidate]) -> tuple[str, ...]:
-    """Words that distinguish equal columns of several winches: ``1 2 3``, ``a b``; else none."""
-    for channel in _SINGLE:
-        items = sorted((i for i in others if i.channel == channel), key=lambda i: i.order)
-        best = [item for item in items if item.order == items[0].order]
-        if len(best) < 2:
-            # Cells of one winch are no winches.
-            if channel == "motor_angle" and best:
-                return ()
-            continue
-        words = [_words(item) for item in best]
-        if len({len(item) for item in words}) != 1:
-            continue
-        differing = [n for n, column in enumerate(zip(*words, strict=True)) if len(set(column)) > 1]
-        if len(differing) != 1:
-            continue
-        labels = tuple(item[differing[0]] for item in words)
-        if len(set(labels)) == len(labels) and _is_series(labels):
-            return labels
-    return ()
-
-
-def _is_series(labels: Sequence[str]) -> bool:
-    """Whether labels are numbered or lettered, and not ``motor`` and ``load``."""
-    stems = {label.rstrip("0123456789") for label in labels}
-    numbered = len(stems) == 1 and all(label[-1:].isdecimal() for label in labels)
-    return numbered or all(len(label) == 1 for label in labels) or set(labels) in _SIDES
-
-
-def _words(item: Candidate) -> list[str]:
-    return words_of(" ".join((*item.column.labels, item.column.name))).split()
-
-
-def _label_of(item: Candidate, labels: Sequence[str]) -> str:
-    found = [label for label in labels if label in _words(item)]
-    return found[0] if len(found) == 1 else ""

@@ -7,18 +7,24 @@ change less than they change a derivative.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of, clock_values, is_counted
 
-__all__ = ["Ratio", "likely_counts", "ratio_of"]
+__all__ = ["CLOCKS", "Ratio", "from_velocity", "likely_counts", "ratio_of"]
 
 _CLEAR = 0.98
 """Least correlation of angle and integral at which their ratio is used."""
 _TOLERANCE = 0.02
 _TURN = 2 * math.pi
+_ANGLES = {"rad": 1.0, "deg": math.pi / 180, "turn": _TURN}
+_SPEEDS = {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": _TURN / 60, "turn/s": _TURN}
+CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+"""SI value of each unit of a time."""
 
 
 @dataclass(frozen=True)
@@ -91,3 +97,75 @@ def likely_counts(estimate: float) -> int | None:
     usual |= {360, 3600, 36_000, 360_000, 1000, 10_000, 100_000, 1_000_000}
     near = [n for n in usual if abs(estimate / n - 1) < 0.005]
     return near[0] if len(near) == 1 else None
+
+
+def from_velocity(work: Work) -> None:
+    """Units, counts and sense from the ratio of the angle to the integral of the velocity."""
+    for velocity in [item for item in work.columns if item.base == "motor_velocity"]:
+        winch = velocity.candidate.channel.rpartition(".")[0]
+        wanted = f"{winch}.motor_angle" if winch else "motor_angle"
+        angle = next((i for i in work.columns if i.candidate.channel == wanted), None)
+        clock = clock_of(work, velocity)
+        if angle is None or clock is None or len(angle.column) != len(velocity.column):
+            continue
+        times = clock_values(clock)
+        if len(times) != len(angle.column):
+            continue
+        ratio = ratio_of(times, angle.column.values, velocity.column.values)
+        if ratio is not None:
+            _apply_ratio(work, ratio, angle, velocity, clock)
+
+
+def _apply_ratio(
+    work: Work, ratio: Ratio, angle: ChosenColumn, velocity: ChosenColumn, clock: ChosenColumn
+) -> None:
+    if angle.factor is not None and velocity.factor is not None and clock.factor is not None:
+        expected = velocity.factor * clock.factor / angle.factor
+        if not ratio.agrees(abs(expected)):
+            share = abs(ratio.value) / abs(expected)
+            work.notes.append(
+                f"'{angle.column.source}' changes {share:.4g} times as much as the integral of "
+                f"'{velocity.column.source}': is a unit, a gear ratio or a resolution wrong?"
+            )
+            return
+    else:
+        matches = list(_matches(ratio, angle, velocity, clock))
+        for item, index in ((angle, 0), (velocity, 1), (clock, 2)):
+            options = {match[index] for match in matches}
+            if item.factor is None and len(options) == 1:
+                unit, factor = options.pop()
+                text = f"ratio of angle and velocity (correlation {abs(ratio.correlation):.4f})"
+                item.settle(factor, unit, "derived", text)
+        if velocity.factor is None and angle.factor is not None and clock.factor is not None:
+            measured = ratio.value * angle.factor / clock.factor
+            work.measured[velocity.column.source] = measured
+    if None not in (angle.factor, velocity.factor) and ratio.value * (velocity.factor or 1) < 0:
+        velocity.factor = -(velocity.factor or 1)
+        velocity.reason += "; sense reversed: it is opposite to the angle"
+        work.notes.append(
+            f"'{velocity.column.source}' has the opposite sense of '{angle.column.source}'; its "
+            "sign is changed"
+        )
+
+
+def _matches(
+    ratio: Ratio, angle: ChosenColumn, velocity: ChosenColumn, clock: ChosenColumn
+) -> Iterator[tuple[tuple[str, float], tuple[str, float], tuple[str, float]]]:
+    """Combinations of units that agree with the ratio."""
+    speeds = _options(velocity, _SPEEDS)
+    clocks = _options(clock, CLOCKS)
+    counted = is_counted(angle)
+    for speed in speeds:
+        for stamp in clocks:
+            if angle.factor is None and counted:
+                counts = likely_counts(_TURN * abs(ratio.value) / (speed[1] * stamp[1]))
+                if counts:
+                    yield (f"1/{counts} turn", _TURN / counts), speed, stamp
+                continue
+            for turn in _options(angle, _ANGLES):
+                if ratio.agrees(abs(speed[1] * stamp[1] / turn[1])):
+                    yield turn, speed, stamp
+
+
+def _options(item: ChosenColumn, units: dict[str, float]) -> list[tuple[str, float]]:
+    return [(item.unit, item.factor)] if item.factor is not None else list(units.items())

@@ -50,7 +50,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     (
         r"\b(soll\w*|\w+soll|target|tar(?= (pos|vel|tor|cur|ang|spe))|set ?points?|"
         r"set (?=pos|vel|tor|cur|ang|spe)|"
-        r"sp|cmd|commande?d?|demand(ed)?|desired|des|"
+        r"sp|cmd|cmptd|computed|commande?d?|demand(ed)?|desired|des|"
         r"reference|ref|consigne|consigna|goal|planned|vorgabe|fuhrungs\w*|profile|offset|"
         r"limit\w*)\b",
         1,
@@ -96,6 +96,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         "time",
     ),
     (r"^(time|zeit|temps|tiempo)\b|\b(time ?stamps?|zeitstempel)\b", 2, "time"),
+    (r"\b(time|zeit)$", 3, "time"),
     # Temperature before force: "cell temperature".
     (r"\b(temperaturs?|temperatures?|temp|temperatura|\w*temperatur|tmp)\b", 1, "temperature"),
     # Poses of a platform.
@@ -155,7 +156,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         "motor_velocity",
     ),
     (
-        r"\b(torques?|drehmoment\w*|\w+drehmoment|moment\w*|\w+moment|couple|par|coppia|tau|trq|"
+        r"\b(torques?|torq|tor|drehmoment\w*|\w+drehmoment|moment\w*|\w+moment|couple|par|coppia|tau|trq|"
         r"effort|m ist|mist|motormoment)\b",
         1,
         "motor_torque",

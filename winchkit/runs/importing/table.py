@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -82,9 +83,9 @@ def named_apart(columns: Sequence[Column]) -> tuple[Column, ...]:
         The name itself where it is unique; else with its labels before it, and with ``#2`` where
         these are equal as well.
     """
-    names = [item.name for item in columns]
+    names = Counter(item.name for item in columns)
     full = [
-        item.name if names.count(item.name) == 1 else " ".join((*item.labels, item.name))
+        item.name if names[item.name] == 1 else " ".join((*item.labels, item.name))
         for item in columns
     ]
     seen: dict[str, int] = {}

@@ -211,7 +211,9 @@ def split_unit(text: str) -> tuple[str, str]:
     if found and found[1]:
         unit = next(part for part in found.groups()[1:] if part is not None).strip()
         is_square = found[2] is not None
-        if read_unit(unit) or unit.lower() in _NO_UNIT or is_square:
+        # "pos (1)" beside "pos (2)" has a number, "quaternion [1]" has the unit 1.
+        is_number = unit.isdecimal() and not is_square
+        if not is_number and (read_unit(unit) or unit.lower() in _NO_UNIT or is_square):
             return found[1].strip(), "" if unit.lower() in _NO_UNIT else unit
     plain = text.strip()
     best = plain, ""

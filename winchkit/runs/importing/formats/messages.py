@@ -14,13 +14,10 @@ from typing import Any
 import numpy as np
 
 from winchkit.errors import Fault, RunError, UsageError, WinchkitError, one_line
+from winchkit.runs.importing.formats.fields import numbers_of
 from winchkit.runs.importing.table import Column, Table, named_apart
 
 __all__ = ["read_messages"]
-
-_LONGEST = 64
-"""Most elements of an array in a message; longer ones are images and point clouds."""
-_DEEPEST = 6
 
 
 def read_messages(path: str, data: bytes) -> Table:
@@ -55,7 +52,7 @@ def read_messages(path: str, data: bytes) -> Table:
         for schema, channel, message in messages:
             found = _decoded(path, schema, channel, message.data, decoders)
             if found is not None:
-                numbers = dict(_numbers("", found, 0))
+                numbers = dict(numbers_of(found))
                 rows.setdefault(channel.topic, []).append((message.log_time, numbers))
             else:
                 encoding = one_line(channel.message_encoding)
@@ -109,35 +106,3 @@ def _columns(topic: str, found: Sequence[tuple[int, Mapping[str, float]]]) -> It
     for name in names:
         values = np.array([row.get(name, np.nan) for _, row in found], dtype=np.float64)
         yield Column(name, values, "", (topic,), group=topic)
-
-
-def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:
-    """Paths and values of the numbers of a message."""
-    if isinstance(value, bool | int | float):
-        yield name or "data", float(value)
-    elif depth > _DEEPEST:
-        return
-    elif isinstance(value, Mapping):
-        yield from _fields(name, value, depth)
-    elif isinstance(value, Sequence) and not isinstance(value, str | bytes):
-        if len(value) <= _LONGEST:
-            for index, item in enumerate(value):
-                yield from _numbers(f"{name}[{index}]", item, depth + 1)
-    elif hasattr(value, "__slots__"):
-        slots = {key.lstrip("_"): getattr(value, key) for key in value.__slots__}
-        yield from _fields(name, slots, depth)
-
-
-def _fields(name: str, fields: Mapping[Any, Any], depth: int) -> Iterator[tuple[str, float]]:
-    joints = fields.get("name")
-    is_joints = isinstance(joints, Sequence) and not isinstance(joints, str) and bool(joints)
-    for key, item in fields.items():
-        if key in {"header", "name"} and depth <= 1:
-            continue
-        path = f"{name}.{key}" if name else str(key)
-        lists = isinstance(item, Sequence) and not isinstance(item, str | bytes)
-        if is_joints and lists and joints is not None and len(item) == len(joints):
-            for joint, one in zip(joints, item, strict=True):
-                yield from _numbers(f"{joint}.{path}", one, depth + 1)
-        else:
-            yield from _numbers(path, item, depth + 1)

@@ -21,7 +21,7 @@ def read_table(path: str | Path) -> Table:
     Parameters
     ----------
     path : str or Path
-        Text, XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF or TDMS.
+        Text, JSON, XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF or TDMS.
 
     Returns
     -------
@@ -52,10 +52,17 @@ def read_table(path: str | Path) -> Table:
         from winchkit.runs.importing.formats.measurement_files import read_mdf, read_tdms
 
         return (read_mdf if data.startswith(b"MDF ") else read_tdms)(name, data)
-    _refuse_known(name, data)
+    return _of_text(name, data)
+
+
+def _of_text(name: str, data: bytes) -> Table:
+    """JSON, or rows of text."""
+    from winchkit.runs.importing.formats.json_file import is_json, read_json
     from winchkit.runs.importing.formats.text import read_text_table
 
-    return read_text_table(name, data)
+    _refuse_known(name, data)
+    table = read_json(name, data) if is_json(data) else None
+    return table or read_text_table(name, data)
 
 
 def _of_arrays(name: str, data: bytes) -> Table:

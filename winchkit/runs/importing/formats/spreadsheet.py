@@ -89,7 +89,11 @@ def read_workbook(path: str, data: bytes) -> Table:
 
 
 def _rows(rows: Iterable[Iterable[object]]) -> list[Row]:
-    return [(n, [_text(cell) for cell in row]) for n, row in enumerate(rows, start=1)]
+    """Cells as text; without the rows below the last filled one, which have formats only."""
+    found = [(n, [_text(cell) for cell in row]) for n, row in enumerate(rows, start=1)]
+    while found and not any(found[-1][1]):
+        found.pop()
+    return found
 
 
 def _text(cell: object) -> str:

@@ -1,0 +1,160 @@
+"""Reader of JSON files: records, lists of rows, lists by name, and one record per line.
+
+A table is a list of mappings (a row each), a list of lists of numbers (a row each) or a list of
+numbers (a column). Single numbers beside it are constants, single texts are metadata.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.formats.fields import fields_of
+from winchkit.runs.importing.formats.variables import table_of_arrays
+from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.unit_spelling import split_unit
+
+__all__ = ["is_json", "read_json"]
+
+_DEEPEST = 6
+_FEWEST = 2
+"""Rows of a table; a list of one element is a field."""
+
+
+def is_json(data: bytes) -> bool:
+    """Whether a file is JSON by its first character that is no blank.
+
+    Parameters
+    ----------
+    data : bytes
+        Content.
+    """
+    start = data[:4000].removeprefix(b"\xef\xbb\xbf").lstrip()
+    return start.startswith(b"{") or (start[:1] == b"[" and start[1:].lstrip()[:1] in b"[{")
+
+
+def read_json(path: str, data: bytes) -> Table | None:
+    """Read JSON, or JSON Lines (a value on every line).
+
+    Parameters
+    ----------
+    path : str
+        File, for messages.
+    data : bytes
+        Its content.
+
+    Returns
+    -------
+    Table, optional
+        None for a text that is no JSON.
+
+    Raises
+    ------
+    RunError
+        For JSON without a list of numbers, and for a file that ends within a value.
+    """
+    value, notes = _loaded(path, data)
+    if value is None:
+        return None
+    found = list(_tables("", value, 0))
+    is_single = len({name for name, _ in found}) == 1
+    arrays: dict[str, Any] = {}
+    units: dict[str, str] = {}
+    for name, columns in found:
+        for key, array in columns.items():
+            full = key if is_single or not name else f"{name}.{key}"
+            # An index at the end is no unit.
+            plain, unit = (
+                (full, "") if full.endswith("]") and full[-2:-1].isdecimal() else split_unit(full)
+            )
+            plain = full if plain in arrays else plain
+            arrays[plain], units[plain] = array, unit
+    if not arrays:
+        raise RunError(Fault("is JSON without a list of records or of numbers", path))
+    single = dict(fields_of(value)) if isinstance(value, Mapping) else {}
+    for name, item in single.items():
+        if "[" not in name and name not in arrays:
+            arrays[name] = np.array(item)
+    return table_of_arrays(path, "JSON", arrays, units=units, notes=notes)
+
+
+def _loaded(path: str, data: bytes) -> tuple[Any, list[str]]:
+    """The value of a file, or the list of the values of its lines; None where it is no JSON."""
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return None, []
+    try:
+        return json.loads(text), []
+    except (ValueError, RecursionError) as error:
+        whole = error
+    lines = [line for line in text.splitlines() if line.strip()]
+    values: list[Any] = []
+    for number, line in enumerate(lines):
+        try:
+            values.append(json.loads(line))
+        except (ValueError, RecursionError):
+            if number == len(lines) - 1 and len(values) >= _FEWEST:
+                return values, [
+                    "the last line is no whole record and left out: is the file cut off?"
+                ]
+            if len(values) >= _FEWEST:
+                raise RunError(Fault("this line is no record of JSON", path, number + 1)) from None
+            if isinstance(whole, json.JSONDecodeError) and whole.pos >= len(text.rstrip()):
+                message = "ends within a value of JSON: is the file cut off?"
+                raise RunError(Fault(message, path)) from None
+            return None, []
+    return values, []
+
+
+def _tables(name: str, value: Any, depth: int) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Columns of every table of a value, by the path of the table."""
+    if depth > _DEEPEST:
+        return
+    if isinstance(value, Mapping):
+        for key, item in value.items():
+            yield from _tables(f"{name}.{key}" if name else str(key), item, depth + 1)
+    elif isinstance(value, Sequence) and not isinstance(value, str) and len(value) >= _FEWEST:
+        if all(isinstance(item, Mapping) for item in value):
+            yield name, _of_records(value)
+        elif all(isinstance(item, list) for item in value):
+            width = min(map(len, value))
+            if width and all(_is_number(cell) for row in value for cell in row[:width]):
+                columns = np.array([[_float(cell) for cell in row[:width]] for row in value]).T
+                yield name, {f"{name or 'column'}[{n}]": c for n, c in enumerate(columns)}
+            else:
+                for n, item in enumerate(value):
+                    yield from _tables(f"{name}[{n}]", item, depth + 1)
+        elif all(_is_number(item) for item in value):
+            array = np.array([_float(item) for item in value])
+            parent, _, last = name.rpartition(".")
+            yield parent, {last or "data": array}
+        elif all(isinstance(item, str) for item in value):
+            parent, _, last = name.rpartition(".")
+            yield parent, {last or "data": np.array(value)}
+
+
+def _of_records(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Columns of a list of mappings; a field that a record lacks is missing in its row."""
+    rows = [dict(fields_of(record)) for record in records]
+    columns: dict[str, Any] = {}
+    for name in dict.fromkeys(key for row in rows for key in row):
+        cells = [row.get(name) for row in rows]
+        if any(isinstance(cell, str) for cell in cells):
+            columns[name] = np.array([cell if isinstance(cell, str) else "" for cell in cells])
+        else:
+            columns[name] = np.array([math.nan if cell is None else cell for cell in cells])
+    return columns
+
+
+def _is_number(value: Any) -> bool:
+    return value is None or isinstance(value, int | float)
+
+
+def _float(value: Any) -> float:
+    return math.nan if value is None else float(value)

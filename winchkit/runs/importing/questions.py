@@ -1,0 +1,138 @@
+"""Questions on what a file does not tell: units, constants, and columns."""
+
+from __future__ import annotations
+
+import math
+
+from winchkit.runs.columns import column_dimension
+from winchkit.runs.importing.assignment import Choice, Question
+from winchkit.runs.importing.chosen import ChosenColumn, Work, is_counted, is_whole
+from winchkit.runs.importing.long_table import axes_of
+from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.unit_settling import is_alike
+from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE
+from winchkit.schema.mapping import DATE
+from winchkit.units import UNITS
+
+__all__ = ["ask_columns", "ask_units", "axis_question"]
+
+_SHOWN = 8
+
+
+def _ask_current(work: Work, item: ChosenColumn) -> None:
+    name, channel, unit = item.column.source, item.candidate.channel, item.candidate.unit
+    current = channel.replace("motor_torque", "motor_current")
+    if unit is not None and not math.isnan(unit.factor):
+        kept = f'--column "{current}={name} [{unit.text}]"'
+        _ask(work, f"'{name}' is a current: which torque constant?", "torque_constant", kept)
+        return
+    text = f"'{name}' ({channel}) is a current in whole numbers without a unit"
+    options = (f"{channel}={name}*FACTOR [N m]", f"{current}={name} [mA]")
+    work.questions.append(Question(text, tuple(f'--column "{option}"' for option in options)))
+
+
+_OPTIONS = {
+    "counts_per_turn": ("--counts-per-turn 4096", "counts"),
+    "rated_torque": ('--rated-torque "2.4 N m"', "torque"),
+    "torque_constant": ('--torque-constant "0.12 N m/A"', "torque constant"),
+    "sensitivity": ('--sensitivity "2 mV/V"', "bridge"),
+    "capacity": ('--capacity "500 N"', "force"),
+}
+
+
+def axis_question(table: Table, by: str) -> Question:
+    """Question whether a column names the axis of each row."""
+    names = ", ".join(list(axes_of(table, by))[:_SHOWN])
+    text = f"each row seems to be of one axis, which column '{by}' names ({names})"
+    return Question(text, (f'--axis "{by}"', '--axis ""'), "axis")
+
+
+def ask_units(work: Work) -> None:
+    """Ask the unit or the constant of every column that has none.
+
+    Of columns of several winches that are named alike the first one is asked.
+    """
+    unknown = [item for item in work.columns if item.factor is None]
+    for number, item in enumerate(unknown):
+        if any(o.base == item.base and is_alike(o, item) for o in unknown[:number]):
+            continue
+        _ask_unit(work, item)
+
+
+def _ask_unit(work: Work, item: ChosenColumn) -> None:
+    name, channel, unit = item.column.source, item.candidate.channel, item.candidate.unit
+    dimension = unit.dimension if unit is not None else ""
+    own = f'--column "{channel}={name} [UNIT]"'
+    if dimension == "voltage" or (dimension == COUNTS and item.base != "motor_angle"):
+        one = next(iter(UNITS[column_dimension(item.base) or "ratio"]))
+        text = f"'{name}' ({channel}) is in {item.column.unit}: how many {one} is 1?"
+        work.questions.append(Question(text, (f'--column "{channel}={name}*FACTOR [{one}]"',)))
+    elif dimension in {COUNTS, COUNT_RATE} or (item.base == "motor_angle" and is_whole(item)):
+        is_known = dimension in {COUNTS, COUNT_RATE} or is_counted(item)
+        what = "is in counts" if is_known else f"({channel}) has no unit and whole numbers"
+        _ask(work, f"'{name}' {what}: how many in a motor turn?", "counts_per_turn", own)
+    elif dimension == SHARE:
+        _ask(
+            work,
+            f"'{name}' is in {unit.text if unit else '%'}: of which torque?",
+            "rated_torque",
+            own,
+        )
+    elif dimension == "current":
+        _ask_current(work, item)
+    elif dimension == BRIDGE:
+        for key in ("sensitivity", "capacity"):
+            if getattr(work.answers, key) is None:
+                _ask(work, f"'{name}' is in mV/V: which {key} of the load cell?", key, own)
+    else:
+        si = column_dimension(item.base)
+        units = ", ".join(UNITS[si]) if si else "1"
+        spelled = item.column.unit
+        had = f"has the unknown unit '{spelled}'" if spelled else "has no unit"
+        text = f"'{name}' ({channel}) {had}; one of {units}"
+        if name in work.measured:
+            measured = f"{work.measured[name]:.4g}"
+            text += f"; by its ratio to the angle 1 is {measured} rad/s"
+            own = f'--column "{channel}={name}*{measured} [rad/s]"'
+            work.questions.append(Question(text, (own, f'--column "{channel}="')))
+            return
+        if item.base != "time":
+            text += f'; --column "{channel}=" where it is none of them'
+        work.questions.append(Question(text, (own,), "", si or ""))
+
+
+def _ask(work: Work, text: str, key: str, own: str) -> None:
+    option, dimension = _OPTIONS[key]
+    work.questions.append(Question(text, (option, own), key, dimension))
+
+
+def ask_columns(work: Work, choice: Choice) -> None:
+    """Questions for a time or a motor angle that no column has."""
+    channels = {item.candidate.channel for item in work.columns}
+    bases = {item.base for item in work.columns}
+    asked = " ".join(option for q in work.questions for option in q.options)
+    has_rate = work.answers.sample_rate or work.table.interval
+    is_pose = any(
+        name.startswith("platform_") or name.endswith(".motor_angle") for name in channels
+    )
+    if not channels & {"time"} and not has_rate and not is_pose and "time=" not in asked:
+        work.questions.append(
+            Question(
+                "no column is time",
+                ('--sample-rate "1 kHz"', '--column "time=COLUMN [ms]"'),
+                "sample_rate",
+                "frequency",
+            )
+        )
+    if not bases - {"time", DATE} and not choice.questions:
+        names = ", ".join(repr(c.column.source) for c in choice.unused)
+        work.questions.append(
+            Question(
+                f"no column is a channel of a run by its name; there are {names}",
+                (
+                    '--column "motor_angle=COLUMN [deg]"',
+                    '--column "motor_torque=COLUMN [N m]"',
+                    '--column "tension=COLUMN [N]"',
+                ),
+            )
+        )

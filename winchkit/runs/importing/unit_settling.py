@@ -1,0 +1,230 @@
+"""Units of chosen columns: of the user, of the file, and by convention."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.runs.columns import column_dimension
+from winchkit.runs.importing.answers import ColumnAnswer
+from winchkit.runs.importing.assignment import Candidate, Confidence
+from winchkit.runs.importing.chosen import ChosenColumn, Work, is_counted, is_whole
+from winchkit.runs.importing.consistency import CLOCKS
+from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
+from winchkit.runs.importing.names import words_of
+from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.unit_spelling import (
+    BRIDGE,
+    COUNT_RATE,
+    COUNTS,
+    GRAVITY,
+    SHARE,
+    SpelledUnit,
+    read_unit,
+)
+from winchkit.runs.importing.winches import stem_of
+from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
+from winchkit.units import UNITS
+
+__all__ = ["as_others", "by_convention", "is_alike", "started"]
+
+_TURN = 2 * math.pi
+_TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
+_SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
+_SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "effort", "thetadot", "dtheta"}
+_GAINS = {"gtau", "ktau", "kt", "km", "torqueconstant", "torquegain", "gf", "forcegain"}
+
+
+def started(work: Work, candidate: Candidate, answer: ColumnAnswer | None) -> ChosenColumn:
+    """A column with the unit that the user or the file gives."""
+    item = ChosenColumn(candidate, reason=candidate.reason)
+    confidence: Confidence = "named" if candidate.rank <= 2 else "derived"
+    unit, text = candidate.unit, candidate.column.unit
+    scale = 1.0
+    if answer is not None:
+        confidence = "given"
+        scale = answer.factor if answer.factor is not None else 1.0
+        if answer.constant:
+            scale = work.table.constants.get(answer.constant, math.nan)
+        scale *= answer.sign
+        if answer.unit:
+            unit, text = read_unit(answer.unit), answer.unit
+        elif answer.factor is not None or answer.constant:
+            si = column_dimension(item.base) or "ratio"
+            item.settle(scale, next(iter(UNITS[si])), "given", "--column")
+            return item
+    if candidate.channel in {"time", DATE}:
+        _settle_clock(work, item, unit, scale, confidence)
+    elif column_dimension(item.base) == "ratio" or item.base in MATRIX:
+        item.settle(scale, "1", confidence, candidate.reason)
+    elif unit is not None:
+        _settle_unit(work, item, unit, scale, confidence)
+        item.unit = item.unit or text
+    elif item.base == "motor_angle" and work.answers.counts_per_turn and is_whole(item):
+        counts = work.answers.counts_per_turn or math.nan
+        item.settle(_TURN / counts * scale, "counts", "given", f"{counts:g} counts per turn")
+    return item
+
+
+def _settle_clock(
+    work: Work, item: ChosenColumn, unit: SpelledUnit | None, scale: float, confidence: Confidence
+) -> None:
+    if item.column.texts is not None:
+        item.settle(1.0, STAMP, confidence, "dates and times of day as text")
+        if not read_stamps(item.column.texts).has_date and item.base == "time":
+            item.reason = "times of day"
+        return
+    epoch = epoch_unit(item.column.values)
+    if epoch == EXCEL and unit is None:
+        item.settle(86_400.0, EXCEL, "derived", "days of a spreadsheet")
+    elif unit is not None:
+        item.settle(scale * unit.factor, unit.text, confidence, item.reason)
+    elif epoch is not None:
+        item.settle(CLOCKS[epoch], epoch, "named", f"{epoch} since 1970")
+    else:
+        steps = np.diff(item.column.values[np.isfinite(item.column.values)])
+        usual = float(np.median(steps)) if len(steps) else math.nan
+        declared = work.table.interval
+        matching = [
+            name
+            for name, value in CLOCKS.items()
+            if declared and abs(usual * value / declared - 1) < 0.2
+        ]
+        if len(matching) == 1:
+            reason = f"steps of {usual:g}, declared interval {declared:g} s"
+            item.settle(CLOCKS[matching[0]], matching[0], "named", reason)
+
+
+def _settle_unit(
+    work: Work, item: ChosenColumn, unit: SpelledUnit, scale: float, confidence: Confidence
+) -> None:
+    """Factor of a known unit; units without an SI value need a constant."""
+    answers, dimension = work.answers, unit.dimension
+    item.unit = unit.text
+    if dimension == "voltage" or (dimension == COUNTS and item.base != "motor_angle"):
+        if item.candidate.rank == 0 and scale != 1.0:
+            item.settle(scale, unit.text, "given", "--column")
+    elif dimension in {COUNTS, COUNT_RATE}:
+        if answers.counts_per_turn:
+            text = f"{answers.counts_per_turn:g} counts per turn"
+            item.settle(_TURN / answers.counts_per_turn * scale, unit.text, "given", text)
+    elif dimension == SHARE:
+        if answers.rated_torque:
+            factor = answers.rated_torque * unit.factor * scale
+            item.settle(factor, unit.text, "given", f"of {answers.rated_torque:g} N m")
+    elif dimension == "current":
+        _settle_current(work, item, unit, scale, confidence)
+    elif dimension == BRIDGE:
+        if answers.sensitivity and answers.capacity:
+            factor = answers.capacity / answers.sensitivity * unit.factor * scale
+            text = f"{answers.capacity:g} N at {answers.sensitivity:g} mV/V"
+            item.settle(factor, unit.text, "given", text)
+    elif dimension == "mass":
+        item.settle(unit.factor * GRAVITY * scale, unit.text, confidence, "weight at 9.80665 m/s^2")
+    else:
+        item.settle(unit.factor * scale, unit.text, confidence, item.reason)
+        item.offset = unit.offset
+
+
+def _settle_current(
+    work: Work, item: ChosenColumn, unit: SpelledUnit, scale: float, confidence: Confidence
+) -> None:
+    """Factor of a current, or of the torque that it gives."""
+    if math.isnan(unit.factor):
+        return
+    if item.base != "motor_torque":
+        item.settle(unit.factor * scale, unit.text, confidence, item.reason)
+        return
+    constant = work.answers.torque_constant or _gain(work.table)
+    if constant:
+        origin: Confidence = "given" if work.answers.torque_constant else "derived"
+        text = f"{constant:g} N m/A"
+        if not item.column.unit and item.candidate.rank:
+            origin, text = "assumed", f"{text}; a current without a unit: A"
+        item.settle(constant * unit.factor * scale, unit.text, origin, text)
+
+
+def _gain(table: Table) -> float | None:
+    """Torque constant among the variables of the file."""
+    found = {
+        value
+        for name, value in table.constants.items()
+        if words_of(name.rpartition(".")[2]).replace(" ", "") in _GAINS and value > 0
+    }
+    return found.pop() if len(found) == 1 else None
+
+
+def as_others(work: Work) -> None:
+    """Units of columns that are named like one of another winch whose unit is known."""
+    for item in work.columns:
+        winch = item.candidate.channel.rpartition(".")[0]
+        if item.factor is not None or not winch or item.column.unit:
+            continue
+        for other in work.columns:
+            same = other.base == item.base and not other.column.unit
+            if same and other.factor is not None and is_alike(item, other):
+                text = f"as '{other.column.source}'"
+                item.settle(abs(other.factor), other.unit, "derived", text)
+                break
+
+
+def is_alike(one: ChosenColumn, other: ChosenColumn) -> bool:
+    """Whether the names of two columns differ in the name of the winch only."""
+    pairs = [(item.column, item.candidate.channel) for item in (one, other)]
+    return stem_of(*pairs[0]) == stem_of(*pairs[1])
+
+
+def by_convention(work: Work) -> None:
+    """Units by convention: SI in files of arrays and for names of robotics, °C, seconds."""
+    for item in work.columns:
+        if item.factor is not None or item.candidate.unit is not None or item.column.unit:
+            continue
+        words = words_of(item.column.name)
+        declared = _declared(work.table, column_dimension(item.base))
+        if declared is not None:
+            item.settle(declared.factor, declared.text, "named", "unit of the whole file")
+        elif item.base == "time":
+            if _is_in_seconds(item.column.values):
+                item.settle(1.0, "s", "assumed", "steps below 1, not whole numbers")
+        elif item.base == "temperature":
+            item.settle(1.0, "degC", "assumed", "temperatures are in degC")
+        elif item.base in _TURNS and (
+            words in {"pos estimate", "vel estimate"} or "odrive" in item.column.name.lower()
+        ):
+            item.settle(_TURN, _TURNS[item.base], "assumed", "ODrive counts in turns")
+        elif _is_si(work.table, item.column.name) and not (
+            item.base == "motor_angle" and is_counted(item)
+        ):
+            dimension = column_dimension(item.base)
+            if dimension is not None:
+                unit = next(iter(UNITS[dimension]))
+                item.settle(1.0, unit, "assumed", "no unit in the file: SI by convention")
+
+
+def _declared(table: Table, dimension: str | None) -> SpelledUnit | None:
+    """Unit of a dimension that is declared above the header: ``Length Units, Millimeters``."""
+    if dimension not in {"length", "angle", "force", "torque"}:
+        return None
+    for key, value in table.metadata.items():
+        if not {"unit", "units", "einheit", "einheiten"} & set(words_of(key).split()):
+            continue
+        for word in value.replace(",", " ").replace(";", " ").split():
+            unit = read_unit(word)
+            if unit is not None and unit.dimension == dimension:
+                return unit
+    return None
+
+
+def _is_si(table: Table, name: str) -> bool:
+    """Whether a name or a format has SI units by convention; names with slashes are of ROS."""
+    words = words_of(name).split()
+    return table.layout in _SI_LAYOUTS or name.startswith("/") or bool(set(words) & _SI_WORDS)
+
+
+def _is_in_seconds(values: Array) -> bool:
+    finite = values[np.isfinite(values)]
+    steps = np.diff(finite)
+    is_whole = bool(np.all(finite == np.round(finite)))
+    return len(steps) > 0 and not is_whole and float(np.median(steps)) < 1.0
