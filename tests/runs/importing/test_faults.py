@@ -287,3 +287,13 @@ def test_empty_rows_below_a_sheet_are_left_out(tmp_path: Path) -> None:
     sheet.cell(row=900, column=5).number_format = "0.00"
     book.save(tmp_path / "log.xlsx")
     assert [len(c) for c in read_table(tmp_path / "log.xlsx").columns] == [20, 20]
+
+
+def test_few_repeated_stamps_are_left_out_with_a_note(tmp_path: Path) -> None:
+    stamps = [0.01 * k for k in range(400)]
+    stamps[200] = stamps[199]
+    stamps[300] = stamps[299]
+    lines = ["time [s];angle [deg]", *(f"{t:.2f};{k}" for k, t in enumerate(stamps))]
+    found = streams_of(guessed(tmp_path / "log.csv", lines))
+    assert found.notes == ("2 of 400 rows have the stamp of the row before them and are left out",)
+    assert len(run_of(found, {})) == 398

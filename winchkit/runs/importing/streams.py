@@ -21,6 +21,8 @@ from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
 
 __all__ = ["Stream", "Streams", "merged", "streams_of"]
 
+_STILL = 0.01
+"""Share of repeated stamps that are left out; with more of them the clock is too coarse."""
 _PADDED = 0.67
 """Share of rows with a value below which a column has a rate of its own: half the rate or less."""
 _BRIDGED = 2.5
@@ -234,7 +236,11 @@ def _forward(stream: Stream) -> Stream:
 
 
 def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
-    """Without rows that repeat the row before them with its stamp, and rows without values."""
+    """Without rows that repeat the row before them with its stamp, and rows without values.
+
+    Other values at the stamp of the row before are left out as well where they are few: the moment
+    of either row is not known, and the others are not concerned.
+    """
     table = np.stack([stream.time, *stream.channels.values()], axis=1)
     same = np.zeros(len(table), dtype=bool)
     same[1:] = np.all((table[1:] == table[:-1]) | (np.isnan(table[1:]) & np.isnan(table[:-1])), 1)
@@ -242,7 +248,16 @@ def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
     notes = []
     if count := int(np.count_nonzero(same & ~empty)):
         notes.append(f"{count} rows that repeat the row before them are left out")
-    return _rows_of(stream, ~(same | empty)), notes
+    found = _rows_of(stream, ~(same | empty))
+    still = np.zeros(len(found.time), dtype=bool)
+    still[1:] = np.diff(found.time) == 0
+    count = int(np.count_nonzero(still))
+    if 0 < count <= _STILL * len(still):
+        notes.append(
+            f"{count} of {len(still)} rows have the stamp of the row before them and are left out"
+        )
+        return _rows_of(found, ~still), notes
+    return found, notes
 
 
 def _rows_of(stream: Stream, kept: NDArray[np.bool_]) -> Stream:
