@@ -1,4 +1,4 @@
-"""Questions on what a file does not tell: units, constants, and columns."""
+"""Questions on what a file does not have: units, constants, and columns."""
 
 from __future__ import annotations
 
