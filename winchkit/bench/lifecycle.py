@@ -36,7 +36,7 @@ _RESET_TIME = 2.0
 
 def await_cycles(loop: ControlLoop, clock: Clock, count: int) -> None:
     """Let the loop take notice of what was just ordered; raises WinchkitError when it hangs."""
-    start, deadline = loop.count, clock.now() + _HANGS
+    start, deadline = loop.count, clock.now() + _HANGS + count * loop.cycle
     while loop.alive and loop.count < start + count:
         if clock.now() > deadline:
             raise WinchkitError("the control loop hangs; the drives stop by their heartbeat")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import pytest
 
@@ -56,3 +57,18 @@ def test_a_lost_map_leaves_no_winch_running(
     before = truth.cable_length
     winch.move_by(pay_out=0.1, speed=0.1)
     assert truth.cable_length - before == pytest.approx(0.1, abs=5e-3)
+
+
+def test_a_bench_of_a_long_cycle_closes_beside_a_dead_drive(clock: SimulatedClock) -> None:
+    """Closing lets 50 cycles pass for the quick stop, 2 s of these: that is no loop that hangs."""
+    declared = read_simbench(catalog.find("sim", "spiral-bench"))
+    declared = replace(declared, bench=replace(declared.bench, cycle=0.04))
+    with LiveBench(declared, simulated_time=clock) as live:
+        with open_bench(live.bench_spec, clock) as bench:
+            bench.winch["A"].move_by(pay_out=0.01, speed=0.1, hold=True)
+            live.inject("A.servo", "silence")
+            clock.sleep(1.0)
+            assert bench.snapshot.tripped
+            closing = clock.now()
+        # A stop that is not obeyed within 5 s, then the quick stop.
+        assert clock.now() - closing == pytest.approx(7.0, abs=1.5)

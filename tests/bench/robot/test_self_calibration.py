@@ -11,6 +11,7 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.robot.self_calibration import PoseVolume, self_calibrated
 from winchkit.bench.robot.tracker import TrackedPose, Tracker
 from winchkit.errors import MotionError, UsageError
+from winchkit.runs.run import Run
 
 
 @pytest.mark.slow
@@ -49,8 +50,14 @@ def test_a_quick_stop_between_two_poses_ends_the_calibration(bench: Bench) -> No
             return [TrackedPose(since, bench.clock.now(), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))]
 
     volume = PoseVolume(0.002, 0.0, 0.1, 0.1)
+    kept: list[Run] = []
     with pytest.raises(MotionError, match="stopped the bench between two motions"):
-        self_calibrated(bench, Stopping(bench.clock.now), poses=10, volume=volume)
+        self_calibrated(bench, Stopping(bench.clock.now), poses=10, volume=volume, keep=kept.append)
     bench.clock.sleep(0.5)
     assert bench.snapshot.at_rest
     assert rested == [pytest.approx(angles(), abs=1e-3)]
+    # The pose that was measured before the stop is not lost.
+    assert [run.name for run in kept] == ["fit"]
+    assert [kept[0][f"{name}.motor_angle"][0] for name in "12345678"] == pytest.approx(
+        rested[0], abs=1e-3
+    )

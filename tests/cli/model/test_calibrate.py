@@ -15,6 +15,7 @@ from calibration_cases import EXACT, Row, csv, elastic_rows, rows
 from report_parsed import Page
 from winchkit.catalog import find
 from winchkit.cli import main
+from winchkit.runs.read import read_run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_robot
 
@@ -277,3 +278,28 @@ def test_poses_come_from_runs_or_a_bench_or_a_simulated_robot(run: Path, tmp_pat
     other = invoke("cabtive", "--sim", "winding-device-robot", "-o", new)
     assert other.exit_code == 2
     assert not new.exists()
+
+
+@pytest.mark.slow
+def test_poses_before_a_trip_are_kept_and_the_command_that_fits_them_is_named(
+    tmp_path: Path,
+) -> None:
+    """A drive goes silent after 40 s of simulated time: some poses are measured by then."""
+    text = find("sim", "cabtive-robot").read_text().replace('"8 ms"', '"40 ms"')
+    sim, new = tmp_path / "robot.toml", tmp_path / "new.toml"
+    fault = '[[fault]]\ntime = "40 s"\ntarget = "3.servo"\nkind = "silence"\n'
+    sim.write_text(f"{text}\n{fault}")
+    stopped = invoke("cabtive", "--sim", sim, "--box", "20 mm", "--turn", "2 deg", "-o", new)
+    assert stopped.exit_code == 5, stopped.output
+    assert "winch 3" in stopped.stderr.partition("winchkit: ")[2]
+    assert not new.exists()
+    poses = read_run(tmp_path / "new-fit.csv")
+    assert f"new-fit.csv ({len(poses.time)} poses)" in stopped.stderr
+    assert 10 <= len(poses.time) < 25
+    # A pose takes the rest of 1 s, and a move of 20 mm at 0.3 m/s^2.
+    assert np.all(np.diff(poses.time) > 1.0)
+    suggested = stopped.stderr.partition("next: winchkit ")[2].splitlines()[0].split()
+    assert suggested[:2] == ["calibrate", "cabtive"]
+    again = invoke(*suggested[1:])
+    assert again.exit_code in (0, 1), again.output
+    assert "position error" in again.stdout

@@ -15,6 +15,7 @@ from winchkit.model.robot import (
     ForceLimits,
     Pose,
     closed_form,
+    distributed_forces,
     gravity_wrench,
     improved_closed_form,
     quadratic,
@@ -109,6 +110,42 @@ def compare_with_slsqp(structure: Array, wrench: Array) -> None:
     )
     assert np.sum((found.value - 510.0) ** 2) <= theirs.fun * 1e5 * (1 + 1e-6) + 1e-6
     np.testing.assert_allclose(found.value, theirs.x, atol=0.5)
+
+
+def test_forces_of_many_poses_are_those_of_each_by_a_linear_programme_and_slsqp() -> None:
+    """Rows whose closed form is within the limits, beyond them, without forces, and unknown."""
+    seeds = [*range(0, 40, 2), *(seed for seed in at_limits() if seed % 2 == 0)]
+    structure, wrench = (np.array(items) for items in zip(*map(cases, seeds), strict=True))
+    structure[3] = np.nan
+    found = distributed_forces(structure, wrench, LIMITS)
+    assert np.isnan(found[3]).all()
+    kinds = set()
+    for k in set(range(len(seeds))) - {3}:
+        exists = wrench_feasibility(structure[k], wrench[k], LIMITS).feasible
+        assert np.isfinite(found[k]).all() == exists
+        if exists:
+            np.testing.assert_allclose(structure[k] @ found[k], -wrench[k], atol=1e-6)
+            assert found[k].min() >= 20.0 - 1e-5
+            assert found[k].max() <= 1000.0 + 1e-5
+            best = np.linalg.norm(found[k] - 510.0)
+            assert best <= np.linalg.norm(optimum(structure[k], wrench[k]) - 510.0) + 1e-3
+        kinds.add((exists, closed_form(structure[k], wrench[k], LIMITS).feasible))
+    assert kinds == {(True, True), (True, False), (False, False)}
+
+
+def optimum(structure: Array, wrench: Array) -> Array:
+    """Forces nearest to the middle of the limits by SLSQP, from the middle."""
+    found = minimize(
+        lambda f: np.sum((f - 510.0) ** 2) / 1e5,
+        np.full(8, 510.0),
+        jac=lambda f: 2 * (f - 510.0) / 1e5,
+        method="SLSQP",
+        bounds=[(20.0, 1000.0)] * 8,
+        constraints=LinearConstraint(structure, -wrench, -wrench),
+        options={"ftol": 1e-14, "maxiter": 1000},
+    )
+    assert np.abs(structure @ found.x + wrench).max() < 1e-4
+    return np.asarray(found.x)
 
 
 @settings(max_examples=40, deadline=None)

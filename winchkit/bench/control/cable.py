@@ -142,8 +142,9 @@ class CableMap:
         return self._now.at_rest.motor_angle(cable_length - self._remembered(), self._force())
 
     def arm(self, motor_angle: float) -> float:
-        """Cable wound in per motor angle, m/rad."""
-        return self._line.arm(motor_angle)
+        """Cable wound in per motor angle, m/rad; that of an angle within 5 mm of cable."""
+        angle, _, arm = self._here
+        return arm if abs((motor_angle - angle) * arm) < _FAR else self._line.arm(motor_angle)
 
     def _pulled(self, motor_angle: float) -> float:
         if self._now is None:

@@ -15,8 +15,8 @@ from winchkit.model.robot import (
     Pose,
     Robot,
     closed_form,
+    distributed_forces,
     dynamic_wrench,
-    quadratic,
 )
 from winchkit.schema.bench import LimitSpec
 
@@ -145,12 +145,14 @@ def _force_faults(
     structure = robot.structure(planned.pose)
     wrench = dynamic_wrench(robot.platform, replace(planned.motion, acceleration=braked))
     count = len(planned.time)
-    for k in np.unique(np.linspace(0, count - 1, min(count, _STATIONS)).astype(int)):
-        if not quadratic(structure[k], wrench[k], tension).feasible:
-            out.append(
-                _without_forces(robot, planned, tension, wrench, int(k), when=" during a stop")
-            )
-            break
+    stations = np.unique(np.linspace(0, count - 1, min(count, _STATIONS)).astype(int))
+    force = distributed_forces(structure[stations], wrench[stations], tension)
+    without = stations[~np.isfinite(force).all(axis=1)]
+    if len(without):
+        first_one = int(without[0])
+        out.append(
+            _without_forces(robot, planned, tension, wrench, first_one, when=" during a stop")
+        )
     return out
 
 

@@ -9,7 +9,9 @@ and the load cells are averaged. Poses of the validation are never used in the f
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +26,7 @@ from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate
 from winchkit.calibration.robot.pose_design import next_poses
 from winchkit.calibration.robot.prediction import rms
-from winchkit.errors import NotPermitted, RunError, UsageError
+from winchkit.errors import MotionError, NotPermitted, RunError, UsageError
 from winchkit.model.robot import Pose, angles_of, robot_of, rotation_of
 from winchkit.runs.poses import read_poses
 from winchkit.runs.run import Channel, Run
@@ -117,8 +119,8 @@ def self_calibrated(
     progress : callable, optional
         Called with what is done and the share of the poses.
     keep : callable, optional
-        Called with the runs ``fit`` and ``validation`` as soon as they are measured, before the
-        fit; again with ``fit`` where poses are added.
+        Called with the run ``fit`` or ``validation`` after each of its poses, so that nothing is
+        lost where the calibration is stopped.
 
     Returns
     -------
@@ -143,72 +145,94 @@ def self_calibrated(
     volume = volume or PoseVolume()
     random = np.random.default_rng(seed)
     driver = _Driver(bench, tracker, volume, compute)
+    session = f"calibrate {datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}"
     total = poses + validation
+    done = 0
+
+    def measured(run: Run) -> None:
+        nonlocal done
+        done += 1
+        keep(run)
+        what = f"measuring pose {min(done + 1, total)} of {total}"
+        progress(what if done <= total else f"{done - total} poses added", min(1.0, done / total))
+
     try:
-        fit = recorded_poses(
-            driver.drawn(random, poses), bench, "fit",
-            lambda done: progress("measuring poses", done / total),
-        )  # fmt: skip
+        progress(f"measuring pose 1 of {total}", 0.0)
+        fit = recorded_poses(driver.drawn(random, poses), bench, "fit", measured, session=session)
         held = recorded_poses(
-            driver.drawn(random, validation), bench, "validation",
-            lambda done: progress("measuring poses", (poses + done) / total),
-        )  # fmt: skip
-        keep(fit)
-        keep(held)
+            driver.drawn(random, validation), bench, "validation", measured, session=session
+        )
+        progress("fitting", None)
         found = driver.fitted(fit, held, options)
         for _ in range(_ROUNDS if accuracy else 0):
-            if rms(found.validation_after.distance) <= (accuracy or 0.0):
+            error = rms(found.validation_after.distance)
+            if error <= (accuracy or 0.0):
                 break
-            progress("adding poses", None)
+            progress(f"adding poses: {error * 1e3:.3g} mm of {(accuracy or 0) * 1e3:g} mm", None)
             more = driver.proposed(found, max(1, poses // 6))
-            extra = recorded_poses(more, bench, "fit", lambda _done: None)
-            fit = _joined(fit, extra)
-            keep(fit)
+            fit = recorded_poses(more, bench, "fit", measured, first=fit, session=session)
             found = driver.fitted(fit, held, options)
-    finally:
-        bench.stop()
+    except BaseException:
+        with suppress(MotionError):  # the first error has the cause
+            bench.stop()
+        raise
+    bench.stop()
     return SelfCalibration(found, fit, held)
 
 
 def recorded_poses(
-    rows: Iterator[Array], bench: Bench, name: str, done: Callable[[int], None]
+    rows: Iterator[Array],
+    bench: Bench,
+    name: str,
+    keep: Callable[[Run], None],
+    *,
+    first: Run | None = None,
+    session: str = "",
 ) -> Run:
     """Measure poses, a row each.
 
     Parameters
     ----------
     rows : iterator of (m,) arrays
-        Values of the channels; each is measured when it is asked for.
+        Time and values of the channels; each is measured when it is asked for.
     bench : Bench
         Whose robot it is.
     name : str
         Of the run.
-    done : callable
-        Called with the number of measured poses.
+    keep : callable
+        Called with the poses so far after each.
+    first : Run, optional
+        Poses that were measured before, to which these are added.
+    session : str
+        In which the tracker was set up once, for the metadata of the run.
 
     Returns
     -------
     Run
         Motor angles and tensions of the lines, and poses of the platform.
     """
+    lines = bench.robot.robot.names
+    units = {
+        **{f"{line}.motor_angle": "rad" for line in lines},
+        **{f"{line}.tension": "N" for line in lines},
+        **dict(zip(_CHANNELS, _UNITS, strict=True)),
+    }
     values: list[Array] = []
+    if first is not None:
+        values.extend(np.column_stack([first.time, *(first[channel] for channel in units)]))
+    run = first
     for row in rows:
         values.append(row)
-        done(len(values))
-    lines = bench.robot.robot.names
-    table = np.array(values)
-    channels = {
-        **{f"{line}.motor_angle": Channel(table[:, i], "rad") for i, line in enumerate(lines)},
-        **{
-            f"{line}.tension": Channel(table[:, len(lines) + i], "N")
-            for i, line in enumerate(lines)
-        },
-        **{
-            channel: Channel(table[:, 2 * len(lines) + i], unit)
-            for i, (channel, unit) in enumerate(zip(_CHANNELS, _UNITS, strict=True))
-        },
-    }
-    return Run(name, np.arange(float(len(table))), channels)
+        table = np.array(values)
+        channels = {
+            channel: Channel(table[:, 1 + i], unit)
+            for i, (channel, unit) in enumerate(units.items())
+        }
+        run = Run(name, table[:, 0], channels, {"session": session} if session else {})
+        keep(run)
+    if run is None:
+        raise RunError(f"{name}: no pose was measured")
+    return run
 
 
 class _Driver:
@@ -222,6 +246,7 @@ class _Driver:
         self._here = bench.robot.pose
         self._preload: Array | None = None
         self._stops = bench.stops
+        self._began = bench.clock.now()
 
     def drawn(self, random: np.random.Generator, count: int) -> Iterator[Array]:
         """Rows of random poses within the limits."""
@@ -275,7 +300,8 @@ class _Driver:
         poses = self.tracker.require(begin, wiring.listen if wiring else "the tracker's address")
         pose = mean_pose(poses)
         angles, tension = (np.mean([row[k] for row in seen], axis=0) for k in (0, 1))
-        return np.concatenate([angles, tension, pose.position, angles_of(pose.rotation)])
+        time = [begin - self._began]
+        return np.concatenate([time, angles, tension, pose.position, angles_of(pose.rotation)])
 
     def _wait(self, duration: float) -> None:
         bench = self.bench
@@ -307,20 +333,6 @@ def _fitted(profile: RobotProfile, fit: Run, held: Run, options: Options | None)
     tracker = profile.instrument.tracker
     unknown = replace(tracker, frame="unknown")
     profile = replace(profile, instrument=replace(profile.instrument, tracker=unknown))
-    # One set-up of the tracker: both runs are one session.
-    fit, held = (replace(run, metadata={"session": "bench"}) for run in (fit, held))
     return calibrate(
         robot_of(profile), read_poses([fit], profile), read_poses([held], profile), options
     )
-
-
-def _joined(first: Run, second: Run) -> Run:
-    """Rows of both."""
-    if set(first.channels) != set(second.channels):
-        raise RunError(f"{second.name}: has other channels than {first.name}")
-    channels = {
-        name: replace(one, values=np.concatenate([one.values, second[name]]))
-        for name, one in first.channels.items()
-    }
-    count = len(first.time) + len(second.time)
-    return replace(first, time=np.arange(float(count)), channels=channels)

@@ -10,7 +10,14 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.control.motion import JERK_TIME
 from winchkit.bench.robot.path import Path
-from winchkit.model.robot import ForceLimits, PlatformMotion, Pose, Robot, dynamic_wrench, quadratic
+from winchkit.model.robot import (
+    ForceLimits,
+    PlatformMotion,
+    Pose,
+    Robot,
+    distributed_forces,
+    dynamic_wrench,
+)
 from winchkit.model.trajectory import Trajectory, plan
 
 __all__ = ["PlatformTrajectory", "motion_at", "plan_along"]
@@ -91,7 +98,8 @@ def plan_along(
     time = np.linspace(0.0, profile.duration, count)
     distance, rate, change = profile.at(time)
     motion = motion_at(path, distance, rate, change)
-    force = _forces(robot, motion, limits)
+    structure = robot.structure(motion.pose)
+    force = distributed_forces(structure, dynamic_wrench(robot.platform, motion), limits)
     tension = np.where(np.isfinite(force), force, 0.0)
     angle = robot.motor_angles(motion.pose, tension=tension)
     length = robot.lengths(motion.pose)
@@ -117,13 +125,3 @@ def motion_at(path: Path, distance: Array, rate: Array, change: Array) -> Platfo
     velocity = first * rate[:, None]
     acceleration = second * rate[:, None] ** 2 + first * change[:, None]
     return PlatformMotion(path.pose(distance), velocity, acceleration)
-
-
-def _forces(robot: Robot, motion: PlatformMotion, limits: ForceLimits) -> Array:
-    structure, wrench = robot.structure(motion.pose), dynamic_wrench(robot.platform, motion)
-    out = np.full(structure.shape[::2], np.nan)
-    for k, (matrix, load) in enumerate(zip(structure, wrench, strict=True)):
-        found = quadratic(matrix, load, limits)
-        if found.feasible:
-            out[k] = found.value
-    return out

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from winchkit.cli.core.messages import note
+import click
+
+from winchkit.cli.core.messages import note, suggest_next
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["PoseSeries", "pose_names"]
 
+_FEWEST = 10
+"""Poses from which a fit of those of a stopped calibration is suggested."""
 _INSTRUMENTS = 0.5
 """Time in which every instrument of a simulated bench has been read, s."""
 
@@ -55,8 +60,8 @@ class PoseSeries:
 
         spec = read_bench(path)
         self._check(spec, path)
-        keep = self._files()
         with (
+            self._kept() as keep,
             ComputationProcess() as compute,
             open_bench(path, name=client_name("calibrate"), realtime="try") as opened,
         ):
@@ -75,9 +80,8 @@ class PoseSeries:
 
         sim = read_simbench(find("sim", name))
         self._check(sim.bench, name)
-        keep = self._files()
         clock = SimulatedClock()
-        with LiveBench(sim, simulated_time=clock) as live:
+        with self._kept() as keep, LiveBench(sim, simulated_time=clock, compiled=True) as live:
             assert live.robot is not None, "the bench has a robot"
             tracker = Tracker(clock.now)
             live.robot.on_pose = tracker.receive
@@ -95,7 +99,7 @@ class PoseSeries:
         from winchkit.bench.robot.computation import at_once
         from winchkit.bench.robot.self_calibration import self_calibrated
 
-        return self_calibrated(
+        found = self_calibrated(
             bench,
             tracker,
             poses=self.poses,
@@ -107,6 +111,14 @@ class PoseSeries:
             progress=self.progress,
             keep=keep,
         )
+        _, error = found.held_out
+        if self.accuracy is not None and error > self.accuracy:
+            click.echo(
+                f"accuracy {self.accuracy * 1e3:g} mm was not reached: {error * 1e3:.3g} mm at the "
+                f"held-out poses after {len(found.fit.time)} fitted ones",
+                err=True,
+            )
+        return found
 
     def _check(self, spec: BenchSpec, name: str) -> None:
         """Raise UsageError unless the bench moves this robot, seen by a tracker."""
@@ -121,8 +133,12 @@ class PoseSeries:
         if own.resolve() != find("profiles", self.robot).resolve():
             raise UsageError(f"ROBOT is '{self.robot}', the bench moves '{spec.robot.profile}'")
 
-    def _files(self) -> Callable[[Run], None]:
-        """What writes the measured poses; raises UsageError where older ones would be lost."""
+    @contextmanager
+    def _kept(self) -> Iterator[Callable[[Run], None]]:
+        """Gives what writes the measured poses; raises UsageError where older ones would be lost.
+
+        Each pose is in its file as soon as it is measured.
+        """
         from winchkit.runs.writer import write_run
 
         files = pose_names(self.output)
@@ -132,9 +148,26 @@ class PoseSeries:
                 f"{held[0]} holds poses of an earlier calibration; name another profile with -o, "
                 "or move the file"
             )
+        counts: dict[str, int] = {}
 
         def keep(run: Run) -> None:
             write_run(run, files[run.name])
-            note(f"written: {files[run.name]} ({len(run.time)} poses)")
+            counts[run.name] = len(run.time)
 
-        return keep
+        try:
+            yield keep
+        except BaseException:
+            self._tell_kept(counts)
+            if counts.get("fit", 0) >= _FEWEST:
+                fit, validation = files.values()
+                with_validation = ["--validate", str(validation)] if "validation" in counts else []
+                suggest_next(
+                    "calibrate", self.robot, str(fit), *with_validation, "-o", str(self.output)
+                )
+            raise
+        self._tell_kept(counts)
+
+    def _tell_kept(self, counts: Mapping[str, int]) -> None:
+        files = pose_names(self.output)
+        for name, count in counts.items():
+            note(f"written: {files[name]} ({count} poses)")

@@ -24,6 +24,8 @@ __all__ = ["command"]
 
 _CHECK_EVERY = 0.1
 _TURN = 1e-4
+_DETERMINED = 6
+"""Cables from which they determine the pose of a platform, so that it can be moved as one."""
 
 
 @click.command(
@@ -122,7 +124,9 @@ def _ended_by_signals(ended: threading.Event) -> Iterator[None]:
 
 
 def _introduce(live: LiveBench, path: Path, *, as_json: bool) -> None:
-    winch = next(iter(live.winches))
+    move = f"jog {next(iter(live.winches))}"
+    if live.robot is not None and live.robot.platform.count >= _DETERMINED:
+        move = "move --pose-by z=10mm"  # one cable alone would become slack or be overloaded
     if as_json:
         echo_json({"schema": 1, "bench": path, "ready": True})
     else:
@@ -130,7 +134,7 @@ def _introduce(live: LiveBench, path: Path, *, as_json: bool) -> None:
     name = path.name.removesuffix("-bench.toml").removesuffix(".toml")
     click.echo(f"{name} runs. From another terminal:", err=True)
     click.echo(f"  winchkit monitor --bench {path}", err=True)
-    click.echo(f"  winchkit jog {winch} --bench {path}", err=True)
+    click.echo(f"  winchkit {move} --bench {path}", err=True)
     click.echo("Lines here: load, fault, recover, status, quit, help. Ctrl-C ends it.", err=True)
 
 

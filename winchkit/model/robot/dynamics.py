@@ -36,7 +36,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.line import GRAVITY
-from winchkit.model.robot.force_distribution import ForceLimits, quadratic
+from winchkit.model.robot.force_distribution import ForceLimits, distributed_forces
 from winchkit.model.robot.kinematics import Pose
 from winchkit.model.robot.robot import Robot
 from winchkit.model.robot.rotation import skew
@@ -226,11 +226,7 @@ def inverse_dynamics(
         NaN where no forces within the limits balance the wrench.
     """
     wrench, structure = dynamic_wrench(robot.platform, motion), robot.structure(motion.pose)
-    force = np.full(structure.shape[::2], np.nan)
-    for k, (matrix, load) in enumerate(zip(structure, wrench, strict=True)):
-        found = quadratic(matrix, load, limits)
-        if found.feasible:
-            force[k] = found.value
+    force = distributed_forces(structure, wrench, limits)
     known = np.all(np.isfinite(force), axis=1)
     pulled = np.where(known[:, None], force, 0.0)
     angle = robot.motor_angles(motion.pose, tension=pulled)

@@ -19,6 +19,7 @@ __all__ = [
     "Forces",
     "approximate_forces",
     "closed_form",
+    "distributed_forces",
     "improved_closed_form",
     "null_space",
     "quadratic",
@@ -199,6 +200,44 @@ def quadratic(structure: Array, wrench: Array, limits: ForceLimits) -> Forces:
     )
     value = np.full(len(low), np.nan) if step is None else centre + null @ step
     return _judge(value, structure, wrench, low, high)
+
+
+def distributed_forces(structure: Array, wrench: Array, limits: ForceLimits) -> Array:
+    """Cable forces within the limits that are closest to their middle, for many poses.
+
+    Parameters
+    ----------
+    structure : (k, 6, n) array
+        Structure matrices Aᵀ.
+    wrench : (k, 6) array
+        w, N and N m.
+    limits : ForceLimits
+        Both finite.
+
+    Returns
+    -------
+    (k, n) array
+        N; NaN in the rows where no forces within the limits balance the wrench.
+
+    Notes
+    -----
+    The closed form is the solution wherever it is within the limits, and is computed for all rows
+    at once; :func:`quadratic` computes the other rows.
+    """
+    low, high = limits.between(structure.shape[2])
+    out = np.full(structure.shape[::2], np.nan)
+    known = np.isfinite(structure).all(axis=(1, 2)) & np.isfinite(wrench).all(axis=1)
+    closed = approximate_forces(structure[known], wrench[known], (low + high) / 2)
+    missing = (structure[known] @ closed[..., None])[..., 0] + wrench[known]
+    size = np.linalg.norm(closed, axis=1) + np.linalg.norm(wrench[known], axis=1)
+    solved = ((low <= closed) & (closed <= high)).all(axis=1)
+    solved &= np.linalg.norm(missing, axis=1) <= _BALANCE * np.maximum(size, 1.0)
+    out[known] = np.where(solved[:, None], closed, np.nan)
+    for k in np.flatnonzero(known)[~solved].tolist():
+        found = quadratic(structure[k], wrench[k], limits)
+        if found.feasible:
+            out[k] = found.value
+    return out
 
 
 def wrench_feasibility(structure: Array, wrench: Array, limits: ForceLimits) -> Feasibility:

@@ -62,6 +62,9 @@ class LiveBench:
     simulated_time : SimulatedClock, optional
         Clock on which the bench runs instead of in real time; it and its user are then in one
         process, and the user opens ``bench_spec`` on the same clock.
+    compiled : bool, optional
+        Compile a robot's mechanics where numba is installed, which takes a second or two; by
+        default in real time only.
 
     Raises
     ------
@@ -81,12 +84,14 @@ class LiveBench:
         clock: Callable[[], float] = monotonic,
         profiles: Mapping[str, WinchProfile] | None = None,
         simulated_time: SimulatedClock | None = None,
+        compiled: bool | None = None,
     ) -> None:
         self.sim_bench = hiding(sim_bench, hidden) if hidden else sim_bench
         self.seed = seed
         self._interface = interface
         self._profiles = profiles
         self._simulated = simulated_time
+        self._compiled = simulated_time is None if compiled is None else compiled
         self._clock = clock = clock if simulated_time is None else simulated_time.now
         self._lock = threading.RLock()
         self._stopping = threading.Event()
@@ -303,7 +308,14 @@ class LiveBench:
         if sim.platform is None:
             profiles = profiles_of(sim) if self._profiles is None else self._profiles
         else:
-            self.robot = LiveRobot(sim, sim.platform, self.seed, now, sends=self._simulated is None)
+            self.robot = LiveRobot(
+                sim,
+                sim.platform,
+                self.seed,
+                now,
+                sends=self._simulated is None,
+                compiled=self._compiled,
+            )
             profiles, loads = self.robot.profiles, self.robot.ends
             truth = self.robot.truth
         for name, wiring in sim.bench.winch.items():

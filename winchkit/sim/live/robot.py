@@ -31,17 +31,24 @@ class LiveRobot:
         Time at which the winches start, s.
     sends : bool
         Whether the tracker sends datagrams to the address at which the bench file listens, as it
-        does in real time; the mechanics are then compiled where numba is installed.
+        does in real time.
+    compiled : bool
+        Whether the mechanics are compiled, where numba is installed; it takes a second or two.
     """
 
     def __init__(
-        self, bench: SimBench, truth: PlatformTruth, seed: int, started: float, *, sends: bool
+        self,
+        bench: SimBench,
+        truth: PlatformTruth,
+        seed: int,
+        started: float,
+        *,
+        sends: bool,
+        compiled: bool,
     ) -> None:
         self._started = started
-        # Of use only where the time of the computer counts: it takes a second or two.
-        compiled = sends and find_spec("numba") is not None
         self.platform, self.profiles, self.ends, self.truth = build_robot(
-            bench, truth, compiled=compiled
+            bench, truth, compiled=compiled and find_spec("numba") is not None
         )
         self.on_pose: Callable[[bytes], None] | None = None
         """Called with each datagram of the tracker, also in simulated time."""
