@@ -98,6 +98,7 @@ def test_a_joint_at_three_speeds_has_offsets_presliding_and_gravity() -> None:
     assert {"drum_angle", "motor_angle", "directed_length"} & {w.variable for w in diagnosis.where}
 
 
+@pytest.mark.campaign
 def test_a_joint_at_two_speeds_has_presliding() -> None:
     """Gravity is offered: two speeds contradict each other by more than its size."""
     found = diagnose(runs_of("franka-q2", "case3_slow", "case3_high"), AXIS).diagnosis

@@ -346,7 +346,7 @@ DRAWN = "#over canvas, main .drop, #details svg, table.library"
 """What each view shows last, where no bench is attached."""
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("scheme", ["light", pytest.param("dark", marks=pytest.mark.campaign)])
 def test_no_view_has_a_violation_of_axe_or_scrolls_sideways(
     browser: Any, served: Served, robot: Served, scheme: str, tmp_path: Path
 ) -> None:

@@ -24,6 +24,7 @@ def test_the_benchmark_calibrates_a_hidden_geometry() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 def test_the_rectangle_needs_an_estimate_of_the_friction() -> None:
     found = robot_rectangle.measure(3, cycle=0.04, scale=0.06, moves=2)
     assert found["dahl_N"] < 0.2 * found["none_N"]

@@ -114,7 +114,7 @@ def believed(home: Array) -> Robot:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rotations", [True, False])
+@pytest.mark.parametrize("rotations", [pytest.param(True, marks=pytest.mark.campaign), False])
 def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None:
     believed, measured = hanging()
     if not rotations:

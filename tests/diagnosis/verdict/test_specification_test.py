@@ -264,7 +264,7 @@ def test_the_null_distribution_is_that_of_fits_to_drawn_data() -> None:
     drawn = null_excess(regression, noise, partial, Named(change, columns, 1), families)
     random, redrawn = np.random.default_rng(3), []
     basis = np.linalg.qr(columns)[0]
-    for _ in range(200):
+    for _ in range(80):
         factor = np.sqrt(noise.dof / random.chisquare(noise.dof))[regression.band_of_row]
         white = random.standard_normal(regression.n_rows) * factor
         white -= partial.explained @ (partial.explained.T @ white)
