@@ -49,6 +49,7 @@ CONTROL_CHARACTERS = re.compile(
 )
 """Control and format characters of Unicode (Cc, Cf, Zl, Zp) and lone surrogates, except line feed
 and tab: they control a terminal, or make one text look like another."""
+_MOST_SUGGESTIONS = 5
 
 
 class WinchkitError(Exception):
@@ -164,7 +165,17 @@ def _escaped(found: re.Match[str]) -> str:
 
 
 def suggest(word: str, known: list[str]) -> str:
-    """``; did you mean 'x'?`` when a known word is close, else nothing."""
-    close = [name for name in known if name.casefold() == word.casefold()]
+    """``; did you mean 'x'?`` when a known word is close, else nothing.
+
+    Where the word is a part of several names, such as ``creep``, all of them are given.
+    """
+    folded = word.casefold()
+    close = [name for name in known if name.casefold() == folded]
+    if not close:
+        with_part = [name for name in known if folded in re.split(r"[-_./ ]", name.casefold())]
+        close = with_part if len(with_part) <= _MOST_SUGGESTIONS else []
     close = close or get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"; did you mean '{close[0]}'?" if close else ""
+    if not close:
+        return ""
+    *others, last = (f"'{name}'" for name in close)
+    return f"; did you mean {', '.join(others)} or {last}?" if others else f"; did you mean {last}?"

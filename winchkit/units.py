@@ -18,6 +18,7 @@ __all__ = [
     "dimension_of",
     "factor",
     "format_quantity",
+    "number_and_unit",
     "parse",
     "suggest",
 ]
@@ -91,6 +92,23 @@ def convert(value: float, unit: str, dimension: str) -> float:
     return value * factor(unit, dimension) + shift
 
 
+def number_and_unit(text: str) -> tuple[float, str] | None:
+    """Split ``"60 mm"`` or ``"60mm"``; the unit is empty where there is none.
+
+    Parameters
+    ----------
+    text : str
+        Quantity as written or typed.
+
+    Returns
+    -------
+    tuple of float and str, or None
+        Number in that unit, and the unit; None for a text that does not start with a number.
+    """
+    found = _QUANTITY.fullmatch(text.strip())
+    return (float(found[1]), found[2]) if found else None
+
+
 def parse(text: object, dimension: str) -> float:
     """Read ``"60 mm"`` as an SI float; a bare number is refused unless it has no dimension."""
     if isinstance(text, int | float) and not isinstance(text, bool):
@@ -100,10 +118,10 @@ def parse(text: object, dimension: str) -> float:
         raise UsageError(f'{text} has no unit; write {article(dimension)} as "{text} {si}"')
     if not isinstance(text, str):
         raise UsageError(f"expected {article(dimension)} with its unit, not {type(text).__name__}")
-    found = _QUANTITY.fullmatch(text.strip())
-    if not found:
+    found = number_and_unit(text)
+    if found is None:
         raise UsageError(f"'{text}' is not a number with its unit")
-    value, unit = float(found[1]), found[2]
+    value, unit = found
     if not unit and dimension != "ratio":
         raise UsageError(f"'{text}' has no unit; use one of {', '.join(UNITS[dimension])}")
     return convert(value, unit or "1", dimension)

@@ -11,7 +11,7 @@ from winchkit.diagnosis.results import CandidateScore, Diagnosis, Estimate, Outp
 from winchkit.effects.effect import Effect
 from winchkit.report.detectability import untestable, visible
 from winchkit.report.figures.waterfall import Waterfall
-from winchkit.report.html.markup import Markup, details, element, join, table
+from winchkit.report.html.markup import Markup, details, element, formula, join, table
 from winchkit.report.words.headline import worst_outputs
 from winchkit.report.words.numbers import (
     Scale,
@@ -87,7 +87,7 @@ def named(
         values = [_sure(name, estimate) for name, estimate in estimates.items()]
         entries.append(element("dt", element("code", effect_id), " ", unbroken(", ".join(values))))
         if effect is not None:
-            words = join([effect.what, " ", element("span", effect.formula, class_="formula")])
+            words = join([effect.what, " ", formula(effect.formula)])
             entries.append(element("dd", words, element("small", f"Source: {effect.source}")))
     return element("dl", *entries, class_="named") if entries else Markup("")
 

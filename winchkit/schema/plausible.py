@@ -7,17 +7,13 @@ wide; valid but unusual values are warnings (:mod:`winchkit.schema.bench_warning
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
 from winchkit.errors import UsageError
 from winchkit.units import parse
 
-__all__ = ["LARGEST", "NUMBER", "Bound", "check_size", "typed_quantity"]
-
-NUMBER = re.compile(r"^\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)$")
-"""A number and its unit as people type them: the space between may be missing."""
+__all__ = ["LARGEST", "Bound", "check_size", "typed_quantity"]
 
 
 class Bound(NamedTuple):
@@ -82,4 +78,4 @@ def typed_quantity(text: str, dimension: str) -> float:
     dimension : str
         Name of the dimension.
     """
-    return check_size(parse(NUMBER.sub(r"\1 \2", text).strip(), dimension), dimension, text)
+    return check_size(parse(text, dimension), dimension, text)

@@ -12,6 +12,7 @@ from report_parsed import Page
 from winchkit.cli.model.effects import command
 from winchkit.effects.card import signature
 from winchkit.effects.catalogue import load_catalogue
+from winchkit.report.html.markup import formula
 from winchkit.report.pages.effects import effects_html
 
 CATALOGUE = load_catalogue()
@@ -32,9 +33,14 @@ def test_every_effect_has_its_section_and_its_link(whole: Page) -> None:
 
 def test_every_card_says_everything(whole: Page) -> None:
     for effect in EFFECTS:
-        for words in (effect.what, effect.formula, effect.source, effect.looks_like):
+        for words in (effect.what, effect.source, effect.looks_like):
             assert " ".join(words.split()) in whole.text
+        assert " ".join(effect.formula.replace("_", "").split()) in whole.text
         assert effect.told_apart in whole.text
+
+
+def test_indices_of_a_formula_are_subscripts() -> None:
+    assert formula("F_c = μ N < F") == ('<span class="formula">F<sub>c</sub> = μ N &lt; F</span>')
 
 
 def test_every_output_that_changes_is_drawn(whole: Page) -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from winchkit.errors import UsageError
-from winchkit.schema.plausible import NUMBER, typed_quantity
-from winchkit.units import UNITS, article
+from winchkit.schema.plausible import typed_quantity
+from winchkit.units import UNITS, article, number_and_unit
 
 __all__ = ["check_typed", "dimension", "optional", "quantity", "seconds"]
 
@@ -50,7 +50,7 @@ def check_typed(option: str, text: str, *dimensions: str, example: str = "") -> 
         raise UsageError(f"{option}: {faults[dimensions.index(fits[0])]} (such as '{example}')")
     wanted = " or ".join(article(name) for name in dimensions)
     units = "; ".join(f"{name} {', '.join(UNITS[name])}" for name in dimensions)
-    is_bare = NUMBER.match(text) and not _unit(text)
+    is_bare = number_and_unit(text) is not None and not _unit(text)
     fault = f"has no unit of {wanted}" if is_bare else f"is not {wanted} with its unit"
     raise UsageError(f"{option}: '{text}' {fault}; write such as '{example}' ({units})")
 
@@ -76,5 +76,5 @@ def seconds(text: str | None) -> float | None:
 
 def _unit(text: str) -> str:
     """The unit of a quantity as typed; empty without one."""
-    found = NUMBER.match(text)
-    return found[2].strip() if found else ""
+    found = number_and_unit(text)
+    return found[1] if found else ""

@@ -40,7 +40,7 @@ EFFECT = Effect(
     apply=apply,
     outputs=("cable_length",),
     what="The cable's own weight bends it; the straight distance is shorter than the cable.",
-    formula="ℓ − w² ℓ³ cos²(inclination) / 24 T², w = mass_per_length·g",
+    formula="ℓ − w² ℓ³ cos²(inclination) / 24 T², w weight per length",
     source="parabola for a shallow catenary (Irvine, Cable Structures)",
     looks_like="A length error only near slack and on long cables, in proportion to ℓ³/T².",
     confused_with=("cable-elongation-linear", "cable-elongation-exponential"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable, Sequence
 from html import escape
 from typing import Any
@@ -15,11 +16,14 @@ __all__ = [
     "details",
     "element",
     "folded",
+    "formula",
     "inline",
     "join",
     "section",
     "table",
 ]
+
+_SUBSCRIPT = re.compile(r"(?<=\w)_(\w+)")
 
 
 class Markup(str):
@@ -40,6 +44,13 @@ def element(name: str, *children: str, **attributes: str) -> Markup:
 def join(children: Iterable[str]) -> Markup:
     """Children concatenated."""
     return Markup("".join(c if isinstance(c, Markup) else escape(c) for c in children))
+
+
+def formula(text: str) -> Markup:
+    """A formula of an effect with its subscripts: ``F_c`` is an F with the index c."""
+    letters = _SUBSCRIPT.split(text)
+    parts = [element("sub", part) if k % 2 else part for k, part in enumerate(letters)]
+    return element("span", *parts, class_="formula")
 
 
 def section(id_: str, heading: str, *children: str) -> Markup:

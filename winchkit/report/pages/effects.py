@@ -12,7 +12,7 @@ from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.reduction import decimated
-from winchkit.report.html.markup import Markup, element, section, table
+from winchkit.report.html.markup import Markup, element, formula, section, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.words.numbers import plain, scale_for
 from winchkit.report.words.sentence import capital
@@ -67,7 +67,7 @@ def _contents(effects: Sequence[Effect]) -> Markup:
 
 def _card(effect: Effect, drawing: Sequence[Markup]) -> Markup:
     pairs = [
-        ("formula", element("span", effect.formula, class_="formula")),
+        ("formula", formula(effect.formula)),
         ("source", effect.source),
         ("changes", listed([OUTPUT_NAMES.get(name, name) for name in effect.outputs])),
         ("needs", "; ".join(NEED_WORDS[need] for need in effect.needs) or "only the motor angle"),

@@ -192,6 +192,11 @@ function choose(effect) { shown.effect = effect; address(); drawLadder(); drawCa
 function address() { history.replaceState(null, "", `${location.pathname}${location.search}#diagnose/${shown.output || ""}/${shown.effect || ""}`); }
 export function restore(parts) { if (parts[0]) { shown.output = parts[0]; shown.chosen = true; } if (parts[1]) shown.effect = parts[1]; }
 
+// "F_c" of a formula as an F with the index c.
+function subscripted(text) {
+  return text.split(/(?<=[\p{L}\p{N}])_([\p{L}\p{N}]+)/u).map((part, k) => (k % 2 ? el("sub", {}, part) : part));
+}
+
 async function drawCard() {
   const box = root.querySelector("#card"), effect = shown.effect;
   if (!box) return;
@@ -202,7 +207,7 @@ async function drawCard() {
     const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}.`) : el("p", { class: "note" }, "✓ Distinguishable from every other candidate.");
     fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
       host, card.signature ? el("div", { class: "row" }, legend(["today", "residual, mean"], ["with", "signature"], ["band", "±1σ", true]), exporter(`signature-${card.effect}`, () => signatureFigure(card))) : null,
-      el("p", { class: "note" }, card.what), el("div", { class: "formula" }, card.formula),
+      el("p", { class: "note" }, card.what), el("div", { class: "formula" }, subscripted(card.formula)),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
       equal, card.next ? el("p", { class: "note" }, card.next) : null,
       el("div", { class: "buttons" }, el("button", { class: "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
