@@ -1,4 +1,4 @@
-"""Between motor and cable, quick enough for every control cycle."""
+"""Cable length and arm from the motor angle, fast enough for every control cycle."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from winchkit.estimation.cable_state import RopeNow, Sample
 __all__ = ["CableMap", "LineModel"]
 
 _FAR = 5e-3
-"""Of cable, after which length and arm are taken anew, m."""
+"""Change of the cable length after which length and arm are computed again, m."""
 _SOON = 0.02
-"""After which tension and memory are asked anew, s."""
+"""Time after which tension and memory effects are computed again, s."""
 
 _NEVER = (nan, (nan, nan))
 
 
 class LineModel(Protocol):
-    """The part of ``winchkit.model.line.Line`` that moving a winch needs."""
+    """Part of ``winchkit.model.line.Line`` that motion control uses."""
 
     def cable_length(self, motor_angle: float) -> float:
         """Free length at a motor angle, m."""
@@ -32,7 +32,7 @@ class LineModel(Protocol):
 
 
 class _Here(NamedTuple):
-    """The cable near one motor angle."""
+    """Linearisation of the cable length at one motor angle."""
 
     angle: float = nan
     length: float = nan
@@ -40,7 +40,7 @@ class _Here(NamedTuple):
 
 
 class _Felt(NamedTuple):
-    """The cable as its effects had it when they were asked last."""
+    """Contributions of the effects at their last evaluation."""
 
     time: float = nan
     angle: float = nan
@@ -65,7 +65,7 @@ class CableMap:
         same in a cycle."""
         self._felt = _Felt()
         self.failure: FileError | None = None
-        """Why an effect of the profile, perhaps a user's own, could not be used any more."""
+        """Fault of an effect of the profile; None while all can be evaluated."""
 
     @classmethod
     def of(cls, now: RopeNow) -> CableMap:
@@ -79,11 +79,11 @@ class CableMap:
 
     @property
     def bends(self) -> bool:
-        """Whether effects of the profile are to be asked in every cycle."""
+        """Whether effects of the profile are to be evaluated in every cycle."""
         return self._now is not None
 
     def feel(self, sample: Sample) -> None:
-        """Take what was measured in this cycle."""
+        """Take the measurements of this cycle."""
         if self._now is None or not isfinite(sample.motor_angle):
             return
         felt = self._felt
@@ -112,7 +112,7 @@ class CableMap:
 
     @property
     def correction(self) -> float:
-        """To be added to the cell's reading for the tension at the platform end, N."""
+        """Tension at the platform end less the reading of the cell, N."""
         return self._felt.correction
 
     def at(self, motor_angle: float) -> tuple[float, float]:
@@ -132,11 +132,11 @@ class CableMap:
         return answer
 
     def cable_length(self, motor_angle: float) -> float:
-        """Length at a motor angle under the tension that there is, m."""
+        """Length at a motor angle under the present tension, m."""
         return self._pulled(motor_angle) + self._remembered()
 
     def motor_angle(self, cable_length: float) -> float:
-        """Motor angle (rad) for a length under the tension that there is."""
+        """Motor angle (rad) for a length under the present tension."""
         if self._now is None:
             return self._line.motor_angle(cable_length)
         return self._now.at_rest.motor_angle(cable_length - self._remembered(), self._force())
@@ -155,6 +155,6 @@ class CableMap:
         return self._felt.tension if isfinite(self._felt.tension) else 0.0
 
     def _remembered(self) -> float:
-        """What memory and temperature add to the length, m."""
+        """Contribution of memory effects and temperature to the length, m."""
         felt = self._felt
         return felt.length - self._pulled(felt.angle) if isfinite(felt.length) else 0.0

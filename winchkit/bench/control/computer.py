@@ -1,4 +1,4 @@
-"""What this computer permits a real-time process: priority, locked memory, kernel settings.
+"""Real-time settings that this computer permits: priority, locked memory, kernel settings.
 
 Linux only; elsewhere every item is refused and says so. Nothing here changes the computer, and
 :func:`survey` leaves the process as it was.
@@ -40,12 +40,12 @@ _THROTTLED = 0.95
 
 @dataclass(frozen=True)
 class Item:
-    """One setting, whether it is as the control loop needs it, and how to get there."""
+    """One setting, whether the control loop can use it, and how to change it."""
 
     name: str
     granted: bool
     detail: str
-    """What holds now."""
+    """Present value, in words."""
     remedy: str = ""
     """The setting that permits it; empty where it is granted."""
 
@@ -55,14 +55,14 @@ class Item:
 
 
 def survey() -> tuple[Item, ...]:
-    """What a control loop would get on this computer, from this account."""
+    """Real-time settings that a control loop would get on this computer with this account."""
     if sys.platform != "linux":
         return (Item("real-time", False, f"not available on {sys.platform}", "use Linux"),)
     return (_scheduling(), _memory(), *_kernel())
 
 
 def instrument_reading(*, scheduled: bool) -> Item:
-    """Who reads the instruments of Modbus and serial lines, where real time is requested.
+    """Process that reads the instruments of Modbus and serial lines, with real time requested.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def locks_without_limit(hard: int) -> bool:
 
 
 def _scheduling() -> Item:
-    """Try it on a thread of its own, which then ends."""
+    """Set the priority of a thread made for this test."""
     refusals: list[OSError] = []
 
     def attempt() -> None:

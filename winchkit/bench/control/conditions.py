@@ -54,7 +54,7 @@ class Exceeds:
     def __init__(self, quantity: str, bound: Callable[[Supervised], float | None]) -> None:
         """Take the name of a field of :class:`Quantities`, and its bound; None for no bound."""
         self.place = Quantities._fields.index(quantity)
-        """Of the quantity among all."""
+        """Index of the quantity in :class:`Quantities`."""
         self._bound = bound
 
     def bound(self, own: Supervised) -> float:
@@ -81,13 +81,13 @@ class Condition:
     latches: bool = False
     """Latched although nothing moved. What forbids a motion under way is latched in any case."""
     debounce: float = 0.0
-    """How long it has to hold, s."""
+    """Time for which it must hold (debounce), s."""
     by_facts: bool = False
     """Whether it looks at nothing but ``observation.FACTS``, and at boot-ups dealt with. Such a
     condition has no ``when``: the supervisor leaves it out while the facts are those under which it
     did not hold, whatever the winch does."""
     when: When = ""
-    """What the winch is to be, for the condition to be tested."""
+    """State of the winch in which the condition is tested."""
     needs: str = ""
     """The key of ``[winch.A.limits]`` or the instrument without which it is not tested."""
 
@@ -102,7 +102,7 @@ def _cell(item: WinchInput) -> Instrumented:
 
 
 def _age(item: WinchInput) -> float:
-    """Of the load cell's newest reading, s."""
+    """Age of the load cell's newest reading, s."""
     return item.now - _cell(item).since
 
 
@@ -434,7 +434,7 @@ CONDITIONS: tuple[Condition, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class BenchCondition:
-    """A row on the bench as a whole, or on what only the control loop sees; it trips there."""
+    """A row on the bench as a whole, or on states of the control loop, which tests it itself."""
 
     kind: str
     variable: str

@@ -1,4 +1,4 @@
-"""One winch in the control loop: which wish and target its drive gets in each cycle."""
+"""One winch in the control loop: the requested power state and setpoint of its drive in a cycle."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["AxisPort", "Controller"]
 
 _ENABLE_TIME = 2.0
 _GATE_TIME = 5.0
-"""How long an enabled drive waits for others that are to start with it, s."""
+"""Time for which an enabled drive waits for others that start with it, s."""
 _RESET_TIME = 1.0
 _RUN_DOWN_MARGIN = 1.0
 _FRESH_SYNCS = 2
@@ -39,7 +39,7 @@ _ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTI
 
 
 class AxisPort(Protocol):
-    """What the loop needs of an axis; ``Cia402Axis`` is one."""
+    """Interface of an axis to the control loop, such as ``Cia402Axis``."""
 
     heartbeat: HeartbeatWatch
 
@@ -53,19 +53,19 @@ class AxisPort(Protocol):
 
     @property
     def operational(self) -> bool:
-        """Whether its PDOs run."""
+        """Whether the drive is in NMT state operational."""
 
     @property
     def position_absolute(self) -> bool:
-        """Whether the drive's count alone is its position, for a later process too."""
+        """Whether the drive's position count is absolute, so that a later process may use it."""
 
     @property
     def mode_kept(self) -> bool:
-        """Whether it is still in its mode."""
+        """Whether the mode display (6061h) is that of the commanded mode (6060h)."""
 
     @property
     def fault_text(self) -> str:
-        """Its fault in words."""
+        """Fault of the drive in words."""
 
     @property
     def nmt_text(self) -> str:
@@ -73,11 +73,11 @@ class AxisPort(Protocol):
 
     @property
     def position_mode(self) -> bool:
-        """Whether it is moved by target positions and not by speeds."""
+        """Whether its setpoints are positions and not speeds."""
 
     @property
     def moves_alone(self) -> bool:
-        """Whether it makes the motion under way by itself (HM, PP)."""
+        """Whether the drive generates the present motion itself (HM, PP)."""
 
     @property
     def alarms(self) -> tuple[int, ...]:
@@ -85,7 +85,7 @@ class AxisPort(Protocol):
 
     @property
     def alarm_text(self) -> str:
-        """They in words."""
+        """Emergency codes in force, in words."""
 
     @property
     def second_master(self) -> str:
@@ -93,7 +93,7 @@ class AxisPort(Protocol):
 
     @property
     def last_request_elsewhere(self) -> float:
-        """When another SDO client last sent this drive a request, s."""
+        """Time of the last SDO request of another client to this drive, s."""
 
     @property
     def control_words_elsewhere(self) -> int:
@@ -101,11 +101,11 @@ class AxisPort(Protocol):
 
     @property
     def stops_on_nmt(self) -> bool:
-        """Whether commissioning saw it leave operation enabled on NMT stop."""
+        """Whether commissioning found that it leaves operation enabled on NMT stop."""
 
     @property
     def sdo_refused(self) -> bool:
-        """Whether it aborted the stop by SDO that is under way."""
+        """Whether it aborted the present stop by SDO."""
 
     @property
     def sdo_state(self) -> State | None:
@@ -118,7 +118,7 @@ class AxisPort(Protocol):
         """NMT stop."""
 
     def end_stop(self) -> None:
-        """The stop by SDO is over."""
+        """End the stop by SDO."""
 
     def emergency_stop(self, *, sdo: bool) -> None:
         """Send the prepared quick stop by RPDO, and by SDO where asked to."""
@@ -142,13 +142,13 @@ class AxisPort(Protocol):
 
 @dataclass(frozen=True)
 class _Order:
-    """A motion that is asked for."""
+    """A requested motion."""
 
     source: MotionSource
     gate: StartGate | None
 
     def may_start(self, time: float) -> bool:
-        """Whether no other drive has to be waited for in this cycle."""
+        """Whether the drive may start in this cycle without waiting for others."""
         return self.gate is None or self.gate.open(time)
 
 
@@ -168,16 +168,16 @@ class Controller:
         self.done = True
         """Whether the last source has finished."""
         self.failure = ""
-        """Why the last source could not go on, when the drive is to blame."""
+        """Fault of the drive that ended the last source; empty without one."""
         self.stopped = False
-        """Whether somebody stopped the last source before its end."""
+        """Whether a stop ended the last source before its end."""
         self.reason = ""
-        """Why, where another winch is to blame."""
+        """Reason of that stop, where another winch caused it."""
         self.commanded = 0.0
         """Winding speed commanded last, m/s."""
         self._velocity = 0.0
         self.uncommanded = ""
-        """What the drive did to its power state unasked; taken once by the control loop."""
+        """Change of the power state without a command; taken once by the control loop."""
         self.escalation = StopEscalation()
         self._wanted: _Order | None = None
         self._begun: _Order | None = None
@@ -191,7 +191,7 @@ class Controller:
         self._word = 0
         self._sync = self._stop_sync = 0
         self._asked: float | None = None
-        """When the power state was asked for by SDO, while no answer to SYNC shows it."""
+        """Time of the SDO request for the power state, while no answer to SYNC shows it."""
         self._words_elsewhere = 0
         """Writes of 6040h by other SDO clients that were dealt with."""
 
@@ -239,7 +239,7 @@ class Controller:
 
     @property
     def pending(self) -> bool:
-        """Whether a motion was ordered that has not started."""
+        """Whether a requested motion has not started yet."""
         return self._wanted is not None
 
     @property
@@ -259,7 +259,7 @@ class Controller:
         return self._velocity * arm, 0.0
 
     def take_uncommanded(self) -> str:
-        """What the drive did without a command, returned once."""
+        """Change of the power state without a command, returned once."""
         words, self.uncommanded = self.uncommanded, ""
         return words
 

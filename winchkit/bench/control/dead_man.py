@@ -1,4 +1,4 @@
-"""Times for which a motion lasts without a sign of life of whoever commands it."""
+"""Times after which a motion ends unless the client that commands it sends a sign of life."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ _CONFIDENCE = 1e-9
 """Probability of a live cell that a run of repeats as long as the one that trips begins."""
 _HOURS = 1000 * 3600.0
 _BLOCK, _BLOCKS = 200, 10
-"""Conversions at rest of which one estimate of the noise is made, and how many are kept."""
+"""Conversions at rest of one estimate of the noise, and number of estimates that are kept."""
 _BY_STEPS = (1, 2, 4, 8, 16, 32)
 _COMMON = 0.02
 """Differences that are rarer say nothing about the usual noise: hits, switching."""
@@ -56,9 +56,9 @@ _WRONG = 0.2
 _BEGUN = 6.07
 _NORMAL = NormalDist()
 _KEPT, _SPACING = 1.0, 5e-3
-"""Predictions that are kept, s, and how far apart at least."""
+"""Span of the predictions that are kept, and their least distance, s."""
 _SETTLING = 0.05
-"""By which a prediction may be early or late, s: the drive's lag, the cable, the amplifier."""
+"""Tolerance of a prediction in time, s: lag of drive, cable and amplifier."""
 _UNSTABLE = 5.0
 """At rest for so long, s, a load has ceased to swing and an amplifier to settle."""
 _NOISIER = 5.0
@@ -66,10 +66,10 @@ _NOISIER = 5.0
 _CALM = 1.0
 """At rest for so long before noise is learned, s: the load swings after a motion."""
 _WINDOW = 0.04
-"""Over which accelerations are taken, s."""
+"""Time over which accelerations are averaged, s."""
 _GRAVITY = 9.80665
 _SAME = 0.999
-"""Of a step: what is less is a finer one, and no rounding."""
+"""Share of a step below which a difference is a finer step and not rounding."""
 _KEEPS_COUNTING = Quality.DUPLICATE | Quality.LATE | Quality.UNSTABLE | Quality.FROZEN
 
 
@@ -79,7 +79,7 @@ class Frozen:
 
     count: float
     duration: float
-    """Since the count changed last, s."""
+    """Time since the last change of the count, s."""
     conversions: float
     predicted: float
     """Change of the tension in that time by the prediction, N; NaN without one."""

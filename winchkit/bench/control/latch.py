@@ -1,4 +1,4 @@
-"""The latch file: trips and lost positions that outlive the process that found them.
+"""The latch file: trips and lost positions, kept beyond the end of the process.
 
 It is kept beside the bench file (``bench.toml`` -> ``bench.trip.json``) from opening on. Its record
 has a fixed size and is overwritten in place, so that a full disk, a missing directory entry or a
@@ -36,7 +36,7 @@ class LatchFile:
     """Keeps the trips of one bench on disk; without a path it keeps nothing."""
 
     def __init__(self, path: str) -> None:
-        """Nothing is opened yet."""
+        """Take the path; the file is opened later."""
         self.path = path
         self._descriptor: int | None = None
         self._since: dict[tuple[str, str], str] = {}
@@ -80,7 +80,7 @@ class LatchFile:
         return None
 
     def clear(self) -> None:
-        """Write that nothing is latched; raises NotPermitted where that is not possible.
+        """Write an empty latch; raises NotPermitted where that is not possible.
 
         Lost positions stay: only homing finds them.
         """

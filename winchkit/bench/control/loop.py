@@ -35,9 +35,9 @@ _DRIVES_NOTICE = 1.25
 """Of the longest gap, which is 2 heartbeats: 2.5 after the last one the drives count the host as
 lost."""
 _LATE = 5
-"""Cycles: after a longer gap the frames that wait are read within as many."""
+"""Cycles within which the frames that wait after a longer gap are read."""
 _TENTHS = 30
-"""Of a period, in which the times of the cycles are counted."""
+"""Bins of the histogram of cycle times, each a tenth of the period wide."""
 _ANEW = 0.1
 """A judgement is put off once in this time at most, s."""
 _HEARD_WITHIN = 0.1
@@ -45,11 +45,11 @@ _HEARD_WITHIN = 0.1
 
 
 class BusPort(Protocol):
-    """What the loop needs of a CAN bus."""
+    """Interface of a CAN bus to the control loop."""
 
     @property
     def fault(self) -> str | None:
-        """Why it died."""
+        """Fault that ended the bus; None while it works."""
 
     def sync(self) -> None:
         """Send SYNC."""
@@ -58,10 +58,10 @@ class BusPort(Protocol):
         """Send the host's heartbeat."""
 
     def gather(self) -> None:
-        """Let the RPDOs of this cycle wait for each other."""
+        """Collect the RPDOs of this cycle."""
 
     def send_gathered(self) -> None:
-        """Send them."""
+        """Send the collected RPDOs."""
 
 
 class ControlLoop:
@@ -90,9 +90,9 @@ class ControlLoop:
         self.on_jog: Callable[[str, float], None] = lambda _name, _winding_speed: None
         self.samplers: list[Callable[[BenchSnapshot], None]] = []
         self.failure: BaseException | None = None
-        """What a callback or an effect of a profile raised."""
+        """Exception of a callback or of an effect of a profile."""
         self.broken: BaseException | None = None
-        """What the loop itself raised: it sends stops only, until it is closed."""
+        """Exception of the loop itself, which sends stops only from then on."""
         self.snapshot: BenchSnapshot | None = None
         self.thread_id = 0
         """Native id of the control thread, once it runs."""
@@ -138,7 +138,7 @@ class ControlLoop:
 
     @property
     def count(self) -> int:
-        """Cycles so far."""
+        """Number of cycles."""
         return self._count
 
     @property
@@ -172,7 +172,7 @@ class ControlLoop:
         return snapshot
 
     def restore(self, trips: Sequence[Trip]) -> None:
-        """Latch what an earlier process has latched."""
+        """Latch the trips of the latch file."""
         for trip in trips:
             self.supervisor.latch(trip)
         self._kept = self.supervisor.tripped
@@ -187,7 +187,7 @@ class ControlLoop:
         self._kept = ()
 
     def _stop_all(self, reason: str) -> None:
-        """Stop what moves, and what was ordered to."""
+        """Stop every winch that moves or is to start."""
         for parts in self.winches.values():
             if parts.controller.phase not in _STOPPED or parts.controller.pending:
                 parts.controller.stop(reason)
@@ -229,7 +229,7 @@ class ControlLoop:
         self._kept = trips
 
     def _sample(self, snapshot: BenchSnapshot) -> None:
-        """Give the cycle to the recorders; one that fails is a warning and no stop."""
+        """Pass the cycle to the recorders; one that fails is a warning and no stop."""
         for sample in tuple(self.samplers):
             try:
                 sample(snapshot)
@@ -244,7 +244,7 @@ class ControlLoop:
         self._warnings.setdefault(warning.kind, warning)
 
     def forget_warnings(self) -> None:
-        """A reset has shown them."""
+        """Clear the warnings at a reset."""
         self._warnings.clear()
 
     def _listen_for_stops(self) -> None:
@@ -257,7 +257,7 @@ class ControlLoop:
                 self.supervisor.latch(Trip("unresponsive", name, _UNRESPONSIVE, latches=True))
 
     def _fall_silent(self) -> None:
-        """End every life sign that a drive watches."""
+        """Stop sending heartbeat and SYNC where drives supervise them."""
         self.beating = False
         watched = [each.axis.fall_silent() for each in self.winches.values()]
         self._sync_watched = any(watched)
@@ -268,7 +268,7 @@ class ControlLoop:
             self.failure = self.failure or parts.cable.failure
 
     def _failing(self) -> str:
-        """Which winch must go down because its drive could not go on, and why, in words."""
+        """Winches to stop because a drive could not continue, with the reason in words."""
         new = [
             f"winch {name}: {failure}"
             for name, parts in self.winches.items()
@@ -399,7 +399,7 @@ class ControlLoop:
         self.supervisor.latch(Trip("bus", "", str(error), latches=True))
 
     def _ask_callbacks(self, snapshot: BenchSnapshot) -> None:
-        """Call the user's functions; the winding speeds that they return are a live dead-man."""
+        """Call the user's functions; the winding speeds that they return renew the dead-man."""
         for callback in list(self.callbacks):
             try:
                 for name, winding_speed in (callback(snapshot) or {}).items():

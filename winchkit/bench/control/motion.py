@@ -1,4 +1,4 @@
-"""Motion sources: what asks a winch to move, evaluated once a cycle and free of any bus.
+"""Motion sources: generators of a winch's setpoints, evaluated once a cycle, without a bus.
 
 A ``winding_speed`` is of the cable in m/s, positive winding in; angles are of the motor.
 """
@@ -36,14 +36,14 @@ __all__ = [
 ]
 
 _CALM = 0.5
-"""Waited for the tension before the length is judged, s."""
+"""Time at rest before the length is compared with its target, s: the tension settles."""
 _CLOSE = 1e-4
-"""Of cable, within which nothing is corrected, m."""
+"""Error of the cable length below which nothing is corrected, m."""
 _TRIES = 3
 _MOST = 0.1
-"""Of cable, beyond which the profile's effects are not valid, m."""
+"""Error of the cable length above which nothing is corrected, m: the profile is wrong then."""
 _SPEED, _ACCELERATION, _JERK = 0.05, 0.2, 1.0
-"""Of a correction, m/s, m/s^2, m/s^3, where the winch's own are not lower."""
+"""Limits of a correction, m/s, m/s^2, m/s^3, where those of the winch are not lower."""
 
 
 class Trim:
@@ -95,17 +95,17 @@ class Trim:
 JERK_TIME = 0.3
 """Time in which a move's acceleration builds up, s."""
 GAIN = 8.0
-"""Of the position loop around a speed-controlled drive, 1/s."""
+"""Gain of the position loop around a speed-controlled drive, 1/s."""
 _MARGIN = 2e-3
-"""Of cable, kept to a length limit, m."""
+"""Distance of the cable length that is kept from a limit, m."""
 SETTLED = 1e-4
-"""Of cable, from the target of a move that counts as done, m."""
+"""Error of the cable length at which a move counts as done, m."""
 SETTLE_TIME = 1.0
 """A move counts as done this long after its end at the latest, s."""
 
 
 class Target(NamedTuple):
-    """What a drive is to do in this cycle."""
+    """Setpoint of a drive in one cycle."""
 
     velocity: float
     """Of the motor, rad/s."""
@@ -119,7 +119,7 @@ class Target(NamedTuple):
 
 
 class MotionSource(Protocol):
-    """Says where to be at each cycle; ``done`` ends it."""
+    """Generator of the setpoint of each cycle, until one is ``done``."""
 
     holds: bool
     """Whether the winch stays enabled, holding its place, after the source is done."""
@@ -154,7 +154,7 @@ class PathStop(Protocol):
 
 
 class Ramp:
-    """Speed that follows a wish with limited acceleration, in cable units."""
+    """Speed of the cable that follows a commanded one with limited acceleration."""
 
     def __init__(self, acceleration: float, speed: float = 0.0) -> None:
         self.speed = speed
@@ -170,7 +170,7 @@ class Ramp:
 
 
 class Jog:
-    """Moves at a speed while someone keeps saying so; silence brings it to rest."""
+    """Moves at a commanded speed that must be renewed; ramps to rest once it has expired."""
 
     holds = False
     joins = True
@@ -194,7 +194,7 @@ class Jog:
         self._angle, self._last = angle, time
 
     def target(self, time: float, angle: float, now: float) -> Target:
-        """Follow the wish, slow down before a length limit, end once expired and at rest."""
+        """Follow the commanded speed, slow down before a length limit, end at rest once expired."""
         live = now < self._expires
         length, arm = self._cable.at(angle)
         wish = self._within(self._wish, length) if live else 0.0
@@ -205,7 +205,7 @@ class Jog:
         return Target(velocity, self._angle, speed, not live and speed == 0.0)
 
     def _within(self, wish: float, length: float) -> float:
-        """The wish, no faster than what can still be braked before a length limit.
+        """Commanded speed, limited to the one from which the winch stops before a length limit.
 
         The drive's speed lags behind by up to the response time, in which the cable runs on.
         """
@@ -243,7 +243,7 @@ class RunDown:
         self._angle, self._last = angle, time
 
     def target(self, time: float, angle: float, _now: float) -> Target:
-        """Slower by one cycle's worth."""
+        """Setpoint with the speed reduced by one cycle's deceleration."""
         before, speed = self._ramp.speed, self._ramp.follow(0.0, time)
         arm = self._cable.at(angle)[1]
         self._angle += (before + speed) / 2 / arm * (time - self._last)
@@ -298,7 +298,7 @@ class Move:
         return max(self._plan.duration, self._stretched)
 
     def stretch(self, duration: float) -> None:
-        """Take ``duration`` (s) where the plan is quicker; slower in the same proportion."""
+        """Extend the move to ``duration`` (s) where it is shorter, at lower speeds."""
         self._stretched = duration
 
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
@@ -308,7 +308,7 @@ class Move:
         self._start = time
 
     def target(self, time: float, angle: float, _now: float) -> Target:
-        """Where the plan is, with the position loop's correction for speed control."""
+        """Setpoint of the planned move, with the position loop's correction for speed control."""
         if self._trim is not None and self._ended:
             return self._trimmed(self._trim, time, angle)
         elapsed = time - self._start
@@ -324,7 +324,7 @@ class Move:
         return Target(velocity, planned, -speed, done=done)
 
     def _trimmed(self, trim: Trim, time: float, angle: float) -> Target:
-        """Where the correction after the plan's end is."""
+        """Setpoint of the correction that follows the planned move."""
         planned, velocity, speed = trim.at(time, self._knots[-1])
         return Target(velocity + GAIN * (planned - angle), planned, speed, done=trim.done)
 

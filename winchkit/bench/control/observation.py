@@ -1,4 +1,4 @@
-"""What the supervisor compares: observations of a cycle, and what it remembers of earlier ones."""
+"""Quantities of the supervisor: measurements of a cycle and states derived from earlier ones."""
 
 from __future__ import annotations
 
@@ -37,35 +37,35 @@ _STEPS, _REST_STEPS = 4, 3
 _MISSED_SYNCS = 5
 """A late cycle of the host makes feedback old; a drive that is silent also misses SYNCs."""
 _SLIP = 0.05
-"""Of cable, m, and ..."""
+"""Least tolerance of the cable slip, m, and ..."""
 _SLIP_SHARE = 0.05
 """... share of the moved length: a length sensor's filter and a profile's error are below."""
 _new = tuple.__new__
 
 
 class Instrumented(NamedTuple):
-    """Newest reading of a sensor as the supervisor needs it; the same until another one comes."""
+    """Newest reading of a sensor; the same object until the next one."""
 
     value: float
     """SI; NaN where the device flags it."""
     since: float
-    """When its age begins to count, s: when it was received, or when this computer went on after
+    """Time from which its age counts, s: when it was received, or when this computer went on after
     a standstill; minus infinity before the first."""
     max_age: float
     """s."""
     quality: str
     time: float
-    """Of the sample, s."""
+    """Time of the sample, s."""
     problem: str = ""
-    """Why nothing comes, in words."""
+    """Fault that prevents new readings, in words; empty without one."""
     gross: float = math.nan
-    """Before any tare."""
+    """Gross value, without tare."""
     received: float = -math.inf
-    """When it came, s."""
+    """Time of reception, s."""
 
 
 class WinchInput(NamedTuple):
-    """What is known of one winch in this cycle; SI.
+    """Measurements and states of one winch in a cycle; SI.
 
     A named tuple, since one is made of every winch in every cycle: a frozen dataclass takes
     several times as long to make.
@@ -92,7 +92,7 @@ class WinchInput(NamedTuple):
     nmt: str = ""
     """NMT state in words, where it is not operational."""
     uncommanded: str = ""
-    """What the drive did to its power state that no control word asked for."""
+    """Change of the power state that no control word requested."""
     second_master: str = ""
     """A command to its drive that was not sent here; empty while there is none."""
     disabled: bool = False
@@ -109,9 +109,9 @@ class WinchInput(NamedTuple):
     """Emergency codes in force without a fault."""
     emergency_text: str = ""
     unstable: str = ""
-    """What makes the load cell's readings at rest unsteady; empty while nothing does."""
+    """Finding that the load cell's readings at rest are unsteady; empty without one."""
     frozen: str = ""
-    """What shows that the load cell is frozen; empty while nothing does."""
+    """Evidence that the load cell is frozen; empty without it."""
     turns_known: bool = True
     """Whether the motor angle counts every turn; if not, the cable length is NaN."""
     sensors: Mapping[str, Instrumented] = MappingProxyType({})
@@ -140,7 +140,7 @@ facts_of = itemgetter(*map(WinchInput._fields.index, FACTS))
 
 
 class Quantities(NamedTuple):
-    """What conditions compare with a bound: each is exceeded upwards, NaN exceeds nothing; SI."""
+    """Quantities with upper bounds; NaN exceeds no bound; SI."""
 
     unanswered: float = 0.0
     """Age of the feedback, s; zero while fewer than 5 SYNCs are unanswered."""
@@ -151,21 +151,21 @@ class Quantities(NamedTuple):
     deviation: float = 0.0
     """Size of the difference of measured and commanded speed, m/s."""
     runaway: float = 0.0
-    """By how much it is faster than the commanded speed, or directed against it, m/s."""
+    """Excess of the speed over the commanded one, or speed against its direction, m/s."""
     following_error: float = 0.0
-    """Its size, m."""
+    """Absolute following error, m."""
     paid_out: float = 0.0
     """Cable length, m."""
     wound_in: float = 0.0
     """Negative cable length, m."""
     slip: float = 0.0
-    """By how much cable slip is beyond what sensor and profile may be wrong by, m."""
+    """Excess of the cable slip over the tolerance of sensor and profile, m."""
     expired: float = 0.0
     """Age of the cell's reading beyond its longest age, s."""
     unreadable: float = 0.0
     """1 where the cell's reading is in time and no number, else 0."""
     tension: float = 0.0
-    """Of the cable, N."""
+    """Tension of the cable, N."""
     slackness: float = 0.0
     """Negative tension, N."""
     tension_rate: float = 0.0
@@ -177,7 +177,7 @@ _NOTHING = Quantities()
 
 @dataclass(frozen=True)
 class Supervised:
-    """What one winch is held to."""
+    """Bounds of one winch."""
 
     limits: LimitSpec
     stale: float
@@ -185,7 +185,7 @@ class Supervised:
     cycle: float = 0.004
     """Period of control, s."""
     resolution: float = 0.0
-    """Of the measured cable speed (606Ch), m/s."""
+    """Resolution of the measured cable speed (606Ch), m/s."""
     safe_length: float = math.inf
     """Cable length at which the last two dead wraps are left on the drum, m."""
 
@@ -223,13 +223,13 @@ class Supervised:
 
 @dataclass
 class Memory:
-    """What the supervisor remembers of one winch."""
+    """State of the supervisor for one winch."""
 
     own: Supervised
     boot_ups: float = math.nan
     """Dealt with so far; unknown before the first observation."""
     since: dict[str, float] = field(default_factory=dict)
-    """When a condition that is debounced began to hold, s."""
+    """Start of each condition that is being debounced, s."""
     gross: float = math.nan
     """Tension of the cable, N; NaN where the cell's newest reading is no number that counts.
 
@@ -241,9 +241,9 @@ class Memory:
     slip: float = 0.0
     """Change of the length sensor less that by the motor since the motion began, m."""
     moved: float = 0.0
-    """Cable that ran since then, m."""
+    """Path of the cable since then, m."""
     quantities: Quantities = _NOTHING
-    """What conditions compare with a bound, of the newest observations."""
+    """Quantities of the newest observations."""
     quiet: object = None
     """The facts under which no condition on facts held when they were tested last."""
     _tension: tuple[float, float] | None = None

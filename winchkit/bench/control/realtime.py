@@ -61,12 +61,12 @@ class RealTime:
 
     @property
     def granted(self) -> bool:
-        """Whether everything was."""
+        """Whether every setting was granted."""
         return all(item.granted for item in self.items)
 
     @property
     def refused(self) -> tuple[Item, ...]:
-        """What was not."""
+        """Settings that were refused."""
         return tuple(item for item in self.items if not item.granted)
 
     @property
@@ -88,7 +88,7 @@ class RealTime:
         return replace(self, items=(*self.items, instrument_reading(scheduled=self.scheduled)))
 
     def close(self) -> None:
-        """Give everything back. Twice does no harm."""
+        """Restore all settings; may be called twice."""
         self._undo.close()
 
 
@@ -189,7 +189,7 @@ def _prioritise(
 
 
 def _restore(before: dict[int, _Scheduling]) -> None:
-    """Give the threads back what they had; those that inherited ours become ordinary."""
+    """Restore the threads' policies; those that inherited ours become ordinary."""
     for thread in threads():
         with suppress(ProcessLookupError):
             policy, priority = before.get(thread, (os.SCHED_OTHER, 0))

@@ -20,12 +20,12 @@ class ReleaseGuard:
     """Distinguishes a new held command from one held already when everything stopped."""
 
     def __init__(self) -> None:
-        """Nothing was stopped yet."""
+        """Begin without a stop."""
         self._asked: dict[str, float] = {}
         self._closed: set[str] = set()
 
     def close(self, winches: set[str]) -> None:
-        """From now on these winches want a release first: they were stopped or reset."""
+        """Require a release of these winches, which were stopped or reset."""
         self._closed |= winches
 
     def resume(self, start: float, ended: float) -> None:

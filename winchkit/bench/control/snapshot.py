@@ -1,4 +1,4 @@
-"""What crosses threads: immutable pictures of a bench at one control cycle."""
+"""Immutable snapshots of a bench at one control cycle, for other threads."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Direction(Flag):
 
 
 class Phase(Enum):
-    """What a winch is doing."""
+    """Phase of a winch's operation."""
 
     DISABLED = "disabled"
     ENABLING = "enabling"
@@ -41,14 +41,14 @@ class Phase(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Trip:
-    """Something that forbids motion, or stopped it."""
+    """A condition that forbids motion, or stopped it."""
 
     kind: str
     winch: str
     message: str
     blocks: Direction = Direction.BOTH
     latches: bool = False
-    """Whether it stays until a reset even if nothing moved when it came."""
+    """Whether it is latched even if nothing moved when it occurred."""
 
     def __str__(self) -> str:
         return f"winch {self.winch}: {self.message}" if self.winch else self.message
@@ -102,7 +102,7 @@ class WinchSnapshots(Mapping[str, WinchSnapshot]):
         self._make = make
         self._made: dict[str, WinchSnapshot] | None = None
         self.phases = phases
-        """What each of them is doing, which is known without the rest."""
+        """Phase of each winch, which needs no snapshot."""
 
     def _all(self) -> dict[str, WinchSnapshot]:
         made = self._made
@@ -144,11 +144,11 @@ class BenchSnapshot:
     tripped: tuple[Trip, ...] = ()
     """Latched, until a reset."""
     blocked: tuple[Trip, ...] = ()
-    """True now, and forbidding motion."""
+    """Conditions that hold now and forbid motion."""
     overruns: int = 0
     """Periods of control in which no cycle began, since the bench was opened."""
     warnings: tuple[Trip, ...] = ()
-    """What holds and forbids nothing."""
+    """Conditions that hold and forbid nothing."""
 
     @property
     def at_rest(self) -> bool:

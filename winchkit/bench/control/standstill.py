@@ -1,4 +1,4 @@
-"""Why the control thread stood still: what the kernel counted for it, its process and its computer.
+"""Cause of a standstill of the control thread, from the kernel's counters.
 
 A late cycle has one of few causes, and each has another remedy: other programs had the processor,
 another thread of this process computed (in Python only one does at a time), or pages of the
@@ -17,7 +17,7 @@ from pathlib import Path
 __all__ = ["StandstillCause"]
 
 _PERIOD = 0.1
-"""Of the readings that a standstill is compared with, s: 15 us each on a quiet computer."""
+"""Period of the readings that a standstill is compared with, s: one takes 15 us."""
 _UNKNOWN = (
     "other programs, the host of a virtual machine, a suspended process, or a clock that was set"
 )
@@ -42,7 +42,7 @@ class StandstillCause:
     """Compares the counters after a standstill with those before; for the control thread only."""
 
     def __init__(self, *, counted: bool = True, proc: Path = Path("/proc")) -> None:
-        """Read nothing yet.
+        """Begin without a reading.
 
         ``counted`` is false in simulated time, which no counter follows; ``proc`` is the folder of
         proc(5).

@@ -1,4 +1,4 @@
-"""The ways to stop a drive, one after another: the next is used once the last is not heard.
+"""Stop methods of a drive in their order: the next is used where one shows no reaction.
 
 A pure state machine, asked once a cycle while a winch is being stopped. Every rung can only take
 energy away: quick stop (02h) and NMT stop lead down from every power state (CiA 402-2, table of
@@ -14,7 +14,7 @@ __all__ = ["STOP_TABLE", "Rung", "StopEscalation", "StopEvidence", "StopRung"]
 
 
 class Rung(IntEnum):
-    """What stops a drive."""
+    """A stop method."""
 
     PDO = 0
     SDO = 1
@@ -70,7 +70,7 @@ STOP_TABLE: tuple[StopRung, ...] = (
 
 @dataclass(frozen=True, slots=True)
 class StopEvidence:
-    """What is known in a cycle of a drive that is being stopped."""
+    """State in a cycle of a drive that is being stopped."""
 
     left: bool
     """Whether a status that was sampled after the stop shows no operation enabled."""
@@ -81,10 +81,10 @@ class StopEvidence:
 
 
 class StopEscalation:
-    """Which rung is due, for one drive."""
+    """Present stop method of one drive."""
 
     def __init__(self) -> None:
-        """Nothing is being stopped."""
+        """Begin without a stop."""
         self._table = STOP_TABLE
         self._level = 0
         self._since = 0.0

@@ -1,4 +1,4 @@
-"""Watches every winch each cycle: what forbids motion now, and what has stopped it.
+"""Supervision of every winch in each cycle: conditions that forbid motion, and trips.
 
 Free of buses and threads: it is given the time and what is known, and remembers only what a
 condition needs (debounce, rates, boot-ups) and the trips that it latched.
@@ -45,7 +45,7 @@ class Supervisor:
         winches: Mapping[str, Supervised],
         conditions: Sequence[Condition] = CONDITIONS,
     ) -> None:
-        """Take what each winch is held to, and the table of conditions."""
+        """Take the bounds of each winch, and the table of conditions."""
         self.tripped: tuple[Trip, ...] = ()
         self.warnings: tuple[Trip, ...] = ()
         """Conditions that hold and forbid nothing."""
@@ -55,7 +55,7 @@ class Supervisor:
         self._rows = {name: _by_case(conditions, own) for name, own in winches.items()}
 
     def check(self, now: float, inputs: Mapping[str, WinchInput]) -> tuple[Trip, ...]:
-        """Everything that forbids motion now; latches what must stop a motion under way."""
+        """Conditions that forbid motion now; those that forbid a present motion are latched."""
         found: list[Trip] = []
         for name, item in inputs.items():
             memory = self._memory[name]
@@ -96,7 +96,7 @@ class Supervisor:
                 self.tripped = (*self.tripped, trip)
 
     def acknowledge(self, boot_ups: Mapping[str, int]) -> None:
-        """Forget what a reset has dealt with, boot-ups up to now; the latch stays."""
+        """Discard what a reset has handled, boot-ups up to now; the latch stays."""
         for name, memory in self._memory.items():
             self._memory[name] = Memory(memory.own, boot_ups.get(name, memory.boot_ups))
 
@@ -106,7 +106,7 @@ class Supervisor:
             self.tripped = tuple(trip for trip in self.tripped if trip not in dealt_with)
 
     def _stops(self, trip: Trip, inputs: Mapping[str, WinchInput]) -> bool:
-        """Whether a motion under way is one that the trip forbids."""
+        """Whether the trip forbids the present motion."""
         for name, item in inputs.items():
             if not item.moving:
                 continue

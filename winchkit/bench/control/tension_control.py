@@ -32,7 +32,7 @@ LOOP = 0.25
 """Gain times stiffness times delay: of 0.37, the limit of a response without overshoot, and 1.57,
 the limit of stability, of an integrator with a delay."""
 _MARGIN = 2e-3
-"""Of cable, kept to the declared travel, m."""
+"""Distance that is kept from the end of the declared travel, m."""
 _STUCK = 0.5
 """Time for which the travel may be used up before the winch trips, s."""
 _STEEL = 210e9
@@ -50,18 +50,18 @@ class TensionReading(NamedTuple):
 
 @dataclass(frozen=True)
 class TensionSetting:
-    """What the control is to keep, SI."""
+    """Setpoint, bounds and delay of the control, SI."""
 
     tension: float
     """N."""
     travel: float
-    """Of cable from its place at the start, either way, m."""
+    """Largest travel of the cable from its start, in either direction, m."""
     speed: float
     """m/s."""
     stiffness: float
     """Upper bound of the stiffness of cable and structure, N/m."""
     delay: float
-    """Of reading and drive together, s."""
+    """Delay of reading and drive together, s."""
     max_age: float
     """Older readings are not used, s."""
 
@@ -127,7 +127,7 @@ class UsedUp:
 
 
 class TensionControl:
-    """Keeps the tension while someone keeps saying so; silence brings the winch to rest."""
+    """Keeps the tension until the command expires unless it is renewed; then ramps to rest."""
 
     holds = False
     joins = False

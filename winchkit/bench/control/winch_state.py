@@ -1,4 +1,4 @@
-"""One winch as the control loop sees it: its parts, and what they know in a cycle."""
+"""One winch in the control loop: its parts, and their measurements in a cycle."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ __all__ = ["Captured", "SensorPort", "WinchParts", "known", "pictures"]
 
 _IDLE = (Phase.DISABLED, Phase.RESETTING)
 _ANSWERED = 2
-"""SYNCs that a drive may leave unanswered and still counts as heard."""
+"""SYNC messages that a drive may leave without a TPDO before it counts as silent."""
 _FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
 _new = tuple.__new__
 _NOTHING = AxisFeedback(math.nan, 0, State.UNKNOWN, 0, math.nan, math.nan, math.nan)
-"""What is shown of a drive that has said nothing yet."""
+"""Feedback of a drive that has sent nothing yet."""
 
 
 class SensorPort(Protocol):
-    """What the loop needs of an instrument."""
+    """Interface of an instrument to the control loop."""
 
     max_age: float
     """A reading older than this is stale, s."""
@@ -42,12 +42,12 @@ class SensorPort(Protocol):
 
     @property
     def problem(self) -> ConnectionLost | None:
-        """Why there is no new reading, while there is none."""
+        """Fault that prevents new readings; None without one."""
 
 
 @dataclass
 class WinchParts:
-    """One winch as the loop sees it."""
+    """Parts of one winch in the control loop."""
 
     axis: AxisPort
     cable: CableMap
@@ -78,7 +78,7 @@ class WinchParts:
 
 
 def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) -> WinchInput:
-    """What the supervisor needs to know of a winch; its cable takes the cycle's measurements.
+    """Measurements of a winch for the supervisor; the model of its cable takes them as well.
 
     Silence counts from ``resumed`` (s) on at the earliest: before, this computer stood still.
     """
@@ -142,7 +142,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
 
 
 def _frozen(parts: WinchParts, test: FrozenCell, now: float, speed: float) -> str:
-    """What shows that the load cell is frozen."""
+    """Evidence that the load cell is frozen, in words; empty without it."""
     cell = parts.sensors.get("cell")
     if cell is None:
         return ""
@@ -179,7 +179,7 @@ def _instrumented(
 
 
 def _sample(parts: WinchParts, feedback: AxisFeedback, now: float) -> Sample:
-    """What the cable is judged by; NaN for a reading that is too old."""
+    """Measurements for the model of the cable; NaN for a reading that is too old."""
     fresh = {
         role: sensor.latest.value
         for role, sensor in parts.sensors.items()
@@ -203,7 +203,7 @@ correction of the cell's reading for the tension at the platform end (N), name o
 def pictures(
     inputs: Mapping[str, WinchInput], taken: Sequence[Captured], now: float
 ) -> dict[str, WinchSnapshot]:
-    """The winches in the cycle at ``now`` (s), as others get to see them."""
+    """Snapshots of the winches in the cycle at ``now`` (s)."""
     return {
         name: _picture(seen, one, now)
         for (name, seen), one in zip(inputs.items(), taken, strict=True)
