@@ -20,11 +20,18 @@ __all__ = [
 ]
 
 _LEAVES_BEHIND = 2.0
+"""Highest rate, in creep rates, from which on the sign is smooth over the creep rate."""
 _CREEP_SHARE = 0.02
+"""Width of the smooth sign of a slower machine, as a share of its highest rate."""
 _CREEP_LEAST = 1e-3
+"""Least width of that sign, as a share of the creep rate: rounding has no direction."""
 _LOAD_SPAN = 0.02
+"""Span of a difference to either side for an acceleration, s: an encoder's noise stays small."""
 _AGREES = 0.1
+"""Standard deviation of reported rate less differences, in that of the differences, up to which
+both agree."""
 _CALMER = 0.5
+"""Noise of a reported rate, in that of the differences, below which it replaces them."""
 _EVEN = 1e-3
 """Deviation of a step from the median step up to which samples count as even."""
 _LEAST_SAMPLES = 8

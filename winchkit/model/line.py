@@ -18,7 +18,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.model.derivatives import Clock, smooth_sign
 from winchkit.model.drum import Drum, drum_of
-from winchkit.model.stages import At, Modifier, Path, Signals, Stage, Way
+from winchkit.model.stages import At, Modifier, Path, Signals, Stage, WinchKinematics
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["GRAVITY", "Line", "Motion"]
@@ -43,8 +43,8 @@ class Motion:
     """Mass from whose acceleration the load is computed, kg, where no instrument measures it."""
     discretization: Array | None = None
     """Curvature of that load over the span of its differences, N: bound of its smoothing error."""
-    rounded: float = 0.0
-    """Share of the line's part of that load's acceleration that is smoothed, 0 to 1."""
+    smoothed_share: float = 0.0
+    """Share, 0 to 1, of second differences in that load's acceleration by the effects."""
     load_std: Array | None = None
     """Standard deviation of that load from the acceleration's, N; None for even samples."""
 
@@ -83,7 +83,7 @@ class Line:
         wound = self._drum.wound(phi + drum_angle) - self._drum.wound(np.asarray(phi))
         return drum_angle, (self.profile.reference.cable_length or 0.0) - wound
 
-    def _pace(self, motor_angle: Array) -> Array:
+    def _nominal_arm(self, motor_angle: Array) -> Array:
         """Cable wound in per motor angle on the nominal profile, m/rad."""
         gear = self._gear(motor_angle)
         return np.asarray(self._drum.arm(self._reference_wound + gear.value) * gear.slope)
@@ -110,22 +110,24 @@ class Line:
         time, angle = signals.time, signals.motor_angle
         drum_angle, length = self._nominal_length(angle)
         clock = signals.clock or Clock(time - time[0], angle, signals.motor_velocity)
-        pace, speed, rate = self._pace(angle), -clock.gradient(length), clock.rate
+        arm, speed, rate = self._nominal_arm(angle), -clock.gradient(length), clock.rate
         if clock.measured_rate is not None:
-            speed = speed + pace * (rate - clock.gradient(angle))
+            speed = speed + arm * (rate - clock.gradient(angle))
         load, mass, discretization, load_std = signals.load, None, None, None
         if load is None and signals.load_mass is not None:
             mass = signals.load_mass
-            directly = clock.measured_rate is None
-            bent = clock.second_derivative(length) if directly else -clock.wide_gradient(speed)
-            load = mass * (GRAVITY - bent)
+            from_angle = clock.measured_rate is None
+            length_acceleration = (
+                clock.second_derivative(length) if from_angle else -clock.wide_gradient(speed)
+            )
+            load = mass * (GRAVITY - length_acceleration)
             discretization = clock.curvature(load)
             if mass and clock.acceleration_std is not None:
-                load_std = mass * np.abs(pace) * clock.acceleration_std
+                load_std = mass * np.abs(arm) * clock.acceleration_std
         tension = load if load is not None else signals.tension
         missing, zero = np.full_like(time, np.nan), np.zeros_like(time)
         fastest = signals.fastest or float(np.max(np.abs(rate), initial=0.0))
-        reeled = fastest * float(np.max(np.abs(pace), initial=0.0))
+        fastest_cable = fastest * float(np.max(np.abs(arm), initial=0.0))
         at = At(
             profile=self.profile,
             time=clock.time,
@@ -136,7 +138,7 @@ class Line:
             drum_angle=drum_angle,
             wound_angle=self._reference_wound + drum_angle,
             speed=speed,
-            direction=smooth_sign(speed, _CREEP_SPEED, reeled),
+            direction=smooth_sign(speed, _CREEP_SPEED, fastest_cable),
             free_length=length,
             tension=zero if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
@@ -159,15 +161,15 @@ class Line:
             ``cable_length``, m, ``motor_torque``, N m, and, where a load is known, ``tension``, N.
         """
         at = motion.at
-        way = self.way(at)
-        out = {"cable_length": self.shown_length(at, way)}
-        drum_side = self.drum_side(motion, way)
+        kinematics = self.kinematics(at)
+        out = {"cable_length": self.indicated_length(at, kinematics)}
+        drum_side = self.drum_side(motion, kinematics)
         if motion.load is not None:
-            out["tension"] = self.shown_tension(at, drum_side)
-        out["motor_torque"] = self.shown_torque(at, way, drum_side)
+            out["tension"] = self.indicated_tension(at, drum_side)
+        out["motor_torque"] = self.indicated_torque(at, kinematics, drum_side)
         return out
 
-    def way(self, at: At) -> Way:
+    def kinematics(self, at: At) -> WinchKinematics:
         """Drum angle, wound length and arm from the motor angle, by gearbox, drum and guide."""
         turned = self._through(Stage.DRUM_ANGLE, self._gear(at.motor_angle), at)
         wound_angle = self._reference_wound + turned.value
@@ -176,22 +178,22 @@ class Line:
         wound = drum.wound(wound_angle) - drum.wound(np.asarray(self._reference_wound))
         path = self._through(Stage.WOUND, Path(wound, drum.arm(wound_angle)), at)
         free = (self.profile.reference.cable_length or 0.0) - path.value
-        return Way(turned.value, free, path.slope * turned.slope)
+        return WinchKinematics(turned.value, free, path.slope * turned.slope)
 
-    def shown_length(self, at: At, way: Way) -> Array:
+    def indicated_length(self, at: At, kinematics: WinchKinematics) -> Array:
         """Reading of the length instrument, m."""
         at = replace(
             at,
-            drum_angle=way.drum_angle,
-            wound_angle=self._reference_wound + way.drum_angle,
-            free_length=way.free_length,
+            drum_angle=kinematics.drum_angle,
+            wound_angle=self._reference_wound + kinematics.drum_angle,
+            free_length=kinematics.free_length,
         )
-        length: Array = way.free_length
+        length: Array = kinematics.free_length
         for stage in (Stage.CABLE, Stage.FRAME, Stage.LENGTH_INSTRUMENT):
             length = self._through(stage, length, at)
         return length
 
-    def _load(self, motion: Motion, way: Way) -> Array:
+    def _load(self, motion: Motion, kinematics: WinchKinematics) -> Array:
         """Load of a known mass that moves with the cable, kinematic effects included.
 
         The cable speed is the arm (m/rad) times the motor's rate, so that a ripple of the arm is
@@ -204,21 +206,21 @@ class Line:
         if motion.load_mass is None or not any(m.stage <= Stage.WOUND for m in self.modifiers):
             return load
         at, clock = motion.at, motion.clock
-        longer = way.free_length - at.free_length
-        paid_out = (self._pace(at.motor_angle) - way.arm) * at.motor_rate
+        longer = kinematics.free_length - at.free_length
+        paid_out = (self._nominal_arm(at.motor_angle) - kinematics.arm) * at.motor_rate
         rest = clock.sharp_gradient(longer) - paid_out
         added = clock.sharp_gradient(paid_out) + clock.wide_gradient(rest)
-        if motion.rounded:
+        if motion.smoothed_share:
             twice = clock.differences(clock.differences(longer))
-            added = added + motion.rounded * (twice - added)
+            added = added + motion.smoothed_share * (twice - added)
         return load - motion.load_mass * added
 
-    def drum_side(self, motion: Motion, way: Way) -> Array:
+    def drum_side(self, motion: Motion, kinematics: WinchKinematics) -> Array:
         """Tension at the drum: from the load along the cable and over the pulleys, N."""
         at = motion.at
         if motion.load is None:
             return np.zeros_like(at.time) if motion.drum_tension is None else motion.drum_tension
-        return self._over_the_pulleys(self._load(motion, way), at)
+        return self._over_the_pulleys(self._load(motion, kinematics), at)
 
     def _over_the_pulleys(self, load: Array, at: At) -> Array:
         """Tension at the drum from the tension at the platform, N."""
@@ -229,13 +231,13 @@ class Line:
                 tension = self._through(Stage.PULLEY, tension, here)
         return np.asarray(tension)
 
-    def shown_tension(self, at: At, drum_side: Array) -> Array:
+    def indicated_tension(self, at: At, drum_side: Array) -> Array:
         """Reading of the load cell, N."""
         return np.asarray(self._through(Stage.CELL, drum_side, at))
 
-    def shown_torque(self, at: At, way: Way, drum_side: Array) -> Array:
+    def indicated_torque(self, at: At, kinematics: WinchKinematics, drum_side: Array) -> Array:
         """Reported torque by virtual work: cable force times derivative of wound length, N m."""
-        torque: Array = drum_side * way.arm
+        torque: Array = drum_side * kinematics.arm
         for stage in (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL):
             torque = self._through(stage, torque, at)
         return torque
@@ -261,7 +263,7 @@ class Line:
             With accelerations of zero, and with the smoothing of directions of a fast machine.
         """
         drum_angle, length = self._nominal_length(motor_angle)
-        speed = self._pace(motor_angle) * motor_rate
+        speed = self._nominal_arm(motor_angle) * motor_rate
         return At(
             profile=self.profile,
             time=time,
@@ -281,20 +283,20 @@ class Line:
 
     def lengths(self, at: At) -> Array:
         """True cable length with every effect up to the frame, m, shape (n,)."""
-        return self.shown_length(at, self.way(at))
+        return self.indicated_length(at, self.kinematics(at))
 
     def readings(self, load: Array, at: At) -> Array:
         """Readings of the load cell under tensions at the platform end, N, shape (n,)."""
-        return self.shown_tension(at, self._over_the_pulleys(load, at))
+        return self.indicated_tension(at, self._over_the_pulleys(load, at))
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""
         at = self._at_rest(motor_angle, tension)
-        return float(self.shown_length(at, self.way(at))[0])
+        return float(self.indicated_length(at, self.kinematics(at))[0])
 
     def arm(self, motor_angle: float) -> float:
         """Cable wound in per motor angle, signed by the gearbox's direction, m/rad."""
-        return float(self.way(self._at_rest(motor_angle, 0.0)).arm[0])
+        return float(self.kinematics(self._at_rest(motor_angle, 0.0)).arm[0])
 
     def nominal_motor_angle(self, cable_length: Array) -> Array:
         """Motor angles of the nominal line at cable lengths (m), any shape, rad."""
@@ -323,8 +325,8 @@ class Line:
 
     def lengths_and_arms(self, at: At) -> tuple[Array, Array]:
         """Cable lengths at rest, (n,), m, and cable wound in per motor angle there, m/rad."""
-        way = self.way(at)
-        return self.shown_length(at, way), way.arm
+        kinematics = self.kinematics(at)
+        return self.indicated_length(at, kinematics), kinematics.arm
 
     @property
     def drum(self) -> Drum:

@@ -21,7 +21,7 @@ __all__ = [
     "Path",
     "Signals",
     "Stage",
-    "Way",
+    "WinchKinematics",
 ]
 
 
@@ -93,7 +93,7 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Way:
+class WinchKinematics:
     """Kinematic chain from the motor angle to the cable; every array of shape (n,)."""
 
     drum_angle: Array

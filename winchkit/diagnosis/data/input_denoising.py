@@ -251,7 +251,7 @@ def _other_force(line: Line, signals: Signals) -> Array | None:
     if signals.motor_torque is None:
         return None
     motion = line.motion(signals)
-    return np.asarray(signals.motor_torque / line.way(motion.at).arm)
+    return np.asarray(signals.motor_torque / line.kinematics(motion.at).arm)
 
 
 def _regressed_force(force: Array, regressors: Array) -> Array:

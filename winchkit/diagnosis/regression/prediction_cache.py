@@ -18,7 +18,7 @@ from winchkit.diagnosis.data.dataset import Recording
 from winchkit.diagnosis.data.spectrum import to_frequency
 from winchkit.effects.term import Term, modifiers_of
 from winchkit.model.line import Line, Motion
-from winchkit.model.stages import Stage, Way
+from winchkit.model.stages import Stage, WinchKinematics
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Predictor", "masked"]
@@ -28,9 +28,9 @@ Correction = float | None
 """Discretisation correction of a known weight's force; None for no correction."""
 _KEPT = 3
 """Entries per stage: the present hypothesis, the one of a derivative, and the previous one."""
-_WAY = (Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND)
+_KINEMATICS = (Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND)
 _FORCE = (Stage.CABLE_WEIGHT, Stage.PULLEY)
-_SHOWN = {
+_INDICATED = {
     "cable_length": (Stage.CABLE, Stage.FRAME, Stage.LENGTH_INSTRUMENT),
     "tension": (Stage.CELL,),
     "motor_torque": (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL),
@@ -45,20 +45,20 @@ class Predictor:
         self._recording = recording
         self._kept: dict[str, OrderedDict[Hashable, Any]] = {}
         # A measured load does not depend on the cable's path; a known weight's force does.
-        force = _FORCE if recording.smooth.load_mass is None else _WAY + _FORCE
+        force = _FORCE if recording.smooth.load_mass is None else _KINEMATICS + _FORCE
         self._stages: dict[str, tuple[Stage, ...]] = {
             "motion": (),
             "nominal": (),
-            "way": _WAY,
+            "kinematics": _KINEMATICS,
             "force": force,
-            "cable_length": _WAY + _SHOWN["cable_length"],
-            "tension": force + _SHOWN["tension"],
-            "motor_torque": _WAY + force + _SHOWN["motor_torque"],
+            "cable_length": _KINEMATICS + _INDICATED["cable_length"],
+            "tension": force + _INDICATED["tension"],
+            "motor_torque": _KINEMATICS + force + _INDICATED["motor_torque"],
         }
 
     def outputs_of(self, stage: Stage) -> set[str]:
         """Outputs that a stage acts on."""
-        return {output for output in _SHOWN if stage in self._stages[output]}
+        return {output for output in _INDICATED if stage in self._stages[output]}
 
     def change(self, output: str, terms: Sequence[Term], correction: Correction = None) -> Array:
         """Coefficients of the change of an output, shape (n_kept,); zero where not compared."""
@@ -85,22 +85,26 @@ class Predictor:
         return self._cached("nominal", (), correction, compute)
 
     def _shown(self, output: str, terms: Sequence[Term], correction: Correction) -> Array:
-        line, at, way = self._line(terms), self._motion(correction).at, self._way(terms)
+        line, at, kinematics = (
+            self._line(terms),
+            self._motion(correction).at,
+            self._kinematics(terms),
+        )
         if output == "cable_length":
-            return line.shown_length(at, way)
+            return line.indicated_length(at, kinematics)
         if output == "tension":
-            return line.shown_tension(at, self._force(terms, correction))
-        return line.shown_torque(at, way, self._force(terms, correction))
+            return line.indicated_tension(at, self._force(terms, correction))
+        return line.indicated_torque(at, kinematics, self._force(terms, correction))
 
-    def _way(self, terms: Sequence[Term]) -> Way:
-        def compute() -> Way:
-            return self._line(terms).way(self._recording.smooth.at)
+    def _kinematics(self, terms: Sequence[Term]) -> WinchKinematics:
+        def compute() -> WinchKinematics:
+            return self._line(terms).kinematics(self._recording.smooth.at)
 
-        return self._cached("way", terms, None, compute)
+        return self._cached("kinematics", terms, None, compute)
 
     def _force(self, terms: Sequence[Term], correction: Correction) -> Array:
         def compute() -> Array:
-            return self._line(terms).drum_side(self._motion(correction), self._way(terms))
+            return self._line(terms).drum_side(self._motion(correction), self._kinematics(terms))
 
         return self._cached("force", terms, correction, compute)
 
@@ -144,5 +148,5 @@ def _corrected(motion: Motion, correction: float) -> Motion:
     if motion.clock.spline is not None:
         return replace(motion, at=replace(motion.at, tension=load), load=load)
     twice = 1 / (3 * motion.clock.reach**2)
-    rounded = float(np.clip((correction + 1 / 12) / twice, 0.0, 1.0))
-    return replace(motion, at=replace(motion.at, tension=load), load=load, rounded=rounded)
+    smoothed = float(np.clip((correction + 1 / 12) / twice, 0.0, 1.0))
+    return replace(motion, at=replace(motion.at, tension=load), load=load, smoothed_share=smoothed)
