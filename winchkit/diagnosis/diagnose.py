@@ -215,7 +215,7 @@ def diagnose_prepared(
     interrupted: Callable[[WinchAnswer], None] | None = None,
 ) -> WinchAnswer:
     """The same as :func:`diagnose` on a prepared data set."""
-    progress("drawing the candidates", 0.1)
+    progress("computing the signatures of the candidates", 0.1)
     engine = selection_engine(dataset, catalogue)
     if caveats(dataset.sanity) and not as_recorded:
         return _unsearched(engine)
@@ -407,7 +407,7 @@ def _plausible(
     sets: Sequence[EquivalenceSet],
     spread: Spread,
 ) -> tuple[list[EquivalenceSet], tuple[Step, ...], tuple[Closest, ...]]:
-    """Sets without members whose values cannot be, their steps, and the effects of empty sets.
+    """Sets without members of implausible values, their steps, and the effects of empty sets.
 
     Where a set has no other member, nothing is named: the other effects were fitted beside it.
     """

@@ -274,9 +274,9 @@ class Diagnosis(Plotted, Tabular):
     interrupted: bool = False
     """Whether the search was interrupted: errors and candidates are known, the verdict is not."""
     fit: FitStatistics | None = None
-    """Of the reported model; None without unknowns."""
+    """Statistics of the reported model's fit; None without unknowns."""
     closest: tuple[Closest, ...] = ()
-    """Effects that are not named since their values cannot be."""
+    """Effects that are not named since their values are implausible."""
     run_offsets: tuple[RunOffset, ...] = ()
     """Offsets of instruments that have another one in every run. Those of a held-out run are its
     own in every held-out error."""

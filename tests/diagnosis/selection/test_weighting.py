@@ -86,12 +86,12 @@ def test_a_missing_effect_gets_equal_weights() -> None:
     assert by_noise < 0.97 * least_squares()
     assert best.noise.rms == noise.rms
     (note,) = best.notes
-    assert "evenly" in note
+    assert "the same weight" in note
 
 
 def test_add_notes_equal_weights() -> None:
     addition = add("motor-coulomb", rides([warming_up(), warming_up()]), GROOVED, CATALOGUE)
-    assert any("evenly" in note for note in addition.notes)
+    assert any("the same weight" in note for note in addition.notes)
     estimate = addition.added[1]["torque"]
     assert estimate.value == pytest.approx(least_squares(), rel=0.01)
     low, high = estimate.interval

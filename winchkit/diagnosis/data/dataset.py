@@ -172,6 +172,11 @@ def prepare(
     catalogue
         Effects, those of the profile among them; by default all that are installed.
 
+    Returns
+    -------
+    Dataset
+        Motions, measured and nominal outputs, bands, repeats, and findings on the runs.
+
     Raises
     ------
     RunError
@@ -308,7 +313,22 @@ def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
 def assemble(
     runs: Sequence[Run], profile: WinchProfile, filtering: Filtering | None = None
 ) -> Dataset:
-    """Build the data set of runs that were validated before."""
+    """Build the data set of runs that were validated before.
+
+    Parameters
+    ----------
+    runs
+        Valid runs of one winch, at least one.
+    profile
+        Winch profile.
+    filtering
+        Low-pass of the torque and decimation; None to choose the low-pass from the runs.
+
+    Returns
+    -------
+    Dataset
+        Motions, measured and nominal outputs, bands and repeats, without findings.
+    """
     line, filtering = Line(profile), filtering or Filtering()
     clocks = [_clock(run) for run in runs]
     fastest = max((_fastest(clock) for clock in clocks), default=0.0)

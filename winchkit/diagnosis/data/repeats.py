@@ -17,7 +17,7 @@ from winchkit.diagnosis.data.spectrum import fast_count
 from winchkit.model.line import GRAVITY
 from winchkit.model.stages import Signals
 
-__all__ = ["Repeats", "find_repeats"]
+__all__ = ["Repeats", "find_repeats", "mean_load"]
 
 _ANGLE_TOLERANCE = 0.02
 _LOAD_TOLERANCE = 0.02

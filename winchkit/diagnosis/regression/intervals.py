@@ -51,9 +51,20 @@ __all__ = [
     "whitened_jacobian",
 ]
 
+HALF_WIDTH = 1.959964
+"""Standard deviations from a value to the end of its 95 % interval."""
+_MANY_PARTS = 3.0
+"""Effective number of parts from which a variance between parts is estimated."""
+_NO_INFORMATION = 1e-9
+"""Share of the information on an unknown below which a part says nothing of it."""
+_UNDETERMINED = 1e6
+"""In units of the usual size: an unknown with a larger standard deviation is undetermined."""
 _LINEAR = 0.15
+"""Relative error of Δχ² at which the search for an interval's end stops."""
 _SEARCHES = 4
+"""Steps of that search."""
 _MOST_STRETCHED = 4.0
+"""Largest length of an interval's arm, in that of the linear one."""
 
 
 def profile_ends(
@@ -144,16 +155,6 @@ class _Profile:
             self._regression.residual(self._regression.hypothesis(vector, like))
             * self._inverse_sigma
         )
-
-
-HALF_WIDTH = 1.959964
-"""Standard deviations from a value to the end of its 95 % interval."""
-_MANY_PARTS = 3.0
-"""Effective number of parts from which a variance between parts is estimated."""
-_NO_INFORMATION = 1e-9
-"""Share of the information on an unknown below which a part says nothing of it."""
-_UNDETERMINED = 1e6
-"""In units of the usual size: an unknown with a larger standard deviation is undetermined."""
 
 
 @dataclass(frozen=True)

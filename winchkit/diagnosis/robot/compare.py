@@ -15,7 +15,7 @@ from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.diagnosis.robot.adjustment import placed
 from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
-from winchkit.diagnosis.robot.errors import UNITS, Errors, column_names, errors_of, rms, signals
+from winchkit.diagnosis.robot.errors import UNITS, Errors, column_names, errors_of, rms, signal_rms
 from winchkit.diagnosis.robot.regression import LinearizationPoint, PoseRegression
 from winchkit.diagnosis.robot.trajectory_regression import regression_at
 from winchkit.diagnosis.robot.variance_components import START
@@ -78,7 +78,7 @@ def compared_robot(
     errors = errors_of(regression, regression.residuals(terms))
     noise = _noise(errors, dataset)
     follows = pose_attributions(regression, errors)
-    size = signals(regression)
+    size = signal_rms(regression)
     outputs = {
         name: OutputError(
             unit=UNITS[name],

@@ -322,7 +322,7 @@ def diagnose_robot(
     FileError
         For effects that do not bind.
     """
-    progress("judging the noise", 0.0)
+    progress("estimating the noise", 0.0)
     preparation = prepare_selection(runs, profile, catalogue or load_catalogue())
     progress("searching", 0.4)
     if calibrated_on(profile, runs):

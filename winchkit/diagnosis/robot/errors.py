@@ -38,6 +38,7 @@ __all__ = [
     "noise_rms",
     "output_fits_of",
     "rms",
+    "signal_rms",
 ]
 
 Errors = dict[str, Array]
@@ -170,7 +171,7 @@ def output_fits_of(
     )
     held_before, held_after = held_out_rms(begin), held_out_rms(final)
     least = noise_rms(final.regression, noise)
-    signal = signals(final.regression)
+    signal = signal_rms(final.regression)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
         name: OutputFit(
@@ -197,8 +198,8 @@ def rms(name: str, error: Array) -> float:
     return float(np.sqrt(np.mean(squares))) if squares.size else float("nan")
 
 
-def signals(regression: PoseRegression) -> dict[str, float]:
-    """How much each output varies, rms about its mean, SI."""
+def signal_rms(regression: PoseRegression) -> dict[str, float]:
+    """Rms of each output about its mean, SI."""
     measured = regression.dataset.measured
     length = regression.equations.residuals(regression.robot)["rope"] + regression.robot.lengths_at(
         measured.motor_angle,

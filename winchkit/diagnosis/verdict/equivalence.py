@@ -44,6 +44,18 @@ _LEAST_NONCENTRALITY = 1.0
 """Noncentrality below which a difference is significant at 5 % in at most one case of six."""
 _LEAST_DIFFERENCE = 0.02
 """Rms difference over the effect below which it is negligible."""
+_MOST_RIVALS = 6
+"""Rivals that are refitted."""
+_SCORE_MARGIN = 40.0
+"""Explained χ² below that of the named effect, within which a rival is refitted."""
+_DELTA_CHI_SQUARE = 9.0
+"""Δχ² = 9: the true effect fits worse by this much with probability at most 1/740."""
+_LEAST_SHARE = 0.5
+"""Share of the named effect's decrease of χ² that a rival must reach."""
+_SHARE_OF_SIMPLER_LAW = 0.75
+"""Share of the decrease of χ² from which a simpler law of the family joins the set."""
+_LEVEL = 0.05
+_SIGN_FLIPS = 2000
 
 
 def is_below_noise(
@@ -93,16 +105,6 @@ def _usual(engine: SelectionEngine, effect: Effect) -> Candidate | None:
         return float(sum(abs(np.log(x / typical)) for x, typical in ratios))
 
     return min(candidates, key=distance, default=None)
-
-
-_MOST_RIVALS = 6
-_SCORE_MARGIN = 40.0
-_DELTA_CHI_SQUARE = 9.0
-"""Δχ² = 9: the true effect fits worse by this much with probability at most 1/740."""
-_LEAST_SHARE = 0.5
-_SHARE_OF_SIMPLER_LAW = 0.75
-_LEVEL = 0.05
-_SIGN_FLIPS = 2000
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ _CHECK = "check sign, unit, torque constant, gravity"
 def implausible(
     term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None
 ) -> str | None:
-    """Reason why the values of an effect cannot be; None where they can.
+    """Reason why the values of an effect are implausible; None where they are plausible.
 
     Parameters
     ----------

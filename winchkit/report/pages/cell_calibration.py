@@ -118,7 +118,6 @@ def _residual_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[st
 
 
 _FORMULA = "True force = c0 + c1 x + c2 x², x the indicated force in N; a line has no c2."
-_SPAN = "Figures of merit; the span is from the smallest to the largest load."
 _TONES = {"up": "today", "down": "with"}
 
 
