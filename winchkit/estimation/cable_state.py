@@ -81,7 +81,7 @@ class _Carried:
         return after
 
     def go_on(self) -> None:
-        """Make the state at the end of this sample that at the start of the next."""
+        """Take over the state at the end of this sample as the start of the next."""
         self.start.update(self.end)
 
 
@@ -108,7 +108,7 @@ class RopeNow:
         """
         used = [term for term in terms if not term.effect.not_in_control]
         self.at_rest = Line(profile, modifiers_of(t for t in used if not t.effect.memory))
-        """Without what has a memory, for planning."""
+        """The line without effects that have a memory, for planning."""
         self.yields = any(
             _on_length(t) and (t.effect.memory or t.effect.stage >= Stage.CABLE) for t in used
         )
@@ -117,7 +117,7 @@ class RopeNow:
         self._line = Line(profile, tuple(item.modifier() for item in self._carried))
         self._on_tension = any(Stage.CABLE_WEIGHT <= t.effect.stage <= Stage.CELL for t in used)
         self.trivial = not (self.yields or self._on_tension)
-        """Whether ``at_rest`` says all that there is to say."""
+        """Whether ``at_rest`` is exact: length by the motor angle alone, cell not corrected."""
         self._weight = weight or 0.0
         self._last: Sample | None = None
         self._calm = self._reading = nan
@@ -179,7 +179,7 @@ class RopeNow:
         return self._calm if moved or isnan(self._reading) else self._reading
 
     def _at_platform(self, at: At, reading: float) -> float:
-        """Tension at the platform end for which the cell shows ``reading``, by two secant steps."""
+        """Tension at the platform end at a ``reading`` of the cell, by two secant steps."""
         begun = isfinite(self._tension) and isfinite(self._reading)
         guess = self._tension + reading - self._reading if begun else reading
         shown = self._shown(at, guess)

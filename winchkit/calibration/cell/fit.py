@@ -51,7 +51,7 @@ class CellFit:
     residuals: tuple[float, ...]
     """True less fitted, N, in the order of the points."""
     residual_std: float
-    """N, with n − p degrees of freedom."""
+    """Residual standard deviation with n − p degrees of freedom, N."""
     span: float
     """N."""
     nonlinearity: Figure

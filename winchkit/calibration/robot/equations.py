@@ -97,7 +97,7 @@ class Equations:
 
     @property
     def hangs(self) -> bool:
-        """Whether measured cable forces and a known weight determine where the platform stands."""
+        """Whether measured cable forces and a known weight determine the pose of the platform."""
         few = len(self.robot.names) < PLATFORM_DOF and self.robot.platform.mass > 0
         return few and bool(np.any(np.all(np.isfinite(self.measured.tension), axis=1)))
 
@@ -291,7 +291,7 @@ class Equations:
         return replace(found, by_robot={**found.by_robot, "cell_gain": by_gain})
 
     def _by_values(self, constraint: Constraint, count: int) -> Array | None:
-        """Derivatives by the vector of parameters; those by what is not a parameter drop out."""
+        """Derivatives by the vector of parameters; those by other quantities are left out."""
         if not (constraint.by_line or constraint.by_robot):
             return None
         block = self._blocks

@@ -32,7 +32,7 @@ class PoseErrors:
     vector: Array
     """Predicted minus measured position, (p, 3), m; NaN as above."""
     measured: Array
-    """Measured positions, (p, 3), m, as the tracker shows them."""
+    """Positions as indicated by the tracker, (p, 3), m."""
     place: NDArray[np.str_]
     """Run and row of each pose, (p,)."""
     unfound: int
@@ -121,7 +121,7 @@ def predicted_poses(equations: Equations, values: Array, start: Pose | None = No
 
 
 def _reading(equations: Equations, values: Array, pose: Pose) -> Pose:
-    """What the tracker shows of poses.
+    """Indications of the tracker at poses.
 
     A session that was not fitted has an unknown frame, which is registered on its own poses.
     """

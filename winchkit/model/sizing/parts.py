@@ -32,7 +32,7 @@ BUCKLES = {
 }
 """First root of the bending vibration of a shaft, by the bearings at its ends."""
 STANDARD_MODULES = (0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.007, 0.01)
-"""Of toothed belts, m."""
+"""Standard modules of toothed belts, m."""
 _STEEL_SOUND = sqrt(2.06e11 / 7850.0)
 """Speed of sound along a steel bar, m/s."""
 _RESERVE = 0.8
