@@ -98,3 +98,22 @@ def test_a_reported_velocity_takes_the_place_of_the_angle() -> None:
     assert np.std(clock.acceleration - exact) < 0.2 * np.std(
         Clock(time, angle).acceleration - exact
     )
+
+
+@pytest.mark.parametrize("gap", [5.0, 40.0, 400.0])
+def test_a_long_gap_leaves_the_derivatives_on_both_sides(gap: float) -> None:
+    """500 to 40,000 knots without a sample, where the penalty alone has no factor."""
+    random = np.random.default_rng(3)
+    even = np.sort(random.uniform(0, 15, 1500))
+    time = np.where(even > 7, even + gap, even)
+    noise = 1e-4 * random.standard_normal(1500)
+    spline = SmoothingSpline.fit(time, 3 * np.sin(1.3 * time) + noise)
+    assert spline.noise == pytest.approx(1e-4, rel=0.15)
+    velocity = spline.smoothed(3 * np.sin(1.3 * time) + noise, 1)
+    error = velocity - 3.9 * np.cos(1.3 * time)
+    far = np.minimum(np.abs(time - 7), np.abs(time - 7 - gap)) > 0.1
+    # As without the gap: 1.1e-3; at its edges there are samples on one side only.
+    assert np.sqrt(np.mean(error[far] ** 2)) < 1.7e-3
+    assert np.max(np.abs(error[~far])) < 0.12
+    # A sine is smoother than white jerk, so that the claim is on the safe side.
+    assert 0.3 < np.sqrt(np.mean((error / spline.std(1)) ** 2)) < 1.3

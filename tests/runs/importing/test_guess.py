@@ -666,3 +666,21 @@ def test_a_channel_that_one_winch_does_not_have_is_asked_for_no_other(tmp_path: 
     assert '--column "1.tension="' in question.text
     answers = Answers(columns=(read_column("1.tension="),))
     assert not guess(tmp_path / "log.csv", columns, answers).questions
+
+
+@pytest.mark.parametrize(
+    "name", ["brake torque", "Compensated brake torque", "Load torque", "Lastmoment", "ext. torque"]
+)
+def test_the_torque_of_a_brake_or_of_the_load_is_not_the_motors(name: str, tmp_path: Path) -> None:
+    m = motion()
+    columns = {"time [s]": m.time, "angle [rad]": m.angle, f"{name} [Nm]": m.torque}
+    assert {i.channel for i in guess(tmp_path / "log.csv", columns).used} == {
+        "time",
+        "motor_angle",
+    }
+
+
+def test_a_first_column_that_seldom_changes_is_no_clock(tmp_path: Path) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text("".join(f"{24 + k // 20} {2.5 + 0.1 * (k % 7)}\n" for k in range(600)))
+    assert not guess_columns(read_table(path)).used

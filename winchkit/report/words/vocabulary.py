@@ -117,7 +117,7 @@ _CLAUSES = {
     "pulley-stribeck": "the pulleys have Coulomb friction with a Stribeck curve",
     "pulley-viscous": "the pulleys have viscous friction",
     "rotor-inertia": "the inertia of the rotor is not negligible",
-    "spring-balancer": "the moving part has a spring",
+    "spring-balancer": "the torque is linear in the position (a spring or a weight)",
     "torque-constant": "the torque constant of the drive is wrong",
     "torque-lag": "the torque signal of the drive is delayed",
     "torque-ripple": "the torque constant depends on the rotor position",

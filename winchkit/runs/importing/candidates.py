@@ -162,7 +162,7 @@ def _by_unit(column: Column, unit: SpelledUnit | None) -> Candidate:
     channel = "" if unit is None else _BY_DIMENSION.get(unit.dimension, "")
     if channel and (channel != "time" or _is_clock(column)):
         return Candidate(column, channel, _BY_UNIT, unit, f"unit {column.unit}")
-    if column.number == 1 and column.name.isdecimal() and _is_clock(column):
+    if column.number == 1 and column.name.isdecimal() and _is_clock(column, steady=True):
         return Candidate(column, "time", _BY_ORDER, None, "first column, increasing")
     known = _UNKNOWN if unit is None else f"{_UNKNOWN}, {unit.dimension}"
     return Candidate(column, "", reason=known)
@@ -177,12 +177,17 @@ def _of_text(column: Column) -> Candidate:
     return Candidate(column, channel, 1, None, "dates and times of day as text")
 
 
-def _is_clock(column: Column) -> bool:
-    """Whether values increase, apart from a few returns and repeated values, or only decrease."""
+def _is_clock(column: Column, *, steady: bool = False) -> bool:
+    """Whether values increase, apart from a few returns and repeated values, or only decrease.
+
+    A ``steady`` clock increases from row to row in most rows.
+    """
     steps = np.diff(column.values[np.isfinite(column.values)])
     if not len(steps):
         return False
     increases = float(np.mean(steps < 0)) < 0.05 and bool(np.any(steps > 0))
+    if steady and 2 * np.count_nonzero(steps) < len(steps):
+        return False
     return increases or bool(np.all(steps < 0))
 
 

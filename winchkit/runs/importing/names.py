@@ -72,6 +72,9 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         1,
         IGNORED,
     ),
+    # Torques of what the motor drives: of a brake on a test bench, of the load.
+    (r"\b(brake|absorber|load|external|ext|brems\w*)( \w+)? (torques?|moments?)\b", 1, IGNORED),
+    (r"\b(brems|last)(dreh)?moment\b", 1, IGNORED),
     (_CRANE, 1, IGNORED),
     (r"\b(theta|phi|q|x|y|z) ?(ddot|dot dot|double ?dot)\b|\bdd(theta|phi|q)\b", 1, IGNORED),
     (r"^pulses?$", 1, IGNORED),
