@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import re
 import signal
@@ -102,15 +103,28 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     return os.cpu_count() or 1 if whole and "not realtime" in config.option.markexpr else 0
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Generator[None, object, object]:
+    """Collect without looking for garbage: of ten thousand tests and their modules, none is."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.enable()
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Mark the tests of ``SLOW``, and leave campaigns to those who ask for them."""
+    tests = Path(__file__).parent
+    slow = {place for part in SLOW for place in (tests / part, *(tests / part).rglob("test_*.py"))}
+    left = []
     for item in items:
-        place = item.path.relative_to(Path(__file__).parent)
-        if place in SLOW or SLOW.intersection(place.parents):
+        if item.path in slow:
             item.add_marker(pytest.mark.slow)
-    if "campaign" not in config.option.markexpr:
-        left = [item for item in items if item.get_closest_marker("campaign")]
+        if item.get_closest_marker("campaign"):
+            left.append(item)
+    if left and "campaign" not in config.option.markexpr:
         items[:] = [item for item in items if not item.get_closest_marker("campaign")]
         config.hook.pytest_deselected(items=left)
 
