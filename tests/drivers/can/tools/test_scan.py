@@ -136,8 +136,8 @@ def test_a_drive_that_produces_sync_is_reported_and_stops_producing() -> None:
     assert slave.objects.get(0x1005) == 0x80
     assert slave.objects.get(0x1014) == 0x81
     sync, emergency = drive.notes
-    assert "the drive sends SYNC itself" in sync
-    assert "EMCY was not heard" in emergency
+    assert "the drive produces SYNC" in sync
+    assert "EMCY was not received" in emergency
 
 
 def test_a_drive_that_will_not_stop_producing_sync_is_refused() -> None:
@@ -145,7 +145,7 @@ def test_a_drive_that_will_not_stop_producing_sync_is_refused() -> None:
     slave.objects.declare(0x1005, 0, 0x07, 0x40000080, access="ro")
     with opened(slave) as (bus, _):
         axis = axis_on(bus)
-        with pytest.raises(NotPermitted, match="sends SYNC itself and does not take 80h"):
+        with pytest.raises(NotPermitted, match="produces SYNC and does not accept 80h"):
             set_communication(axis.objects)
 
 

@@ -29,7 +29,7 @@ def _sync(node: SdoNode) -> tuple[str, ...]:
     if kept is None or kept & (_PRODUCES | _IDENTIFIER) == _SYNC:
         return ()
     place, produces = node.place(0x1005), bool(kept & _PRODUCES)
-    said = "the drive sends SYNC itself" if produces else "the drive listens to another SYNC"
+    role = "the drive produces SYNC" if produces else "the drive consumes SYNC with another COB-ID"
     try:
         if produces:
             # CiA 301: the identifier does not change while SYNC is produced.
@@ -41,10 +41,10 @@ def _sync(node: SdoNode) -> tuple[str, ...]:
         now = kept
     if now & (_PRODUCES | _IDENTIFIER) != _SYNC:
         raise NotPermitted(
-            f"{place} is {kept:X}h: {said} and does not take 80h; two producers of SYNC, or one "
-            "that is not heard, spoil every cyclic mode; set it in the drive"
+            f"{place} is {kept:X}h: {role} and does not accept 80h; no cyclic mode works with two "
+            "producers of SYNC or another COB-ID; set it in the drive"
         )
-    return (f"{place} was {kept:X}h: {said}; it is 80h now, until the drive restarts",)
+    return (f"{place} was {kept:X}h: {role}; it is 80h now, until the drive restarts",)
 
 
 def _emergency(node: SdoNode) -> tuple[str, ...]:
@@ -61,5 +61,5 @@ def _emergency(node: SdoNode) -> tuple[str, ...]:
     except DeviceRefused:
         now = kept
     if now & (_INVALID | _IDENTIFIER) != wanted:
-        return (f"{place} is {kept:X}h and cannot be set to {wanted:X}h: its EMCY is not heard",)
-    return (f"{place} was {kept:X}h, EMCY was not heard; it is {wanted:X}h now",)
+        return (f"{place} is {kept:X}h and cannot be set to {wanted:X}h: its EMCY is not received",)
+    return (f"{place} was {kept:X}h, EMCY was not received; it is {wanted:X}h now",)
