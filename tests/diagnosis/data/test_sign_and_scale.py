@@ -126,6 +126,14 @@ def test_slopes_that_differ_from_run_to_run_are_no_wrong_unit() -> None:
     assert codes([alone, *(scaled(run, "tension", share) for run, share in pairs)]) == []
 
 
+def test_factors_that_differ_from_run_to_run_are_no_unit() -> None:
+    """Of two runs one near feet and metres, the other near pounds and kilograms."""
+    runs = [made(seed) for seed in range(2)]
+    same = [scaled(run, "tension", 0.3048) for run in runs]
+    assert codes(same) == [("tension", "wrong-factor")] * 2
+    assert codes([same[0], scaled(runs[1], "tension", 0.45359)]) == []
+
+
 def joint(seed: int, sign: float) -> tuple[Run, WinchProfile]:
     """A joint without a load: inertia, friction, gravity over its angle, an offset."""
     random = np.random.default_rng(seed)

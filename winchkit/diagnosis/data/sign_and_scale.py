@@ -205,7 +205,15 @@ def _is_wrong(slope: Slope) -> bool:
 
 
 def _differ(slopes: Sequence[Slope]) -> bool:
-    """Whether the slopes that are not wrong differ from run to run."""
+    """Whether the slopes that are not wrong differ from run to run, or the units of the others.
+
+    A channel has one unit in all runs: two units are none, but an effect that is missing.
+    """
+    wrong = [slope for slope in slopes if _is_wrong(slope)]
+    sizes = [abs(slope.value) for slope in wrong]
+    units = {known for slope in wrong if (known := named_factor(slope))}
+    if len(units) > 1 and max(sizes) > _EQUAL * min(sizes):
+        return True
     sizes = [slope.value for slope in slopes if not _is_wrong(slope)]
     return len(sizes) > 1 and max(sizes) > _EQUAL * min(sizes)
 
