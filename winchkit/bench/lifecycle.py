@@ -5,7 +5,8 @@ The latch is cleared last, once nothing forbids motion: a reset that fails leave
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.snapshot import Direction, Phase
@@ -24,6 +25,7 @@ __all__ = [
     "await_sensors",
     "clear_faults",
     "reset",
+    "stopped_after",
 ]
 
 _POLL = 0.01
@@ -32,6 +34,21 @@ _FIRST_READING = 1.5
 _REST_TIME = 5.0
 _HANGS = 1.0
 _RESET_TIME = 2.0
+
+
+@contextmanager
+def stopped_after(stop: Callable[[], None]) -> Iterator[None]:
+    """Call ``stop`` at the end of the block; an error of the block is raised, not that of the stop.
+
+    A drive that is dead does not come to rest either: the first error has the cause.
+    """
+    try:
+        yield
+    except BaseException:
+        with suppress(MotionError):
+            stop()
+        raise
+    stop()
 
 
 def await_cycles(loop: ControlLoop, clock: Clock, count: int) -> None:

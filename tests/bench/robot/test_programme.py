@@ -11,9 +11,10 @@ import pytest
 
 from winchkit import find, read_robot, read_run, robot_of
 from winchkit.bench.bench import Bench
+from winchkit.bench.lifecycle import stopped_after
 from winchkit.bench.robot.planner import Planner
 from winchkit.bench.robot.programme import planned_motions, run_robot_programme
-from winchkit.errors import FileError, MotionError, NotPermitted, UsageError
+from winchkit.errors import FileError, LimitTripped, MotionError, NotPermitted, UsageError
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.read import read_robot_programme
 from winchkit.schema.robot_bench import RobotWiring
@@ -138,3 +139,19 @@ def test_faults_of_a_robot_programme(tmp_path: Path) -> None:
     assert "exactly one of to, by, hold; it has to and hold" in words
     assert "q" in words
     assert "at least one of x, y, z" in words
+
+
+@pytest.mark.parametrize("error", [LimitTripped("no feedback"), KeyboardInterrupt()])
+def test_the_cause_is_raised_where_the_stop_after_it_fails_too(error: BaseException) -> None:
+    """A dead drive trips the bench and does not come to rest afterwards."""
+    stops = []
+
+    def stop() -> None:
+        stops.append(1)
+        raise MotionError("winch 3 did not come to rest within 5 s")
+
+    with pytest.raises(type(error)), stopped_after(stop):
+        raise error
+    with pytest.raises(MotionError, match="come to rest"), stopped_after(stop):
+        pass
+    assert len(stops) == 2

@@ -9,6 +9,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
+from winchkit.bench.lifecycle import stopped_after
 from winchkit.bench.robot.path import Waypoint
 from winchkit.bench.robot.planner import Planner, coordinates_of, moved
 from winchkit.bench.robot.platform import Platform
@@ -155,7 +156,7 @@ def run_robot_programme(
         first, _ = planned_motions(planner, programme, end)
     Path(folder).mkdir(parents=True, exist_ok=True)
     execution = _Execution(bench, platform, progress, check)
-    try:
+    with stopped_after(bench.stop):
         execution.play(0, approach)
         for repeat, path in enumerate(files, start=1):
             about = {"programme": programme.name, "repeat": str(repeat)}
@@ -163,8 +164,6 @@ def run_robot_programme(
                 execution.play(repeat, first)
             if recorder.rows == 0:
                 raise RunError(f"{path}: no reading came during the run; check the sensors")
-    finally:
-        bench.stop()
     return files
 
 

@@ -9,7 +9,6 @@ and the load cells are averaged. Poses of the validation are never used in the f
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
@@ -18,6 +17,7 @@ import numpy as np
 
 from winchkit.arguments import require_type
 from winchkit.arrays import Array
+from winchkit.bench.lifecycle import stopped_after
 from winchkit.bench.robot.computation import Computation, at_once
 from winchkit.bench.robot.path import Waypoint
 from winchkit.bench.robot.planner import Planner, moved
@@ -26,7 +26,7 @@ from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate
 from winchkit.calibration.robot.pose_design import next_poses
 from winchkit.calibration.robot.prediction import rms
-from winchkit.errors import MotionError, NotPermitted, RunError, UsageError
+from winchkit.errors import NotPermitted, RunError, UsageError
 from winchkit.model.robot import Pose, angles_of, robot_of, rotation_of
 from winchkit.runs.poses import read_poses
 from winchkit.runs.run import Channel, Run
@@ -156,7 +156,7 @@ def self_calibrated(
         what = f"measuring pose {min(done + 1, total)} of {total}"
         progress(what if done <= total else f"{done - total} poses added", min(1.0, done / total))
 
-    try:
+    with stopped_after(bench.stop):
         progress(f"measuring pose 1 of {total}", 0.0)
         fit = recorded_poses(driver.drawn(random, poses), bench, "fit", measured, session=session)
         held = recorded_poses(
@@ -172,11 +172,6 @@ def self_calibrated(
             more = driver.proposed(found, max(1, poses // 6))
             fit = recorded_poses(more, bench, "fit", measured, first=fit, session=session)
             found = driver.fitted(fit, held, options)
-    except BaseException:
-        with suppress(MotionError):  # the first error has the cause
-            bench.stop()
-        raise
-    bench.stop()
     return SelfCalibration(found, fit, held)
 
 
