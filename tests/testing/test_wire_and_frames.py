@@ -103,7 +103,7 @@ NAMES = names()
 @pytest.mark.parametrize(
     ("identifier", "data", "name", "words"),
     [
-        (0x000, "8103", "nmt", "A: reset"),
+        (0x000, "8103", "nmt", "A: reset node"),
         (0x000, "0100", "nmt", "all nodes: start"),
         (0x080, "", "sync", "SYNC"),
         (0x703, "7F", "A.heartbeat", "A: pre-operational"),
