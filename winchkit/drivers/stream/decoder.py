@@ -70,7 +70,7 @@ class ParsedFrame(NamedTuple):
 
 
 class _Status(NamedTuple):
-    """What is said beside the numbers: meanings, value of a digit, text of the unit."""
+    """Meanings, factor of the numbers and text of the unit, by the status of a frame."""
 
     said: list[Says]
     factor: float
@@ -170,7 +170,7 @@ class Decoder:
         return self._numbers(fields, status._replace(said=said + status.said))
 
     def _status(self, fields: dict[str, str]) -> _Status | None:
-        """What the bits of the status characters say, None where they say nothing that is known."""
+        """Decoded status characters; None where the device file gives their bits no meaning."""
         found = _Status([], 1.0, fields.get("unit", "").strip())
         for group in self._spec.status:
             if group.field not in fields:
