@@ -85,8 +85,17 @@ def await_sensors(sensors: Iterable[Sensor], clock: Clock) -> None:
         clock.sleep(_POLL)
 
 
-def await_rest(loop: ControlLoop, names: Iterable[str], clock: Clock) -> None:
-    """Return when these winches are disabled and stand still; raises MotionError if not."""
+def await_rest(
+    loop: ControlLoop,
+    names: Iterable[str],
+    clock: Clock,
+    *,
+    unless: Callable[[str], bool] = lambda _name: False,
+) -> None:
+    """Return when these winches are disabled and stand still; raises MotionError if not.
+
+    Those of which ``unless`` is true are not waited for.
+    """
     deadline = clock.now() + _REST_TIME
     controllers = {name: loop.winches[name].controller for name in names}
     await_cycles(loop, clock, 2)
@@ -96,7 +105,8 @@ def await_rest(loop: ControlLoop, names: Iterable[str], clock: Clock) -> None:
         busy = [
             name
             for name, item in controllers.items()
-            if item.phase is not Phase.DISABLED or seen[name].phase is not Phase.DISABLED
+            if (item.phase is not Phase.DISABLED or seen[name].phase is not Phase.DISABLED)
+            and not unless(name)
         ]
         if not busy:
             return
@@ -162,12 +172,18 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     if silent:
         # Every drive has missed the heartbeat, and its watchdog is proved anew.
         troubled = set(axes)
-    if any(axes[name].host.disturbs for name in troubled):
-        # The proof of one is a silence towards all: each of them is set up anew.
-        troubled = set(axes)
+    troubled |= _disturbed(troubled, axes)
+    # The last feedback of a drive without its mapping stays: only commissioning reads anew. So it
+    # is with a drive that turns out meanwhile to have restarted.
+    await_rest(
+        loop,
+        [name for name in axes if name not in troubled],
+        clock,
+        unless=lambda name: axes[name].lost_set_up,
+    )
+    troubled |= {name for name in axes if axes[name].lost_set_up}
+    troubled |= _disturbed(troubled, axes)
     lost = [name for name in axes if name in troubled]
-    # The last feedback of a drive without its mapping stays: only commissioning reads anew.
-    await_rest(loop, [name for name in axes if name not in lost], clock)
     if not (loop.beating or silent):
         raise LimitTripped(
             "a drive did not obey the stop that the reset waited for, and the host's heartbeat "
@@ -216,6 +232,11 @@ def _set_up(lost: Sequence[str], wired: Wired, clock: Clock) -> None:
         await_rest(loop, lost, clock)
     finally:
         loop.listening = True
+
+
+def _disturbed(troubled: set[str], axes: Mapping[str, Cia402Axis]) -> set[str]:
+    """All drives where the proof of one of these is a silence towards all of them, else none."""
+    return set(axes) if any(axes[name].host.disturbs for name in troubled) else set()
 
 
 def _on_reopened(wired: Wired, spec: BenchSpec) -> set[str]:

@@ -23,7 +23,7 @@ from slave.rig import Rig
 from slave.wire import GENERIC
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Trip
-from winchkit.errors import LimitTripped, MotionError
+from winchkit.errors import LimitTripped, MotionError, NoReply
 
 _RAMP, _BRAKE = 628.0, 100.0
 """6085h of the slave, and what its brake does without torque, rad/s^2."""
@@ -271,6 +271,34 @@ def test_a_reset_says_what_tripped_while_it_set_drives_up(tmp_path: Path) -> Non
         cleared = bench.reset()
         assert "cannot send" in cleared
         assert not any("boot" in words for words in cleared), "of which the reset is the cause"
+
+
+@pytest.mark.parametrize("boot_time", [0.02, 0.3, 0.8])
+def test_a_drive_that_restarts_during_a_reset_is_set_up_anew(
+    boot_time: float, tmp_path: Path
+) -> None:
+    """Its last feedback, operation enabled, is no motion to wait for."""
+    rig = Rig(tmp_path)
+    slave = rig.slaves[0]
+    with rig.opened() as bench:
+        key = jogging(rig, bench)
+        slave.network.boot_time = boot_time
+        slave.inject("reboots")
+        key.release()
+        rig.wait(0.002)
+        start = rig.time
+        try:
+            bench.reset()
+        except NoReply:
+            assert boot_time > 0.5, "an SDO client waits as long"
+            assert rig.time - start < 2.0
+            with pytest.raises(LimitTripped):
+                bench.winch["A"].jog(pay_out=0.1)
+            rig.wait(1.0)
+            bench.reset()
+        assert not since(rig, start).enabled
+        assert slave.objects.get(0x1A00, 0), "mapped anew"
+        bench.winch["A"].move_by(pay_out=0.02)
 
 
 def test_a_stall_of_this_computer_is_named(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 
 import can
 import pytest
+from can.interfaces.socketcan import SocketcanBus
 
 from drive_server import HOST, NODE, DriveServer
 from winchkit import open_bench
@@ -28,6 +29,8 @@ SERVER = Path(__file__).with_name("drive_server.py")
 _GROUP = "239.74.163.2"
 _MARK = 0x7DF
 """An identifier that no other node uses."""
+_SO_RCVBUFFORCE, _RECEIVE_BUFFER = 33, 4_000_000
+"""Of <asm-generic/socket.h>, for a buffer above net.core.rmem_max; bytes."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +47,9 @@ class Witness:
 
     def __init__(self, options: dict[str, Any]) -> None:
         self._ear, self._mouth = can.Bus(**options), can.Bus(**options)
+        if isinstance(self._ear, SocketcanBus):
+            # As candump beside it: what this thread does not read at once is kept.
+            self._ear.socket.setsockopt(socket.SOL_SOCKET, _SO_RCVBUFFORCE, _RECEIVE_BUFFER)
         self._frames: list[Seen] = []
         self._all: list[Seen] = []
         self._marks = 0

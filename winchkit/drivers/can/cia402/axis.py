@@ -41,6 +41,8 @@ __all__ = ["AxisFeedback", "Cia402Axis"]
 
 _STALE_SYNCS, _STALE_BEATS = 5, 2
 """Feedback that is older than both of these does not show the drive's state any more."""
+_LATE_REPLY = 0.05
+"""Left for the reply to a single SDO request, s: a tenth of the time-out of a transfer."""
 _NMT_STOP = 0x02
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
@@ -93,7 +95,11 @@ class Cia402Axis:
         """Set the drive up, checked and disabled; raises NoReply, DeviceRefused, NotPermitted."""
         self._gathering = self._commander = None
         self._previous = 0
+        stopping = self._sdo_stop.active
         self._sdo_stop.hold(True)
+        if stopping:
+            # Its last reply would be taken for that of a transfer which begins meanwhile.
+            self._clock.sleep(_LATE_REPLY)
         try:
             return self._commission()
         finally:

@@ -27,7 +27,9 @@ class SdoStop:
     def __init__(self, bus: CanBus, node: int) -> None:
         """Nothing is sent yet."""
         self._bus, self._node = bus, node
-        self._active = self._asked = self._held = False
+        self._asked = self._held = False
+        self.active = False
+        """Whether it has sent something since it was last ended."""
         self.taken = False
         """Whether the drive has confirmed the write."""
         self.refused = False
@@ -39,16 +41,16 @@ class SdoStop:
         """Write 6040h = 02h, or ask for 6041h once that is confirmed; raises ConnectionLost."""
         if self._held:
             return
-        if not self._active:
-            self._active, self.taken, self.refused, self.state = True, False, False, None
+        if not self.active:
+            self.active, self.taken, self.refused, self.state = True, False, False, None
             self._bus.on(_REPLY + self._node, self._receive)
         self._asked = self.taken
         self._bus.send(_REQUEST + self._node, _ASK if self._asked else _WRITE)
 
     def end(self) -> None:
         """Leave the node's replies to the confirmed client again."""
-        if self._active:
-            self._active = self.refused = False
+        if self.active:
+            self.active = self.refused = False
             self.state = None
             self._bus.off(_REPLY + self._node)
 
