@@ -113,9 +113,10 @@ def await_rest(
         if clock.now() > deadline:
             for name in busy:
                 controllers[name].stop()
+            tripped = "".join(f"; {trip}" for trip in loop.snapshot.tripped)
             raise MotionError(
                 f"winch {busy[0]} did not come to rest within {_REST_TIME:g} s (drive: "
-                f"{seen[busy[0]].state}); use the emergency stop and look at the drive"
+                f"{seen[busy[0]].state}); use the emergency stop and look at the drive{tripped}"
             )
         clock.sleep(_POLL)
 
