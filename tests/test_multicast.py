@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -61,3 +63,50 @@ def test_frames_of_the_library_are_received_but_for_extended_ones(ports: Ports) 
     library.send(can.Message(arbitration_id=0x18FF0001, data=b"x", is_extended_id=True))
     library.send(can.Message(arbitration_id=0x80, data=b"", is_extended_id=False))
     assert [mine.receive(1.0), mine.receive(1.0)] == [None, (0x80, b"")]
+
+
+_TWO_INTERFACES = """
+ip link set lo up
+ip link add net0 type veth peer name net1
+ip link set net0 up
+ip link set net1 up
+ip address add 192.0.2.2/24 dev net0
+ip route add default via 192.0.2.1
+ip route add 239.0.0.0/8 dev lo
+"""
+_EXCHANGE = """
+import sys
+from winchkit.multicast import MulticastPort
+import can
+mine, other = (MulticastPort("239.74.163.2", 43113) for _ in "ab")
+with can.Bus(interface="udp_multicast", channel="239.74.163.2", port=43113) as library:
+    mine.send(0x181, b"1")
+    assert other.receive(1.0) == (0x181, b"1")
+    assert library.recv(1.0).arbitration_id == 0x181
+    library.send(can.Message(arbitration_id=0x80, is_extended_id=False))
+    assert mine.receive(1.0) == (0x80, b"")
+    assert mine.receive(0.05) is None, "what it has sent itself"
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="network namespaces are those of Linux")
+def test_a_group_on_the_loopback_is_reached_beside_a_network() -> None:
+    """The route to the group decides where frames go, not that to everything else."""
+    if shutil.which("unshare") is None or shutil.which("ip") is None:
+        pytest.skip("no unshare or no ip here")
+    made = subprocess.run(
+        ["unshare", "-rn", "sh", "-ec", f"{_TWO_INTERFACES}exec {sys.executable} -c 'pass'"],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    if made.returncode:
+        pytest.skip(f"no second network here: {made.stderr.strip()}")
+    script = f'{_TWO_INTERFACES}exec "$0" -c "$1"'
+    done = subprocess.run(
+        ["unshare", "-rn", "sh", "-ec", script, sys.executable, _EXCHANGE],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr

@@ -54,13 +54,10 @@ class MulticastPort:
             self._input, self._output = (
                 opened.enter_context(socket.socket(family, socket.SOCK_DGRAM)) for _ in range(2)
             )
-            # Bound to one address, by which own frames are known also beside other computers.
-            with socket.socket(family, socket.SOCK_DGRAM) as probe:
-                probe.connect(self._group)
-                self._output.bind((probe.getsockname()[0], 0))
-            # Connected, so that the kernel looks for the route once.
-            self._output.connect(self._group)
-            self._own: tuple[str, int] = self._output.getsockname()[:2]
+            # Not bound to an address: that of a source would choose the interface, where those who
+            # listen have joined by the route to the group.
+            self._output.bind(("", 0))
+            self._own = self._source()
             shared = ("SO_REUSEADDR", "SO_REUSEPORT")
             for option in (getattr(socket, name) for name in shared if hasattr(socket, name)):
                 self._input.setsockopt(socket.SOL_SOCKET, option, 1)
@@ -98,7 +95,7 @@ class MulticastPort:
             "bitrate_switch": False,
             "error_state_indicator": False,
         }
-        self._output.send(self._pack(frame))
+        self._output.sendto(self._pack(frame), self._group)
 
     def receive(self, timeout: float) -> tuple[int, bytes] | None:
         """Take the next data frame of 11 bits of another sender, if one comes within ``timeout`` s.
@@ -111,7 +108,8 @@ class MulticastPort:
             if timeout > 0 and self._arrival.poll(timeout * 1e3):
                 return self.receive(0.0)
             return None
-        if sender[:2] == self._own:
+        if sender[1] == self._own[1] and sender[:2] in (self._own, self._source()):
+            # Frames of its own pass the kernel's filter once this computer's address has changed.
             return self.receive(0.0)
         self.arrived = _stamp(ancillary)
         frame: Any = self._unpack(datagram)
@@ -120,6 +118,12 @@ class MulticastPort:
             return None if other else (frame["arbitration_id"], bytes(frame["data"]))
         except (KeyError, TypeError) as error:
             raise ValueError(f"a datagram is no CAN frame: {error!r}") from error
+
+    def _source(self) -> tuple[str, int]:
+        """Address of this computer on the way to the group, and the port of what is sent here."""
+        with socket.socket(self._output.family, socket.SOCK_DGRAM) as probe:
+            probe.connect(self._group)
+            return probe.getsockname()[0], self._output.getsockname()[1]
 
     def close(self) -> None:
         """Leave the group."""
