@@ -208,3 +208,7 @@ class Objects:
         self.written.append((index, sub, value))
 
     write_verified = write
+
+    def verify(self, index: int, sub: int, value: int) -> None:
+        """Read back what was written."""
+        assert self.values[index, sub] == value

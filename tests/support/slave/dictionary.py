@@ -16,7 +16,8 @@ UNSIGNED = {0x01: 1, 0x05: 1, 0x06: 2, 0x07: 4, 0x16: 3, 0x18: 5, 0x19: 6, 0x1A:
 REAL = {0x08: 4, 0x11: 8}
 _TEXT = (0x09, 0x0B)
 _HEAD = re.compile(r"^([0-9A-Fa-f]{4})(?:sub([0-9A-Fa-f]{1,2}))?$", re.IGNORECASE)
-_COMPACT = 0x08, 0x09
+_ARRAY = 0x08
+_COMPACT = _ARRAY, 0x09
 
 
 class Abort(Exception):
@@ -63,8 +64,10 @@ class Entry:
 class Dictionary:
     """Objects by index and sub-index."""
 
-    def __init__(self, entries: dict[tuple[int, int], Entry]) -> None:
-        self.entries = entries
+    def __init__(
+        self, entries: dict[tuple[int, int], Entry], arrays: frozenset[int] = frozenset()
+    ) -> None:
+        self.entries, self._arrays = entries, arrays
         self._indices = {index for index, _ in entries}
         self._start = {key: item.value for key, item in entries.items()}
 
@@ -76,7 +79,7 @@ class Dictionary:
 
     def copy(self) -> Dictionary:
         """The same objects with values of their own."""
-        return Dictionary({key: replace(item) for key, item in self.entries.items()})
+        return Dictionary({key: replace(item) for key, item in self.entries.items()}, self._arrays)
 
     def has(self, index: int, sub: int = 0) -> bool:
         """Whether the slave has this object."""
@@ -119,6 +122,8 @@ class Dictionary:
         entry = self.entry(index, sub)
         if entry.access == "wo":
             raise Abort(0x06010001)
+        if index in self._arrays and sub > self.get(index):
+            raise Abort(0x08000024)  # an element above the present count holds no data
         return entry.value
 
     def check_download(self, index: int, sub: int, data: bytes) -> None:
@@ -158,6 +163,7 @@ def _parsed(path: Path, node: int) -> Dictionary:
     start = text.find("[")
     parser.read_string(text[start:])
     entries: dict[tuple[int, int], Entry] = {}
+    arrays = set()
     for name in parser.sections():
         match = _HEAD.match(name.strip())
         if match is None:
@@ -170,7 +176,9 @@ def _parsed(path: Path, node: int) -> Dictionary:
             entries.setdefault((index, 0), _entry(section, node))
         else:
             _add_compact(entries, index, section, node)
-    return Dictionary(entries)
+        if sub is None and _number(section.get("objecttype", ""), node) == _ARRAY:
+            arrays.add(index)
+    return Dictionary(entries, frozenset(arrays))
 
 
 def _add_compact(

@@ -207,6 +207,10 @@ class SdoNode:
     def write_verified(self, index: int, sub: int, value: int) -> None:
         """Write, read back and compare; raises DeviceRefused when the device kept another value."""
         self.write(index, sub, value)
+        self.verify(index, sub, value)
+
+    def verify(self, index: int, sub: int, value: int) -> None:
+        """Read back what was written; raises DeviceRefused when the device kept another value."""
         kept = self.read(index, sub)
         if kept != value:
             raise DeviceRefused(

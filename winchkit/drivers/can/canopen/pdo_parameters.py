@@ -86,8 +86,11 @@ def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
     if node.writes(mapping, 0):
         node.write(mapping, 0, 0)
         for position, item in enumerate(codec.objects, start=1):
-            node.write_verified(mapping, position, item.entry)
+            node.write(mapping, position, item.entry)
         node.write_verified(mapping, 0, len(codec.objects))
+        # Entries above the count need not be readable: of an array, they do not exist (CiA 301).
+        for position, item in enumerate(codec.objects, start=1):
+            node.verify(mapping, position, item.entry)
     else:
         _check_fixed(node, direction, codec)
     if renamed:
