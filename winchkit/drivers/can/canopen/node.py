@@ -117,8 +117,8 @@ def object_name(index: int, sub: int = 0) -> str:
     return f"{index:04X}h:{sub}" if sub else f"{index:04X}h"
 
 
-ABSENT = frozenset({0x06020000, 0x06090011})
-"""SDO abort codes of an object or sub-index that does not exist (CiA 301)."""
+ABSENT = frozenset({0x06020000, 0x06090011, 0x08000024})
+"""SDO abort codes of an object or sub-index that does not exist, or has no data (CiA 301)."""
 _TIMEOUT = 0.5
 _FULL_TRIES, _FULL_PAUSE = 20, 0.005
 """How often, and after which pause (s), a full queue of the interface is tried again."""
