@@ -52,6 +52,8 @@ class Network:
         self._heard: dict[int, float] = {}
         self._lost: set[int] = set()
         self._consumers: list[tuple[int, float]] | None = None
+        self.polls_need_life_time = False
+        """Whether a poll is answered with life guarding on only, as by Lely's CANopen stack."""
         self._toggle = 0
         self._guarded: float | None = None
 
@@ -85,6 +87,8 @@ class Network:
     def guard(self, now: float) -> None:
         """An RTR for the state: the answer carries a toggle bit; life guarding begins."""
         if self.state is Nmt.INITIALISING or self.objects.get(0x1017):
+            return
+        if self.polls_need_life_time and not self.objects.get(0x100C) * self.objects.get(0x100D):
             return
         self._guarded = now
         self._lost.discard(0)

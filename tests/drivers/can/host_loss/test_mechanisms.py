@@ -127,8 +127,12 @@ def test_6007h_says_nothing_of_a_makers_watchdog(silence: str) -> None:
         assert not found.host_loss.certain
 
 
-def test_a_guarded_drive_sends_no_heartbeat_and_is_supervised_by_its_replies() -> None:
+@pytest.mark.parametrize("polls_need_life_time", [False, True])
+def test_a_guarded_drive_sends_no_heartbeat_and_is_supervised_by_its_replies(
+    polls_need_life_time: bool,
+) -> None:
     slave = drive()
+    slave.network.polls_need_life_time = polls_need_life_time
     with rig(slave) as bench:
         axis = bench.axis(generic(host_loss="guarding"))
         axis.commission()

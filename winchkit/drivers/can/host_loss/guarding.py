@@ -16,6 +16,8 @@ __all__ = ["FACTOR", "Guarding", "GuardingWatch", "guard_time"]
 
 FACTOR = 3
 """Life time factor: the drive tolerates two lost polls."""
+_LONG_GUARD_TIME, _LONG_FACTOR = 1.0, 60
+"""s, and how many of them: a commissioning takes some seconds."""
 _TOGGLE, _STATE = 0x80, 0x7F
 _MS = 1e-3
 
@@ -84,9 +86,12 @@ class Guarding(Mechanism):
         return guard_time(self.terms.limit)
 
     def set_up(self) -> None:
-        """Life guarding stays off until the proof: it starts with the first poll."""
+        """A life time of a minute until the proof, so that polls may be few.
+
+        With a guard time of 0 some drives answer no poll (Lely's CANopen stack).
+        """
         self.limit = FACTOR * self.guard_time
-        self.disarm()
+        self._set(_LONG_GUARD_TIME, _LONG_FACTOR)
 
     def poll(self) -> None:
         """Ask the drive for its state."""
@@ -94,7 +99,7 @@ class Guarding(Mechanism):
 
     def withhold(self) -> float:
         """Poll a few times with life guarding on, then no more."""
-        self._switch_on()
+        self._set(self.guard_time, FACTOR)
         before = self.watch.replies
         self._send_life_signs(self.poll, self.guard_time)
         self.clock.sleep(self.guard_time / 2)
@@ -106,8 +111,8 @@ class Guarding(Mechanism):
         return max(0.0, self.limit - self.guard_time / 2)
 
     def restore(self) -> None:
-        """Life guarding off, so that polls may be few while the drive is set up."""
-        self.disarm()
+        """A life time of a minute again, so that polls may be few while the drive is set up."""
+        self._set(_LONG_GUARD_TIME, _LONG_FACTOR)
 
     def arm(self) -> None:
         """Life guarding on, from the control loop's first poll.
@@ -117,14 +122,14 @@ class Guarding(Mechanism):
         """
         self.node.write(0x1017, 0, round(self.terms.period / _MS))
         self.node.write_verified(0x1017, 0, 0)
-        self._switch_on()
+        self._set(self.guard_time, FACTOR)
         self.watch.begin_anew()
 
     def disarm(self) -> None:
-        """Life guarding off; polls are still answered."""
+        """Life guarding off."""
         for index in (0x100D, 0x100C):
             self.node.write_verified(index, 0, 0)
 
-    def _switch_on(self) -> None:
-        self.node.write_verified(0x100C, 0, round(self.guard_time / _MS))
-        self.node.write_verified(0x100D, 0, FACTOR)
+    def _set(self, guard_time: float, factor: int) -> None:
+        self.node.write_verified(0x100C, 0, round(guard_time / _MS))
+        self.node.write_verified(0x100D, 0, factor)
