@@ -45,7 +45,7 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
     name : str
         Shipped name, or path.
     beside : str or Path, optional
-        File in whose folder relative paths are tried too.
+        File in whose folder relative paths are tried too; it is not found itself.
 
     Returns
     -------
@@ -64,8 +64,9 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
     name = str(path_of(name, "name"))
     leaf = "device.toml" if kind == "devices" else ""
     base = Path(beside).parent if beside else Path()
+    asking = Path(beside).resolve() if beside else None
     for candidate in (base / name, base / f"{name}.toml", Path(name)):
-        if candidate.is_file():
+        if candidate.is_file() and candidate.resolve() != asking:
             return candidate
         if leaf and (candidate / leaf).is_file():
             return candidate / leaf
