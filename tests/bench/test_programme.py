@@ -60,7 +60,7 @@ def test_a_stop_during_a_hold_ends_the_programme_and_keeps_its_log(
 def test_a_quick_stop_ends_a_held_tension(live: LiveBench, bench: Bench) -> None:
     """And whoever goes on refreshing it is refused: nothing moves before it was released."""
     winch, plant = bench.winch["A"], live.winches["A"].plant
-    wanted = winch.snapshot.rope_tension + 30.0  # the load hangs free: the winch winds in
+    wanted = winch.snapshot.load_tension + 30.0  # the load hangs free: the winch winds in
 
     def stop(snapshot: BenchSnapshot) -> None:
         if snapshot.winch["A"].cable_speed < -2e-3:

@@ -188,7 +188,7 @@ def test_it_works_on_a_bare_drive_without_any_force(effect: Effect) -> None:
     for values in predicted.values():
         assert np.all(np.isfinite(values))
     bare = line.predict(motion)
-    blind = {"load", "rope_force"} & set(effect.needs)
+    blind = {"load", "cable_force"} & set(effect.needs)
     assert not blind or all(np.array_equal(predicted[name], bare[name]) for name in bare)
 
 

@@ -227,7 +227,7 @@ class Winch(WinchStatus):
                 f"tension_high, {high:g} N"
             )
         here = self.snapshot
-        self.permit(direction_of(tension - here.rope_tension), held=True)
+        self.permit(direction_of(tension - here.load_tension), held=True)
         self.require_length()
         expires = self._bench.clock.now() + hold
         with self._bench.commanders.claimed(self.name):

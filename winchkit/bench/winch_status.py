@@ -54,7 +54,7 @@ class WinchStatus:
         The load's instrument shows it; else the cell's reading, less what the effects of the
         profile put between the two. The bare reading is ``snapshot.tension``.
         """
-        return self.snapshot.rope_tension
+        return self.snapshot.load_tension
 
     @property
     def cable(self) -> CableMap:

@@ -32,7 +32,7 @@ __all__ = [
 
 Values = Mapping[str, float]
 Need = Literal[
-    "cable", "layers", "guide", "pulley", "temperature", "load", "rope_force", "gearing", "robot",
+    "cable", "layers", "guide", "pulley", "temperature", "load", "cable_force", "gearing", "robot",
     "axis", "whole_turns", "torque",
 ]  # fmt: skip
 NEED_WORDS: Mapping[Need, str] = {
@@ -42,7 +42,7 @@ NEED_WORDS: Mapping[Need, str] = {
     "pulley": "a [[pulley]] in the profile",
     "temperature": "a temperature channel in every run",
     "load": "a load channel or load_mass",
-    "rope_force": "a load, load_mass or tension",
+    "cable_force": "a load, load_mass or tension",
     "gearing": "a gearbox",
     "robot": "a robot's profile",
     "axis": "a profile of kind 'axis', or runs without any force in a cable",

@@ -30,8 +30,8 @@ _AT: Mapping[Output, tuple[Stage, str, float]] = {
 }
 """Stage of a curve, its unit, and its typical size, by output."""
 _NEEDS: Mapping[str, tuple[Need, ...]] = {
-    "load": ("rope_force",),
-    "tension": ("rope_force",),
+    "load": ("cable_force",),
+    "tension": ("cable_force",),
     "temperature": ("temperature",),
 }
 

@@ -73,7 +73,7 @@ def test_the_truth_lies_within_its_uncertainty() -> None:
 
 def test_noise_of_the_instruments_is_found_from_the_poses_alone(paper: Calibrated) -> None:
     assert paper.weights.sigma["position"] == pytest.approx(2e-5, rel=0.25)
-    assert paper.weights.sigma["rope"] == pytest.approx(6e-6, rel=0.25)
+    assert paper.weights.sigma["closure"] == pytest.approx(6e-6, rel=0.25)
 
 
 def test_a_bound_is_kept_and_reported(paper: Calibrated) -> None:
@@ -212,7 +212,7 @@ def test_a_hanging_platform_of_four_cables_is_calibrated_too() -> None:
 def test_unmodelled_cable_noise_gets_less_weight() -> None:
     fit = measured(csv(rows(90, 7, noise=Noise(rope=4e-4))))
     found = calibrate(robot(), fit, held())
-    assert found.weights.sigma["rope"] == pytest.approx(4e-4, rel=0.3)
+    assert found.weights.sigma["closure"] == pytest.approx(4e-4, rel=0.3)
     assert improved(found) < 0.3
 
 
@@ -240,7 +240,7 @@ def test_positions_in_the_wrong_unit_are_noticed() -> None:
 
 
 def test_instruments_said_to_be_perfect_break_nothing() -> None:
-    sigma = {"position": 1e-10, "rope": 1e-9}
+    sigma = {"position": 1e-10, "closure": 1e-9}
     found = calibrate(robot(), measured(csv(rows())), held(), Options(sigma=sigma))
     assert rms(found.validation_after.distance) < 1e-4
 

@@ -37,8 +37,8 @@ def test_hidden_elasticity_is_explained_by_the_effect_and_by_nothing_else(
     assert rms(shifted.validation_after.distance) > 3e-4
     assert rms(named.validation_after.distance) < 2e-5
     # The fit without shows it: its cables seem a hundred times noisier than the encoders are.
-    assert without.weights.sigma["rope"] > 3e-4
-    assert named.weights.sigma["rope"] < 1e-5
+    assert without.weights.sigma["closure"] > 3e-4
+    assert named.weights.sigma["closure"] < 1e-5
     # And says what it lacks.
     shares = {c.effect: c.share for c in without.candidates}
     assert without.candidates[0].effect == "cable-elongation-linear"

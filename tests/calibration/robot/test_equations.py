@@ -64,7 +64,7 @@ def residuals(made: Equations, state: State) -> dict[str, Array]:
 )
 def test_derivatives_are_those_of_the_residuals(effects: tuple[str, ...]) -> None:
     made, state = equations(*effects)
-    kinds = {"rope", "position", "rotation", "swivel", "cable_length"}
+    kinds = {"closure", "position", "rotation", "swivel", "cable_length"}
     assert kinds <= set(made.kinds)
     derived = {r.kind: r.by_values for r in made.rows(state) if r.by_values is not None}
     assert len(derived) > 1
@@ -105,20 +105,22 @@ def test_computed_forces_change_strain_by_the_payload_as_they_should() -> None:
         "cable-elongation-linear", "payload-mass", "payload-centre", middle_force=40.0
     )
     block = made.parameters.block
-    rope = next(r for r in made.rows(state) if r.kind == "rope")
-    assert rope.by_values is not None
+    closure = next(r for r in made.rows(state) if r.kind == "closure")
+    assert closure.by_values is not None
     for k in (*block["payload_mass"], *block["payload_centre"]):
         step = np.zeros(len(state.values))
         step[k] = 1e-4
-        up = residuals(made, State(state.values + step, state.pose))["rope"]
-        down = residuals(made, State(state.values - step, state.pose))["rope"]
-        np.testing.assert_allclose(rope.by_values[..., k], (up - down) / 2e-4, rtol=1e-4, atol=1e-9)
+        up = residuals(made, State(state.values + step, state.pose))["closure"]
+        down = residuals(made, State(state.values - step, state.pose))["closure"]
+        np.testing.assert_allclose(
+            closure.by_values[..., k], (up - down) / 2e-4, rtol=1e-4, atol=1e-9
+        )
 
 
 def test_the_reduced_fit_is_the_minimum_of_the_whole_one() -> None:
     """A dense least-squares step over all poses and parameters moves nothing any more."""
     few = measured(csv(rows(12, 5)))
-    options = Options(sigma={"rope": 6e-6, "position": 2e-5})
+    options = Options(sigma={"closure": 6e-6, "position": 2e-5})
     free = replace(robot(), profile=replace(robot().profile, prior={}))
     found = calibrate(free, few, held(), options)
     equations_, state = found.equations, found.solution.state

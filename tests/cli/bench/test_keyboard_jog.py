@@ -17,7 +17,7 @@ STATUS = {
         "A": {
             "cable_length": 4.0,
             "cable_speed": None,
-            "rope_tension": 98.1,
+            "load_tension": 98.1,
             "length": None,
             "phase": "disabled",
         }

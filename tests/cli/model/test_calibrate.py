@@ -243,7 +243,7 @@ def test_rows_without_motor_angles_are_counted_and_left_out(run: Path, tmp_path:
         (("--noise", "position=0 mm"), "above zero"),
         (("--middle-force", "60"), "no unit"),
         (("--middle-force", "-5 N"), "above 0"),
-        (("--noise", "rope"), "write KIND=VALUE"),
+        (("--noise", "closure"), "write KIND=VALUE"),
     ],
 )
 def test_options_that_cannot_be_meant(

@@ -21,7 +21,7 @@ from winchkit.model.robot import robot_of
 from winchkit.runs import read_run
 from winchkit.schema.profiles.robot import PriorSpec
 
-SIGMA = {**START, "rope": 8e-5, "position": 3e-5, "rotation": 1e-3, "swivel": 3e-3}
+SIGMA = {**START, "closure": 8e-5, "position": 3e-5, "rotation": 1e-3, "swivel": 3e-3}
 
 
 def text(count: int) -> str:
@@ -53,7 +53,7 @@ def test_derivatives_by_the_geometry_are_those_of_the_residuals(dataset: RobotDa
             equations.residuals(robot_of(profile_with_geometry(robot().profile, [item.moved(s)])))
             for s in (0.01, -0.01)
         )
-        for kind in ("rope", "swivel", "gauge"):
+        for kind in ("closure", "swivel", "gauge"):
             slope = (up[kind] - down[kind]) / (0.02 * item.std)
             known = np.isfinite(slope)
             np.testing.assert_allclose(by[kind][..., index][known], slope[known], 1e-5, 1e-6)

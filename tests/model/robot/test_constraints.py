@@ -63,7 +63,12 @@ def test_calibration_and_diagnosis_have_the_same_equations(dataset: RobotDataset
     fitted = {r.kind: r for r in made.rows(State(made.parameters.nominal, pose))}
     diagnosed = Equations(dataset, pose, robot())
     residuals, by_pose = diagnosed.residuals(robot()), diagnosed.by_pose(robot())
-    names = {"rope": "rope", "position": "position", "rotation": "rotation", "swivel": "swivel"}
+    names = {
+        "closure": "closure",
+        "position": "position",
+        "rotation": "rotation",
+        "swivel": "swivel",
+    }
     for kind, other in {**names, "cable_length": "gauge"}.items():
         np.testing.assert_allclose(fitted[kind].residual, residuals[other], rtol=0, atol=1e-14)
         np.testing.assert_allclose(fitted[kind].by_pose, by_pose[other], rtol=0, atol=1e-14)

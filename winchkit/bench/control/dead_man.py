@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-__all__ = ["DEAD_MAN", "FIRST_PRESS", "LIFE_SIGN"]
+__all__ = ["DEAD_MAN", "FIRST_PRESS", "LIFE_SIGN", "RELEASE"]
 
 DEAD_MAN = 0.2
 """A jog ends this long after its last refresh, s."""
 FIRST_PRESS = 0.7
 """Hold of the first press of a key, whose repeat starts late, s."""
+RELEASE = FIRST_PRESS + 0.1
+"""Without a request for this long a held command was released, s: a key that is pressed anew
+repeats only after its first delay, which must not count as a release."""
 LIFE_SIGN = 0.5
 """A move, step or homing of another process ends this long after that process's last request, s:
 ten requests of a command, which sends one each 0.05 s."""

@@ -155,7 +155,7 @@ class ControlLoop:
         count = self._count
         resumed = now if now < self._catching_up else self._resumed
         inputs = {name: known(parts, now, count, resumed) for name, parts in self.winches.items()}
-        self._note_failed_ropes()
+        self._note_failed_cables()
         blocked = self.supervisor.check(now, inputs)
         # Before anything is stopped: whoever sees a motion ended must see the trip that ended it.
         self.snapshot = snapshot = self._picture(now, inputs, blocked)
@@ -262,7 +262,7 @@ class ControlLoop:
         watched = [each.axis.fall_silent() for each in self.winches.values()]
         self._sync_watched = any(watched)
 
-    def _note_failed_ropes(self) -> None:
+    def _note_failed_cables(self) -> None:
         """A cable whose effects fail is known no better than it was: everything stops."""
         for parts in self.winches.values():
             self.failure = self.failure or parts.cable.failure

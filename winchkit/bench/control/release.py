@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from winchkit.bench.control.dead_man import FIRST_PRESS
+from winchkit.bench.control.dead_man import RELEASE
 from winchkit.errors import NotPermitted
 
 __all__ = ["NotReleased", "ReleaseGuard"]
-
-_RELEASE = FIRST_PRESS + 0.1
-"""Without a request for this long a held command was released, s: a key that is pressed anew
-repeats only after its first delay, which must not count as a release."""
 
 
 class NotReleased(NotPermitted):
@@ -34,7 +30,7 @@ class ReleaseGuard:
         Whoever resets may be the one who holds, and asks for nothing meanwhile.
         """
         for winch, last in self._asked.items():
-            if start - last < _RELEASE:
+            if start - last < RELEASE:
                 self._asked[winch] = max(last, ended)
 
     def ask(self, winch: str, now: float) -> None:
@@ -43,9 +39,9 @@ class ReleaseGuard:
         self._asked[winch] = now
         if winch not in self._closed:
             return
-        if last is not None and now - last < _RELEASE:
+        if last is not None and now - last < RELEASE:
             raise NotReleased(
                 f"winch {winch} was stopped or reset while this command was held; release it for "
-                f"{_RELEASE:g} s before moving the winch again"
+                f"{RELEASE:g} s before moving the winch again"
             )
         self._closed.discard(winch)

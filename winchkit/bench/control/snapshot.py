@@ -72,7 +72,7 @@ class WinchSnapshot(NamedTuple):
     tension: float = math.nan
     """The load cell's reading, N."""
     load: float = math.nan
-    rope_tension: float = math.nan
+    load_tension: float = math.nan
     """At the platform end: the load, else from the cell's reading by the profile's effects, N."""
     length: float = math.nan
     """From the length instrument."""

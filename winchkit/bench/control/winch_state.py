@@ -226,7 +226,7 @@ def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
         cable_speed=0.0 - seen.winding_speed,
         tension=cell,
         load=load,
-        rope_tension=load if math.isfinite(load) else cell + correction,
+        load_tension=load if math.isfinite(load) else cell + correction,
         length=fresh.get("length", math.nan),
         temperature=fresh.get("temperature", math.nan),
         quality={

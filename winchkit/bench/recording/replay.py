@@ -163,7 +163,7 @@ def _picture(moment: float, values: Mapping[str, float], told: Mapping[str, Any]
         cable_speed=known["cable_speed"],
         tension=known["tension"],
         load=known["load"],
-        rope_tension=known["load"] if math.isfinite(known["load"]) else known["tension"],
+        load_tension=known["load"] if math.isfinite(known["load"]) else known["tension"],
         length=known["length"],
         temperature=known["temperature"],
         commander=str(told.get("commander", "")),

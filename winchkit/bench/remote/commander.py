@@ -12,16 +12,12 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Protocol
 
-from winchkit.bench.control.dead_man import FIRST_PRESS
+from winchkit.bench.control.dead_man import RELEASE
 from winchkit.bench.remote.identity import Client
 from winchkit.drivers.clock import Clock
 from winchkit.errors import MotionError, NotPermitted
 
 __all__ = ["Commanded", "Commanders", "NotCommander"]
-
-_RELEASE = FIRST_PRESS + 0.1
-"""A refused client may command again once it has ordered nothing for this time, s: longer than
-the pause before a held key repeats."""
 
 
 class NotCommander(NotPermitted):
@@ -92,7 +88,7 @@ class Commanders:
                     f"winch {winch} is commanded by {holder.name}; end that one first, or take "
                     "the winch over (--take-over)"
                 )
-            if now - self._refused.get(key, -_RELEASE) < _RELEASE:
+            if now - self._refused.get(key, -RELEASE) < RELEASE:
                 self._refused[key] = now
                 raise NotCommander(
                     f"winch {winch} was commanded by another client; release the jog before "

@@ -59,7 +59,7 @@ from winchkit.tabular import Columns, Tabular
 __all__ = ["Calibrated", "Options", "calibrate", "equations_of", "split"]
 
 _HELD_OUT_EVERY = 10
-_NAMES = {"rope": "lengths by the drums", "position": "positions"}
+_NAMES = {"closure": "lengths by the drums", "position": "positions"}
 _LARGEST_ERROR = 0.05
 """Held-out position error as a share of the largest distance of two exit points, above which a
 robot is not called calibrated (rule of thumb: far above any camera, far below a wrong pose)."""
@@ -397,11 +397,11 @@ def _disagreements(equations: Equations, weights: Weights) -> list[str]:
     """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
     prior_std, sigma = float(equations.parameters.std[0]), weights.sigma
     checks = {
-        "rope": "gearbox.direction, the lines' order, [home] and the motor angles there",
+        "closure": "gearbox.direction, the lines' order, [home] and the motor angles there",
         "position": "that the poses are of this robot, in its base frame",
     }
     # A camera may well be coarser than a drawing.
-    most = {"rope": prior_std, "position": _COARSE_RATIO * prior_std}
+    most = {"closure": prior_std, "position": _COARSE_RATIO * prior_std}
     return [
         f"{_NAMES[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the "
         f"standard deviation of the exit points' prior: check {cause}"

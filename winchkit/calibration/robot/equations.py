@@ -52,8 +52,8 @@ _RATIO_STEP = 1e-6
 class Equations:
     """Constraint equations of a robot at measured poses.
 
-    Kinds are ``rope`` (closure), ``position``, ``rotation``, ``swivel``, ``cable_length`` and
-    ``balance``.
+    Kinds are ``closure`` (length by the drum), ``position``, ``rotation``, ``swivel``,
+    ``cable_length`` and ``balance``.
     """
 
     robot: Robot
@@ -86,7 +86,7 @@ class Equations:
         """Kinds of equations that were measured, always in the same order."""
         m = self.measured
         there = {
-            "rope": m.motor_angle,
+            "closure": m.motor_angle,
             "position": m.position,
             "rotation": m.angles,
             "swivel": m.swivel,
@@ -201,7 +201,7 @@ class Equations:
     @property
     def _constraint_of(self) -> dict[str, Callable[[State], Constraint]]:
         return {
-            "rope": self._closure,
+            "closure": self._closure,
             "position": self._position,
             "rotation": self._rotation,
             "swivel": self._swivel,

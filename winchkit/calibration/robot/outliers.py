@@ -12,7 +12,7 @@ from winchkit.model.robot.identification.bundle_adjustment import Solution
 __all__ = ["gross_errors", "unexplained"]
 
 _WORDS = {
-    "rope": "motor angles",
+    "closure": "motor angles",
     "position": "positions",
     "rotation": "rotations",
     "swivel": "swivel angles",

@@ -86,7 +86,7 @@ def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array
     # Kinds that were not fitted have unknown zeros and take no part.
     sigma = {kind: weights.sigma.get(kind, np.inf) for kind in equations.kinds}
     state = place(equations, State(values, start_of(equations, values)), Weights(sigma))
-    return next(c.residual for kind, c in equations.constraints(state) if kind == "rope")
+    return next(c.residual for kind, c in equations.constraints(state) if kind == "closure")
 
 
 def predicted_poses(equations: Equations, values: Array, start: Pose | None = None) -> Pose:

@@ -146,8 +146,8 @@ class Fitted:
         plausible scale of the tracker."""
         own = self.equations.instruments_at(self.solution.state.values)
         scale = own.trackers[0].scale if own is not None else 0.0
-        rope = self.weights.sigma.get("rope", 0.0)
-        return abs(scale) < LARGEST_SCALE and rope < float(self.equations.parameters.std[0])
+        closure = self.weights.sigma.get("closure", 0.0)
+        return abs(scale) < LARGEST_SCALE and closure < float(self.equations.parameters.std[0])
 
     @cached_property
     def errors(self) -> PoseErrors:

@@ -29,14 +29,14 @@ def _noise(unit: str, kind: str, least: float = 1e-7) -> KindNoise:
 
 
 NOISE: dict[str, KindNoise] = {
-    "rope": _noise("m", "rope"),
+    "closure": _noise("m", "closure"),
     "position": _noise("m", "position"),
     "rotation": _noise("rad", "rotation"),
     "swivel": _noise("rad", "swivel"),
     "cable_length": _noise("m", "cable_length"),
     "balance": _noise("N", "balance", 1e-4),
 }
-"""Kinds of equations; ``rope`` is the length by the drum against the length by geometry."""
+"""Kinds of equations; ``closure`` is the length by the drum against the length by geometry."""
 
 _LEAST_REDUNDANCY = 12.0
 

@@ -131,7 +131,7 @@ def status_table(status: Mapping[str, Any]) -> Table:
             _number(winch["cable_length"], 4, "m"),
             _number(winch["cable_speed"], 3, "m/s"),
             _number(winch["motor_torque"], 3, "N m"),
-            _number(winch["rope_tension"], 1, "N"),
+            _number(winch["load_tension"], 1, "N"),
             cell(", ".join([winch["state"], *_complaints(winch["quality"] or {})])),
             cell(winch.get("commander") or "—"),
         )

@@ -216,8 +216,8 @@ def status_line(status: dict[str, Any]) -> str:
         if winch["length"] is not None:
             text += f" (measured {_decimals(winch['length'], 4)} m)"
         text += f" {_decimals(winch['cable_speed'])} m/s"
-        if winch["rope_tension"] is not None:
-            text += f" {_decimals(winch['rope_tension'], 1)} N"
+        if winch["load_tension"] is not None:
+            text += f" {_decimals(winch['load_tension'], 1)} N"
         parts.append(f"{text} {winch['phase']}")
     return "  ".join(parts)
 

@@ -39,7 +39,7 @@ Loss = Literal["least-squares", "huber", "cauchy"]
 
 _LOSSES: tuple[Loss, ...] = ("least-squares", "huber", "cauchy")
 _NOISE_DIMENSIONS = {
-    "rope": "length",
+    "closure": "length",
     "position": "length",
     "rotation": "angle",
     "swivel": "angle",

@@ -31,9 +31,9 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         or profile.reference.cable_length is not None
     )
     turns_whole = not is_axis and _turns(dataset) >= 1
-    rope_force = any(bool(r.raw.at.tension.any()) for r in recordings)
+    cable_force = any(bool(r.raw.at.tension.any()) for r in recordings)
     # Without a cable force a winch's drum that never turns once is what a joint is.
-    is_joint = set(dataset.outputs) == {"motor_torque"} and not rope_force and not turns_whole
+    is_joint = set(dataset.outputs) == {"motor_torque"} and not cable_force and not turns_whole
     have = {
         "cable": has_cable,
         "layers": profile.drum.kind in {"spiral", "archimedean"},
@@ -41,7 +41,7 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "pulley": bool(profile.pulley),
         "temperature": all(r.signals.temperature is not None for r in recordings),
         "load": any(r.raw.load is not None for r in recordings),
-        "rope_force": rope_force,
+        "cable_force": cable_force,
         "gearing": True,
         "robot": False,
         "axis": is_axis or is_joint,

@@ -68,7 +68,7 @@ def lacking(effect: Effect, dataset: RobotDataset) -> list[str]:
     out = []
     if not effect.places(moving=dataset.moves):
         return ["a motion: poses stand still" if effect.in_motion else "a place on a robot"]
-    if "rope_force" in effect.needs and not dataset.has_tension:
+    if "cable_force" in effect.needs and not dataset.has_tension:
         out.append(_OUTSIDE_LINES["tension"])
     if "tension" in effect.outputs and not dataset.has_balance:
         out.append("tensions that carry the platform's weight")
@@ -88,7 +88,7 @@ def lacking_parts(effect: Effect, dataset: RobotDataset) -> list[str]:
 
 def with_needs_met(effect: Effect, dataset: RobotDataset) -> Effect:
     """The effect without needs; a cable law includes the home lengths of lines without one."""
-    if "rope_force" in effect.needs and effect.outputs == ("cable_length",):
+    if "cable_force" in effect.needs and effect.outputs == ("cable_length",):
         known = lines_with_home_length(dataset.robot)
         effect = with_home_lengths(effect, [n for n in dataset.names if n not in known])
     return replace(effect, needs=())

@@ -3,7 +3,7 @@
 The equations and their derivatives are those of :mod:`winchkit.model.robot.constraints`, and the
 residuals are model less measurement by kind, in SI. Here
 
-* ``rope`` is the closure equation with the effects of the catalogue in the length by the drum,
+* ``closure`` is the closure equation with the effects of the catalogue in the length by the drum,
   which is the length under load; the calibration has the unstrained length, so that its residual
   is smaller by the factor 1 − ε;
 * lengths by the drum are those of :class:`winchkit.model.line.Line`, which applies effects; without
@@ -70,7 +70,7 @@ from winchkit.model.stages import At, Stage
 
 __all__ = ["POSED", "Equations", "continuous", "start_pose"]
 
-POSED = ("rope", "position", "rotation", "swivel", "gauge", "statics")
+POSED = ("closure", "position", "rotation", "swivel", "gauge", "statics")
 """Kinds that depend on the pose, in their order."""
 _NEWTON_STEPS, _FORCE_STEP, _LEAST_SLOPE, _FORCE_TOLERANCE = 8, 1e-4, 0.05, 1e-9
 
@@ -135,7 +135,7 @@ class Equations:
         length = lengths(robot.geometry, pose.position, pose.rotation)
         force = self.forces(robot)
         out = {
-            "rope": closure_residual(length, self._by_drum(robot, force)),
+            "closure": closure_residual(length, self._by_drum(robot, force)),
             "position": self._position(robot),
             "rotation": self._rotation(robot),
             "swivel": self._swivel(robot),
@@ -189,7 +189,7 @@ class Equations:
         if self.dataset.hangs:
             statics = self._statics(robot).by_pose
         return {
-            "rope": length,
+            "closure": length,
             "position": place,
             "rotation": turned,
             "swivel": swivel,
@@ -227,7 +227,7 @@ class Equations:
         of_line, of_all = closure_by_geometry(length, at_home, winding, radius, np.ones_like(angle))
         swivel = swivel_sensitivities(robot.geometry, pose.position, pose.rotation)
         by_kind = {
-            "rope": {**of_line, "layer_growth": of_all["layer_growth"][..., 0]},
+            "closure": {**of_line, "layer_growth": of_all["layer_growth"][..., 0]},
             "swivel": by_geometry(swivel),
             "gauge": by_geometry(length),
         }

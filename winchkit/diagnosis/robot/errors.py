@@ -78,13 +78,13 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
     residuals = _in_base(regression, residuals)
     moved = np.where(known, np.concatenate([residuals["position"], residuals["rotation"]], 1), 0.0)
     by = _slope(regression)
-    closure = residuals["rope"] - (by @ moved[..., None])[..., 0]
+    closure = residuals["closure"] - (by @ moved[..., None])[..., 0]
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
     out = {"cable_length": np.where(np.isfinite(closure), -length, np.nan)}
     if regression.dataset.measured.motor_angle.shape[1] >= PLATFORM_DOF:
-        whole = np.isfinite(residuals["rope"]).all(axis=1, keepdims=True)
-        known_closure = np.where(whole, np.nan_to_num(residuals["rope"]), np.nan)
+        whole = np.isfinite(residuals["closure"]).all(axis=1, keepdims=True)
+        known_closure = np.where(whole, np.nan_to_num(residuals["closure"]), np.nan)
         found = residuals["position"] - (to_place @ known_closure[..., None])[..., 0]
         if np.isfinite(found).any():
             out["platform_position"] = found
@@ -106,7 +106,7 @@ def _errors_of_hanging(regression: PoseRegression, residuals: Mapping[str, Array
     """Errors at the poses that everything but the drums determines, to first order."""
     at_pose, to_length = _hanging_maps(regression)
     others = _stacked(regression, residuals)
-    closure = residuals["rope"] - (to_length @ others[..., None])[..., 0]
+    closure = residuals["closure"] - (to_length @ others[..., None])[..., 0]
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
     return {
@@ -117,7 +117,7 @@ def _errors_of_hanging(regression: PoseRegression, residuals: Mapping[str, Array
 
 def _stacked(regression: PoseRegression, values: Mapping[str, Array]) -> Array:
     """All rows of a pose but those of the drums in standard deviations; zero where missing."""
-    sigma, kinds = regression.point.sigma, [k for k in POSED if k != "rope"]
+    sigma, kinds = regression.point.sigma, [k for k in POSED if k != "closure"]
     return np.concatenate([np.nan_to_num(values[k]) / sigma[k] for k in kinds], axis=1)
 
 
@@ -125,7 +125,7 @@ def _hanging_maps(regression: PoseRegression) -> tuple[Array, Array]:
     """Projection of closures beside coordinates that nothing else determines (p, n, n), and the map
     from the other rows to closures, (p, n, r)."""
     by, here = regression.slope(), regression.residuals(())
-    sigma, kinds = regression.point.sigma, [k for k in POSED if k != "rope"]
+    sigma, kinds = regression.point.sigma, [k for k in POSED if k != "closure"]
     known = np.concatenate([np.isfinite(here[k]) for k in kinds], axis=1)
     slope = np.concatenate([by[k] / sigma[k] for k in kinds], axis=1)
     slope = np.where(known[..., None] & np.isfinite(slope), slope, 0.0)
@@ -133,17 +133,17 @@ def _hanging_maps(regression: PoseRegression) -> tuple[Array, Array]:
     seen = size > _LEAST_SINGULAR_VALUE * np.maximum(size[:, :1], 1e-300)
     inverse = np.where(seen, 1 / np.where(seen, size, 1.0), 0.0)
     pose_of = (np.swapaxes(right, 1, 2) * inverse[:, None]) @ np.swapaxes(left, 1, 2)
-    rope = np.nan_to_num(by["rope"])
-    free = rope @ (np.swapaxes(right, 1, 2) * ~seen[:, None])
+    closure = np.nan_to_num(by["closure"])
+    free = closure @ (np.swapaxes(right, 1, 2) * ~seen[:, None])
     undone = free @ np.linalg.pinv(free, rcond=1e-9)
-    return np.eye(rope.shape[1]) - undone, np.asarray(rope @ pose_of)
+    return np.eye(closure.shape[1]) - undone, np.asarray(closure @ pose_of)
 
 
 def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
     """Rms of the errors by the noise of the instruments alone, by output, SI."""
     if regression.dataset.hangs:
         at_pose, to_length = _hanging_maps(regression)
-        variance = noise.sigma["rope"] ** 2 + np.sum(to_length**2, axis=2)
+        variance = noise.sigma["closure"] ** 2 + np.sum(to_length**2, axis=2)
         length = float(np.sqrt(np.mean(variance * np.diagonal(at_pose, axis1=1, axis2=2))))
         return {"cable_length": length, "tension": noise.sigma["tension"]}
     at_pose, to_place = _maps(regression)
@@ -153,10 +153,10 @@ def noise_rms(regression: PoseRegression, noise: PoseNoise) -> dict[str, float]:
         here
     )
     spread = by * np.sqrt(pose)[:, None, :]
-    whole = spread @ np.swapaxes(spread, 1, 2) + sigma["rope"] ** 2 * np.eye(by.shape[1])
+    whole = spread @ np.swapaxes(spread, 1, 2) + sigma["closure"] ** 2 * np.eye(by.shape[1])
     length = np.trace(at_pose @ whole @ np.swapaxes(at_pose, 1, 2), axis1=1, axis2=2)
     out = {"cable_length": float(np.sqrt(np.mean(length) / by.shape[1]))}
-    place = np.sum(to_place**2, axis=(1, 2)) * sigma["rope"] ** 2 + 3 * sigma["position"] ** 2
+    place = np.sum(to_place**2, axis=(1, 2)) * sigma["closure"] ** 2 + 3 * sigma["position"] ** 2
     out["platform_position"] = float(np.sqrt(np.mean(place)))
     out["tension"] = sigma["tension"]
     return out
@@ -201,7 +201,9 @@ def rms(name: str, error: Array) -> float:
 def signal_rms(regression: PoseRegression) -> dict[str, float]:
     """Rms of each output about its mean, SI."""
     measured = regression.dataset.measured
-    length = regression.equations.residuals(regression.robot)["rope"] + regression.robot.lengths_at(
+    length = regression.equations.residuals(regression.robot)[
+        "closure"
+    ] + regression.robot.lengths_at(
         measured.motor_angle,
         regression.equations.forces(regression.robot),
         regression.equations.temperature,
@@ -247,7 +249,7 @@ def _slope(regression: PoseRegression) -> Array:
 
     The platform's origin is c = u − R o with the observed point u and its place o on the platform.
     """
-    by, tracker = regression.slope()["rope"], regression.tracker
+    by, tracker = regression.slope()["closure"], regression.tracker
     if tracker is None or not np.any(tracker.offset):
         return by
     lever = regression.equations.pose.rotation @ tracker.offset

@@ -25,7 +25,7 @@ from winchkit.model.robot.identification.variance_components import re_estimated
 __all__ = ["START", "PoseNoise", "Stack", "noise_of", "repeated_differences"]
 
 START: Mapping[str, float] = {
-    **{kind: COMMON[kind] for kind in ("rope", "position", "rotation", "swivel")},
+    **{kind: COMMON[kind] for kind in ("closure", "position", "rotation", "swivel")},
     "gauge": COMMON["cable_length"],
     "tension": COMMON["balance"],
     "statics": COMMON["balance"],

@@ -43,6 +43,6 @@ EFFECT = Effect(
     told_apart="At least four loads, the lowest near slack.",
     family="cable law",
     contains=("cable-elongation-linear",),
-    needs=("rope_force",),
+    needs=("cable_force",),
     on_robot=frozenset({"all"}),
 )

@@ -36,6 +36,6 @@ EFFECT = Effect(
     confused_with=("frame-compliance", "cable-elongation-quartic", "cable-elongation-exponential"),
     told_apart="The same load at several lengths; several loads over the full stroke.",
     family="cable law",
-    needs=("rope_force",),
+    needs=("cable_force",),
     on_robot=frozenset({"one", "all"}),
 )

@@ -84,7 +84,7 @@ EFFECT = Effect(
     told_apart="At least four loads over the whole range; the torque shows a curved cell.",
     family="cable law",
     contains=("cable-elongation-linear",),
-    needs=("rope_force",),
+    needs=("cable_force",),
     probes=({"k1": 2e5}, {"k1": 2e5, "b2": 100.0}, {"k1": 2e5, "b3": 3e4}),
     on_robot=frozenset({"all"}),
 )

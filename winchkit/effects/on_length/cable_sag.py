@@ -45,7 +45,7 @@ EFFECT = Effect(
     looks_like="A length error only near slack and on long cables, in proportion to ℓ³/T².",
     confused_with=("cable-elongation-linear", "cable-elongation-exponential"),
     told_apart="Low tension over the full stroke; a hanging cable does not sag.",
-    needs=("rope_force",),
+    needs=("cable_force",),
     order=4,
     probes=({"mass_per_length": 0.14},),
 )

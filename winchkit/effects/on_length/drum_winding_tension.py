@@ -72,7 +72,7 @@ EFFECT = Effect(
     looks_like="A length error over the drum angle that depends on the tension at winding.",
     confused_with=("cable-hysteresis", "drum-radius", "cable-elongation-linear"),
     told_apart="Wind in under one load, pay out under another.",
-    needs=("rope_force",),
+    needs=("cable_force",),
     order=5,
     left_out="the tension at which the cable on the drum was wound in is not known",
 )

@@ -37,6 +37,6 @@ EFFECT = Effect(
     looks_like="A length error in proportion to the tension, the same at every length.",
     confused_with=("cable-elongation-linear",),
     told_apart="The same load at several lengths; several loads over the full stroke.",
-    needs=("rope_force",),
+    needs=("cable_force",),
     on_robot=frozenset({"one", "all"}),
 )

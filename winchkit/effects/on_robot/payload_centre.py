@@ -28,6 +28,6 @@ EFFECT = Effect(
     looks_like="Higher tensions on one side and lower ones on the other, by a constant moment.",
     confused_with=("payload-mass", "cell-gain"),
     told_apart="Poses that turn the platform: its height matters only where the platform tilts.",
-    needs=("robot", "rope_force"),
+    needs=("robot", "cable_force"),
     on_robot=frozenset({"platform"}),
 )

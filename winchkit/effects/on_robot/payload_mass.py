@@ -24,6 +24,6 @@ EFFECT = Effect(
     looks_like="Tensions above those that balance the weight in upper lines, below in lower lines.",
     confused_with=("payload-centre", "cell-gain"),
     told_apart="A weight known well on the platform: it changes the mass, and no cell.",
-    needs=("robot", "rope_force"),
+    needs=("robot", "cable_force"),
     on_robot=frozenset({"platform"}),
 )

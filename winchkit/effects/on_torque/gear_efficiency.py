@@ -32,5 +32,5 @@ EFFECT = Effect(
     looks_like="A step of the torque error with the direction, in proportion to the load.",
     confused_with=("torque-constant", "motor-coulomb", "pulley-coulomb"),
     told_apart="Two loads in both directions.",
-    needs=("rope_force", "gearing"),
+    needs=("cable_force", "gearing"),
 )

@@ -34,5 +34,5 @@ EFFECT = Effect(
     looks_like="A torque error in proportion to the load, equal in both directions.",
     confused_with=("gear-efficiency", "cell-gain", "drum-radius"),
     told_apart="Several loads in both directions; the length excludes a wrong drum radius.",
-    needs=("rope_force",),
+    needs=("cable_force",),
 )

@@ -5,7 +5,7 @@ further instrument gives its own rows. A residual is model less measurement, in 
 fits the geometry in these equations; diagnosis fits effects beside them. The pose is unknown in
 both.
 
-``rope`` (closure, CABTIVE paper, Eq. 1 to 3). Geometric length against the length by the drum:
+``closure`` (closure, CABTIVE paper, Eq. 1 to 3). Geometric length against the length by the drum:
 
     r = L(c, R) − ε (L(c, R) + d) − [L(c₀, R₀) + h − ΔW(φ)]
 

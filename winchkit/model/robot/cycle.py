@@ -7,7 +7,6 @@ there = cycle.pose_at(measured_lengths)    # warm-started from the last one
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from winchkit.model.robot.robot import Robot, cables_of
 
 __all__ = ["RobotCycle", "flat_pose"]
 
-Flat = Sequence[float]
 _TOLERANCE = 1e-5
 _STEPS = 20
 

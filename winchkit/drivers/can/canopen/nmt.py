@@ -1,4 +1,7 @@
-"""Heartbeat protocol of CiA 301: consumer and producer; the caller gives the time to both."""
+"""NMT of CiA 301: commands and states in words, heartbeat consumer and producer.
+
+The caller gives the time to both.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,14 @@ import math
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = ["NMT_STATES", "HeartbeatProducer", "HeartbeatWatch", "NmtState", "state_text"]
+__all__ = [
+    "NMT_STATES",
+    "HeartbeatProducer",
+    "HeartbeatWatch",
+    "NmtState",
+    "command_text",
+    "state_text",
+]
 
 
 class NmtState(IntEnum):
@@ -23,11 +33,23 @@ class NmtState(IntEnum):
 
 NMT_STATES = frozenset(int(state) for state in NmtState)
 """State bytes of CiA 301."""
+_COMMANDS = {
+    0x01: "start",
+    0x02: "stop",
+    0x80: "enter pre-operational",
+    0x81: "reset node",
+    0x82: "reset communication",
+}
 
 
 def state_text(state: int) -> str:
     """NMT state of a heartbeat in words; the number of one that CiA 301 does not have."""
     return str(NmtState(state)) if state in NMT_STATES else f"state {state:02X}h"
+
+
+def command_text(command: int) -> str:
+    """NMT command specifier in words; the number of one that CiA 301 does not have."""
+    return _COMMANDS.get(command, f"unknown ({command:02X}h)")
 
 
 @dataclass

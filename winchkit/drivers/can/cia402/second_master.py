@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.canopen.nmt import command_text
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 
@@ -24,13 +25,6 @@ _DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6
 """Command specifiers of requests (CiA 301); a block download begins where bit 0 is 0."""
 _HEAD = 4
 _CONTROL_WORD = 0x6040
-_COMMANDS = {
-    0x01: "start",
-    0x02: "stop",
-    0x80: "enter pre-operational",
-    0x81: "reset node",
-    0x82: "reset communication",
-}
 
 
 class SecondMaster:
@@ -99,7 +93,7 @@ class SecondMaster:
     def _take_nmt(self, data: bytes, _now: float) -> None:
         if len(data) > 1 and data[1] in (0, self._node):
             to = f"node {self._node}" if data[1] else "all nodes"
-            self._note(f"NMT command {_COMMANDS.get(data[0], f'{data[0]:02X}h')} to {to}")
+            self._note(f"NMT command {command_text(data[0])} to {to}")
 
     def _take_heartbeat(self, data: bytes, _now: float) -> None:
         self._note(f"heartbeat with the node number of this host ({data.hex(' ')})")

@@ -11,7 +11,7 @@ from typing import Any
 import canopen
 
 from winchkit.drivers.can.canopen.emergency import parse_emergency
-from winchkit.drivers.can.canopen.nmt import state_text
+from winchkit.drivers.can.canopen.nmt import command_text, state_text
 from winchkit.drivers.can.canopen.node import is_signed, object_name, read_dictionary
 from winchkit.drivers.can.canopen.pdo import MappedObject, PdoCodec, parse_object
 from winchkit.drivers.can.cia402.state_machine import FAULT_RESET, HALT, state_of
@@ -20,13 +20,6 @@ from winchkit.schema.devices.servo import PdoSpec
 
 __all__ = ["Decoded", "KnownNode", "decode", "known_node", "write_frames"]
 
-_NMT = {
-    0x01: "start",
-    0x02: "stop",
-    0x80: "enter pre-operational",
-    0x81: "reset node",
-    0x82: "reset communication",
-}
 _CONTROL = {
     0x00: "disable voltage",
     0x02: "quick stop",
@@ -118,7 +111,7 @@ def decode(identifier: int, data: bytes, nodes: Mapping[int, KnownNode]) -> Deco
 def _nmt(data: bytes, nodes: Mapping[int, KnownNode]) -> Decoded:
     command, node = data
     who = nodes[node].name if node in nodes else f"node {node}" if node else "all nodes"
-    return Decoded("NMT", node, f"{who}: {_NMT.get(command, f'command {command:02X}h')}")
+    return Decoded("NMT", node, f"{who}: {command_text(command)}")
 
 
 def _of_node(base: int, data: bytes, known: KnownNode) -> tuple[str, str]:

@@ -26,7 +26,7 @@ from winchkit.arrays import Array
 __all__ = ["START", "Component", "re_estimated"]
 
 START: Mapping[str, float] = {
-    "rope": 5e-5,
+    "closure": 5e-5,
     "position": 5e-5,
     "rotation": 2e-3,
     "swivel": 2e-3,
