@@ -71,14 +71,14 @@ class Exchange:
         scores = self._engine.scores(held, self._noise)
         return held, least, {item.candidate.effect.id: item for item in scores}
 
-    def trial(self, rival: Score, target: float, least: float) -> Trial:
+    def trial(self, rival: Score, target: float, least: float, aim: float) -> Trial:
         """Fit a rival in the effect's place.
 
         It is fitted again from the others' present values where its χ² is above ``target`` and
-        would nearly reach that value by linear prediction. It is abandoned where even the larger
-        χ² ``least`` is out of reach.
+        would nearly reach that value by linear prediction. A fit ends where ``aim``, ``target`` at
+        least, is out of reach. It is abandoned where even the larger χ² ``least`` is.
         """
-        first_trial = self._engine.trial(self.base, rival, self._noise, target=least, aim=target)
+        first_trial = self._engine.trial(self.base, rival, self._noise, target=least, aim=aim)
         if first_trial.fit.chi_square < target or not self._others.terms:
             return first_trial
         held, least_held, scores = self._held
@@ -87,7 +87,7 @@ class Exchange:
         if rival_beside is None or least_held - rival_beside.explained_ss > limit:
             return first_trial
         second_trial = self._engine.trial(
-            held, rival_beside, self._noise, all_starts=True, target=least, aim=target
+            held, rival_beside, self._noise, all_starts=True, target=least, aim=aim
         )
         return min(
             first_trial, second_trial, key=lambda trial: (trial.criterion, trial.fit.chi_square)

@@ -1,13 +1,15 @@
 """Equivalence sets: effects that these runs cannot distinguish from the named ones.
 
-Each rival is refitted in the place of the named effect. It joins the set if Δχ² < 9, or if its
-held-out losses per block are not significantly larger by a sign-flip test at 5 %; a law with more
-parameters if a likelihood-ratio test is significant although BIC prefers the simpler one, or if its
-curvature is not detectable.
+Each rival is refitted in the place of the named effect, under the larger of the noise and of what
+the named model leaves unexplained (quasi-likelihood). It joins the set if Δχ² is below the square
+of a quantile of t, 9 for well-known variances, or if its held-out losses per block are not
+significantly larger by a sign-flip test at 5 %; a law with more parameters if a likelihood-ratio
+test is significant although BIC prefers the simpler one, or if its curvature is not detectable.
 
 References
 ----------
 Pitman, E. J. G. (1937). J. R. Statist. Soc. Suppl. 4, 119-130.
+Wedderburn, R. W. M. (1974). Biometrika 61, 439-447.
 Wilks, S. S. (1938). Ann. Math. Statist. 9, 60-62.
 Hansen, P. R., Lunde, A., Nason, J. M. (2011). Econometrica 79, 453-497.
 """
@@ -22,6 +24,7 @@ from scipy.special import chdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.cross_validation import held_out
+from winchkit.diagnosis.regression.dispersion import fits_worse, largest_loss, overdispersed
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.projection import orthonormal
@@ -48,8 +51,6 @@ _MOST_RIVALS = 6
 """Rivals that are refitted."""
 _SCORE_MARGIN = 40.0
 """Explained χ² below that of the named effect, within which a rival is refitted."""
-_DELTA_CHI_SQUARE = 9.0
-"""Δχ² = 9: the true effect fits worse by this much with probability at most 1/740."""
 _LEAST_SHARE = 0.5
 """Share of the named effect's decrease of χ² that a rival must reach."""
 _SHARE_OF_SIMPLER_LAW = 0.75
@@ -112,7 +113,7 @@ class EquivalenceSet:
     """Equivalence set of one addition, in an order that does not depend on noise.
 
     Effects with the fewest parameters first, of these the ones that the data do not reject against
-    the best of them (Δχ² < 9), those with the fewest measured inputs first, in the order of the
+    the best of them, those with the fewest measured inputs first, in the order of the
     catalogue.
     """
 
@@ -157,15 +158,22 @@ def equivalence_set(
 
     Notes
     -----
+    All fits are compared under the larger of the noise and of the final model's residual, per band
+    (:func:`~winchkit.diagnosis.regression.dispersion.overdispersed`): what the final model leaves
+    unexplained is no evidence for one of two rivals. Of a true and a wrong effect the true one
+    loses more than t² times the variance with probability at most 1/740, t being the quantile for
+    the degrees of freedom of the variances in which the two differ.
+
     Every rival is compared with the named effect at 5 % by itself; there is no correction for the
     number of rivals. A rival must reach half of the named effect's decrease of χ².
     """
-    exchange = Exchange(engine, final, noise, index)
-    own, base, scores = exchange.own, exchange.base, exchange.scores
+    dispersed = overdispersed(engine.regression, final, noise)
+    own_fit = engine.refit(final.hypothesis, dispersed)
+    exchange = Exchange(engine, own_fit, dispersed, index)
+    own, base, scores = final.hypothesis.terms[index], exchange.base, exchange.scores
     own_explained_ss = next(
         (s.explained_ss for s in scores if s.candidate.effect.id == own.effect.id), 0.0
     )
-    n_parameters = Coordinates(own.effect).n_parameters
     rivals = [
         s
         for s in scores
@@ -178,52 +186,66 @@ def equivalence_set(
         if _confusable_by_drift(s.candidate.effect, own.effect) and s not in rivals
     ]
     blocks = engine.regression.blocks
-    own_losses = held_out(engine.regression, final, noise, blocks)
-    least = base.chi_square - _LEAST_SHARE * (base.chi_square - final.chi_square)
-    members: list[_Member] = [(n_parameters, own, final)]
+    own_losses = held_out(engine.regression, own_fit, dispersed, blocks)
+    least = base.chi_square - _LEAST_SHARE * (base.chi_square - own_fit.chi_square)
+    goal = own_fit.chi_square + largest_loss(np.inf)
+    aim = own_fit.chi_square + largest_loss(float(dispersed.dof.min()))
+    compared = [own_fit]
     for rival in rivals:
-        trial = exchange.trial(rival, final.chi_square + _DELTA_CHI_SQUARE, least)
+        trial = exchange.trial(rival, goal, least, aim)
         fitted = trial.fit
         if not np.isfinite(trial.criterion):
             continue
         if fitted.chi_square > least:
             continue
-        term = fitted.hypothesis.terms[-1]
-        n_rival_parameters = Coordinates(term.effect).n_parameters
-        joins = _richer_law_joins(engine, final, noise, index, fitted)
+        joins = _richer_law_joins(engine, own_fit, dispersed, index, fitted)
         if joins is None:
-            rival_losses = held_out(engine.regression, fitted, noise, blocks)
-            within_delta = fitted.chi_square < final.chi_square + _DELTA_CHI_SQUARE
-            joins = within_delta or _sign_flip_p_value(rival_losses - own_losses) > _LEVEL
-        if joins or _reduces_to(engine, fitted, final, base, index):
-            members.append((n_rival_parameters, term, fitted))
-    members = _ordered(engine, members)
-    ordered = [term for _, term, _ in members]
-    projected = engine.projected(base, noise)
+            rival_losses = held_out(engine.regression, fitted, dispersed, blocks)
+            joins = (
+                not fits_worse(engine.regression, fitted, own_fit, dispersed)
+                or _sign_flip_p_value(rival_losses - own_losses) > _LEVEL
+            )
+        if joins or _reduces_to(engine, fitted, own_fit, base, index):
+            compared.append(fitted)
+    members = [
+        _Member(own, final, own_fit) if f is own_fit else _Member(f.hypothesis.terms[-1], f, f)
+        for f in compared
+    ]
+    members = _ordered(engine, members, dispersed)
+    projected = engine.projected(base, dispersed)
     angles = {
-        term.effect.id: _angle(projected, own.effect.id, term.effect.id)
-        for term in ordered
-        if term.effect.id != own.effect.id
+        member.term.effect.id: _angle(projected, own.effect.id, member.term.effect.id)
+        for member in members
+        if member.term.effect.id != own.effect.id
     }
-    fits = tuple(fitted for _, _, fitted in members)
-    return EquivalenceSet(own, tuple(t.effect.id for t in ordered), tuple(ordered), fits, angles)
+    terms = tuple(member.term for member in members)
+    fits = tuple(member.fit for member in members)
+    return EquivalenceSet(own, tuple(t.effect.id for t in terms), terms, fits, angles)
 
 
-_Member = tuple[int, Term, Fit]
-"""Number of parameters, the effect with its values, and the fit."""
+@dataclass(frozen=True)
+class _Member:
+    term: Term
+    """The effect with its values."""
+    fit: Fit
+    """Fit that is reported: of the named effect the final one."""
+    compared: Fit
+    """Fit under the variances of the comparison."""
 
 
-def _ordered(engine: SelectionEngine, members: Sequence[_Member]) -> list[_Member]:
+def _ordered(engine: SelectionEngine, members: Sequence[_Member], noise: Noise) -> list[_Member]:
     """Members in the order of :class:`EquivalenceSet`."""
-    least: dict[int, float] = {}
-    for count, _, fitted in members:
-        least[count] = min(least.get(count, np.inf), fitted.chi_square)
+    best: dict[int, Fit] = {}
+    for member in members:
+        count = Coordinates(member.term.effect).n_parameters
+        if count not in best or member.compared.chi_square < best[count].chi_square:
+            best[count] = member.compared
 
     def key(member: _Member) -> tuple[int, bool, int, int]:
-        count, term, fitted = member
-        worse = fitted.chi_square > least[count] + _DELTA_CHI_SQUARE
-        place = engine.place_in_catalogue(term.effect.id)
-        return count, worse, len(term.effect.needs), place
+        effect = member.term.effect
+        count = Coordinates(effect).n_parameters
+        worse = fits_worse(engine.regression, member.compared, best[count], noise)
+        return count, worse, len(effect.needs), engine.place_in_catalogue(effect.id)
 
     return sorted(members, key=key)
 
@@ -239,7 +261,7 @@ def _richer_law_joins(
     own, rival = final.hypothesis.terms[index].effect, fitted.hypothesis.terms[-1].effect
     more = Coordinates(rival).n_parameters - Coordinates(own).n_parameters
     if more > 0 and _listed_as_confusable(rival, own) and not rival.nested_with(own):
-        return fitted.chi_square < final.chi_square + _DELTA_CHI_SQUARE
+        return not fits_worse(engine.regression, fitted, final, noise)
     if more > 0 and not _same_family(rival, own):
         nearly_linear = engine.regression.has_known_loads and own.id in rival.contains
         return _weakly_preferred(final, fitted, more) or (

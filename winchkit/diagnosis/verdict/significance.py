@@ -80,6 +80,8 @@ def _last_is_significant(
     engine: SelectionEngine, rival: Fit, noise: Noise, threshold: float
 ) -> bool:
     """Whether the rival of an addition is, the last effect of its fit."""
+    # The sets are compared under other weights than those of the reported model.
+    rival = engine.refit(rival.hypothesis, noise)
     last = len(rival.hypothesis.terms) - 1
     spread = spread_of(engine.regression, rival, noise, engine.regression.blocks)
     return excess_evidence(engine, rival, noise, spread, last, threshold=threshold) > 0.0
