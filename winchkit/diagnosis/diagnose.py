@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -362,6 +362,7 @@ def _answer(
             *missing_excitation(engine.regression),
             *notes,
             *judgement.notes,
+            *(note for each in sets for note in _beside_notes(each)),
         ),
         sanity=engine.regression.dataset.sanity,
         used_share=engine.regression.dataset.used_share,
@@ -394,6 +395,11 @@ def _traces(
 def _spread(engine: SelectionEngine, result: SelectionResult) -> Spread:
     """Uncertainty of the unknowns of the final model."""
     return spread_of(engine.regression, result.final, result.noise, engine.regression.blocks)
+
+
+def _beside_notes(equivalence: EquivalenceSet) -> Iterator[str]:
+    for effect, further in equivalence.beside.items():
+        yield f"{effect} predicts the runs as well as {equivalence.effects[0]} beside {further}"
 
 
 def _insignificant_note(equivalence: EquivalenceSet) -> str:

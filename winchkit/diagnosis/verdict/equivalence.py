@@ -16,15 +16,20 @@ Hansen, P. R., Lunde, A., Nason, J. M. (2011). Econometrica 79, 453-497.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import chdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.cross_validation import held_out
-from winchkit.diagnosis.regression.dispersion import fits_worse, largest_loss, overdispersed
+from winchkit.diagnosis.regression.dispersion import (
+    excess_p_value,
+    fits_worse,
+    largest_loss,
+    overdispersed,
+)
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.projection import orthonormal
@@ -56,6 +61,8 @@ _LEAST_SHARE = 0.5
 _SHARE_OF_SIMPLER_LAW = 0.75
 """Share of the decrease of χ² from which a simpler law of the family joins the set."""
 _LEVEL = 0.05
+_INCOMPLETE = 0.25
+"""Level of the preliminary test that the residual of the final model does not exceed the noise."""
 _SIGN_FLIPS = 2000
 
 
@@ -125,6 +132,8 @@ class EquivalenceSet:
     """Fit of each member beside all other effects."""
     angles: dict[str, float]
     """Angle between its signature and each rival's, rad."""
+    beside: Mapping[str, str] = field(default_factory=dict)
+    """Further effect beside which a member explains as much, for members that need one."""
 
     def only(self, effects: Collection[str]) -> EquivalenceSet:
         """The same set without other members than ``effects``."""
@@ -134,7 +143,8 @@ class EquivalenceSet:
         names = tuple(term.effect.id for term in terms)
         # Angles from the signature of an effect that has left the set are not those of another.
         angles = {n: self.angles[n] for n in names if n in self.angles and self.term in terms}
-        return EquivalenceSet(own, names, tuple(terms), tuple(fits), angles)
+        beside = {n: self.beside[n] for n in names if n in self.beside}
+        return EquivalenceSet(own, names, tuple(terms), tuple(fits), angles, beside)
 
 
 def equivalence_set(
@@ -164,6 +174,11 @@ def equivalence_set(
     loses more than t² times the variance with probability at most 1/740, t being the quantile for
     the degrees of freedom of the variances in which the two differ.
 
+    Where, without repeats, the final model may leave more than the noise, another effect may be
+    missing. A rival that is worse alone then joins the set, after all others, if it predicts blocks
+    of time as well beside the further effect that explains most of what it leaves: gravity beside a
+    friction that is an offset in runs of one direction.
+
     Every rival is compared with the named effect at 5 % by itself; there is no correction for the
     number of rivals. A rival must reach half of the named effect's decrease of χ².
     """
@@ -185,33 +200,39 @@ def equivalence_set(
         for s in scores
         if _confusable_by_drift(s.candidate.effect, own.effect) and s not in rivals
     ]
-    blocks = engine.regression.blocks
-    own_losses = held_out(engine.regression, own_fit, dispersed, blocks)
+    own_losses = held_out(engine.regression, own_fit, dispersed, engine.regression.blocks)
     least = base.chi_square - _LEAST_SHARE * (base.chi_square - own_fit.chi_square)
     goal = own_fit.chi_square + largest_loss(np.inf)
     aim = own_fit.chi_square + largest_loss(float(dispersed.dof.min()))
-    compared = [own_fit]
+    compared, worse = [own_fit], list[Fit]()
     for rival in rivals:
         trial = exchange.trial(rival, goal, least, aim)
         fitted = trial.fit
-        if not np.isfinite(trial.criterion):
-            continue
-        if fitted.chi_square > least:
+        if not np.isfinite(trial.criterion) or fitted.chi_square > least:
             continue
         joins = _richer_law_joins(engine, own_fit, dispersed, index, fitted)
         if joins is None:
-            rival_losses = held_out(engine.regression, fitted, dispersed, blocks)
-            joins = (
-                not fits_worse(engine.regression, fitted, own_fit, dispersed)
-                or _sign_flip_p_value(rival_losses - own_losses) > _LEVEL
-            )
+            joins = not fits_worse(
+                engine.regression, fitted, own_fit, dispersed
+            ) or _predicts_as_well(engine, fitted, own_losses, dispersed)
         if joins or _reduces_to(engine, fitted, own_fit, base, index):
             compared.append(fitted)
+        else:
+            worse.append(fitted)
     members = [
         _Member(own, final, own_fit) if f is own_fit else _Member(f.hypothesis.terms[-1], f, f)
         for f in compared
     ]
     members = _ordered(engine, members, dispersed)
+    if not noise.from_repeats and excess_p_value(engine.regression, final, noise) < _INCOMPLETE:
+        alone = [member.term.effect for member in members]
+        beside = [_beside_another(engine, rival, alone, dispersed) for rival in worse]
+        members += [
+            member
+            for member in beside
+            if member is not None
+            and _predicts_as_well(engine, member.compared, own_losses, dispersed)
+        ]
     projected = engine.projected(base, dispersed)
     angles = {
         member.term.effect.id: _angle(projected, own.effect.id, member.term.effect.id)
@@ -220,7 +241,8 @@ def equivalence_set(
     }
     terms = tuple(member.term for member in members)
     fits = tuple(member.fit for member in members)
-    return EquivalenceSet(own, tuple(t.effect.id for t in terms), terms, fits, angles)
+    further = {m.term.effect.id: m.beside for m in members if m.beside}
+    return EquivalenceSet(own, tuple(t.effect.id for t in terms), terms, fits, angles, further)
 
 
 @dataclass(frozen=True)
@@ -231,6 +253,41 @@ class _Member:
     """Fit that is reported: of the named effect the final one."""
     compared: Fit
     """Fit under the variances of the comparison."""
+    beside: str = ""
+    """Further effect without which it explains less."""
+
+
+def _predicts_as_well(engine: SelectionEngine, rival: Fit, losses: Array, noise: Noise) -> bool:
+    """Whether held-out losses per block are not significantly larger than those of another fit."""
+    own = held_out(engine.regression, rival, noise, engine.regression.blocks)
+    return _sign_flip_p_value(own - losses) > _LEVEL
+
+
+def _beside_another(
+    engine: SelectionEngine, rival: Fit, members: Sequence[Effect], noise: Noise
+) -> _Member | None:
+    """A rival with the further effect that explains most of what it leaves; None without one.
+
+    The further effect is no member of the set and contains none: that would explain the same
+    without the rival.
+    """
+    own = rival.hypothesis.terms[-1]
+    for item in engine.scores(rival, noise):
+        effect = item.candidate.effect
+        if item.net_gain <= 0.0:
+            return None
+        if {effect.id, *effect.contains} & {member.id for member in (own.effect, *members)}:
+            continue
+        trial = engine.trial(rival, item, noise)
+        labels = [term.effect.id for term in trial.fit.hypothesis.terms]
+        if not np.isfinite(trial.criterion) or labels.count(own.effect.id) != 1:
+            return None
+        place = labels.index(own.effect.id)
+        others = trial.fit.hypothesis.without(place)
+        term = trial.fit.hypothesis.terms[place]
+        both = engine.refit(others.with_term(term, engine.regression.n_runs), noise)
+        return _Member(both.hypothesis.terms[-1], both, both, beside=effect.id)
+    return None
 
 
 def _ordered(engine: SelectionEngine, members: Sequence[_Member], noise: Noise) -> list[_Member]:

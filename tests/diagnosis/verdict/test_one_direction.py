@@ -1,0 +1,61 @@
+"""One effect that imitates two: a run of one direction, in which friction is an offset.
+
+A joint with gravity and Coulomb friction turns once from one end to the other at one speed. Its
+torque is nearly linear in the angle, as of a spring with an offset.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.results import Diagnosis
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.axis import AxisProfile
+
+JOINT = AxisProfile(name="joint")
+RATE = 200.0
+SECONDS = 5.0
+REACH = 1.05
+"""Angle at the ends, rad."""
+GRAVITY, FRICTION, NOISE = -2.2, 1.75, (0.1, 0.03)
+"""N m; noise of a first-order process of 0.1 s, and white noise."""
+
+
+def joint(seed: int, *, back: bool) -> Diagnosis:
+    """Diagnosis of a move from end to end, or there and back."""
+    random = np.random.default_rng(seed)
+    time = np.arange(0.0, SECONDS, 1 / RATE)
+    speed = np.clip(np.minimum(time, SECONDS - time) / 0.5, 0.0, 1.0)
+    if back:
+        time, speed = np.arange(0.0, 2 * SECONDS, 1 / RATE), np.concatenate([speed, -speed])
+    angle = np.cumsum(speed) / RATE
+    angle = 2 * REACH * angle / angle.max() - REACH
+    speed = np.gradient(angle, time)
+    torque = GRAVITY * np.sin(angle) + FRICTION * np.tanh(speed / 0.01)
+    state, coloured = 0.0, np.empty(len(time))
+    for index, step in enumerate(random.standard_normal(len(time))):
+        state = 0.95 * state + 0.25 * step
+        coloured[index] = state
+    torque += NOISE[0] * coloured + NOISE[1] * random.standard_normal(len(time))
+    channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+    return diagnose([Run("move", time, channels, {})], JOINT).diagnosis
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_spring_is_not_the_only_name_of_gravity_and_friction(seed: int) -> None:
+    found = joint(seed, back=False)
+    names = [effect for step in found.steps for effect in step.effects]
+    assert "spring-balancer" in names
+    assert "joint-gravity" in names
+    note = next(note for note in found.notes if note.startswith("joint-gravity predicts"))
+    assert "beside motor-coulomb" in note
+
+
+def test_back_again_gravity_and_friction_are_named() -> None:
+    found = joint(3, back=True)
+    names = {step.effects[0] for step in found.steps}
+    assert "joint-gravity" in names
+    assert "spring-balancer" not in names
+    assert any(name.startswith("motor-") for name in names)
