@@ -404,3 +404,40 @@ def test_a_jerk_is_no_spike() -> None:
     force[int(20 * RATE)] += 20
     (finding,) = found(Run("r", time, channels), "outliers")
     assert finding.text.startswith("1 of ")
+
+
+def _with_velocity(angle: Array, velocity: Array) -> list[str]:
+    time = np.arange(len(angle)) / RATE
+    channels = {
+        "motor_angle": Channel(angle, "rad"),
+        "motor_velocity": Channel(velocity, "rad/s"),
+    }
+    findings = inspect_run(Run("r", time, channels)).findings
+    return [f.code for f in findings if f.channel == "motor_velocity"]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_velocity_of_another_axis_or_delayed_is_inconsistent(seed: int) -> None:
+    """A quarter of a period is no correlation, a tenth is cos²(36°) = 0.65 of the variance."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(COUNT) / RATE
+    period = time[-1] / (30 + 10 * rng.random())
+    phase = 2 * np.pi * time / period
+    angle, noise = 3 * np.sin(phase), rng.normal(0, 0.02, COUNT)
+    size = 2 * np.pi / period
+    turned = [3 * size * np.cos(phase - 2 * np.pi * share) for share in (0.0, 0.1, 0.25)]
+    codes = [_with_velocity(angle, own + noise) for own in turned]
+    assert codes[:1] == [[]]
+    assert "inconsistent-velocity" not in codes[1]
+    assert codes[2] == ["inconsistent-velocity"]
+    assert _with_velocity(angle, np.cos(1.7 * phase) + noise) == ["inconsistent-velocity"]
+
+
+def test_a_velocity_that_says_nothing_of_the_angle_is_not_inconsistent() -> None:
+    """At rest, with an offset, or of noise alone: nothing contradicts the angle."""
+    time, rng = np.arange(COUNT) / RATE, np.random.default_rng(4)
+    quantised = np.round(rng.normal(0, 1e-3, COUNT), 3)
+    slow = 1e-3 * np.sin(0.1 * time)
+    assert "inconsistent-velocity" not in _with_velocity(quantised, slow)
+    assert "inconsistent-velocity" not in _with_velocity(40 * np.sin(time), 40 * np.cos(time) + 90)
+    assert "inconsistent-velocity" not in _with_velocity(np.sin(time), rng.normal(0, 1, COUNT))

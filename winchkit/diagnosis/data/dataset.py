@@ -21,7 +21,7 @@ from winchkit.diagnosis.data.motor_current import with_torques
 from winchkit.diagnosis.data.outlying_repeats import outlying_repeat
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, even_instants
-from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, without_outliers
+from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
 from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
@@ -195,7 +195,7 @@ def prepare(
     inspected = [inspect_run(run) for run in runs]
     sanity = findings(inspected, profile, catalogue)
     resolution = resolutions(inspected)
-    runs, mended = evenly_stamped([without_outliers(one) for one in inspected])
+    runs, mended = evenly_stamped([usable(one) for one in inspected])
     notes += mended
     decimation = decimation_for(runs) if decimate else None
     if decimation is not None:

@@ -11,11 +11,12 @@ from winchkit.diagnosis.data.sign_and_scale import sign_and_scale
 from winchkit.effects.catalogue import Catalogue
 from winchkit.model.stages import OUTPUTS
 from winchkit.runs.run import Channel, Run
+from winchkit.runs.sanity.consistency import INCONSISTENT
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import Inspection
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["ALARMING", "caveats", "findings", "resolutions", "without_outliers"]
+__all__ = ["ALARMING", "caveats", "findings", "resolutions", "usable"]
 
 ALARMING = frozenset({"inverted-sign", "wrong-factor"})
 """Codes of findings with which effects of a winch are not looked for."""
@@ -25,7 +26,8 @@ def findings(
     inspected: Sequence[Inspection], profile: WinchProfile, catalogue: Catalogue | None = None
 ) -> tuple[Finding, ...]:
     """Findings on runs: sign and scale against the profile first, then of every channel."""
-    found = sign_and_scale([one.run for one in inspected], profile, catalogue)
+    runs = [_with_derived_velocity(one) for one in inspected]
+    found = sign_and_scale(runs, profile, catalogue)
     found += [f for one in inspected for f in one.findings]
     # A constant angle is that of a run at rest, which has a note.
     return tuple(f for f in found if (f.code, f.channel) != ("constant", "motor_angle"))
@@ -46,12 +48,25 @@ def resolutions(inspected: Sequence[Inspection]) -> dict[str, float]:
     return out
 
 
-def without_outliers(inspected: Inspection) -> Run:
-    """The run with NaN in place of single spikes, so that these are not compared."""
-    run = inspected.run
-    if not inspected.outliers:
-        return run
+def usable(inspected: Inspection) -> Run:
+    """The run without what findings exclude.
+
+    Single spikes are NaN, so that they are not compared. A velocity that is not the derivative of
+    the motor angle is left out: the rate is then that of the angle.
+    """
+    run = _with_derived_velocity(inspected)
     channels: dict[str, Channel] = dict(run.channels)
     for name, mask in inspected.outliers.items():
-        channels[name] = replace(channels[name], values=np.where(mask, np.nan, run[name]))
+        if name in channels:
+            channels[name] = replace(channels[name], values=np.where(mask, np.nan, run[name]))
     return replace(run, channels=channels)
+
+
+def _with_derived_velocity(inspected: Inspection) -> Run:
+    """The run without velocities that contradict the motor angle."""
+    run = inspected.run
+    wrong = {found.channel for found in inspected.findings if found.code == INCONSISTENT}
+    if not wrong:
+        return run
+    kept = {name: channel for name, channel in run.channels.items() if name not in wrong}
+    return replace(run, channels=kept)

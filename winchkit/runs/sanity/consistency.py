@@ -7,11 +7,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from winchkit.arrays import Array
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.factors import Slope, named_factor, slope_text
 from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.local_noise import local_noise
 
-__all__ = ["velocity_consistency"]
+__all__ = ["INCONSISTENT", "velocity_consistency"]
+
+INCONSISTENT = "inconsistent-velocity"
+"""Code of the finding on a velocity that is not the derivative of the motor angle."""
 
 _RANGE = 0.8, 1.25
 """Slopes that are no wrong unit: a velocity that its drive has filtered or estimated."""
@@ -20,16 +25,25 @@ _SIGMAS = 3.0
 _BLOCKS = 40
 _LEAST_SAMPLES = 50
 _CORRELATION = 0.5
+"""Least squared correlation at which a slope is judged: less than half of the integral varies with
+the angle where a filter delays the velocity by more than an eighth of the motion's period."""
+_CLEAR = 4.0
+"""Standard deviations of the noise by which both the motion and the velocity are clear."""
 _GAP = 2.5
 
 
 def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:
-    """Findings ``inverted-sign`` and ``wrong-factor`` of ``motor_velocity``; value: the slope.
+    """Findings on ``motor_velocity``.
+
+    ``inverted-sign`` and ``wrong-factor`` have the slope as value, ``inconsistent-velocity`` the
+    squared correlation.
 
     Notes
     -----
     The integral of the velocity over about 40 blocks of time is regressed on the change of the
-    angle; blocks with a gap are left out.
+    angle; blocks with a gap are left out. A velocity is inconsistent where the squared correlation
+    is below one half, a constant offset aside, although the changes of the angle and the velocity
+    itself are both four times as large as their noise.
     """
     prefix = f"{winch}." if winch else ""
     name, angle = f"{prefix}motor_velocity", f"{prefix}motor_angle"
@@ -51,9 +65,35 @@ def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:
     slope = float(turned @ integral) / square
     left = integral - slope * turned
     if slope**2 * square < _CORRELATION * float(integral @ integral):
+        size = _noise(velocity, np.median(steps), len(steps) / _BLOCKS, run[angle])
+        if size is not None and np.std(turned) > _CLEAR * size:
+            yield from _inconsistent(run, name, turned - turned.mean(), integral - integral.mean())
         return
     std = float(np.sqrt(left @ left / (len(turned) - 1) / square))
     yield from _judged(run, name, Slope(slope, std))
+
+
+def _noise(velocity: Array, step: float, rows: float, angle: Array) -> float | None:
+    """Noise of a block's integral and change of the angle; None for a velocity that is all noise.
+
+    A velocity that varies from sample to sample is integrated wrongly by the trapezoidal rule.
+    """
+    own = local_noise(velocity)
+    if _CLEAR * own > np.nanstd(velocity):
+        return None
+    return float(np.hypot(own * step * np.sqrt(rows), np.sqrt(2) * local_noise(angle)))
+
+
+def _inconsistent(run: Run, name: str, turned: Array, integral: Array) -> Iterator[Finding]:
+    squares = float(turned @ turned) * float(integral @ integral)
+    explained = float(turned @ integral) ** 2 / squares if squares else 0.0
+    if explained < _CORRELATION:
+        text = (
+            f"it is not the derivative of the motor angle, whose changes share {explained:.0%} of "
+            "their variance with its integral: of another axis, or delayed by a filter; the "
+            "derivative of the angle is used instead"
+        )
+        yield Finding(INCONSISTENT, run.name, name, explained, text)
 
 
 def _judged(run: Run, name: str, slope: Slope) -> Iterator[Finding]:
