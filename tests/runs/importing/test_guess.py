@@ -359,6 +359,7 @@ def test_two_columns_that_fit_equally_are_asked(tmp_path: Path) -> None:
     assert question.options == (
         '--column "tension=left force"',
         '--column "tension=right force"',
+        '--column "tension="',
     )
 
 

@@ -102,12 +102,13 @@ class Candidate:
     reason: str = ""
 
     @property
-    def order(self) -> tuple[int, bool, int]:
-        """Sort key: the best candidate first."""
+    def order(self) -> tuple[int, bool, bool, int]:
+        """Sort key: the best candidate first; one of an unknown unit (mm/mm) after the others."""
         words = set(words_of(" ".join((*self.column.labels, self.column.name))).split())
         is_current = self.unit is not None and self.unit.dimension == "current"
         preference = len(words & _AVOIDED) - len(words & _PREFERRED)
-        return self.rank, is_current, preference
+        is_foreign = bool(self.column.unit) and self.unit is None
+        return self.rank, is_foreign, is_current, preference
 
 
 @dataclass

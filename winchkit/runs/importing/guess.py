@@ -54,6 +54,8 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     as_others(work)
     from_velocity(work)
     by_convention(work)
+    # A unit by convention gives others by the ratio, or the ratio contradicts it.
+    from_velocity(work)
     as_others(work)
     _drop_clocks(work)
     ask_units(work)
@@ -68,7 +70,7 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
         table,
         tuple({**unused, **assigned}[column.source] for column in table.columns),
         tuple(dict.fromkeys(work.questions)),
-        tuple(work.notes),
+        tuple(dict.fromkeys(work.notes)),
         rate,
     )
 

@@ -72,6 +72,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         1,
         IGNORED,
     ),
+    # Quantities of the tool of a robot.
+    (r"\btcp\b", 1, IGNORED),
     # Torques of what the motor drives: of a brake on a test bench, of the load.
     (r"\b(brake|absorber|load|external|ext|brems\w*)( \w+)? (torques?|moments?)\b", 1, IGNORED),
     (r"\b(brems|last)(dreh)?moment\b", 1, IGNORED),

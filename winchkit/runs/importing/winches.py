@@ -64,7 +64,11 @@ def choose_channels(others: Sequence[Candidate], choice: Choice, without: Collec
         items.sort(key=lambda item: item.order)
         best = [item for item in items if item.order == items[0].order]
         base = channel.rpartition(".")[2]
-        if len(best) > 1 and (same := _named_alike(best, given)) is not None:
+        alike = [item for item in items if _is_as_given(item, channel, given)]
+        if len(alike) == 1:
+            items.remove(alike[0])
+            items.insert(0, alike[0])
+        elif len(best) > 1 and (same := _named_alike(best, given)) is not None:
             items.remove(same)
             items.insert(0, same)
         elif len(best) > 1:
@@ -76,7 +80,7 @@ def choose_channels(others: Sequence[Candidate], choice: Choice, without: Collec
                 choice.questions.append(
                     Question(
                         f"which column is {channel}? {' and '.join(map(repr, names))} fit equally",
-                        tuple(f'--column "{channel}={name}"' for name in names),
+                        tuple(f'--column "{channel}={name}"' for name in (*names, "")),
                     )
                 )
             reason = f"one of several: --column {channel}=…"
@@ -102,6 +106,18 @@ def stem_of(column: Column, channel: str) -> tuple[str, ...]:
     label = channel.rpartition(".")[0]
     words = words_of(" ".join((*column.labels, column.name))).split()
     return tuple("*" if label and word == label else word for word in words)
+
+
+def _is_as_given(item: Candidate, channel: str, given: Sequence[Candidate]) -> bool:
+    """Whether a column is named like the one that the user gives for the channel of a winch."""
+    base = channel.rpartition(".")[2]
+    label = channel.rpartition(".")[0]
+    return bool(label) and any(
+        other.channel.rpartition(".")[2] == base
+        and "." in other.channel
+        and stem_of(other.column, other.channel) == stem_of(item.column, channel)
+        for other in given
+    )
 
 
 def _channel_as_given(item: Candidate, label: str, given: Sequence[Candidate]) -> str:

@@ -35,6 +35,7 @@ _UNIT_ROW = {"unit", "units", "unit symbol", "einheit"}
 """First cells of the rows of a header that has the title of each row above the times."""
 _ROW_LABELS = {"type", "name", "id", "parent", "unit", "units", "description", "channel"}
 _IDENTIFIER = re.compile(r"[0-9A-Fa-f]{8,}(-[0-9A-Fa-f]{4,})*|\d+")
+_INCREMENT = re.compile(r"t ?inc\w*\s*=\s*(\S+)", re.IGNORECASE)
 _RATEKEYS = re.compile(
     r"(export frame rate|capture frame rate|frame rate|sample ?rate|sampling ?rate|"
     r"sample frequency|sampling frequency|abtastrate|messrate|frequenz|frequency|rate|fs)\W*"
@@ -83,6 +84,9 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     Header
         Names are empty where the file has none.
     """
+    header = _of_oscilloscope(rows, width, decimal)
+    if header is not None:
+        return header
     cut = _start_of_block(rows, width, decimal, is_blank=is_blank)
     if is_blank:
         cut = _start_of_names(rows, cut)
@@ -97,6 +101,29 @@ def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool
     header.rows = tuple(tuple(cells) for _, cells in rows[cut:] if any(cells))
     header.interval = header.interval or _interval(header.metadata, decimal)
     return header
+
+
+def _of_oscilloscope(rows: Sequence[Row], width: int, decimal: str) -> Header | None:
+    """Names with the time of the first sample and the interval behind them, in place of times.
+
+    ``X,CH1,Start,Increment`` above ``Sequence,Volt,-6e-6,1e-8``, or
+    ``Time(s),CH1(V),t0 = -6e-6, tInc = 1e-8``.
+    """
+    filled = [cells for _, cells in rows if any(cells)]
+    for cells, below in pairwise([*filled, []]):
+        keys = [cell.casefold() for cell in cells]
+        step = None
+        if "increment" in keys and len(below) > keys.index("increment") >= width:
+            step = number(below[keys.index("increment")], decimal)
+            units = _padded(below, width)
+        elif given := [found for cell in cells if (found := _INCREMENT.fullmatch(cell))]:
+            step, units = number(given[0][1], decimal), [""] * width
+        if step is not None and step > 0:
+            names = [split_unit(name) for name in _padded(cells, width)]
+            pairs = zip(names, units, strict=True)
+            known = [own or (unit if read_unit(unit) else "") for (_, own), unit in pairs]
+            return Header([name for name, _ in names], known, [()] * width, interval=step)
+    return None
 
 
 def _start_of_block(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool) -> int:

@@ -1,12 +1,15 @@
 """Readers of MAT files (version 5, and 7.3 by extra ``hdf5``) and of HDF5 files.
 
-Structures are flattened with dots. Objects of MATLAB classes (timetable, timeseries) are opaque in
-a MAT file: save them as arrays, e.g. ``t = seconds(T.Time); x = T.x; save f.mat t x``.
+Structures are flattened with dots. Objects of MATLAB classes (table, timetable, timeseries, string)
+are opaque in a MAT file: they are left out with a note.
 """
 
 from __future__ import annotations
 
 import io
+import struct
+import warnings
+import zlib
 from collections.abc import Iterator
 from typing import Any
 
@@ -19,6 +22,9 @@ from winchkit.runs.importing.table import Table, refuse_size
 __all__ = ["read_hdf5", "read_mat"]
 
 _DEEPEST = 8
+_HEADER, _COMPRESSED = 128, 15
+"""Bytes before the first variable of a MAT file of version 5; type of a compressed variable."""
+_CLASSES = "save its arrays, e.g. t = seconds(T.Time); x = T.x; save('file.mat', 't', 'x')"
 
 
 def read_mat(path: str, data: bytes) -> Table:
@@ -45,9 +51,17 @@ def read_mat(path: str, data: bytes) -> Table:
 
     try:
         stream: Any = io.BytesIO(data)
-        sizes = [int(np.prod(shape)) for _, shape, _ in whosmat(stream)]
-        refuse_size(path, 8 * sum(sizes), "arrays")
-        found = loadmat(stream, simplify_cells=True)
+        try:
+            size = 8 * sum(int(np.prod(shape)) for _, shape, _ in whosmat(stream))
+        except TypeError:
+            # An object of a class has no shape.
+            size = sum(_sizes(data))
+        refuse_size(path, size, "arrays")
+        with warnings.catch_warnings():
+            # All objects of classes have the same name.
+            warnings.simplefilter("ignore")
+            stream.seek(0)
+            found = loadmat(stream, simplify_cells=True)
     except RunError:
         raise
     except Exception as error:  # noqa: BLE001 - scipy raises many kinds for damaged files
@@ -55,13 +69,46 @@ def read_mat(path: str, data: bytes) -> Table:
     arrays: dict[str, Any] = {}
     notes = []
     for name, value in found.items():
-        if name.startswith("__"):
+        if str(name).startswith("__"):
             continue
-        if type(value).__name__ == "MatlabOpaque" or "MatlabOpaque" in str(type(value)):
-            notes.append(f"'{name}' is an object of a MATLAB class and left out; save its arrays")
+        if "MatlabOpaque" in str(type(value)):
+            notes.append(_object_note(*(_first(value, key) for key in ("s0", "s2"))))
             continue
         arrays.update(_flat(name, value, 0))
+    _refuse_objects(path, arrays, notes)
     return table_of_arrays(path, "MAT", arrays, notes=notes)
+
+
+def _sizes(data: bytes) -> Iterator[int]:
+    """Unpacked sizes of the variables of a MAT file of version 5, bytes."""
+    order = ">" if data[126:128] == b"MI" else "<"
+    start = _HEADER
+    while start + 8 <= len(data):
+        kind, length = struct.unpack_from(f"{order}II", data, start)
+        inner = data[start : start + 8]
+        if kind == _COMPRESSED:
+            inner = zlib.decompressobj().decompress(data[start + 8 : start + 8 + length], 8)
+        yield int(struct.unpack_from(f"{order}II", inner)[1]) if len(inner) == 8 else 0
+        start += 8 + length
+
+
+def _text(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _first(value: Any, key: str) -> str:
+    """Name or class of an object."""
+    return _text(np.ravel(value[key])[0])
+
+
+def _object_note(name: str, kind: str) -> str:
+    return f"'{name}' is an object of the MATLAB class {kind} and left out: {_CLASSES}"
+
+
+def _refuse_objects(path: str, arrays: dict[str, Any], notes: list[str]) -> None:
+    """Raise RunError for a file of objects alone, with what to do."""
+    if notes and not arrays:
+        raise RunError([Fault(note, path) for note in notes])
 
 
 def _flat(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
@@ -103,6 +150,7 @@ def read_hdf5(path: str, data: bytes) -> Table:
         ) from None
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
+    notes: list[str] = []
     try:
         with h5py.File(io.BytesIO(data), "r") as source:
             sets: dict[str, Any] = {}
@@ -117,15 +165,22 @@ def read_hdf5(path: str, data: bytes) -> Table:
             refuse_size(path, 8 * sum(int(item.size or 0) for item in sets.values()), "arrays")
             for name, item in sets.items():
                 kind = item.attrs.get("MATLAB_class", b"")
+                if "MATLAB_object_decode" in item.attrs:
+                    notes.append(_object_note(name, _text(kind)))
+                    continue
+                if item.attrs.get("MATLAB_empty", 0):
+                    # Its numbers are the shape of an empty array.
+                    continue
                 if item.dtype.kind not in "fiub" and not item.dtype.names:
                     continue
                 if kind in (b"char", b"cell", "char", "cell") or item.dtype.hasobject:
                     continue
                 arrays[name] = item[()]
                 unit = item.attrs.get("units", item.attrs.get("unit", ""))
-                units[name] = unit.decode() if isinstance(unit, bytes) else str(unit)
+                units[name] = _text(unit)
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, UnicodeDecodeError) as error:
         if isinstance(error, RunError):
             raise
         raise RunError(Fault(f"is not a readable HDF5 file: {error}", path)) from None
-    return table_of_arrays(path, "HDF5", arrays, units=units)
+    _refuse_objects(path, arrays, notes)
+    return table_of_arrays(path, "HDF5", arrays, units=units, notes=notes)

@@ -27,6 +27,8 @@ __all__ = ["read_text_table", "table_of_rows"]
 
 _AHEAD = 3
 _BLOCK = 4096
+_COUNTED = 4
+"""Columns from which a row that counts them is no chance."""
 _HEAD = 60
 """Lines in which a header ends."""
 _END_OF_HEADER = "***End_of_Header***"
@@ -196,10 +198,14 @@ def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended:
     first = _first_of_numbers(rows, dialect, is_keyed=is_padded)
     if first is None:
         raise RunError(Fault("has no rows of numbers", path))
+    is_counted = _counts_columns(rows[first][1])
     header = read_header(
         rows[:first], dialect.width, dialect.decimal, is_blank=dialect.delimiter == BLANKS
     )
+    first += is_counted
     found = _kept(path, rows, first, header, dialect, is_ended=is_ended, is_padded=is_padded)
+    if is_counted:
+        found.notes.append("the first row of numbers counts the columns and is left out")
     columns = named_apart([c.column(header, n) for n, c in enumerate(found.columns)])
     lines = np.array(found.lines, dtype=np.intp)
     return Table(
@@ -211,6 +217,14 @@ def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended:
         faults=tuple(found.faults),
         notes=tuple(found.notes),
         interval=header.interval,
+    )
+
+
+def _counts_columns(cells: Sequence[str]) -> bool:
+    """Whether a row is ``0,1,2,3`` or ``1,2,3,4``: the header of a table without names."""
+    numbers = list(cells if cells[0] else cells[1:])
+    return len(numbers) >= _COUNTED and any(
+        numbers == [str(n + start) for n in range(len(numbers))] for start in (0, 1)
     )
 
 

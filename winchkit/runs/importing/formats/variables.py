@@ -9,6 +9,7 @@ import numpy as np
 
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.unit_spelling import read_unit, split_unit
 
 __all__ = ["column_of", "table_of_arrays"]
 
@@ -103,10 +104,13 @@ def column_of(name: str, array: Any, unit: str) -> Column:
     array : (n,) array
         Numbers, dates or durations (``datetime64``, ``timedelta64``).
     unit : str
-        Unit of numbers as spelled in the file.
+        Unit of numbers as spelled in the file; empty where the name may have it, ``Load [N]``.
     """
     if array.dtype.kind in "mM":
         missing = np.isnat(array)
         whole = array.astype(f"{array.dtype.kind}8[ns]").astype(np.int64).astype(np.float64)
         return Column(name, np.where(missing, np.nan, whole), "ns")
+    plain, own = (name, unit) if unit else split_unit(name)
+    if own and read_unit(own) is not None:
+        name, unit = plain, own
     return Column(name, array.astype(np.float64), unit)
