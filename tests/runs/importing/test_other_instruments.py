@@ -18,6 +18,7 @@ from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.can_trace import is_can_trace
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
+from winchkit.runs.importing.sign_bits import unsigned_note
 
 COUNT, STEP = 300, 0.01
 
@@ -208,3 +209,46 @@ def test_quantities_of_the_tool_are_of_no_winch(tmp_path: Path) -> None:
         "motor_angle",
         "motor_torque",
     }
+
+
+def _stored(value: int, bits: int, how: str) -> int:
+    if how == "two's complement":
+        return value % 2**bits
+    return value if value >= 0 else 2 ** (bits - 1) - value
+
+
+@pytest.mark.parametrize(("bits", "how"), [(11, "sign and magnitude"), (16, "two's complement")])
+def test_a_lost_sign_is_told(bits: int, how: str, tmp_path: Path) -> None:
+    """A servo's load of ±300 in a field without a sign."""
+    head = "time,position,torque\n"
+    loads = [round(300 * np.sin(k / 9)) for k in range(COUNT)]
+    lines = [f"{k * STEP:g},{k % 90}.5,{_stored(v, bits, how)}" for k, v in enumerate(loads)]
+    columns = ("motor_angle=position [deg]", "motor_torque=torque*0.01 [N m]")
+    guess = guessed(tmp_path / "servo.csv", head + "\n".join(lines) + "\n", *columns)
+    assert [f"{bits} bits stored without a sign ({how}" in note for note in guess.notes] == [True]
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(8, 20))
+def test_counts_and_levels_have_their_sign(seed: int, bits: int) -> None:
+    """An encoder over its whole range, two levels of speed, and signed values."""
+    rng = np.random.default_rng(seed)
+    counts = rng.integers(0, 2**bits, 500).astype(float)
+    levels = np.where(rng.random(500) < 0.5, 0, 1200) + rng.integers(0, 20, 500)
+    signed = rng.integers(-(2**bits), 2**bits, 500).astype(float)
+    for values in (counts, levels.astype(float), signed, np.full(500, 7.0)):
+        assert not unsigned_note("x", values)
+
+
+def test_components_of_a_six_axis_cell_are_asked(tmp_path: Path) -> None:
+    names = ["Fx", "Fy", "Fz", "Mx", "My", "Mz"]
+    head = "Time [s]," + ",".join(f"{n} [{'N' if n[0] == 'F' else 'Nm'}]" for n in names) + "\n"
+    rows = [
+        f"{k * STEP:g}," + ",".join(f"{np.sin(k / 9 + n):.4f}" for n in range(6))
+        for k in range(COUNT)
+    ]
+    guess = guessed(tmp_path / "cell.csv", head + "\n".join(rows) + "\n")
+    assert {item.channel for item in guess.used} == {"time"}
+    assert ["Fz" in question.text for question in guess.questions] == [True, False]
+    alone = head.replace("Fx", "Ax").replace("Fy", "Ay").replace(" [N],Ay [N]", " [V],Ay [V]")
+    guess = guessed(tmp_path / "cell.csv", alone + "\n".join(rows) + "\n")
+    assert by_source(guess)["Fz"].channel == "tension"

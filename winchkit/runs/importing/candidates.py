@@ -18,6 +18,7 @@ from winchkit.runs.importing.pose_columns import (
     chosen_body,
     complete_sets,
     quaternion_names,
+    vector_names,
 )
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import (
@@ -47,6 +48,8 @@ _BY_DIMENSION = {
 _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
 _UNKNOWN = "unknown name"
 _NOT_USED = "set point, error, state, counter, constant or a quantity of another body"
+_SCALAR = {"tension", "load", "motor_torque"}
+"""Channels of a cable or a shaft, which have no components along x, y and z."""
 _UNEVEN = 0.5
 """Range of the steps of a clock over their median."""
 
@@ -74,6 +77,7 @@ def choose(
     """
     choice = Choice()
     numbered = quaternion_names([item.name for item in table.columns])
+    vectors = vector_names([item.name for item in table.columns])
     free: list[Candidate] = []
     for column in table.columns:
         if column.source in given:
@@ -83,6 +87,8 @@ def choose(
             )
         else:
             found = _candidate(column, numbered)
+            if found.channel in _SCALAR and column.name in vectors:
+                found = replace(found, rank=_BY_RANK, reason=f"{found.reason}, one of x, y, z")
             (free if found.channel else choice.unused).append(found)
     taken = {item.channel for item in choice.chosen}
     free = _left_after(taken, free, choice)

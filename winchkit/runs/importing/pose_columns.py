@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import Column
 
-__all__ = ["body_of", "chosen_body", "complete_sets", "quaternion_names"]
+__all__ = ["body_of", "chosen_body", "complete_sets", "quaternion_names", "vector_names"]
 
 _NOT_A_BODY = re.compile(
     r"^(rigid body|rigid body marker|marker|bone|type|name|position|rotation|orientation|"
     r"mean marker error|marker quality|trajectories|pose pose|pose|transform)$"
 )
+_AXES = re.compile("[xyz]")
 _POSITION = ("platform_x", "platform_y", "platform_z")
 _QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
 _ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
@@ -91,6 +92,28 @@ def complete_sets(channels: Mapping[str, object]) -> tuple[str, ...]:
         if all(name in channels for name in group):
             return found + group
     return found
+
+
+def vector_names(names: Sequence[str]) -> frozenset[str]:
+    """Names that differ in x, y and z only, as those of a six-axis cell: ``Fx``, ``Fy``, ``Fz``.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Names of all columns.
+
+    Returns
+    -------
+    frozenset of str
+        Names of which all three components are there.
+    """
+    stems: dict[tuple[str, str], dict[str, str]] = {}
+    for name in names:
+        plain = words_of(name).replace(" ", "")
+        for axis in _AXES.finditer(plain):
+            stem = plain[: axis.start()], plain[axis.end() :]
+            stems.setdefault(stem, {})[axis[0]] = name
+    return frozenset(n for own in stems.values() if len(own) == 3 for n in own.values())
 
 
 def quaternion_names(names: Sequence[str]) -> dict[str, str]:
