@@ -441,3 +441,32 @@ def test_a_velocity_that_says_nothing_of_the_angle_is_not_inconsistent() -> None
     assert "inconsistent-velocity" not in _with_velocity(quantised, slow)
     assert "inconsistent-velocity" not in _with_velocity(40 * np.sin(time), 40 * np.cos(time) + 90)
     assert "inconsistent-velocity" not in _with_velocity(np.sin(time), rng.normal(0, 1, COUNT))
+
+
+@pytest.mark.parametrize("row", [0, -1])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_first_or_last_row_of_another_moment_is_an_outlier(row: int, seed: int) -> None:
+    """A logger's first row has values from before: angle and torque jump together."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(COUNT) / RATE
+    angle, torque = 3 * np.sin(time), 0.2 * np.cos(time) + rng.normal(0, 0.01, COUNT)
+    assert not inspect_run(_drive(time, angle, torque)).outliers
+    angle[row] -= 4.0
+    torque[row] += 0.5
+    masks = inspect_run(_drive(time, angle, torque)).outliers
+    assert {name: np.flatnonzero(mask).tolist() for name, mask in masks.items()} == {
+        "motor_angle": [range(COUNT)[row]],
+        "motor_torque": [range(COUNT)[row]],
+    }
+
+
+def test_a_run_may_begin_in_motion_or_with_a_step_like_later_ones() -> None:
+    time = np.arange(COUNT) / RATE
+    square = 0.3 * np.sign(np.sin(20 * time + 1e-3))
+    square[0] = -0.3
+    assert not inspect_run(_drive(time, 90 * time, square)).outliers
+
+
+def _drive(time: Array, angle: Array, torque: Array) -> Run:
+    channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+    return Run("r", time, channels)

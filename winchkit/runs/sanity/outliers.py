@@ -20,6 +20,8 @@ _LIMIT = 12.0
 """Local standard deviations: beyond 8 in none of 10¹⁵ Gaussian samples, and room for tails."""
 _AGREEMENT = 0.25
 """Largest range of the four neighbours, in deviations of the sample."""
+_END = 3.0
+"""Largest other steps of a run in the step from its first sample, or to its last one."""
 _SAME_EVENT = 4.0
 """Local standard deviations of another channel at the same time, with which a peak is physical."""
 _LEVEL = 0.01
@@ -46,9 +48,12 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
     deviations (of the deviations, by their median over 50 samples), and the neighbours agree within
     a quarter of it. Where one of the two at a distance of two samples deviates as much, it is left
     out: of two spikes with one sample between them, neither hides the other. A peak that lasts two
-    samples, a step, or an oscillation is none.
+    samples, a step, or an oscillation is none. The first and the last sample have neighbours on
+    one side: they are spikes where the step to the next sample exceeds twelve standard deviations
+    and three times the largest other step, and the next four samples agree.
     """
-    return _spikes(values, resolution(values))[0]
+    spikes, _, ends = _spikes(values, resolution(values))
+    return spikes | ends
 
 
 def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArray[np.bool_]]:
@@ -65,7 +70,8 @@ def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArr
     -------
     dict of (n,) array of bool
         Channels with at least one spike. A peak of the force that lasts one sample, as at a jerk,
-        appears in the angle, the tension, the load or the torque at the same time: it is none.
+        appears in the angle, the tension, the load or the torque at the same time: it is none. A
+    first or last row of another moment differs in several channels.
 
     Notes
     -----
@@ -77,18 +83,20 @@ def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArr
     names = [name for name in run if name.rpartition(".")[2] in CHANNEL_DIMENSIONS]
     found = {name: _spikes(run[name], resolutions[name]) for name in names}
     out = {}
-    for name, (spikes, _) in found.items():
+    for name, (spikes, _, ends) in found.items():
         winch = name.rpartition(".")[0]
+        if ends.any():
+            out[name] = ends
         if not spikes.any():
             continue
         beside = [
             shared
-            for other, (_, shared) in found.items()
+            for other, (_, shared, _) in found.items()
             if other != name and other.rpartition(".")[0] in {"", winch}
         ]
         alone = spikes & ~_physical(spikes, beside)
         if alone.any():
-            out[name] = alone
+            out[name] = alone | ends
     return out
 
 
@@ -109,13 +117,15 @@ def outliers(run: Run, masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Findi
         )
 
 
-def _spikes(values: Array, step: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Spikes, and samples whose deviation is large enough to be the same event."""
-    out, event = np.zeros(len(values), dtype=bool), np.zeros(len(values), dtype=bool)
+def _spikes(
+    values: Array, step: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Spikes, samples whose deviation is large enough to be the same event, and ends apart."""
+    out, event, ends = (np.zeros(len(values), dtype=bool) for _ in range(3))
     rows = np.flatnonzero(np.isfinite(values))
     known = values[rows]
     if len(known) < _WINDOW:
-        return out, event
+        return out, event, ends
     around = np.stack([known[:-4], known[1:-3], known[3:-1], known[4:]])
     deviation = np.abs(known[2:-2] - _median_of_four(*around))
     # Neighbours that are equal in a quantised or held channel have a local deviation of zero.
@@ -129,7 +139,16 @@ def _spikes(values: Array, step: float) -> tuple[NDArray[np.bool_], NDArray[np.b
     agree = np.ptp(around, axis=0) < _AGREEMENT * deviation
     out[rows[2:-2][large & agree]] = True
     event[rows[2:-2][deviation > _SAME_EVENT * scale]] = True
-    return out, event
+    ends[rows[0]] = _is_apart(known, float(scale[0]))
+    ends[rows[-1]] = _is_apart(known[::-1], float(scale[-1]))
+    return out, event, ends
+
+
+def _is_apart(values: Array, scale: float) -> bool:
+    """Whether the first value is no sample of the signal that follows it."""
+    steps = np.abs(np.diff(values))
+    limit = max(_LIMIT * scale, _END * float(np.max(steps[1:])))
+    return bool(steps[0] > limit and np.ptp(values[1:5]) < _AGREEMENT * steps[0])
 
 
 def _median_of_four(a: Array, b: Array, c: Array, d: Array) -> Array:
