@@ -218,7 +218,7 @@ def _stored(value: int, bits: int, how: str) -> int:
 
 
 @pytest.mark.parametrize(("bits", "how"), [(11, "sign and magnitude"), (16, "two's complement")])
-def test_a_lost_sign_is_told(bits: int, how: str, tmp_path: Path) -> None:
+def test_a_lost_sign_has_a_note(bits: int, how: str, tmp_path: Path) -> None:
     """A servo's load of ±300 in a field without a sign."""
     head = "time,position,torque\n"
     loads = [round(300 * np.sin(k / 9)) for k in range(COUNT)]
