@@ -46,7 +46,6 @@ class _Felt(NamedTuple):
     angle: float = nan
     length: float = nan
     tension: float = nan
-    correction: float = 0.0
 
 
 class CableMap:
@@ -64,6 +63,10 @@ class CableMap:
         """The motor angle that :meth:`at` was asked for last, and its answer: several ask for the
         same in a cycle."""
         self._felt = _Felt()
+        self.correction = 0.0
+        """Tension at the platform end less the reading of the cell, N."""
+        self.bends = now is not None
+        """Whether effects of the profile are to be evaluated in every cycle."""
         self.failure: FileError | None = None
         """Fault of an effect of the profile; None while all can be evaluated."""
 
@@ -76,11 +79,6 @@ class CableMap:
     def yields(self) -> bool:
         """Whether the length depends on more than the motor angle."""
         return self._now is not None and self._now.yields
-
-    @property
-    def bends(self) -> bool:
-        """Whether effects of the profile are to be evaluated in every cycle."""
-        return self._now is not None
 
     def feel(self, sample: Sample) -> None:
         """Take the measurements of this cycle."""
@@ -104,16 +102,10 @@ class CableMap:
         arm = self._here.arm
         if not moved < _FAR:
             arm = self._line.arm(sample.motor_angle)
-        self._felt = _Felt(
-            sample.time, sample.motor_angle, state.length, state.tension, state.correction
-        )
+        self._felt = _Felt(sample.time, sample.motor_angle, state.length, state.tension)
+        self.correction = state.correction
         self._here = _Here(sample.motor_angle, state.length, arm)
         self._asked = _NEVER
-
-    @property
-    def correction(self) -> float:
-        """Tension at the platform end less the reading of the cell, N."""
-        return self._felt.correction
 
     def at(self, motor_angle: float) -> tuple[float, float]:
         """Cable length (m) and arm (m/rad) at a motor angle (rad)."""

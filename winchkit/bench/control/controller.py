@@ -34,7 +34,10 @@ somebody else enables is stopped well within 0.15 s, the longest a first stop ma
 _TRANSFER_PAUSE = 1.0
 """Longest time between two requests of one SDO transfer, s: the usual time-out of a client. A frame
 from here in between would abort the transfer, which may be that of a firmware."""
-_FOLLOWING = (Phase.MOVING, Phase.RUN_DOWN)
+_MOVING = Phase.MOVING
+_FOLLOWING = (_MOVING, Phase.RUN_DOWN)
+_OPERATION_ENABLED = State.OPERATION_ENABLED
+_ENABLE, _DISABLE = Wish.ENABLE, Wish.DISABLE
 _ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 
@@ -275,9 +278,11 @@ class Controller:
         feedback = self.axis.feedback
         if feedback is None:
             return
-        match self.phase:
-            case Phase.MOVING:
-                self._move(now, feedback)
+        phase = self.phase
+        if phase is _MOVING:
+            self._move(now, feedback)
+            return
+        match phase:
             case Phase.DISABLED:
                 self._stay_disabled(now, feedback)
             case Phase.ENABLING:
@@ -357,12 +362,12 @@ class Controller:
         self._enter(Phase.STOPPING, now)
 
     def _stay_disabled(self, now: float, feedback: AxisFeedback) -> None:
-        if feedback.state is State.OPERATION_ENABLED or self._enabled_unseen(now, feedback):
+        if feedback.state is _OPERATION_ENABLED or self._enabled_unseen(now, feedback):
             self.uncommanded = "the drive was enabled without a command from here"
             self._enter(Phase.STOPPING, now)
             self._stop(now, feedback)
             return
-        self._word = self.axis.send(Wish.DISABLE)
+        self._word = self.axis.send(_DISABLE)
 
     def _enabled_unseen(self, now: float, feedback: AxisFeedback) -> bool:
         """Whether a drive that answers no SYNC shows by SDO that it is in operation enabled.
@@ -422,25 +427,26 @@ class Controller:
             self._fail(waiting if enabled else stays, now)
 
     def _move(self, now: float, feedback: AxisFeedback) -> None:
-        if self.source is None or feedback.state is not State.OPERATION_ENABLED:
+        source = self.source
+        if source is None or feedback.state is not _OPERATION_ENABLED:
             self._leave(now, feedback)
             return
-        target = self.source.target(self._time, feedback.angle, now)
+        target = source.target(self._time, feedback.angle, now)
         self._follow(target, feedback)
         if target.done:
             self.done = True
-            if not self.source.holds:
+            if not source.holds:
                 self._begin_run_down(now)
 
     def _follow(self, target: Target, feedback: AxisFeedback) -> None:
+        velocity, angle, self.commanded, _, start = target
         fastest = self.limits.speed / abs(self.cable.at(feedback.angle)[1])
-        velocity = self._velocity = max(-fastest, min(fastest, target.velocity))
-        self.commanded = target.winding_speed
-        if target.angle is not None:
-            self._angle = target.angle
-        self._word = self.axis.send(
-            Wish.ENABLE, velocity=velocity, angle=target.angle, start=target.start
-        )
+        if not abs(velocity) <= fastest:
+            velocity = max(-fastest, min(fastest, velocity))
+        self._velocity = velocity
+        if angle is not None:
+            self._angle = angle
+        self._word = self.axis.send(_ENABLE, velocity=velocity, angle=angle, start=start)
 
     def _begin_run_down(self, now: float) -> None:
         source: object = self.source

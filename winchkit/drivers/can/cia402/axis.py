@@ -11,7 +11,7 @@ from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
 from winchkit.drivers.can.canopen.nmt import NMT_STATES, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
-from winchkit.drivers.can.cia402.command import Command, Commander
+from winchkit.drivers.can.cia402.command import Commander
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec, await_booted, commission
 from winchkit.drivers.can.cia402.feedback import (
     AxisFeedback,
@@ -44,6 +44,9 @@ _STALE_SYNCS, _STALE_BEATS = 5, 2
 _LATE_REPLY = 0.05
 """Left for the reply to a single SDO request, s: a tenth of the time-out of a transfer."""
 _NMT_STOP = 0x02
+_ENABLE, _DISABLE = Wish.ENABLE, Wish.DISABLE
+_RAMPS = (Wish.RUN_DOWN, Wish.HALT)
+_OPERATIONAL = int(NmtState.OPERATIONAL)
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 
@@ -67,7 +70,7 @@ class Cia402Axis:
         self.emergencies = EmergencyLog()
         self.drive: Commissioned | None = None
         """Confirmed set-up; None before the axis is commissioned."""
-        self._mode = MODES[device.servo.motion_mode]
+        self._enter_mode(device.servo.motion_mode)
         self._bus, self._clock, self._watch = bus, clock, watch
         self._node = SdoNode(bus, node, Path(device.path).parent / device.servo.eds)
         terms = Terms(watch.host, watch.timeout, watch.heartbeat, watch.cycle)
@@ -124,7 +127,8 @@ class Cia402Axis:
         counter = self._position.begin(drive, self._boot_ups)
         commander = Commander(self.name, drive, self._node.node, drive.mode, counter)
         gathering = self._listen(drive)
-        self.drive, self._mode = drive, MODES[drive.mode]
+        self.drive = drive
+        self._enter_mode(drive.mode)
         self._quick_stop = self._watch.quick_stop
         self._commander, self._gathering = commander, gathering
         self._stop_frames = commander.stop_frames()
@@ -184,11 +188,6 @@ class Cia402Axis:
     def mode(self) -> str:
         """Name of its mode of operation."""
         return self._mode.name
-
-    @property
-    def moves_alone(self) -> bool:
-        """Whether it makes the motion of its mode by itself (HM, PP)."""
-        return self._mode.moves_alone
 
     @property
     def nmt_text(self) -> str:
@@ -275,23 +274,27 @@ class Cia402Axis:
         """Frames with fewer bytes than they should have."""
         return self.health.short + self.emergencies.short
 
-    @property
-    def position_mode(self) -> bool:
+    def _enter_mode(self, name: str) -> None:
+        self._mode = mode = MODES[name]
+        self.moves_alone = mode.moves_alone
+        """Whether it makes the motion of its mode by itself (HM, PP)."""
+        self.position_mode = mode.kind is Target.ANGLE
         """Whether it is moved by target positions (CSP, IP) and not by speeds."""
-        return self._mode.kind is Target.ANGLE
 
     @property
     def mode_kept(self) -> bool:
         """Whether the drive still shows the mode that it was given."""
-        feedback = self.feedback
-        shown = None if feedback is None else feedback.mode
+        gathering = self._gathering
+        if gathering is None or gathering.feedback is None:
+            return True
+        shown = gathering.feedback.mode
         return shown is None or shown == self._mode.number
 
     @property
     def operational(self) -> bool:
         """Whether its heartbeat shows the NMT state operational."""
         state = self.heartbeat.state
-        return state is None or state == NmtState.OPERATIONAL
+        return state is None or state == _OPERATIONAL
 
     @property
     def mapping_lost(self) -> bool:
@@ -310,7 +313,7 @@ class Cia402Axis:
 
     def _certain(self, feedback: AxisFeedback | None) -> State:
         """The state that a feedback, the newest, shows."""
-        if feedback is None or self.mapping_lost:
+        if feedback is None or self.heartbeat.boot_ups != self._boot_ups:
             return State.UNKNOWN
         sync, now = self._cycle
         old = sync - feedback.sync > _STALE_SYNCS
@@ -370,11 +373,11 @@ class Cia402Axis:
         commander, feedback = self._commander, self.feedback
         if commander is None or feedback is None:
             return self._previous
-        if wish in (Wish.RUN_DOWN, Wish.HALT) and not self._mode.can_run_down:
+        if wish in _RAMPS and not self._mode.can_run_down:
             wish = Wish.STOP
-        if wish is Wish.ENABLE and not self._watched and not self._note_life_sign():
+        if not self._watched and wish is _ENABLE and not self._note_life_sign():
             # The drive's watchdog arms on the first life sign that it receives.
-            wish = Wish.DISABLE
+            wish = _DISABLE
         word = control_word(
             self._certain(feedback),
             wish,
@@ -382,8 +385,9 @@ class Cia402Axis:
             age=self._cycle[0] - feedback.sync,
             at_rest=self._position.at_rest(feedback),
         )
-        command = Command(wish, velocity, angle, torque, start)
-        word, frames = commander.frames(word, command, feedback)
+        word, frames = commander.frames(
+            word, feedback, wish, velocity=velocity, angle=angle, torque=torque, start=start
+        )
         if not self.host.silent or not self.host.withholds_rpdos:
             for identifier, data in frames:
                 self._bus.post(identifier, data)
@@ -403,18 +407,20 @@ class Cia402Axis:
             )
         homed = self.homing is Homing.DONE
         commander = Commander(self.name, drive, self._node.node, mode, self._position.counter)
-        before = self._commander, self._mode
+        before, previous = self._commander, self._mode.name
         # From here on cyclic PDOs must carry the new mode, lest they set the old one again.
-        self._commander, self._mode = commander, MODES[mode]
+        self._commander = commander
+        self._enter_mode(mode)
         self._stop_frames = commander.stop_frames()
         try:
             change_mode(self._node, mode, self._clock)
         except WinchkitError:
-            self._commander, self._mode = before
+            self._commander = before
+            self._enter_mode(previous)
             if self._commander is not None:
                 self._stop_frames = self._commander.stop_frames()
             raise
-        self._position.changed_mode(before[1].name, mode, homed=homed)
+        self._position.changed_mode(previous, mode, homed=homed)
 
     def prepare_homing(self, homing: HomingSpec) -> None:
         """Set a homing up and change to HM, disabled; ``send(Wish.ENABLE, start=True)`` runs it.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import struct
 from enum import Enum
 from itertools import accumulate, islice
-from typing import NamedTuple
 
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.commission import Commissioned
@@ -22,7 +21,6 @@ from winchkit.drivers.can.cia402.state_machine import (
 from winchkit.errors import Fault, FileError, NotPermitted
 
 __all__ = [
-    "Command",
     "Commander",
     "SetPoint",
 ]
@@ -68,21 +66,8 @@ Key = tuple[int, int]
 _CONTROL, _MODE = (0x6040, 0), (0x6060, 0)
 _VELOCITY_OFFSET, _TORQUE_OFFSET = (0x60B1, 0), (0x60B2, 0)
 _ALWAYS = {_CONTROL, _MODE, _VELOCITY_OFFSET, _TORQUE_OFFSET}
-_MOVES = (Wish.ENABLE, Wish.RUN_DOWN)
-
-
-class Command(NamedTuple):
-    """Requested state and targets of one cycle; SI at the motor shaft."""
-
-    wish: Wish
-    velocity: float = 0.0
-    """rad/s."""
-    angle: float | None = None
-    """rad; None holds the axis where it is."""
-    torque: float = 0.0
-    """N m."""
-    start: bool = False
-    """Start a homing."""
+_ENABLED, _RUN_DOWN = State.OPERATION_ENABLED, Wish.RUN_DOWN
+_MOVES = (Wish.ENABLE, _RUN_DOWN)
 
 
 class Commander:
@@ -99,6 +84,8 @@ class Commander:
         """Raise FileError where the device file maps too little, or an object without a source."""
         self._name, self._drive, self._mode = name, drive, MODES[mode]
         self.counter = counter or PositionCounter(*counter_range(drive.tpdo))
+        self._by_angle = self._mode.kind is Target.ANGLE
+        self._homes = mode == "HM"
         self._set_point = SetPoint() if mode == "PP" else None
         target = self._mode.target
         _check(name, drive, mode, target)
@@ -126,28 +113,35 @@ class Commander:
         self._torques = self._places((0x6071, 0) if kind is Target.TORQUE else _TORQUE_OFFSET)
 
     def frames(
-        self, word: int, command: Command, feedback: AxisFeedback
+        self,
+        word: int,
+        feedback: AxisFeedback,
+        wish: Wish,
+        *,
+        velocity: float = 0.0,
+        angle: float | None = None,
+        torque: float = 0.0,
+        start: bool = False,
     ) -> tuple[int, list[tuple[int, bytes]]]:
         """The control word with the bits of the mode, and the frames to send.
 
         ``word`` is what the state machine asks for; only one that keeps the drive enabled gets
-        bits and targets, any other goes with zero and the actual position. Raises NotPermitted
-        for targets beyond the drive's range.
+        bits and targets (rad/s, rad, N m; no angle holds the axis where it is, ``start`` starts a
+        homing), any other goes with zero and the actual position. Raises NotPermitted for targets
+        beyond the drive's range.
         """
-        wish, velocity, angle, torque, start = command
-        enabled = feedback.state is State.OPERATION_ENABLED
-        moves = enabled and word == ENABLE_OPERATION and wish in _MOVES
+        moves = word == ENABLE_OPERATION and feedback.state is _ENABLED and wish in _MOVES
         actual = feedback.shown
         if actual is None:
             actual = self._drive.scale.angle_counts(feedback.angle)
-        bits, aim, mode = 0, actual, self._mode
-        if moves and mode.kind is Target.ANGLE:
+        bits, aim = 0, actual
+        if moves and self._by_angle:
             bits, aim = self._aim(angle, feedback, actual)
         elif self._set_point is not None:
             self._set_point.reset(actual)
-        elif moves and start and mode.name == "HM":
+        elif moves and start and self._homes:
             bits = START
-        if moves and wish is Wish.RUN_DOWN and mode.moves_alone:
+        if moves and wish is _RUN_DOWN and self._mode.moves_alone:
             bits = HALT
         word |= bits
         values = self._zeros.copy()

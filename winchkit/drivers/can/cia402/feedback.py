@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from operator import itemgetter
 from typing import Any, NamedTuple
 
 from winchkit.drivers.can.bus.bus import Handler
@@ -133,7 +132,7 @@ class Gathering:
         self._lacking = tuple(_WITHOUT[key] for key in lacking)
         objects = [*mapped, *lacking]
         # A quantity that no TPDO carries is any number times NaN.
-        self._pick = itemgetter(*(objects.index(key) if key in objects else 0 for key in _SHOWN))
+        self._at = tuple(objects.index(key) if key in objects else 0 for key in _SHOWN)
         units = zip(
             _QUANTITIES, (scale.angle, scale.velocity, scale.torque, scale.current), strict=True
         )
@@ -158,7 +157,8 @@ class Gathering:
         if self._strays:
             self._strays = []
         self._next = self._first
-        self._sync, self._sent = sync, now
+        self._sync = sync
+        self._sent = now
 
     def receiver(self, codec: PdoCodec) -> Handler:
         """What takes the frames of one TPDO."""
@@ -168,8 +168,9 @@ class Gathering:
         """Take a TPDO of the set; the last of them completes an answer, which becomes feedback."""
         number, size, frames = codec.spec.number, codec.size, self._frames
         place = sorted(self._order).index(number)
-        unpack, pick, cycle = self._unpack, self._pick, self._cycle
-        counter = self._counter
+        unpack, cycle, join = self._unpack, self._cycle, b"".join
+        slower, lacking, counter = self._slower, self._lacking, self._counter
+        status_at, position_at, velocity_at, torque_at, mode_at, error_at, current_at = self._at
         angle, speed, torque, current = self._units
 
         def receive(data: bytes, now: float) -> None:
@@ -186,11 +187,15 @@ class Gathering:
             self._next = following = self._following[number]
             if following:
                 return
-            values = unpack(b"".join(frames))
-            values += self._others(now) if self._slower else self._lacking
-            status, position, velocity, force, mode, error, amperes = pick(values)
-            delay, sent = self._came - self._sent, self._sent
-            time = sent + delay / 2 if 0 <= delay < cycle else sent
+            values = unpack(join(frames))
+            if slower:
+                values += self._others(now)
+            elif lacking:
+                values += lacking
+            sent = self._sent
+            delay = self._came - sent
+            time = sent if delay < 0.0 or delay >= cycle else sent + delay / 2.0
+            position, status = values[position_at], values[status_at]
             self._complete += 1
             # What AxisFeedback(...) makes, without the call of its constructor.
             self.feedback = _new(
@@ -201,11 +206,11 @@ class Gathering:
                     STATES[status & STATE_BITS],
                     status,
                     counter.take(position, time) * angle,
-                    velocity * speed,
-                    force * torque,
-                    mode,
-                    error,
-                    amperes * current,
+                    values[velocity_at] * speed,
+                    values[torque_at] * torque,
+                    values[mode_at],
+                    values[error_at],
+                    values[current_at] * current,
                     position,
                     counter.known,
                 ),

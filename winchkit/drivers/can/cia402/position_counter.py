@@ -38,7 +38,7 @@ class PositionCounter:
     def take(self, count: int, time: float) -> int:
         """Take a count of the drive and the time of its sampling (s); returns it unwrapped."""
         change = count - self.last
-        if not -self.half <= change <= self.half:
+        if abs(change) > self.half:
             self.cross(change)
         if time - self.time > self.gap:
             self.miss()

@@ -45,12 +45,15 @@ class Standstill:
         if time <= self._time:
             return self._still
         self._time = time
+        speed = abs(velocity)
+        if speed > self.speed:
+            self._angle, self._since, self._still = angle, time, False
+            return False
         if not isfinite(self._angle):
             self._angle = angle
-        turns = abs(velocity) > self.speed
-        if turns or abs(angle - self._angle) > self.travel:
+        if abs(angle - self._angle) > self.travel:
             self._angle, self._since = angle, time
-        self._still = abs(velocity) <= self.speed and time - self._since >= _WINDOW
+        self._still = speed <= self.speed and time - self._since >= _WINDOW
         return self._still
 
 
