@@ -168,3 +168,35 @@ def test_every_quantity_is_compared() -> None:
     compared = {row.kind for row in CONDITIONS if isinstance(row.holds, Exceeds)}
     assert compared == {kind for kind, _ in FORMULAS}
     assert all(isinstance(row.holds, Exceeds) or row.by_facts for row in CONDITIONS)
+
+
+READINGS = st.lists(
+    st.tuples(
+        st.sampled_from([0.0, 0.004, 0.03, 0.06]),
+        near(20.0, 100.0, 500.0),
+        st.integers(1, 5),
+        st.sampled_from([True, True, True, False]),
+    ),
+    min_size=1,
+    max_size=12,
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(readings=READINGS, moving=INPUTS)
+def test_a_reading_that_stays_leads_to_the_same_rate_again(
+    readings: list[tuple[float, float, int, bool]], moving: WinchInput
+) -> None:
+    """One memory sees the same object for several cycles, the other an equal one in each."""
+    same, equal = Memory(BENCHES[0]), Memory(BENCHES[0])
+    now, newest = 1.0, 1.0
+    for step, value, cycles, stamped in readings:
+        newest += step
+        time = newest if stamped else math.nan
+        cell = Instrumented(value, newest, 0.1, "good", time, gross=value, received=newest)
+        for _ in range(cycles):
+            now = max(now + CYCLE, newest)
+            same.observe(moving._replace(tension=cell, now=now))
+            equal.observe(moving._replace(tension=cell._replace(), now=now))
+            assert repr(same.quantities) == repr(equal.quantities)
+            assert repr((same.gross, same.tension_rate)) == repr((equal.gross, equal.tension_rate))

@@ -35,6 +35,7 @@ __all__ = [
     "within_limits",
 ]
 
+_new = tuple.__new__
 _CALM = 0.5
 """Time at rest before the length is compared with its target, s: the tension settles."""
 _CLOSE = 1e-4
@@ -163,9 +164,11 @@ class Ramp:
 
     def follow(self, wish: float, time: float) -> float:
         """Speed at ``time``; the first call starts the clock."""
-        step = 0.0 if self._time is None else (time - self._time) * self._acceleration
-        self._time = time
-        self.speed += max(-step, min(step, wish - self.speed))
+        before, self._time = self._time, time
+        missing = wish - self.speed
+        if missing and before is not None:
+            step = (time - before) * self._acceleration
+            self.speed += max(-step, min(step, missing))
         return self.speed
 
 
@@ -202,7 +205,8 @@ class Jog:
         velocity = speed / arm
         self._angle += velocity * (time - self._last)
         self._last = time
-        return Target(velocity, self._angle, speed, not live and speed == 0.0)
+        # What Target(...) makes, without the call of its constructor.
+        return _new(Target, (velocity, self._angle, speed, not live and speed == 0.0, False))
 
     def _within(self, wish: float, length: float) -> float:
         """Commanded speed, limited to the one from which the winch stops before a length limit.
@@ -215,7 +219,7 @@ class Jog:
         room = max(0.0, (length - low if wish > 0 else high - length) - _MARGIN)
         lag = self._lag
         fastest = math.sqrt(lag * lag + 2 * self._limits.acceleration * room) - lag
-        return math.copysign(min(abs(wish), fastest), wish)
+        return wish if abs(wish) <= fastest else math.copysign(fastest, wish)
 
 
 class RunDown:

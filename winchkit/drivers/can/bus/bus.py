@@ -387,31 +387,34 @@ class CanBus:
             if not frames and (state := port.state()) is not None:
                 self._errors.enter(state)
             now = self.clock.now()
-            for frame in frames:
-                try:
-                    self._dispatch(frame, now)
-                except Exception as error:  # noqa: BLE001 - a defect: it is named, the bench stops
-                    self.fault = (
-                        f"internal error in the receive thread at frame {frame.identifier:03X}h: "
-                        f"{type(error).__name__}: {error}"
-                    )
-                    return
+            if not self._dispatch(frames, now):
+                return
 
-    def _dispatch(self, frame: Frame, now: float) -> None:
-        identifier, data, stamp, error = frame
-        if error:
-            self._take_error(frame)
-            return
-        self.received += 1
-        if self.tap is not None:
-            self._show(now, identifier, data)
-        if identifier > _HEARTBEAT:
-            self._heard.add(identifier - _HEARTBEAT)
-        handler = self._handlers.get(identifier)
-        if handler is not None:
-            handler(data, self._times.map(stamp, now) if stamp else now)
-        elif identifier in _SDO_REPLY and len(data) == _SDO_SIZE:
-            self.network.notify(identifier, bytearray(data), now)
+    def _dispatch(self, frames: Sequence[Frame], now: float) -> bool:
+        """Hand frames to their handlers; False where one has raised, which is a defect."""
+        handler_of, stamp_to_clock = self._handlers.get, self._times.map
+        for identifier, data, stamp, error in frames:
+            try:
+                if error:
+                    self._take_error(identifier, data)
+                    continue
+                self.received += 1
+                if self.tap is not None:
+                    self._show(now, identifier, data)
+                if identifier > _HEARTBEAT:
+                    self._heard.add(identifier - _HEARTBEAT)
+                handler = handler_of(identifier)
+                if handler is not None:
+                    handler(data, stamp_to_clock(stamp, now) if stamp else now)
+                elif identifier in _SDO_REPLY and len(data) == _SDO_SIZE:
+                    self.network.notify(identifier, bytearray(data), now)
+            except Exception as raised:  # noqa: BLE001 - a defect: it is named, the bench stops
+                self.fault = (
+                    f"internal error in the receive thread at frame {identifier:03X}h: "
+                    f"{type(raised).__name__}: {raised}"
+                )
+                return False
+        return True
 
     def _show_sent(self, identifier: int, data: bytes) -> None:
         """Show a frame that was sent here; no interface hands it back."""
@@ -426,10 +429,10 @@ class CanBus:
         else:
             self.tap = None
 
-    def _take_error(self, frame: Frame) -> None:
+    def _take_error(self, identifier: int, data: bytes) -> None:
         """A bus-off is a fault: until the controller restarts no frame is sent."""
         before = self._errors.state
-        self._errors.take(frame.identifier, frame.data)
+        self._errors.take(identifier, data)
         state = self._errors.state
         if state is BusState.OFF and before is not BusState.OFF:
             self.fault = "the controller is bus off; check termination, bit rate and wiring"

@@ -23,6 +23,7 @@ from winchkit.drivers.can.bus.health import BusState
 __all__ = ["Frame", "SocketCan", "parse_socketcan"]
 
 _FRAME = struct.Struct("=IB3x8s")
+_SIZE = _FRAME.size
 _EXTENDED, _REMOTE, _ERROR = 1 << 31, 1 << 30, 1 << 29
 _STAMP = struct.Struct("@ll")
 _INTERVAL = struct.Struct("@ll")
@@ -37,6 +38,9 @@ _VECTOR = struct.Struct("@PN")
 _MESSAGE = struct.Struct("@PIPNPNi0PI0P")
 """``struct mmsghdr``: name and its size, vectors and their number, control messages and their
 size, flags, bytes of the message."""
+_HEADER = struct.calcsize("@PIPNP")
+_OUTCOME = struct.Struct(f"@{_HEADER}xNi0PI0P")
+"""What a call has set of it: size of the control messages, flags, bytes of the message."""
 _MOST, _ANCILLARY = 64, 128
 """Frames of one system call, and bytes of control messages of each."""
 _CONFIRM = 0x800
@@ -156,12 +160,15 @@ class _Messages:
         """Frames of the first ``count``, which were received, and the newest count of drops."""
         taken: list[Frame] = []
         dropped, at, place = None, 0, 0
-        headers = _MESSAGE.iter_unpack(self._headers[: count * _MESSAGE.size])
+        outcomes = _OUTCOME.iter_unpack(self._headers[: count * _MESSAGE.size])
         contents = _FRAME.iter_unpack(self._frames[: count * _FRAME.size])
-        for (*_, used, flags, size), (word, length, payload) in zip(headers, contents, strict=True):
+        for (used, flags, size), (word, length, payload) in zip(outcomes, contents, strict=True):
             frame: Frame | None
-            if size == _FRAME.size and word < _ERROR:
-                stamp, drops = _told(self._control, place, place + used) if used else (0.0, None)
+            drops = None
+            if size == _SIZE and word < _ERROR:
+                stamp = 0.0
+                if used:
+                    stamp, drops = _told(self._control, place, place + used)
                 # What Frame(...) makes, without the call of its constructor.
                 frame = _new(Frame, (word, payload[:length], stamp, False))
             else:
@@ -171,7 +178,8 @@ class _Messages:
                 dropped = drops
             if frame is not None and not flags & _CONFIRM:
                 taken.append(frame)
-            at, place = at + _FRAME.size, place + self._ancillary
+            at += _SIZE
+            place += self._ancillary
         return taken, dropped
 
     def fill(self, frames: Iterable[tuple[int, bytes]]) -> None:
