@@ -123,6 +123,50 @@ def test_stamps_are_mapped_within_the_least_delay_and_never_into_the_future(
         assert mapped <= sent + best + 4e-4 * elapsed + 2e-6
 
 
+class PlainTimes:
+    """The rules of ``FrameTime`` one after another, without regard to their cost."""
+
+    offset: float | None = None
+    last = 0.0
+    late_since: float | None = None
+
+    def map(self, stamp: float, now: float) -> float:
+        if stamp <= 0.0:
+            return now
+        seen = now - stamp
+        before = seen if self.offset is None else self.offset
+        late = seen - before
+        if late > 0.02:
+            since = stamp if self.late_since is None else self.late_since
+            was_set = stamp - since >= 0.25
+            self.offset, self.late_since = (seen, None) if was_set else (before, since)
+        else:
+            most = 2e-4 * max(0.0, now - self.last)
+            self.offset, self.late_since = before + min(late, most) if late >= 0 else seen, None
+        self.last = now
+        return max(stamp + self.offset, now - 0.1)
+
+
+@given(
+    frames=st.lists(
+        st.tuples(
+            st.sampled_from([0.0, 0.0, 0.0, 0.004, 0.02, 0.3]),
+            st.sampled_from([0.0, 0.0, 1e-4, 0.001, 0.019, 0.05, 0.2, -0.5, 0.5]),
+            st.sampled_from([True, True, True, False]),
+        ),
+        max_size=60,
+    )
+)
+def test_several_frames_of_a_reception_are_mapped_as_one_by_one(
+    frames: list[tuple[float, float, bool]],
+) -> None:
+    tested, plain, now = FrameTime(), PlainTimes(), 50.0
+    for step, delay, stamped in frames:
+        now += step
+        stamp = now + 1000.0 - delay if stamped else 0.0
+        assert tested.map(stamp, now) == plain.map(stamp, now)
+
+
 def test_a_frame_that_was_read_late_is_as_old_as_it_is() -> None:
     """A receive thread that was held up for 60 ms, then a backlog, then nothing special."""
     times = FrameTime()

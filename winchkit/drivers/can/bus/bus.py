@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import logging
+import math
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -52,7 +53,7 @@ class FrameTime:
     """
 
     def __init__(self) -> None:
-        self._offset: float | None = None
+        self._offset = math.inf
         self._last = 0.0
         self._late_since: float | None = None
 
@@ -60,25 +61,21 @@ class FrameTime:
         """Moment of a frame on the bench's clock, given its stamp and when it was received, s."""
         if stamp <= 0.0:
             return now
-        offset = self._offset = self._learn(stamp, now)
-        self._last = now
-        return max(stamp + offset, now - _OLDEST)
-
-    def _learn(self, stamp: float, now: float) -> float:
-        seen = now - stamp
-        if self._offset is None or seen < self._offset:
+        seen, offset = now - stamp, self._offset
+        if seen < offset:
+            self._late_since, offset = None, seen
+        elif seen - offset <= _LATE:
             self._late_since = None
-            return seen
-        late = seen - self._offset
-        if late <= _LATE:
-            self._late_since = None
-            return self._offset + min(late, _DRIFT * max(0.0, now - self._last))
-        if self._late_since is None:
+            # Not within a reception, whose frames have the same ``now``.
+            if now > self._last:
+                offset += min(seen - offset, _DRIFT * (now - self._last))
+        elif self._late_since is None:
             self._late_since = stamp
-        if stamp - self._late_since < _SET:
-            return self._offset
-        self._late_since = None
-        return seen
+        elif stamp - self._late_since >= _SET:
+            self._late_since, offset = None, seen
+        self._offset, self._last = offset, now
+        time, oldest = stamp + offset, now - _OLDEST
+        return time if time > oldest else oldest
 
 
 Handler = Callable[[bytes, float], None]

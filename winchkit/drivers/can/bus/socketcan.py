@@ -28,9 +28,11 @@ _EXTENDED, _REMOTE, _ERROR = 1 << 31, 1 << 30, 1 << 29
 _STAMP = struct.Struct("@ll")
 _INTERVAL = struct.Struct("@ll")
 _DROPS = struct.Struct("=I")
-_SO_TIMESTAMPNS, _SO_RXQ_OVFL = 35, 40
+_SOL_SOCKET, _SO_TIMESTAMPNS, _SO_RXQ_OVFL = socket.SOL_SOCKET, 35, 40
 _CONTROL = struct.Struct("@Nii0N")
 """``struct cmsghdr``: length with this header, level, kind; its content follows."""
+_STAMPED = struct.Struct("@Nii0Nll")
+"""The control message of a time stamp."""
 _WORD = struct.calcsize("@N")
 """To which the length of a control message is rounded up."""
 _VECTOR = struct.Struct("@PN")
@@ -168,7 +170,7 @@ class _Messages:
             if size == _SIZE and word < _ERROR:
                 stamp = 0.0
                 if used:
-                    stamp, drops = _told(self._control, place, place + used)
+                    stamp, drops = self._told(place, used)
                 # What Frame(...) makes, without the call of its constructor.
                 frame = _new(Frame, (word, payload[:length], stamp, False))
             else:
@@ -181,6 +183,14 @@ class _Messages:
             at += _SIZE
             place += self._ancillary
         return taken, dropped
+
+    def _told(self, place: int, used: int) -> tuple[float, int | None]:
+        """Time stamp and count of drops; nearly always there is the stamp alone."""
+        if used == _STAMPED.size:
+            length, level, kind, seconds, nanoseconds = _STAMPED.unpack_from(self._control, place)
+            if length == used and kind == _SO_TIMESTAMPNS and level == _SOL_SOCKET:
+                return seconds + nanoseconds * 1e-9, None
+        return _told(self._control, place, place + used)
 
     def fill(self, frames: Iterable[tuple[int, bytes]]) -> None:
         """Write data frames into the first of them."""
@@ -222,7 +232,7 @@ def _told(control: bytes | bytearray, at: int, last: int) -> tuple[float, int | 
         content, end = at + _CONTROL.size, at + length
         if length < _CONTROL.size or end > last:
             break
-        if level == socket.SOL_SOCKET:
+        if level == _SOL_SOCKET:
             if kind == _SO_TIMESTAMPNS and end - content >= _STAMP.size:
                 seconds, nanoseconds = _STAMP.unpack_from(control, content)
                 stamp = seconds + nanoseconds * 1e-9
