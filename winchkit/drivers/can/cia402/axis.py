@@ -11,7 +11,7 @@ from winchkit.drivers.can.canopen.emergency import EmergencyLog, error_text
 from winchkit.drivers.can.canopen.nmt import NMT_STATES, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
-from winchkit.drivers.can.cia402.command import Commander
+from winchkit.drivers.can.cia402.command import Command, Commander
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec, await_booted, commission
 from winchkit.drivers.can.cia402.feedback import (
     AxisFeedback,
@@ -45,6 +45,7 @@ _LATE_REPLY = 0.05
 """Left for the reply to a single SDO request, s: a tenth of the time-out of a transfer."""
 _NMT_STOP = 0x02
 _ENABLE, _DISABLE = Wish.ENABLE, Wish.DISABLE
+_new = tuple.__new__
 _RAMPS = (Wish.RUN_DOWN, Wish.HALT)
 _OPERATIONAL = int(NmtState.OPERATIONAL)
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
@@ -385,9 +386,9 @@ class Cia402Axis:
             age=self._cycle[0] - feedback.sync,
             at_rest=self._position.at_rest(feedback),
         )
-        word, frames = commander.frames(
-            word, feedback, wish, velocity=velocity, angle=angle, torque=torque, start=start
-        )
+        # What Command(...) makes, without the call of its constructor.
+        command = _new(Command, (wish, velocity, angle, torque, start))
+        word, frames = commander.frames(word, command, feedback)
         if not self.host.silent or not self.host.withholds_rpdos:
             for identifier, data in frames:
                 self._bus.post(identifier, data)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 from enum import Enum
 from itertools import accumulate, islice
+from typing import NamedTuple
 
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.commission import Commissioned
@@ -21,6 +22,7 @@ from winchkit.drivers.can.cia402.state_machine import (
 from winchkit.errors import Fault, FileError, NotPermitted
 
 __all__ = [
+    "Command",
     "Commander",
     "SetPoint",
 ]
@@ -70,6 +72,20 @@ _ENABLED, _RUN_DOWN = State.OPERATION_ENABLED, Wish.RUN_DOWN
 _MOVES = (Wish.ENABLE, _RUN_DOWN)
 
 
+class Command(NamedTuple):
+    """Requested state and targets of one cycle; SI at the motor shaft."""
+
+    wish: Wish
+    velocity: float = 0.0
+    """rad/s."""
+    angle: float | None = None
+    """rad; None holds the axis where it is."""
+    torque: float = 0.0
+    """N m."""
+    start: bool = False
+    """Start a homing."""
+
+
 class Commander:
     """Makes frames of commands, for one drive in one mode."""
 
@@ -113,23 +129,15 @@ class Commander:
         self._torques = self._places((0x6071, 0) if kind is Target.TORQUE else _TORQUE_OFFSET)
 
     def frames(
-        self,
-        word: int,
-        feedback: AxisFeedback,
-        wish: Wish,
-        *,
-        velocity: float = 0.0,
-        angle: float | None = None,
-        torque: float = 0.0,
-        start: bool = False,
+        self, word: int, command: Command, feedback: AxisFeedback
     ) -> tuple[int, list[tuple[int, bytes]]]:
         """The control word with the bits of the mode, and the frames to send.
 
         ``word`` is what the state machine asks for; only one that keeps the drive enabled gets
-        bits and targets (rad/s, rad, N m; no angle holds the axis where it is, ``start`` starts a
-        homing), any other goes with zero and the actual position. Raises NotPermitted for targets
-        beyond the drive's range.
+        bits and targets, any other goes with zero and the actual position. Raises NotPermitted
+        for targets beyond the drive's range.
         """
+        wish, velocity, angle, torque, start = command
         moves = word == ENABLE_OPERATION and feedback.state is _ENABLED and wish in _MOVES
         actual = feedback.shown
         if actual is None:
