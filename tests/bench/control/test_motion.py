@@ -60,6 +60,46 @@ def test_a_jog_slows_down_before_a_length_limit() -> None:
     assert not rig.supervisor.tripped
 
 
+@given(
+    cycles=st.lists(
+        st.tuples(
+            st.sampled_from([0.0, 0.0, 0.1, -0.1, 0.5, -0.7]),
+            st.sampled_from([CYCLE, CYCLE, 0.0, 0.1, 0.3]),
+            st.sampled_from([0.0, -900.0, -996.0, 690.0, 699.0, 900.0, math.nan]),
+            st.booleans(),
+        ),
+        max_size=40,
+    ),
+    limited=st.booleans(),
+)
+def test_a_jog_commands_the_plain_formula(
+    cycles: list[tuple[float, float, float, bool]], limited: bool
+) -> None:
+    """Towards the wish, within the speed from which it stops 2 mm before a limit, by the ramp."""
+    limits = LimitSpec(0.5, 1.0, (0.5, 9.0) if limited else None)
+    source = Jog(CableMap(StraightLine()), limits)
+    time, speed, before = 1.0, 0.0, None
+    source.start(time, 0.0, 0.0)
+    for wanted, step, angle, live in cycles:
+        time += step
+        source.refresh(wanted, time + 1.0 if live else time)
+        wish = max(-0.5, min(0.5, wanted)) if live else 0.0
+        if limited:
+            length = 4.0 - 0.005 * angle
+            room = (length - 0.5 if wish > 0 else 9.0 - length) - 0.002
+            room = room if room > 0.0 else 0.0
+            most = math.sqrt(0.06**2 + 2 * room) - 0.06
+            wish = math.copysign(min(abs(wish), most), wish)
+        change = 0.0 if before is None else time - before
+        speed += max(-change, min(change, wish - speed))
+        before = time
+        target = source.target(time, angle, time)
+        assert target.winding_speed == pytest.approx(speed, abs=1e-12)
+        assert target.velocity == pytest.approx(speed / 0.005, abs=1e-9)
+        assert target.done is (not live and target.winding_speed == 0.0)
+        assert not target.start
+
+
 @pytest.mark.parametrize("pays_out", [True, False])
 @pytest.mark.parametrize(
     ("speed", "acceleration", "response", "lag"),

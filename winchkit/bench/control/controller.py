@@ -439,11 +439,11 @@ class Controller:
                 self._begin_run_down(now)
 
     def _follow(self, target: Target, feedback: AxisFeedback) -> None:
-        velocity, angle, self.commanded, _, start = target
+        velocity, angle, winding_speed, _, start = target
         fastest = self.limits.speed / abs(self.cable.at(feedback.angle)[1])
         if not abs(velocity) <= fastest:
             velocity = max(-fastest, min(fastest, velocity))
-        self._velocity = velocity
+        self._velocity, self.commanded = velocity, winding_speed
         if angle is not None:
             self._angle = angle
         self._word = self.axis.send(_ENABLE, velocity=velocity, angle=angle, start=start)

@@ -219,7 +219,7 @@ class Jog:
         room = max(0.0, (length - low if wish > 0 else high - length) - _MARGIN)
         lag = self._lag
         fastest = math.sqrt(lag * lag + 2 * self._limits.acceleration * room) - lag
-        return wish if abs(wish) <= fastest else math.copysign(fastest, wish)
+        return math.copysign(fastest, wish) if fastest < abs(wish) else wish
 
 
 class RunDown:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import AxisPort, Controller
@@ -62,21 +62,17 @@ class WinchParts:
     """Name of the client that commands it."""
     cable_spec: CableSpec = field(default_factory=CableSpec)
     """The cable as the profile declares it."""
-    _read: list[object] = field(default_factory=list)
+    _read: tuple[Any, ...] = ()
     _instruments: Mapping[str, Instrumented] = field(default_factory=dict)
 
     def instruments(self, resumed: float) -> Mapping[str, Instrumented]:
         """Newest reading of each instrument; the same mapping until another one comes."""
-        read: list[object] = [resumed]
-        for sensor in self.sensors.values():
-            read.append(sensor.latest)
-            read.append(sensor.problem)
+        read = (resumed, [(sensor.latest, sensor.problem) for sensor in self.sensors.values()])
         if read != self._read:
             self._read = read
-            # Each once more: what has come meanwhile leads here again in the next cycle.
             self._instruments = {
-                role: _instrumented(sensor.latest, sensor.problem, sensor.max_age, resumed)
-                for role, sensor in self.sensors.items()
+                role: _instrumented(*seen, self.sensors[role].max_age, resumed)
+                for role, seen in zip(self.sensors, read[1], strict=True)
             }
         return self._instruments
 

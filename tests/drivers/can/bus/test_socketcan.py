@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.drivers.can.bus.socketcan import Frame, SocketCan, parse_socketcan
+from winchkit.drivers.can.bus.socketcan import Frame, SocketCan, _Messages, parse_socketcan
 
 _TIMESTAMPNS, _RXQ_OVFL = 35, 40
 _PACKET = struct.Struct("=IB3x8s")
@@ -28,6 +28,15 @@ def control(kind: int, content: bytes) -> bytes:
 
 def stamped(seconds: int, nanoseconds: int) -> bytes:
     return control(_TIMESTAMPNS, struct.pack("@ll", seconds, nanoseconds))
+
+
+CONTROLS = st.one_of(
+    st.builds(stamped, st.integers(0, 1 << 40), st.integers(0, 999_999_999)),
+    st.builds(control, st.sampled_from([_RXQ_OVFL, 20]), st.binary(min_size=3, max_size=16)),
+    st.builds(control, st.just(_TIMESTAMPNS), st.binary(max_size=16)),
+    st.binary(max_size=32),
+)
+"""Time stamps, counts of drops, messages of another kind and fragments."""
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +134,39 @@ def test_frames_with_their_control_messages() -> None:
 def test_no_content_of_the_kernel_s_memory_raises(raw: bytes, extra: bytes) -> None:
     frame, _ = parse_socketcan(raw, extra)
     assert frame is None or len(frame.data) <= 8
+
+
+@settings(max_examples=200)
+@given(
+    messages=st.lists(
+        st.tuples(
+            st.sampled_from([0x181, 0x7FF, 0x20000040, 0x80000181, 0x40000181]),
+            st.binary(max_size=8),
+            st.sampled_from([16, 16, 16, 9]),
+            st.lists(CONTROLS, max_size=3).map(b"".join),
+        ),
+        max_size=64,
+    )
+)
+def test_messages_of_one_call_are_what_they_are_one_by_one(
+    messages: list[tuple[int, bytes, int, bytes]],
+) -> None:
+    """Of the kernel's results only what ``struct mmsghdr`` says is read."""
+    room = 128
+    memory, expected = _Messages(room), []
+    size_of = struct.calcsize("@PIPNPNi0PI0P")
+    used_at, length_at = struct.calcsize("@PIPNP"), struct.calcsize("@PIPNPNi0P")
+    newest = None
+    for k, (identifier, data, length, extra) in enumerate(messages):
+        raw = _PACKET.pack(identifier, len(data), data)
+        memory._frames[k * 16 : k * 16 + 16] = raw
+        memory._control[k * room : k * room + len(extra)] = extra
+        struct.pack_into("@N", memory._headers, k * size_of + used_at, len(extra))
+        struct.pack_into("@I", memory._headers, k * size_of + length_at, length)
+        frame, drops = parse_socketcan(raw[:length], extra)
+        expected += [] if frame is None else [frame]
+        newest = newest if drops is None else drops
+    assert memory.taken(len(messages)) == (expected, newest)
 
 
 @pytest.mark.parametrize("identifier", [0x80000181, 0x40000181, 0xC0000181])

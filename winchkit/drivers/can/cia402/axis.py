@@ -314,7 +314,7 @@ class Cia402Axis:
 
     def _certain(self, feedback: AxisFeedback | None) -> State:
         """The state that a feedback, the newest, shows."""
-        if feedback is None or self.heartbeat.boot_ups != self._boot_ups:
+        if feedback is None or self.mapping_lost:
             return State.UNKNOWN
         sync, now = self._cycle
         old = sync - feedback.sync > _STALE_SYNCS

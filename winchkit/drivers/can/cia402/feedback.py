@@ -194,7 +194,7 @@ class Gathering:
                 values += lacking
             sent = self._sent
             delay = self._came - sent
-            time = sent if delay < 0.0 or delay >= cycle else sent + delay / 2.0
+            time = sent + delay / 2 if 0 <= delay < cycle else sent
             position, status = values[position_at], values[status_at]
             self._complete += 1
             # What AxisFeedback(...) makes, without the call of its constructor.
