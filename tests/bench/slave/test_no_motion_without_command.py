@@ -271,7 +271,8 @@ class NoMotionWithoutCommand(RuleBasedStateMachine):
         self.slave.mend_all()
         if self.oracle.excused:
             self.rig.wait(0.5)
-            self.oracle.allowed = self.oracle.time + FIRST_STOP
+            # A command that no trip has ended meanwhile still stands.
+            self.oracle.unasked(FIRST_STOP)
             self.oracle.excused = False
 
     # What the model knows
