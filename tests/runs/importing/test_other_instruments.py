@@ -19,6 +19,7 @@ from winchkit.runs.importing.formats.can_trace import is_can_trace
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.sign_bits import unsigned_note
+from winchkit.runs.importing.streams import streams_of
 
 COUNT, STEP = 300, 0.01
 
@@ -252,3 +253,13 @@ def test_components_of_a_six_axis_cell_are_asked(tmp_path: Path) -> None:
     alone = head.replace("Fx", "Ax").replace("Fy", "Ay").replace(" [N],Ay [N]", " [V],Ay [V]")
     guess = guessed(tmp_path / "cell.csv", alone + "\n".join(rows) + "\n")
     assert by_source(guess)["Fz"].channel == "tension"
+
+
+def test_times_with_separators_of_thousands_are_one_fault(tmp_path: Path) -> None:
+    """``0.000``, ``100.000``, …, ``1.000.000``: microseconds, or milliseconds of a spreadsheet."""
+    stamps = [f"{100_000 * k:,}".replace(",", ".") for k in range(COUNT)]
+    text = "\n".join(f"{stamp};3.658;{k % 9}.315" for k, stamp in enumerate(stamps)) + "\n"
+    guess = guessed(tmp_path / "log.csv", text, "time=1 [ms]", "motor_angle=3 [deg]")
+    (fault,) = streams_of(guess).faults
+    assert "separators of thousands" in fault.message
+    assert "'1.000.000'" in fault.message

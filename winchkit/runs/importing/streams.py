@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -31,6 +32,8 @@ _SLOW = ("temperature", "swivel")
 """Channels that do not determine the rows of a run."""
 _EXCEL_EPOCH = 25_569.0
 """1970-01-01 in days since 1899-12-30."""
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(\.\d{3}){2,}|(,\d{3}){2,})")
+"""Whole numbers with separators of thousands: one separator alone may be a decimal sign."""
 _QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
 
 
@@ -174,7 +177,11 @@ def _cell_faults(
     for source, column in columns.items():
         wrong = [(row, text) for row, text in column.wrong]
         if column.texts is not None and used[source].channel in {"time", DATE}:
-            wrong += [(row, column.texts[row]) for row in read_stamps(column.texts).wrong]
+            stamps = [(row, column.texts[row]) for row in read_stamps(column.texts).wrong]
+            if 2 * len(stamps) > len(column.texts):
+                found.append(_no_times(table, source, stamps))
+            else:
+                wrong += stamps
         elif column.texts is not None:
             message = f"column '{source}' has text, e.g. {column.texts[0]!r}, and no numbers"
             found.append(Fault(message, table.path, table.line_of(0)))
@@ -184,6 +191,16 @@ def _cell_faults(
             for row, text in wrong
         ]
     return found
+
+
+def _no_times(table: Table, source: str, wrong: Sequence[tuple[int, str]]) -> Fault:
+    """Fault of a column of text that is given as the time and has neither numbers nor stamps."""
+    grouped = [(row, text) for row, text in wrong if _THOUSANDS.fullmatch(text)]
+    row, text = (grouped or [*wrong])[0]
+    message = f"column '{source}' has text, e.g. {text!r}, and neither numbers nor stamps"
+    if grouped:
+        message += ": separators of thousands; write the numbers without them"
+    return Fault(message, table.path, table.line_of(row))
 
 
 def _clock(column: Column, item: Assignment, day: Column | None) -> tuple[float, Array, bool]:
