@@ -54,6 +54,9 @@ class Network:
         self._consumers: list[tuple[int, float]] | None = None
         self.polls_need_life_time = False
         """Whether a poll is answered with life guarding on only, as by Lely's CANopen stack."""
+        self.same_consumer_goes_on = False
+        """Whether an entry of 1016h that is written again as it was is monitored on, as there."""
+        self._consumer_before = 0
         self._toggle = 0
         self._guarded: float | None = None
 
@@ -98,6 +101,9 @@ class Network:
     def written(self, index: int, sub: int, now: float) -> None:
         """An object was written by SDO."""
         if index == 0x1016 and sub:
+            same = self.objects.get(0x1016, sub) == self._consumer_before
+            if self.same_consumer_goes_on and same:
+                return
             self._consumers = None
             nodes = {node for node, _ in self._consumed()}
             self._heard = {node: at for node, at in self._heard.items() if node in nodes}
@@ -111,6 +117,7 @@ class Network:
         """One node may stand in one consumer entry only."""
         if index != 0x1016 or not sub:
             return
+        self._consumer_before = self.objects.get(0x1016, sub)
         value = int.from_bytes(data, "little")
         node = value >> 16 & 0xFF
         others = {

@@ -11,10 +11,10 @@ from winchkit.bench.commissioning.record import hash_of
 from winchkit.errors import Fault, FileError, NotPermitted, UsageError
 from winchkit.regular_file import read_text
 
-__all__ = ["AnswerFile", "Dialogue", "TypedAnswers", "agreed", "confirm"]
+__all__ = ["YES_OR_NO", "AnswerFile", "Dialogue", "TypedAnswers", "agreed", "confirm"]
 
 _YES = ("yes", "y")
-_NO = ("no", "n")
+YES_OR_NO = (*_YES, "no", "n")
 
 
 class Dialogue(Protocol):
@@ -26,8 +26,11 @@ class Dialogue(Protocol):
     def show(self, text: str) -> None:
         """Show a text that needs no answer."""
 
-    def ask(self, key: str, question: str) -> str:
-        """The answer to a question; ``key`` names it in a file of answers."""
+    def ask(self, key: str, question: str, choices: tuple[str, ...] = ()) -> str:
+        """The answer to a question, one of ``choices`` where there are any.
+
+        ``key`` names the question in a file of answers.
+        """
 
 
 class TypedAnswers:
@@ -39,15 +42,18 @@ class TypedAnswers:
         """``read`` returns a line with its end, and nothing when the input has ended."""
         self.show, self._read = say, read
 
-    def ask(self, key: str, question: str) -> str:
-        """Ask until something is answered; raises NotPermitted when the input ends."""
+    def ask(self, key: str, question: str, choices: tuple[str, ...] = ()) -> str:
+        """Ask until one of the choices is typed; raises NotPermitted when the input ends."""
         while True:
             self.show(question)
             line = self._read()
             if not line:
                 raise NotPermitted(f"the input ended at the question '{key}'; nothing was recorded")
-            if answer := line.strip():
-                return answer
+            answer = line.strip()
+            if answer and (not choices or answer.casefold() in choices):
+                return answer.casefold() if choices else answer
+            if answer:
+                self.show(f"'{answer}': type {' or '.join(choices)}")
 
 
 class AnswerFile:
@@ -64,14 +70,19 @@ class AnswerFile:
         except (OSError, ValueError) as error:
             raise FileError(Fault(f"cannot be read as TOML: {error}", str(path))) from error
 
-    def ask(self, key: str, question: str) -> str:
-        """The answer under a dotted key; raises UsageError where there is none."""
+    def ask(self, key: str, question: str, choices: tuple[str, ...] = ()) -> str:
+        """The answer under a dotted key; raises UsageError where there is none, or another."""
         found: object = self._tree
         for part in key.split("."):
             found = found.get(part) if isinstance(found, dict) else None
         if found is None or isinstance(found, dict):
             raise UsageError(f"{self._path}: no answer '{key}' to: {question}")
         answer = str(found).strip()
+        if choices and answer.casefold() not in choices:
+            raise UsageError(
+                f"{self._path}: {key} is '{answer}', not one of {', '.join(choices)}; nothing was "
+                "recorded"
+            )
         self.show(f"{question} {answer}")
         return answer
 
@@ -82,10 +93,8 @@ def agreed(answer: str) -> bool:
 
 
 def confirm(dialogue: Dialogue, key: str, question: str) -> str:
-    """An answer that is yes; raises NotPermitted for no, UsageError for anything else."""
-    answer = dialogue.ask(key, f"{question} [yes/no]")
+    """An answer that is yes; raises NotPermitted for no."""
+    answer = dialogue.ask(key, f"{question} [yes/no]", YES_OR_NO)
     if agreed(answer):
         return answer
-    if answer.casefold() in _NO:
-        raise NotPermitted(f"not confirmed: {key}; nothing was recorded")
-    raise UsageError(f"'{answer}' is neither yes nor no ({key}); nothing was recorded")
+    raise NotPermitted(f"not confirmed: {key}; nothing was recorded")

@@ -15,7 +15,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from winchkit.bench.bench import Bench
 from winchkit.bench.cells.instruments import device_of, eds_of
-from winchkit.bench.commissioning.dialogue import Dialogue, agreed, confirm
+from winchkit.bench.commissioning.dialogue import YES_OR_NO, Dialogue, agreed, confirm
 from winchkit.bench.commissioning.motions import Motions
 from winchkit.bench.commissioning.record import (
     Confirmation,
@@ -32,6 +32,7 @@ from winchkit.bench.commissioning.validity import drive_record
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
 from winchkit.bench.remote.server import StationServer
+from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NotPermitted
 from winchkit.schema.bench import BenchSpec, WinchWiring
@@ -122,8 +123,7 @@ class _Steps:
         """Identity, brake, host loss, NMT stopped."""
         axis, name = trials.axes[self._name], self._name
         self._drive = drive_record(axis)
-        numbers = ", ".join(f"{key} {value}" for key, value in vars(self._drive).items())
-        self._dialogue.show(f"winch {name}: {numbers}")
+        self._dialogue.show(f"winch {name}: {_identity(self._drive)}")
         if not self._drive.serial:
             self._dialogue.show(
                 f"winch {name}: the drive has no serial number (1018h:4); another drive of the "
@@ -184,15 +184,14 @@ class _Steps:
             f"winch {self._name}: it will be enabled at rest. Is the cable unloaded ('unloaded'), "
             "or does a brake hold the load ('brake'; it is tried now)?"
         )
-        answer = self._dialogue.ask(f"{self._name}.brake", question)
+        answer = self._dialogue.ask(f"{self._name}.brake", question, ("unloaded", "brake"))
         if answer == "unloaded":
             self._note("brake", question, answer)
             return
-        if answer != "brake" or not self._wiring.brake:
+        if not self._wiring.brake:
             raise NotPermitted(
-                f"winch {self._name}: '{answer}': the bench file declares "
-                f"brake = {str(self._wiring.brake).lower()}; unload the cable, or fit and declare "
-                "a brake"
+                f"winch {self._name}: the bench file declares no brake; unload the cable, or fit a "
+                "brake and declare it (brake = true)"
             )
         seen = trials.brake(self._name)
         if not seen.stopped:
@@ -236,7 +235,7 @@ class _Steps:
             f"winch {self._name}: try the loss of the host in a slow move, winding in at "
             f"{speed:g} m/s for 0.8 s ('yes' moves it, 'no' leaves it out)?"
         )
-        answer = self._dialogue.ask(f"{self._name}.try_in_motion", question)
+        answer = self._dialogue.ask(f"{self._name}.try_in_motion", question, YES_OR_NO)
         return self._host_silent(trials, speed) if agreed(answer) else None
 
     def _nmt(self, trials: Trials) -> None:
@@ -290,7 +289,7 @@ class _Steps:
             "and keep it there, then answer 'pulled'; or answer 'right' where a known load hangs "
             "now and its tension has this size and sign"
         )
-        answer = self._dialogue.ask(f"{name}.cell", question)
+        answer = self._dialogue.ask(f"{name}.cell", question, ("pulled", "right"))
         after = motions.tension()
         if answer == "pulled":
             if after - before <= motions.cell_noise:
@@ -299,10 +298,10 @@ class _Steps:
                     "must raise it. Check its sign (`scale` of its device file), its wiring, and "
                     "whether it is on this cable"
                 )
-        elif answer != "right" or not after > motions.cell_noise:
+        elif not after > motions.cell_noise:
             raise NotPermitted(
-                f"winch {name}: cell: '{answer}' at {after:.1f} N: neither a pull that raises it, "
-                "nor a tension above its noise that is confirmed as right"
+                f"winch {name}: the cell reads {after:.1f} N, which is within its noise; hang a "
+                "known load on the cable, or pull on it"
             )
         self._note("cell", question, answer, before=before, after=after)
 
@@ -323,6 +322,12 @@ class _Steps:
 
     def _note(self, item: str, question: str, answer: str, **measured: float) -> None:
         self._confirmed.append(Confirmation(item, question, answer, _now(), measured))
+
+
+def _identity(drive: DriveRecord) -> str:
+    """Identity and software version in words."""
+    identity = Identity(drive.vendor, drive.product, drive.revision, drive.serial)
+    return f"{identity}, software {drive.software}" if drive.software else str(identity)
 
 
 def _slow(wiring: WinchWiring) -> float:

@@ -127,6 +127,22 @@ def test_6007h_says_nothing_of_a_makers_watchdog(silence: str) -> None:
         assert not found.host_loss.certain
 
 
+@pytest.mark.parametrize("pause", [0.0, 0.02, 0.04, 0.08, 0.12])
+def test_a_pause_of_the_host_before_it_sets_a_drive_up_again_is_no_loss(pause: float) -> None:
+    """A drive that monitors on where its entry of 1016h is written again as it was."""
+    slave = drive()
+    slave.network.same_consumer_goes_on = True
+    with rig(slave) as bench:
+        axis = bench.axis(generic())
+        axis.commission()
+        bench.cycles(axis, Wish.DISABLE, 60)
+        bench.world.wait(pause)
+        axis.commission()
+        bench.world.wait(0.1)
+        assert list(axis.emergencies) == []
+        assert slave.network.state is Nmt.OPERATIONAL
+
+
 @pytest.mark.parametrize("polls_need_life_time", [False, True])
 def test_a_guarded_drive_sends_no_heartbeat_and_is_supervised_by_its_replies(
     polls_need_life_time: bool,

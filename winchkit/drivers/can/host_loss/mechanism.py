@@ -128,7 +128,12 @@ class Heartbeat(Mechanism):
         return "" if there else "it has no 1016h and cannot watch the host's heartbeat"
 
     def set_up(self) -> None:
-        """Enter the host into the heartbeat consumer list (1016h)."""
+        """Enter the host into the heartbeat consumer list (1016h), from which it was removed.
+
+        Where the same entry is written again, some drives monitor on from the last heartbeat that
+        they had, however the host has paused since (Lely's CANopen stack).
+        """
+        self.disarm()
         self.node.write_verified(0x1016, 1, consumer_entry(self.terms.host, self.limit))
 
     def withhold(self) -> float:
