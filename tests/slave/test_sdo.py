@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from pathlib import Path
 
 import canopen
@@ -71,8 +72,10 @@ def test_pythons_canopen_reads_and_writes_it() -> None:
     network.connect(interface="virtual", channel=channel)
     try:
         node = network.add_node(3, str(GENERIC))
+        booted = threading.Event()
+        node.nmt.add_heartbeat_callback(lambda _state: booted.set())
         with SlavesOnBus([Slave.from_file(GENERIC, 3)], channel):
-            node.nmt.wait_for_bootup(5.0)  # before it a node answers no SDO
+            assert booted.wait(10.0), "before its boot-up a node answers no SDO"
             node.sdo.RESPONSE_TIMEOUT = 5.0
             assert node.sdo[0x1000].raw == 0x00020192
             node.sdo[0x607A].raw = -12345
