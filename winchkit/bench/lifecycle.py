@@ -165,6 +165,7 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     for axis in axes.values():
         # What somebody else commands during the reset keeps it from succeeding.
         axis.forget_second_master()
+        axis.forget_position_jump()
     troubled = {trip.winch for trip in (*seen.tripped, *seen.blocked) if trip.kind in _UNHEARD}
     if "" in troubled:
         troubled = {name for name in axes if axes[name].lost_set_up} | troubled - {""}

@@ -153,8 +153,8 @@ class WinchStatus:
         if not self.snapshot.turns_known:
             raise NotPermitted(
                 f"winch {self.name}: its cable length is not known, the drive's position counter "
-                "(6064h) may have wrapped without feedback, or has in an earlier process; home "
-                "first: `winchkit home "
+                "(6064h) has jumped, may have wrapped without feedback, or has in an earlier "
+                "process; home first: `winchkit home "
                 f"{self.name} --here LENGTH` moves nothing"
             )
 

@@ -34,6 +34,7 @@ def parts(*, faulty: bool) -> Any:
         fault_text="fault text",
         nmt_text="NMT text",
         second_master="second master",
+        position_jump="position jump",
         alarms=(0x4210,),
         alarm_text="alarm text",
     )
@@ -85,6 +86,7 @@ def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
         "unstable": "unstable",
         "frozen": "frozen",
         "turns_known": True,
+        "position_jump": "position jump",
         "sensors": SENSORS,
         "now": NOW,
         "feedback": winch.axis.feedback,

@@ -23,7 +23,7 @@ from slave.rig import Rig
 from slave.wire import GENERIC
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import Trip
-from winchkit.errors import LimitTripped, MotionError, NoReply
+from winchkit.errors import LimitTripped, MotionError, NoReply, NotPermitted
 
 _RAMP, _BRAKE = 628.0, 100.0
 """6085h of the slave, and what its brake does without torque, rad/s^2."""
@@ -299,6 +299,40 @@ def test_a_drive_that_restarts_during_a_reset_is_set_up_anew(
         assert not since(rig, start).enabled
         assert slave.objects.get(0x1A00, 0), "mapped anew"
         bench.winch["A"].move_by(pay_out=0.02)
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_position_that_jumps_ends_the_motion_and_is_unknown_until_homed(
+    moving: bool, tmp_path: Path
+) -> None:
+    rig = Rig(tmp_path)
+    slave = rig.slaves[0]
+    with rig.opened() as bench:
+        winch = bench.winch["A"]
+        if moving:
+            key = jogging(rig, bench)
+        start = rig.time
+        slave.inject("position wraps", 1000)
+        rig.wait(0.5)
+        assert [trip.kind for trip in bench.snapshot.tripped] == ["position"]
+        if moving:
+            key.release()
+            seen = observe(rig, key, start)
+            assert "turns of the motor from one answer to the next" in seen.cause
+            assert seen.left <= _WITHIN
+        angle = slave.motor.angle
+        with pytest.raises(LimitTripped, match="latched"):
+            winch.jog(pay_out=0.1)
+        bench.reset()
+        rig.wait(1.0)
+        for motion in (winch.jog, winch.move_by):
+            with pytest.raises(NotPermitted, match="home"):
+                motion(pay_out=0.05)
+        rig.wait(0.5)
+        assert slave.motor.angle == pytest.approx(angle, abs=0.05), "nothing has moved since"
+        winch.home(at=2.0)
+        winch.move_by(pay_out=0.02)
+        assert winch.cable_length == pytest.approx(2.02, abs=2e-3)
 
 
 def test_a_stall_of_this_computer_is_named(tmp_path: Path) -> None:

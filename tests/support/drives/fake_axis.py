@@ -62,6 +62,7 @@ class FakeAxis:
     moves_alone: bool = False
     stops_on_nmt: bool = False
     second_master: str = ""
+    position_jump: str = ""
     nmt_text: str = "operational"
     alarms: tuple[int, ...] = ()
     alarm_text: str = ""

@@ -205,6 +205,18 @@ CONDITIONS: tuple[Condition, ...] = (
         by_facts=True,
     ),
     Condition(
+        "position",
+        "change of 6064h between two answers",
+        "what 1.5 x limits.speed turns within that time and 0.25 s",
+        lambda item, _own, _memory: bool(item.position_jump),
+        lambda item, *_: (
+            f"{item.position_jump}, faster than it can turn: the counter was set, or the encoder "
+            "fails; the cable length is not known; look why, reset, then home the winch"
+        ),
+        latches=True,
+        by_facts=True,
+    ),
+    Condition(
         "motion at rest",
         "cable speed by the motor while the drive is commanded to be disabled",
         "3 steps of 606Ch, at least 1 % of limits.speed",
@@ -422,8 +434,8 @@ CONDITIONS: tuple[Condition, ...] = (
         "shorter",
         lambda item, _own, _memory: not item.turns_known,
         lambda *_: (
-            "the cable length is not known: 6064h may have wrapped without feedback, or has "
-            "wrapped in an earlier process; home the winch"
+            "the cable length is not known: 6064h has jumped, may have wrapped without feedback, "
+            "or has wrapped in an earlier process; home the winch"
         ),
         blocks=Direction.NONE,
         by_facts=True,

@@ -83,6 +83,10 @@ class AxisPort(Protocol):
         """Whether the drive generates the present motion itself (HM, PP)."""
 
     @property
+    def position_jump(self) -> str:
+        """Change of 6064h that no motion explains, in words; empty without one."""
+
+    @property
     def alarms(self) -> tuple[int, ...]:
         """Emergency codes in force without a fault."""
 

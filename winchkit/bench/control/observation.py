@@ -114,6 +114,8 @@ class WinchInput(NamedTuple):
     """Evidence that the load cell is frozen; empty without it."""
     turns_known: bool = True
     """Whether the motor angle counts every turn; if not, the cable length is NaN."""
+    position_jump: str = ""
+    """Change of 6064h that no motion explains, in words; empty without one."""
     sensors: Mapping[str, Instrumented] = MappingProxyType({})
     """Newest reading of each instrument by its role; ``tension`` is that of the cell."""
     now: float = 0.0
@@ -134,6 +136,7 @@ FACTS = (
     "unstable",
     "frozen",
     "turns_known",
+    "position_jump",
 )
 """What of a :class:`WinchInput` is no measured number and seldom changes."""
 facts_of = itemgetter(*map(WinchInput._fields.index, FACTS))

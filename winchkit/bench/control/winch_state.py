@@ -134,6 +134,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             "" if frozen is None else frozen.unstable,
             "" if frozen is None else _frozen(parts, frozen, now, winding_speed),
             turns_known,
+            axis.position_jump,
             sensors,
             now,
             feedback,

@@ -63,6 +63,54 @@ def test_a_long_gap_makes_the_turns_unknown() -> None:
     assert counter.known
 
 
+@given(
+    st.integers(0, 4095),
+    st.lists(st.tuples(st.floats(-1.0, 1.0), st.floats(0.001, 1.0)), min_size=1, max_size=40),
+)
+def test_a_motion_up_to_the_greatest_speed_is_no_jump(
+    start: int, steps: list[tuple[float, float]]
+) -> None:
+    counter, true, time = PositionCounter(0, 4095, fastest=1000.0), start, 0.0
+    counter.take(start, time)
+    for share, span in steps:
+        true, time = true + round(share * 1000.0 * span), time + span
+        counter.take(shown(true, 0, 4095), time)
+    assert counter.jump == 0.0
+    assert counter.known
+
+
+@pytest.mark.parametrize("after", [0.004, 0.5])
+@pytest.mark.parametrize("jump", [-1, 1])
+def test_a_change_faster_than_the_motor_can_turn_is_a_jump(after: float, jump: int) -> None:
+    """1000 counts/s for the time in between, and 0.25 s of delay."""
+    within = round(1000.0 * (after + 0.25))
+    for size, jumped in ((within - 1, False), (within + 1, True)):
+        counter = PositionCounter(-(2**31), 2**31 - 1, fastest=1000.0)
+        counter.take(7, 0.0)
+        counter.take(7 + jump * size, after)
+        assert (counter.jump != 0.0, counter.known) == (jumped, not jumped)
+        if jumped:
+            assert counter.jump == jump * size
+
+
+def test_a_jump_across_the_end_is_measured_the_short_way() -> None:
+    counter = PositionCounter(0, 4095, fastest=1000.0)
+    counter.take(4000, 0.0)
+    assert counter.take(1000, 0.004) == 5096
+    assert counter.jump == 1096
+
+
+def test_the_zero_that_a_homing_sets_is_no_jump() -> None:
+    counter = PositionCounter(-(2**31), 2**31 - 1, fastest=1000.0)
+    counter.take(100_000, 0.0)
+    counter.suspend()
+    counter.take(0, 0.004)
+    counter.resume(homed=True)
+    counter.take(1, 0.008)
+    assert counter.jump == 0.0
+    assert counter.known
+
+
 def test_a_drive_that_restarts_after_a_crossing_has_lost_its_turns() -> None:
     counter = PositionCounter(0, 4095)
     counter.take(4000, 0.0)

@@ -238,6 +238,15 @@ class Cia402Axis:
         """Whether the drive's count alone is its position: no range of 6064h was left or missed."""
         return self._position.absolute
 
+    @property
+    def position_jump(self) -> str:
+        """Change of 6064h that no motion explains, in words; empty without one."""
+        return self._position.jump
+
+    def forget_position_jump(self) -> None:
+        """A reset begins; the position stays unknown until the drive is homed."""
+        self._position.forget_jump()
+
     def lose_position(self) -> None:
         """Take the position as unknown until the drive is homed; before it is commissioned."""
         self._position.lose()

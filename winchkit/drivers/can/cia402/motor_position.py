@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from winchkit.drivers.can.cia402.commission import Commissioned
 from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
@@ -21,12 +23,27 @@ class MotorPosition:
         """Of its 6064h; None before it is commissioned."""
         self._standstill: Standstill | None = None
         self._boot_ups = 0
+        self._angle = math.nan
         self._lost = False
 
     @property
     def absolute(self) -> bool:
         """Whether the drive's count alone is the position, for a later process too."""
         return not self._lost if self.counter is None else self.counter.absolute
+
+    @property
+    def jump(self) -> str:
+        """Change of 6064h that no motion explains, in words; empty without one."""
+        counter = self.counter
+        if counter is None or not counter.jump:
+            return ""
+        turns = counter.jump * self._angle / math.tau
+        return f"6064h changed by {turns:.2f} turns of the motor from one answer to the next"
+
+    def forget_jump(self) -> None:
+        """A reset has shown it; the position stays unknown."""
+        if self.counter is not None:
+            self.counter.jump = 0.0
 
     def lose(self) -> None:
         """An earlier process has lost count of the ranges, or has counted some."""
@@ -39,6 +56,7 @@ class MotorPosition:
             low, high = self._wraps or counter_range(drive.tpdo)
             counter = PositionCounter(low, high, self._fastest / drive.scale.angle)
             counter.known = not self._lost
+        self._angle = drive.scale.angle
         counter.restart(forgotten=boot_ups != self._boot_ups)
         self.counter, self._boot_ups = counter, boot_ups
         self._standstill = Standstill(drive.scale)

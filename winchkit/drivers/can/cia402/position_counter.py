@@ -2,7 +2,8 @@
 
 After its highest value a counter goes on at its lowest. Two successive values that differ by more
 than half the range have crossed the end, as long as the motor cannot turn half the range between
-them; after a longer gap the number of crossings is unknown.
+them; after a longer gap the number of crossings is unknown. So is the position once two values
+differ by more than the motor can turn between them: the counter was set, or its encoder fails.
 """
 
 from __future__ import annotations
@@ -13,11 +14,18 @@ from winchkit.errors import NotPermitted
 
 __all__ = ["PositionCounter"]
 
+_DELAY = 0.25
+"""By which a value may be older than the SYNC that it answers, s: a drive or a computer that stands
+still for longer is missed by its heartbeat."""
+
 
 class PositionCounter:
     """One drive's counter; ``low`` to ``high`` are the counts that it can show."""
 
-    __slots__ = ("_kept", "gap", "half", "high", "known", "last", "low", "offset", "span", "time")
+    __slots__ = (
+        "_fastest", "_kept", "_step", "gap", "half", "high", "jump", "known", "last", "low",
+        "offset", "span", "time",
+    )  # fmt: skip
 
     def __init__(self, low: int, high: int, fastest: float = 0.0) -> None:
         """Take the range, and the greatest speed of the motor in counts/s (0: not known)."""
@@ -26,6 +34,8 @@ class PositionCounter:
         self.half: float = self.span // 2
         self.gap = self.half / fastest if fastest > 0 else inf
         """After this long without feedback the crossings are unknown, s."""
+        self._fastest = fastest if fastest > 0 else inf
+        self._step = min(self.half, self._fastest * _DELAY)
         self.last: float = inf
         """Newest count as the drive shows it; infinite before the first."""
         self.time = -inf
@@ -33,23 +43,30 @@ class PositionCounter:
         """Whole ranges that were crossed, in counts: to be added to what the drive shows."""
         self.known = True
         """Whether no crossing can have been missed."""
+        self.jump = 0.0
+        """Change between two successive values that no motion explains, in counts; 0 for none."""
         self._kept = (0, True)
 
     def take(self, count: int, time: float) -> int:
         """Take a count of the drive and the time of its sampling (s); returns it unwrapped."""
         change = count - self.last
-        if abs(change) > self.half:
-            self.cross(change)
+        if abs(change) > self._step:
+            self._far(change, time)
         if time - self.time > self.gap:
             self.miss()
         self.last, self.time = count, time
         return count + self.offset
 
-    def cross(self, change: float) -> None:
-        """Count a crossing of the counter's end; the first value of all is none."""
+    def _far(self, change: float, time: float) -> None:
+        """Count a crossing of the counter's end, or note a jump; the first value of all is none."""
         if change in (inf, -inf):
             return
-        self.offset += -self.span if change > 0 else self.span
+        if abs(change) > self.half:
+            turned = -self.span if change > 0 else self.span
+            self.offset += turned
+            change += turned
+        if abs(change) > self._fastest * (time - self.time + _DELAY):
+            self.jump, self.known = change, False
 
     def miss(self) -> None:
         """Note a gap that is too long; one before the first value is none."""
@@ -77,10 +94,12 @@ class PositionCounter:
         """Take the drive's counts as they are: while it homes, they jump to the new zero."""
         self._kept = (self.offset, self.known)
         self.offset, self.half, self.known = 0, inf, True
+        self._step = inf
 
     def resume(self, *, homed: bool) -> None:
         """Unwrap again: from the new zero where one was found, else from where it was."""
         self.half = self.span // 2
+        self._step = min(self.half, self._fastest * _DELAY)
         self.offset, self.known = (0, True) if homed else self._kept
         self._kept = (0, True)
 
