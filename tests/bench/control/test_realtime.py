@@ -84,6 +84,15 @@ def test_a_priority_that_somebody_else_has_set_is_kept() -> None:
         assert scheduling(chosen) == (os.SCHED_RR, 80)
 
 
+@pytest.fixture
+def unfrozen() -> Iterator[None]:
+    """The collector as a program has it: tests/conftest.py has frozen what was collected."""
+    gc.unfreeze()
+    yield
+    gc.freeze()
+
+
+@pytest.mark.usefixtures("unfrozen")
 def test_collector_and_interpreter_lock_are_given_back() -> None:
     threshold, interval = gc.get_threshold(), sys.getswitchinterval()
     before = locked()
