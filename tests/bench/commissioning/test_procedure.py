@@ -244,3 +244,13 @@ def test_a_device_file_that_changes_meanwhile_ends_in_no_record(tmp_path: Path) 
         with pytest.raises(NotPermitted, match=r"device\.toml changed meanwhile"):
             commissioned(bench, edit)
         assert not bench.record.exists()
+
+
+def test_an_answer_of_a_file_counts_in_any_case_as_a_typed_one(tmp_path: Path) -> None:
+    path = tmp_path / "answers.toml"
+    path.write_text('[A]\nbrake = "Unloaded"\nby = "Ann"\n', encoding="utf-8")
+    answers = AnswerFile(path, lambda _text: None)
+    assert answers.ask("A.brake", "?", ("unloaded", "brake")) == "unloaded"
+    assert answers.ask("A.by", "?") == "Ann"
+    with pytest.raises(UsageError, match="not one of pulled, right"):
+        answers.ask("A.brake", "?", ("pulled", "right"))

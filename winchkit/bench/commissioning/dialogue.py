@@ -49,9 +49,9 @@ class TypedAnswers:
             line = self._read()
             if not line:
                 raise NotPermitted(f"the input ended at the question '{key}'; nothing was recorded")
-            answer = line.strip()
-            if answer and (not choices or answer.casefold() in choices):
-                return answer.casefold() if choices else answer
+            answer = _as_offered(line.strip(), choices)
+            if answer and (not choices or answer in choices):
+                return answer
             if answer:
                 self.show(f"'{answer}': type {' or '.join(choices)}")
 
@@ -77,14 +77,19 @@ class AnswerFile:
             found = found.get(part) if isinstance(found, dict) else None
         if found is None or isinstance(found, dict):
             raise UsageError(f"{self._path}: no answer '{key}' to: {question}")
-        answer = str(found).strip()
-        if choices and answer.casefold() not in choices:
+        answer = _as_offered(str(found).strip(), choices)
+        if choices and answer not in choices:
             raise UsageError(
                 f"{self._path}: {key} is '{answer}', not one of {', '.join(choices)}; nothing was "
                 "recorded"
             )
         self.show(f"{question} {answer}")
         return answer
+
+
+def _as_offered(answer: str, choices: tuple[str, ...]) -> str:
+    """An answer in the case of the choices; names are free and keep theirs."""
+    return answer.casefold() if choices else answer
 
 
 def agreed(answer: str) -> bool:

@@ -71,7 +71,7 @@ def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArr
     dict of (n,) array of bool
         Channels with at least one spike. A peak of the force that lasts one sample, as at a jerk,
         appears in the angle, the tension, the load or the torque at the same time: it is none. A
-    first or last row of another moment differs in several channels.
+        first or last row of another moment differs in several channels.
 
     Notes
     -----
