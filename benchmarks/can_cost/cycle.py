@@ -318,7 +318,7 @@ def lateness_of_cycle(
         # No heartbeat came between the commissioning and the first cycle.
         boot_ups = {name: one.axis.heartbeat.boot_ups for name, one in it.loop.winches.items()}
         it.loop.supervisor.acknowledge(boot_ups)
-        it.loop.clear_latch(it.loop.supervisor.tripped)
+        it.loop.clear_latch()
         begin(it)
         time.sleep(0.5)
         it.clock.late.clear()

@@ -200,17 +200,19 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     clear_faults(loop, clock)
     for axis in axes.values():
         axis.forget_alarms()
-    loop.supervisor.acknowledge({name: axis.heartbeat.boot_ups for name, axis in axes.items()})
-    dealt_with = loop.supervisor.tripped
-    meanwhile = [trip for trip in dealt_with if trip not in seen.tripped]
+    boot_ups = {name: axis.heartbeat.boot_ups for name, axis in axes.items()}
+    meanwhile = [t for t in loop.supervisor.acknowledge(boot_ups) if t not in seen.tripped]
     cleared += [
         str(trip) for trip in meanwhile if not (trip.kind in _UNHEARD and trip.winch in lost)
     ]
-    await_cycles(loop, clock, 3)
-    still = [trip for trip in loop.snapshot.blocked if trip.blocks is Direction.BOTH]
-    if still:
-        raise LimitTripped("still not free to move: " + "; ".join(map(str, still)))
-    loop.clear_latch(dealt_with)
+    try:
+        await_cycles(loop, clock, 3)
+        still = [trip for trip in loop.snapshot.blocked if trip.blocks is Direction.BOTH]
+        if still:
+            raise LimitTripped("still not free to move: " + "; ".join(map(str, still)))
+        loop.clear_latch()
+    finally:
+        loop.supervisor.withdraw()
     loop.forget_warnings()
     await_cycles(loop, clock, 2)
     if loop.snapshot.tripped:

@@ -119,7 +119,7 @@ def test_the_verdict_is_that_of_every_row_in_every_cycle(seed: int) -> None:
             boot_ups = {name: chance.choice((0, item.boot_ups)) for name, item in items.items()}
             for each in (marked, plain):
                 each.acknowledge(boot_ups)
-                each.clear(each.tripped)
+                each.clear()
         now = cycle * OWN.cycle
         blocked = marked.check(now, items)
         assert blocked == plain.check(now, items)

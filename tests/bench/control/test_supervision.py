@@ -55,7 +55,7 @@ def test_a_reboot_is_latched_even_while_nothing_moves() -> None:
     rig.step()
     assert kinds(rig) == {"boot-up"}
     rig.supervisor.acknowledge({"A": 0, "B": 1})
-    rig.supervisor.clear(rig.supervisor.tripped)
+    rig.supervisor.clear()
     rig.run(0.1)
     assert not kinds(rig)
 
@@ -183,7 +183,7 @@ def test_a_trip_stays_until_it_is_reset() -> None:
     rig.run(2.0)
     assert kinds(rig) == {"tension high"}
     rig.supervisor.acknowledge({"A": 0, "B": 0})
-    rig.supervisor.clear(rig.supervisor.tripped)
+    rig.supervisor.clear()
     rig.run(0.5)
     assert not kinds(rig)
 

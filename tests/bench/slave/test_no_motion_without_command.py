@@ -19,6 +19,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from slave import Declared, Slave, State
 from slave.held_key import HeldKey
+from slave.network import Nmt
 from slave.oracle import ESCALATED, FIRST_STOP, Oracle
 from slave.rig import Rig
 from slave.wire import GENERIC
@@ -37,6 +38,11 @@ _HOME = 3.0
 _ENABLED_BY_OTHERS = ("second master enables", "enables itself")
 _BLOCKS_STOPS = ("quick stop ignored", "control word unheeded", "status frozen")
 _NOTHING_HELPS = ("unresponsive", "turns while disabled", "monitoring fails")
+_OFF = frozenset({"host frames lost", "off the bus"})
+_NO_RPDO = _OFF | {"rpdo unheard", "sync unheard"}
+"""RPDOs and TPDOs are synchronous."""
+_NO_TPDO = _OFF | {"tpdo lost", "sync unheard", "silent"}
+_NO_SDO = _OFF | {"sdo unheard", "sdo refused"}
 _TRIPS_ALWAYS = (
     "reboots",
     "reset by a stranger",
@@ -253,7 +259,7 @@ class NoMotionWithoutCommand(RuleBasedStateMachine):
 
     @rule(name=st.sampled_from(_FAULTS))
     def fault(self, name: str) -> None:
-        if name in _NOTHING_HELPS:
+        if name in _NOTHING_HELPS or (name in _ENABLED_BY_OTHERS and self._out_of_reach()):
             self.oracle.excused = True
         if name in _BLOCKS_STOPS:
             self.oracle.unasked(ESCALATED)
@@ -276,6 +282,18 @@ class NoMotionWithoutCommand(RuleBasedStateMachine):
             self.oracle.excused = False
 
     # What the model knows
+
+    def _out_of_reach(self) -> bool:
+        """Whether nothing shows this drive's state, and no control word changes it (safety.md)."""
+        faults = set(self.slave.faults)
+        processes_pdos = self.slave.network.state is Nmt.OPERATIONAL
+        serves_sdos = self.slave.network.state is not Nmt.STOPPED and not faults & _NO_SDO
+        shown = processes_pdos and not faults & _NO_TPDO
+        shown = (
+            shown or (serves_sdos and "silent" not in faults)
+        ) and "status frozen" not in faults
+        obeys = (processes_pdos and not faults & _NO_RPDO) or serves_sdos
+        return not shown and ("control word unheeded" in faults or not obeys)
 
     def _must_trip(self, name: str, before: State, *, commanded: bool) -> bool:
         """Whether this alone is a trip, by what the slave did."""

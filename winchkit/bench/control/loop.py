@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Callable, Collection, Container, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -177,13 +177,13 @@ class ControlLoop:
             self.supervisor.latch(trip)
         self._kept = self.supervisor.tripped
 
-    def clear_latch(self, dealt_with: Container[Trip]) -> None:
-        """Clear these trips here and on disk; others stay, and are written in the next cycle.
+    def clear_latch(self) -> None:
+        """Clear the acknowledged trips here and on disk; others are written in the next cycle.
 
         Raises NotPermitted where the latch file cannot be written.
         """
         self._latch.clear()
-        self.supervisor.clear(dealt_with)
+        self.supervisor.clear()
         self._kept = ()
 
     def _stop_all(self, reason: str) -> None:

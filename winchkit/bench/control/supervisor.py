@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from operator import gt
 from typing import NamedTuple
@@ -49,6 +49,8 @@ class Supervisor:
         self.tripped: tuple[Trip, ...] = ()
         self.warnings: tuple[Trip, ...] = ()
         """Conditions that hold and forbid nothing."""
+        self._acknowledged: tuple[Trip, ...] = ()
+        """Trips that a reset is about to clear; one of the same kind that comes now is another."""
         self._latching = threading.Lock()
         """A trip that comes while others are cleared is not lost."""
         self._memory = {name: Memory(own) for name, own in winches.items()}
@@ -92,18 +94,35 @@ class Supervisor:
     def latch(self, trip: Trip) -> None:
         """Add a trip; the first of its kind on a winch stands."""
         with self._latching:
-            if not any((old.kind, old.winch) == (trip.kind, trip.winch) for old in self.tripped):
+            standing = self.tripped[len(self._acknowledged) :]
+            if not any((old.kind, old.winch) == (trip.kind, trip.winch) for old in standing):
                 self.tripped = (*self.tripped, trip)
 
-    def acknowledge(self, boot_ups: Mapping[str, int]) -> None:
-        """Discard what a reset has handled, boot-ups up to now; the latch stays."""
+    def acknowledge(self, boot_ups: Mapping[str, int]) -> tuple[Trip, ...]:
+        """Discard what a reset has handled, boot-ups up to now; returns the trips to clear.
+
+        The latch stays until :meth:`clear`. What trips from now on is not cleared by it.
+        """
         for name, memory in self._memory.items():
             self._memory[name] = Memory(memory.own, boot_ups.get(name, memory.boot_ups))
-
-    def clear(self, dealt_with: Container[Trip]) -> None:
-        """Clear these trips; others stay."""
         with self._latching:
-            self.tripped = tuple(trip for trip in self.tripped if trip not in dealt_with)
+            self._acknowledged = self.tripped
+        return self._acknowledged
+
+    def clear(self) -> None:
+        """Clear the acknowledged trips; others stay."""
+        with self._latching:
+            self.tripped = self.tripped[len(self._acknowledged) :]
+            self._acknowledged = ()
+
+    def withdraw(self) -> None:
+        """Acknowledge nothing any more: what is not cleared stays, the first of its kind."""
+        with self._latching:
+            first = {(trip.kind, trip.winch): trip for trip in reversed(self.tripped)}
+            self.tripped = tuple(
+                trip for trip in self.tripped if first[trip.kind, trip.winch] is trip
+            )
+            self._acknowledged = ()
 
     def _stops(self, trip: Trip, inputs: Mapping[str, WinchInput]) -> bool:
         """Whether the trip forbids the present motion."""
