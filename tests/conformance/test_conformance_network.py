@@ -10,7 +10,7 @@ from bus_rig import HEARTBEAT, Rig
 from drive_server import HOST, NODE
 from master import Master
 from winchkit.drivers.can.canopen.nmt import NmtState
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 
 pytestmark = pytest.mark.realtime
 
@@ -83,10 +83,10 @@ def test_a_boot_up_is_noticed_and_the_mapping_known_to_be_lost(rig: Rig, master:
     assert not master.axis.operational
     assert rig.drive.number(0x1016, 1) == 0
     stale = master.axis.feedback
-    master.cycles(Wish.DISABLE, 10)
+    master.cycles(RequestedState.DISABLE, 10)
     assert master.axis.feedback is stale, "nothing new comes from a drive without its mapping"
     master.commission()
-    master.cycles(Wish.DISABLE, 3)
+    master.cycles(RequestedState.DISABLE, 3)
     assert master.axis.operational
     assert master.state is State.SWITCH_ON_DISABLED
     assert master.axis.feedback is not stale
@@ -100,8 +100,8 @@ def test_a_reset_of_its_communication_is_noticed_too(rig: Rig, master: Master) -
 
 
 def test_the_hosts_silence_stops_the_drive(rig: Rig, master: Master) -> None:
-    master.until(Wish.ENABLE, State.OPERATION_ENABLED)
-    master.cycles(Wish.ENABLE, 20, velocity=4.0)
+    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
+    master.cycles(RequestedState.ENABLE, 20, velocity=4.0)
     assert rig.drive.see()["velocity"] > 3.0
     master.cycles_silent(1)
     rig.forget()
@@ -118,7 +118,7 @@ def test_the_hosts_silence_stops_the_drive(rig: Rig, master: Master) -> None:
 
 
 def test_the_drives_silence_is_noticed(rig: Rig, master: Master) -> None:
-    master.cycles(Wish.DISABLE, 3)
+    master.cycles(RequestedState.DISABLE, 3)
     assert not master.axis.heartbeat.lost(master.clock.now())
     rig.drive.inject("heartbeat stop")
     master.await_silently(lambda: master.axis.heartbeat.lost(master.clock.now()))
@@ -133,11 +133,11 @@ def test_the_drives_silence_is_noticed(rig: Rig, master: Master) -> None:
     [("over-current", 0x2310), ("following error", 0x8611), ("under-voltage", 0x3220)],
 )
 def test_emergencies_arrive_in_words(rig: Rig, master: Master, kind: str, code: int) -> None:
-    master.until(Wish.ENABLE, State.OPERATION_ENABLED)
+    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
     rig.forget()
     rig.drive.inject(kind)
-    master.until(Wish.DISABLE, State.FAULT)
-    master.cycles(Wish.DISABLE, 2)
+    master.until(RequestedState.DISABLE, State.FAULT)
+    master.cycles(RequestedState.DISABLE, 2)
     assert master.axis.emergencies[-1].code == code
     assert f"{code:04X}h" in master.axis.fault_text
     assert rig.drive.see()["error"] == code

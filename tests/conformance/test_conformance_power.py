@@ -9,7 +9,7 @@ import pytest
 from bus_rig import Rig
 from drive_server import NODE
 from master import Master
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 from winchkit.errors import NotPermitted
 
 pytestmark = pytest.mark.realtime
@@ -27,13 +27,13 @@ def master(rig: Rig) -> Iterator[Master]:
 def test_states_and_transitions_one_by_one(rig: Rig, master: Master) -> None:
     master.commission()
     rig.forget()
-    master.until(Wish.ENABLE, State.OPERATION_ENABLED)
+    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
     assert rig.states() == ["SWITCH_ON_DISABLED", "READY", "SWITCHED_ON", "OPERATION_ENABLED"]
     words = [word for word in rig.witness.words() if word & 0x8F]
     # The last word of one transition is repeated until the status word says that it is done.
     assert list(dict.fromkeys(words)) == [0x06, 0x07, 0x0F]
     rig.forget()
-    master.until(Wish.DISABLE, State.SWITCH_ON_DISABLED)
+    master.until(RequestedState.DISABLE, State.SWITCH_ON_DISABLED)
     assert rig.states() == ["OPERATION_ENABLED", "QUICK_STOP_ACTIVE", "SWITCH_ON_DISABLED"]
     assert not UPWARDS & set(rig.witness.words()[1:])
 
@@ -53,15 +53,17 @@ def test_the_mode_is_verified_and_kept_under_watch(rig: Rig, master: Master) -> 
     assert rig.drive.number(0x6061) == 9
     modes = [value & 0xFF for index, _, value in rig.witness.writes() if index == 0x6060]
     assert modes == [9]
-    master.cycles(Wish.DISABLE, 3)
+    master.cycles(RequestedState.DISABLE, 3)
     assert master.axis.mode_kept
     # Another master changes it behind our back.
     rig.witness.send(0x600 + NODE, bytes.fromhex("2F60600003000000"))
-    master.cycles(Wish.DISABLE, 10)
+    master.cycles(RequestedState.DISABLE, 10)
     assert not master.axis.mode_kept
 
 
-@pytest.mark.parametrize("wish", [Wish.STOP, Wish.DISABLE, Wish.RESET])
+@pytest.mark.parametrize(
+    "requested", [RequestedState.STOP, RequestedState.DISABLE, RequestedState.RESET]
+)
 @pytest.mark.parametrize(
     ("start", "way"),
     [
@@ -74,7 +76,7 @@ def test_the_mode_is_verified_and_kept_under_watch(rig: Rig, master: Master) -> 
     ids=lambda item: str(item) if isinstance(item, State) else "",
 )
 def test_a_stop_never_energises(
-    rig: Rig, master: Master, start: State, way: tuple[int, ...], wish: Wish
+    rig: Rig, master: Master, start: State, way: tuple[int, ...], requested: RequestedState
 ) -> None:
     rig.drive.put(0x605A, 0, 6)  # stays in quick stop active
     master.commission()
@@ -82,7 +84,7 @@ def test_a_stop_never_energises(
         master.send_word(word)
     master.await_silently(lambda: master.state is start)
     rig.forget()
-    master.cycles(wish, 8)
+    master.cycles(requested, 8)
     assert not UPWARDS & set(rig.witness.words())
     after = rig.states()
     assert "OPERATION_ENABLED" not in after[1:]
@@ -93,22 +95,22 @@ def test_a_stop_never_energises(
 def test_a_stop_ends_disabled_whatever_605a_says(rig: Rig, master: Master, code: int) -> None:
     rig.drive.put(0x605A, 0, code)
     master.commission()
-    master.until(Wish.ENABLE, State.OPERATION_ENABLED)
-    master.cycles(Wish.ENABLE, 10, velocity=4.0)
+    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
+    master.cycles(RequestedState.ENABLE, 10, velocity=4.0)
     rig.forget()
-    master.until(Wish.DISABLE, State.SWITCH_ON_DISABLED)
+    master.until(RequestedState.DISABLE, State.SWITCH_ON_DISABLED)
     assert set(rig.witness.words()[1:]) <= {0x00, 0x02}
     assert abs(rig.drive.see()["velocity"]) < 0.05
 
 
 def test_a_reset_of_a_fault_stays_disabled(rig: Rig, master: Master) -> None:
     master.commission()
-    master.until(Wish.ENABLE, State.OPERATION_ENABLED)
+    master.until(RequestedState.ENABLE, State.OPERATION_ENABLED)
     rig.drive.inject("over-current")
-    master.until(Wish.DISABLE, State.FAULT)
+    master.until(RequestedState.DISABLE, State.FAULT)
     rig.forget()
-    master.until(Wish.RESET, State.SWITCH_ON_DISABLED)
-    master.cycles(Wish.RESET, 5)
+    master.until(RequestedState.RESET, State.SWITCH_ON_DISABLED)
+    master.cycles(RequestedState.RESET, 5)
     assert rig.state() == "SWITCH_ON_DISABLED"
     assert rig.states() == ["FAULT", "SWITCH_ON_DISABLED"]
     assert set(rig.witness.words()) <= {0x00, 0x02, 0x80}

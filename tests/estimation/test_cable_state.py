@@ -10,7 +10,7 @@ import pytest
 
 from winchkit.effects import Effect, Term, load_catalogue
 from winchkit.effects.reference_motion import STANDARD_PROFILE
-from winchkit.estimation.cable_state import RopeNow, RopeState, Sample
+from winchkit.estimation.cable_state import CableEstimator, CableState, Sample
 from winchkit.model.line import Line
 from winchkit.model.stages import Signals, Stage
 
@@ -56,11 +56,11 @@ def steady(signals: Signals) -> np.ndarray:
     return (signals.time < 18) | (signals.time > 27)
 
 
-def followed(term: Term, signals: Signals, **given: np.ndarray) -> list[RopeState]:
-    """What RopeNow makes of a run; ``given`` are the channels of its samples."""
+def followed(term: Term, signals: Signals, **given: np.ndarray) -> list[CableState]:
+    """What CableEstimator makes of a run; ``given`` are the channels of its samples."""
     line = Line(STANDARD_PROFILE)
     rate = line.motion(signals).at.motor_rate
-    now = RopeNow(STANDARD_PROFILE, [term])
+    now = CableEstimator(STANDARD_PROFILE, [term])
     columns = {"temperature": signals.temperature, **given}
     return [
         now.update(
@@ -116,7 +116,7 @@ def test_effects_of_one_chain_are_undone_together() -> None:
     line = Line(STANDARD_PROFILE, tuple(t.modifier() for t in terms))
     motion = line.motion(signals)
     cell = line.predict(motion)["tension"]
-    now = RopeNow(STANDARD_PROFILE, terms)
+    now = CableEstimator(STANDARD_PROFILE, terms)
     assert signals.load is not None
     for k, time in enumerate(signals.time):
         rate = float(motion.at.motor_rate[k])
@@ -130,7 +130,7 @@ def test_effects_of_one_chain_are_undone_together() -> None:
 def test_noise_of_the_cell_does_not_wear_a_loop_of_friction_away() -> None:
     """At rest a Dahl loop keeps its place, however long the cell's reading trembles."""
     effect = CATALOGUE["cable-hysteresis"]
-    now = RopeNow(STANDARD_PROFILE, [term_of(effect)])
+    now = CableEstimator(STANDARD_PROFILE, [term_of(effect)])
     noise = np.random.default_rng(1).normal(0.0, 0.4, 3000)
     ramp = np.interp(np.arange(3000), [0, 200, 500], [100, 100, 200])
     lengths = [
@@ -150,9 +150,9 @@ def test_what_is_not_measured_falls_back() -> None:
         STANDARD_PROFILE, reference=replace(STANDARD_PROFILE.reference, cable_length=4.0)
     )
     angle = profile.reference.motor_angle
-    blind = RopeNow(profile, terms, weight=100.0).update(Sample(0.0, angle, 0.0))
+    blind = CableEstimator(profile, terms, weight=100.0).update(Sample(0.0, angle, 0.0))
     assert blind.length == pytest.approx(4.0 + stressed * 100.0 / stiffness, rel=1e-9)
-    now = RopeNow(profile, terms)
+    now = CableEstimator(profile, terms)
     assert now.update(Sample(0.0, angle, 0.0)).length == pytest.approx(4.0)
     seen = now.update(Sample(0.02, angle, 0.0, cell=200.0)).length
     # A cell that fell silent leaves the last tension standing.
@@ -162,8 +162,8 @@ def test_what_is_not_measured_falls_back() -> None:
 def test_a_new_zero_is_no_motion() -> None:
     """A homing lets the motor angle jump; play and friction stay as they were."""
     backlash = term_of(CATALOGUE["gear-backlash"])
-    now = RopeNow(STANDARD_PROFILE, [backlash])
-    bare = RopeNow(STANDARD_PROFILE, [])
+    now = CableEstimator(STANDARD_PROFILE, [backlash])
+    bare = CableEstimator(STANDARD_PROFILE, [])
     for k in range(100):
         now.update(Sample(0.02 * k, 0.2 * k, 10.0))
     jumped = Sample(2.0, -300.0, 0.0)
@@ -182,14 +182,16 @@ def test_what_control_leaves_out_has_a_reason_and_no_influence() -> None:
     assert "motor-coulomb" in reasons
     assert not {"cable-creep", "pulley-dahl", "drum-radius", "cell-gain"} & set(reasons)
     terms = [term_of(CATALOGUE[name]) for name in expected]
-    now = RopeNow(STANDARD_PROFILE, terms)
+    now = CableEstimator(STANDARD_PROFILE, terms)
     assert now.trivial
     state = now.update(Sample(1.0, 30.0, 5.0, cell=150.0))
-    assert state == RopeNow(STANDARD_PROFILE, []).update(Sample(1.0, 30.0, 5.0, cell=150.0))
+    assert state == CableEstimator(STANDARD_PROFILE, []).update(Sample(1.0, 30.0, 5.0, cell=150.0))
 
 
 def test_an_effect_of_ones_own_with_a_memory_takes_part_once_it_says_what_it_carries() -> None:
     own = replace(CATALOGUE["cable-creep"], id="mine", carry=None)
     assert "memory" in own.not_in_control
     assert not CATALOGUE["cable-creep"].not_in_control
-    assert not isnan(RopeNow(STANDARD_PROFILE, [term_of(own)]).update(Sample(0, 0, 0)).length)
+    assert not isnan(
+        CableEstimator(STANDARD_PROFILE, [term_of(own)]).update(Sample(0, 0, 0)).length
+    )

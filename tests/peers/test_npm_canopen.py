@@ -18,7 +18,7 @@ from can_bridge import Bridge
 from npm_install import install
 from winchkit import catalog
 from winchkit.drivers.can.bus.bus import CanBus
-from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused, NoReply
@@ -233,7 +233,7 @@ def test_we_report_what_a_foreign_node_refuses(slave: tuple[Peer, CanBus, SdoNod
 
 def test_we_start_stop_and_receive_a_foreign_node(slave: tuple[Peer, CanBus, SdoNode]) -> None:
     peer, bus, node = slave
-    watch = HeartbeatWatch(0.4)
+    watch = HeartbeatConsumer(0.4)
     bus.on(0x700 + SLAVE, watch.receive)
     until(lambda: watch.state == NmtState.PRE_OPERATIONAL)
     for command, state in ((0x01, NmtState.OPERATIONAL), (0x80, NmtState.PRE_OPERATIONAL)):

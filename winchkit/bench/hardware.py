@@ -101,7 +101,7 @@ def wire(
     the machine's.
     """
     from winchkit.effects import load_catalogue, terms_of
-    from winchkit.estimation.cable_state import RopeNow
+    from winchkit.estimation.cable_state import CableEstimator
 
     profiles = {name: _profile(spec, winch) for name, winch in spec.winch.items()}
     robot = robot_of_bench(spec)
@@ -109,7 +109,9 @@ def wire(
         profiles |= line_profiles(robot)
     catalogue = load_catalogue(spec.effect_files)
     cables = {
-        name: CableMap.of(RopeNow(profile, terms_of(profile, catalogue), _weight(spec.winch[name])))
+        name: CableMap.of(
+            CableEstimator(profile, terms_of(profile, catalogue), _weight(spec.winch[name]))
+        )
         for name, profile in profiles.items()
     }
     buses = _open_buses(spec, clock, stack)

@@ -19,11 +19,11 @@ from winchkit.model.line import Line
 from winchkit.model.stages import At, Modifier, Stage
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["RopeNow", "RopeState", "Sample"]
+__all__ = ["CableEstimator", "CableState", "Sample"]
 
-_CALMING = 0.2
+_LOW_PASS = 0.2
 """Time constant of the low-pass of the tension, s: well below the period of a swinging load."""
-_HELD = 3e-3
+_DEAD_BAND = 3e-3
 """Dead band of the tension as a share of it: friction with hysteresis is erased by noise."""
 _SHORTEST = 1e-4
 """Least step in time, s."""
@@ -31,7 +31,7 @@ _JUMP = 1.0
 """Change of the motor angle that its rate does not explain: a new zero instead of motion, rad."""
 _USUAL = 20.0
 """Temperature where none is measured, at which every thermal effect is zero, °C."""
-_GOOD = 1e-3
+_CLOSE_ENOUGH = 1e-3
 """Tolerance of the cell's reading when solving for the tension, N."""
 
 
@@ -48,7 +48,7 @@ class Sample:
 
 
 @dataclass(frozen=True, slots=True)
-class RopeState:
+class CableState:
     """Estimated state of the cable."""
 
     length: float
@@ -60,7 +60,7 @@ class RopeState:
 
 
 @dataclass
-class _Carried:
+class _TermWithMemory:
     """A term with the state of its memory, by pulley."""
 
     term: Term
@@ -80,7 +80,7 @@ class _Carried:
         self.end[at.pulley] = effect.carry(after, value, at, values)
         return after
 
-    def go_on(self) -> None:
+    def take_over(self) -> None:
         """Take over the state at the end of this sample as the start of the next."""
         self.start.update(self.end)
 
@@ -89,7 +89,7 @@ def _on_length(term: Term) -> bool:
     return term.effect.stage <= Stage.FRAME
 
 
-class RopeNow:
+class CableEstimator:
     """State of the cable of one winch, updated sample by sample."""
 
     def __init__(
@@ -113,17 +113,17 @@ class RopeNow:
             _on_length(t) and (t.effect.memory or t.effect.stage >= Stage.CABLE) for t in used
         )
         """Whether the length depends on more than the motor angle."""
-        self._carried = [_Carried(term) for term in used]
-        self._line = Line(profile, tuple(item.modifier() for item in self._carried))
+        self._terms = [_TermWithMemory(term) for term in used]
+        self._line = Line(profile, tuple(item.modifier() for item in self._terms))
         self._on_tension = any(Stage.CABLE_WEIGHT <= t.effect.stage <= Stage.CELL for t in used)
         self.trivial = not (self.yields or self._on_tension)
         """Whether ``at_rest`` is exact: length by the motor angle alone, cell not corrected."""
         self._weight = weight or 0.0
         self._last: Sample | None = None
-        self._calm = self._reading = nan
+        self._low_passed = self._reading = nan
         self._tension = nan
 
-    def update(self, sample: Sample) -> RopeState:
+    def update(self, sample: Sample) -> CableState:
         """Update with one sample.
 
         Parameters
@@ -133,13 +133,13 @@ class RopeNow:
 
         Returns
         -------
-        RopeState
+        CableState
             True length, tension and correction of the cell.
         """
         before = self._before(sample)
         step = max(sample.time - before.time, _SHORTEST)
         measured = sample.load if isfinite(sample.load) else sample.cell
-        reading = self._calmed(measured, step)
+        reading = self._filtered(measured, step)
         last = self._tension if isfinite(self._tension) else nan
         correction = 0.0
         if isnan(reading):
@@ -151,10 +151,10 @@ class RopeNow:
             correction = tension - reading
         at = self._moments(before, sample, step, last, tension)
         length = float(self._line.lengths(at)[-1])
-        for item in self._carried:
-            item.go_on()
+        for item in self._terms:
+            item.take_over()
         self._last, self._tension, self._reading = sample, tension, reading
-        return RopeState(length, tension, correction)
+        return CableState(length, tension, correction)
 
     def _before(self, sample: Sample) -> Sample:
         """Previous sample; a restart where the motor angle jumped without motion."""
@@ -167,16 +167,16 @@ class RopeNow:
             return last
         return Sample(last.time, sample.motor_angle, sample.motor_rate)
 
-    def _calmed(self, measured: float, step: float) -> float:
+    def _filtered(self, measured: float, step: float) -> float:
         """Low-passed reading with a dead band."""
         if not isfinite(measured):
             return self._reading
-        if isnan(self._calm):
-            self._calm = measured
+        if isnan(self._low_passed):
+            self._low_passed = measured
             return measured
-        self._calm += (measured - self._calm) * (1 - exp(-step / _CALMING))
-        moved = abs(self._calm - self._reading) > _HELD * abs(self._calm)
-        return self._calm if moved or isnan(self._reading) else self._reading
+        self._low_passed += (measured - self._low_passed) * (1 - exp(-step / _LOW_PASS))
+        moved = abs(self._low_passed - self._reading) > _DEAD_BAND * abs(self._low_passed)
+        return self._low_passed if moved or isnan(self._reading) else self._reading
 
     def _at_platform(self, at: At, reading: float) -> float:
         """Tension at the platform end at a ``reading`` of the cell, by two secant steps."""
@@ -184,7 +184,7 @@ class RopeNow:
         guess = self._tension + reading - self._reading if begun else reading
         shown = self._shown(at, guess)
         miss = reading - shown
-        if abs(miss) < _GOOD:
+        if abs(miss) < _CLOSE_ENOUGH:
             return guess
         slope = (self._shown(at, guess + miss) - shown) / miss
         solved = guess + miss / slope if slope > 0 else guess + miss

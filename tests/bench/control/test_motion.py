@@ -75,7 +75,7 @@ def test_a_jog_slows_down_before_a_length_limit() -> None:
 def test_a_jog_commands_the_plain_formula(
     cycles: list[tuple[float, float, float, bool]], limited: bool
 ) -> None:
-    """Towards the wish, within the speed from which it stops 2 mm before a limit, by the ramp."""
+    """To the requested speed, within that from which it stops 2 mm before a limit, by the ramp."""
     limits = LimitSpec(0.5, 1.0, (0.5, 9.0) if limited else None)
     source = Jog(CableMap(StraightLine()), limits)
     time, speed, before = 1.0, 0.0, None
@@ -83,15 +83,15 @@ def test_a_jog_commands_the_plain_formula(
     for wanted, step, angle, live in cycles:
         time += step
         source.refresh(wanted, time + 1.0 if live else time)
-        wish = max(-0.5, min(0.5, wanted)) if live else 0.0
+        requested = max(-0.5, min(0.5, wanted)) if live else 0.0
         if limited:
             length = 4.0 - 0.005 * angle
-            room = (length - 0.5 if wish > 0 else 9.0 - length) - 0.002
+            room = (length - 0.5 if requested > 0 else 9.0 - length) - 0.002
             room = room if room > 0.0 else 0.0
             most = math.sqrt(0.06**2 + 2 * room) - 0.06
-            wish = math.copysign(min(abs(wish), most), wish)
+            requested = math.copysign(min(abs(requested), most), requested)
         change = 0.0 if before is None else time - before
-        speed += max(-change, min(change, wish - speed))
+        speed += max(-change, min(change, requested - speed))
         before = time
         target = source.target(time, angle, time)
         assert target.winding_speed == pytest.approx(speed, abs=1e-12)

@@ -178,10 +178,10 @@ def test_a_target_beyond_the_drives_range_is_a_trip_of_that_winch() -> None:
     rig = moving_rig()
     send = rig.axes["A"].send
 
-    def refuses(wish: object, **keys: float) -> int:
+    def refuses(requested: object, **keys: float) -> int:
         if keys.get("velocity"):
             raise NotPermitted("motor angle 1e9 rad is beyond the drive's range")
-        return send(wish, **keys)  # type: ignore[arg-type]
+        return send(requested, **keys)  # type: ignore[arg-type]
 
     rig.axes["A"].send = refuses  # type: ignore[method-assign, assignment]
     rig.step(2)

@@ -17,7 +17,7 @@ from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.effects import load_catalogue, terms_of
 from winchkit.errors import FileError
-from winchkit.estimation.cable_state import RopeNow, Sample
+from winchkit.estimation.cable_state import CableEstimator, Sample
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.read import read_bench, read_profile, read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
@@ -78,10 +78,10 @@ def invoke(*arguments: object) -> Result:
     return CliRunner().invoke(main, [str(argument) for argument in arguments])
 
 
-def rope_now(folder: Path, effects: str) -> RopeNow:
+def rope_now(folder: Path, effects: str) -> CableEstimator:
     file, profile = write(folder, effects)
     declared = read_profile(profile)
-    return RopeNow(declared, terms_of(declared, load_catalogue([file])), 0.0)
+    return CableEstimator(declared, terms_of(declared, load_catalogue([file])), 0.0)
 
 
 def test_an_own_effect_moves_length_and_tension_as_one_of_the_catalogue_does(
@@ -158,7 +158,7 @@ def test_an_effect_that_fails_under_way_ramps_the_winch_down(
     )
     file, profile = write(tmp_path, MINE, own)
     declared = read_profile(profile)
-    now = RopeNow(declared, terms_of(declared, load_catalogue([file])), 0.0)
+    now = CableEstimator(declared, terms_of(declared, load_catalogue([file])), 0.0)
     limits = LimitSpec(0.6, 1.0, (0.5, 9.0))
     rig = Rig(limits, cable=CableMap.of(now))
     rig.controller().begin(Move(rig.cable(), limits, 2.0))

@@ -15,7 +15,7 @@ from model_files import answer, invoke
 from winchkit.bench.control.cable import CableMap
 from winchkit.catalog import find
 from winchkit.effects import terms_of
-from winchkit.estimation.cable_state import RopeNow, Sample
+from winchkit.estimation.cable_state import CableEstimator, Sample
 from winchkit.schema.read import read_profile, read_simbench
 from winchkit.sim.bench import hiding
 from winchkit.sim.live.bench_file import write_bench
@@ -110,7 +110,7 @@ def errors(profile: Path, physics: str, load: float) -> tuple[float, float]:
     """Of length (m) and tension (N), the largest after moves to three lengths with a profile."""
     declared = hiding(read_simbench(find("sim", BENCH)), [physics])
     nominal, better = read_profile(find("profiles", "bench-spiral")), read_profile(profile)
-    now = RopeNow(better, terms_of(better), load * 9.80665)
+    now = CableEstimator(better, terms_of(better), load * 9.80665)
     cable = CableMap.of(now)
     plant = WinchPlant(nominal, declared.truth["A"], seed=1, noise=declared.noise)
     plant.hang(load)
@@ -134,7 +134,7 @@ def advance(plant: WinchPlant, cable: CableMap, angle: float) -> None:
     """A hundredth of a second at a motor angle, and what the cable's map makes of it."""
     plant.advance(0.01, DriveCommand(angle=angle))
     seen = plant.measure()
-    cable.feel(Sample(plant.time, plant.motor_angle, plant.motor_velocity, cell=seen.tension))
+    cable.update(Sample(plant.time, plant.motor_angle, plant.motor_velocity, cell=seen.tension))
 
 
 @pytest.mark.parametrize(

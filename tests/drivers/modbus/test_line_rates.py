@@ -15,7 +15,9 @@ from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.modbus import ModbusSpec
 from winchkit.schema.read import read_device
 
-WISHES = st.lists(st.tuples(st.floats(1, 1000), st.floats(1e-4, 0.1)), min_size=1, max_size=8)
+REQUESTED_STATES = st.lists(
+    st.tuples(st.floats(1, 1000), st.floats(1e-4, 0.1)), min_size=1, max_size=8
+)
 
 
 def spec(name: str) -> ModbusSpec:
@@ -51,7 +53,7 @@ def test_above_19200_baud_the_silence_is_fixed() -> None:
     assert cost.silence == pytest.approx(2 * 1.75e-3)
 
 
-@given(WISHES)
+@given(REQUESTED_STATES)
 def test_the_share_is_fair_and_fills_the_line(wishes: list[tuple[float, float]]) -> None:
     wanted, times = [w for w, _ in wishes], [t for _, t in wishes]
     rates = fair_rates(wanted, times)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 
 __all__ = ["STOPS", "transition"]
 
-STOPS = (Wish.RUN_DOWN, Wish.HALT, Wish.STOP, Wish.DISABLE, Wish.RESET)
+STOPS = (
+    RequestedState.RUN_DOWN,
+    RequestedState.HALT,
+    RequestedState.STOP,
+    RequestedState.DISABLE,
+    RequestedState.RESET,
+)
 """Wishes that must never energise a drive."""
 
 

@@ -11,9 +11,9 @@ from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
-from winchkit.drivers.can.canopen.nmt import HeartbeatWatch
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
 from winchkit.drivers.can.cia402.axis import AxisFeedback
-from winchkit.drivers.can.cia402.state_machine import State, Wish, control_word
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State, control_word
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import LimitSpec
@@ -52,7 +52,7 @@ class FakeAxis:
     velocity: float = 0.0
     state: State = State.SWITCH_ON_DISABLED
     words: list[int] = field(default_factory=list)
-    heartbeat: HeartbeatWatch = field(default_factory=lambda: HeartbeatWatch(0.2))
+    heartbeat: HeartbeatConsumer = field(default_factory=lambda: HeartbeatConsumer(0.2))
     operational: bool = True
     mode_kept: bool = True
     fault_text: str = ""
@@ -115,7 +115,7 @@ class FakeAxis:
 
     def send(
         self,
-        wish: Wish,
+        requested: RequestedState,
         *,
         velocity: float = 0.0,
         angle: float | None = None,
@@ -126,7 +126,7 @@ class FakeAxis:
         previous = self.words[-1] if self.words else 0
         age = self._sync[0] - self.feedback.sync
         word = control_word(
-            self.feedback.state, wish, previous=previous, age=age, at_rest=self.at_rest
+            self.feedback.state, requested, previous=previous, age=age, at_rest=self.at_rest
         )
         self.words.append(word)
         if not self.alive or not self.hears_pdos:

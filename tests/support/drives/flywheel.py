@@ -23,15 +23,15 @@ class Flywheel:
     motor_torque: float = 0.25
 
     def advance(self, duration: float, command: DriveCommand) -> None:
-        wish = 0.0
+        requested = 0.0
         if command.power and not command.brake:
-            wish = command.speed
+            requested = command.speed
             if command.angle is not None:
-                wish += 25.0 * (command.angle - self.motor_angle)
+                requested += 25.0 * (command.angle - self.motor_angle)
         if command.power and command.torque is not None:
             self.motor_velocity += command.torque / INERTIA * duration
         else:
-            self.motor_velocity += (wish - self.motor_velocity) * -math.expm1(-duration / _LAG)
+            self.motor_velocity += (requested - self.motor_velocity) * -math.expm1(-duration / _LAG)
         self.motor_angle += self.motor_velocity * duration
 
     def measure(self) -> Flywheel:

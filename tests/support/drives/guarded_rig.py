@@ -21,7 +21,7 @@ from winchkit import catalog
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
@@ -76,13 +76,15 @@ class Rig:
         spec = WatchSpec(HOST, HEARTBEAT, self.cycle, True, **watch)
         return Cia402Axis(self.bus, node, device, spec, self.clock)
 
-    def cycles(self, axis: Cia402Axis, wish: Wish, count: int, **command: float) -> None:
+    def cycles(
+        self, axis: Cia402Axis, requested: RequestedState, count: int, **command: float
+    ) -> None:
         for _ in range(count):
             axis.begin_cycle(next(self.syncs), self.time)
             self.bus.sync()
             self.bus.heartbeat(HOST, 5)
             self.world.wait(self.cycle)
-            axis.send(wish, **command)
+            axis.send(requested, **command)
 
     def until_left(self, within: float, slave: int = 0) -> float:
         """Wait until a slave has left operation enabled; returns the time that it took, s."""
@@ -92,8 +94,8 @@ class Rig:
 
     def moving(self, axis: Cia402Axis) -> None:
         """Enable the drive and turn its motor."""
-        self.cycles(axis, Wish.ENABLE, 40)
-        self.cycles(axis, Wish.ENABLE, 30, velocity=3.0)
+        self.cycles(axis, RequestedState.ENABLE, 40)
+        self.cycles(axis, RequestedState.ENABLE, 30, velocity=3.0)
         assert self.slaves[0].power.state is State.ENABLED
         assert abs(self.slaves[0].motor.velocity) > 2.0
 

@@ -21,7 +21,7 @@ from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec
 from winchkit.drivers.can.cia402.limits import DriveLimits
 from winchkit.drivers.can.cia402.modes import MODES
-from winchkit.drivers.can.cia402.state_machine import Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState
 from winchkit.drivers.can.cia402.units import Scale
 from winchkit.errors import DeviceRefused
 from winchkit.schema.devices.device import DeviceSpec
@@ -170,7 +170,7 @@ class HandMade:
     def enable(self) -> None:
         """An enabled drive with the command to stay so."""
         self.answer(0x0237, mode=MODES[self.mode].number)
-        self.axis.send(Wish.ENABLE)
+        self.axis.send(RequestedState.ENABLE)
         self.sent()
 
     def sent(self) -> dict[int, bytes]:

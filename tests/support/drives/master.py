@@ -13,7 +13,7 @@ from winchkit import catalog
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import Commissioned, WatchSpec
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.read import read_device
 
@@ -70,16 +70,16 @@ class Master:
             self._sync()
         raise AssertionError("it did not come to that")
 
-    def cycles(self, wish: Wish, count: int, velocity: float = 0.0) -> None:
-        """Whole cycles towards a wish."""
+    def cycles(self, requested: RequestedState, count: int, velocity: float = 0.0) -> None:
+        """Whole cycles towards a requested state."""
         for _ in range(count):
             self._sync()
-            self.axis.send(wish, velocity=velocity)
+            self.axis.send(requested, velocity=velocity)
 
-    def until(self, wish: Wish, state: State) -> None:
+    def until(self, requested: RequestedState, state: State) -> None:
         """Cycles until the feedback says that the drive is in a state."""
         for _ in range(_PATIENCE):
-            self.cycles(wish, 1)
+            self.cycles(requested, 1)
             if self.state is state:
                 return
         raise AssertionError(f"the drive is {self.state}, not {state}: {self._rig.drive.see()}")

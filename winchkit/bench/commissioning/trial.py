@@ -21,8 +21,8 @@ from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.state_machine import (
     DISABLE_VOLTAGE,
     QUICK_STOP,
+    RequestedState,
     State,
-    Wish,
     state_of,
 )
 from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
@@ -137,7 +137,7 @@ class Trials:
             self._run(axis, 0.0, _SETTLE_TIME, name)
             angle, start = _angle(axis), self._clock.now()
             while self._clock.now() - start < _BRAKE_TIME:
-                self._cycle(axis, Wish.DISABLE)
+                self._cycle(axis, RequestedState.DISABLE)
             travel = self._travel(name, axis, angle)
             state = _asked(axis)
         return Trial(_has_left(state), _BRAKE_TIME, str(state), travel)
@@ -178,7 +178,7 @@ class Trials:
     def _enable(self, axis: Cia402Axis) -> None:
         deadline = self._clock.now() + _ENABLE_TIME
         while axis.state is not State.OPERATION_ENABLED:
-            self._cycle(axis, Wish.ENABLE)
+            self._cycle(axis, RequestedState.ENABLE)
             if self._clock.now() > deadline:
                 raise NotPermitted(
                     f"{axis.name}: still {axis.state} {_ENABLE_TIME:g} s after the command to "
@@ -198,7 +198,7 @@ class Trials:
             dt, last = now - last, now
             velocity += max(-slope * dt, min(slope * dt, wanted - velocity))
             angle += velocity * dt
-            self._cycle(axis, Wish.ENABLE, velocity, angle)
+            self._cycle(axis, RequestedState.ENABLE, velocity, angle)
 
     def _require_room(self, name: str, axis: Cia402Axis, speed: float) -> None:
         """Raise NotPermitted where winding in at ``speed`` may pass the lower length limit.
@@ -221,7 +221,11 @@ class Trials:
             )
 
     def _cycle(
-        self, axis: Cia402Axis, wish: Wish, velocity: float = 0.0, angle: float | None = None
+        self,
+        axis: Cia402Axis,
+        requested: RequestedState,
+        velocity: float = 0.0,
+        angle: float | None = None,
     ) -> None:
         now = self._clock.now()
         self._sync += 1
@@ -234,9 +238,9 @@ class Trials:
         self._clock.sleep(self.spec.cycle)
         for one in self.axes.values():
             if one is axis:
-                one.send(wish, velocity=velocity, angle=angle)
+                one.send(requested, velocity=velocity, angle=angle)
             else:
-                one.send(Wish.DISABLE)
+                one.send(RequestedState.DISABLE)
 
     def _left(
         self, axis: Cia402Axis, start: float, blind: float, patience: float

@@ -6,7 +6,7 @@ from math import isfinite, nan
 from typing import NamedTuple, Protocol
 
 from winchkit.errors import FileError
-from winchkit.estimation.cable_state import RopeNow, Sample
+from winchkit.estimation.cable_state import CableEstimator, Sample
 
 __all__ = ["CableMap", "LineModel"]
 
@@ -31,7 +31,7 @@ class LineModel(Protocol):
         """Cable wound in per motor angle, m/rad; positive angle times arm winds in."""
 
 
-class _Here(NamedTuple):
+class _Linearisation(NamedTuple):
     """Linearisation of the cable length at one motor angle."""
 
     angle: float = nan
@@ -39,7 +39,7 @@ class _Here(NamedTuple):
     arm: float = nan
 
 
-class _Felt(NamedTuple):
+class _Evaluation(NamedTuple):
     """Contributions of the effects at their last evaluation."""
 
     time: float = nan
@@ -56,22 +56,22 @@ class CableMap:
     are evaluated with tension and history every 20 ms or 5 mm, whichever comes first.
     """
 
-    def __init__(self, line: LineModel, now: RopeNow | None = None) -> None:
+    def __init__(self, line: LineModel, now: CableEstimator | None = None) -> None:
         self._line, self._now = line, now
-        self._here = _Here()
+        self._nearby = _Linearisation()
         self._asked = _NEVER
         """The motor angle that :meth:`at` was asked for last, and its answer: several ask for the
         same in a cycle."""
-        self._felt = _Felt()
+        self._evaluated = _Evaluation()
         self.correction = 0.0
         """Tension at the platform end less the reading of the cell, N."""
-        self.bends = now is not None
+        self.has_effects = now is not None
         """Whether effects of the profile are to be evaluated in every cycle."""
         self.failure: FileError | None = None
         """Fault of an effect of the profile; None while all can be evaluated."""
 
     @classmethod
-    def of(cls, now: RopeNow) -> CableMap:
+    def of(cls, now: CableEstimator) -> CableMap:
         """The map of a profile with its effects, if it has any that control can use."""
         return cls(now.at_rest, None if now.trivial else now)
 
@@ -80,13 +80,13 @@ class CableMap:
         """Whether the length depends on more than the motor angle."""
         return self._now is not None and self._now.yields
 
-    def feel(self, sample: Sample) -> None:
+    def update(self, sample: Sample) -> None:
         """Take the measurements of this cycle."""
         if self._now is None or not isfinite(sample.motor_angle):
             return
-        felt = self._felt
-        moved = abs((sample.motor_angle - felt.angle) * self._here.arm)
-        if sample.time - felt.time < _SOON and moved < _FAR:
+        last = self._evaluated
+        moved = abs((sample.motor_angle - last.angle) * self._nearby.arm)
+        if sample.time - last.time < _SOON and moved < _FAR:
             return
         try:
             state = self._now.update(sample)
@@ -99,12 +99,12 @@ class CableMap:
                 f"{sample.motor_angle:g} rad, {sample.cell:g} N; mend them or leave them out"
             )
             return
-        arm = self._here.arm
+        arm = self._nearby.arm
         if not moved < _FAR:
             arm = self._line.arm(sample.motor_angle)
-        self._felt = _Felt(sample.time, sample.motor_angle, state.length, state.tension)
+        self._evaluated = _Evaluation(sample.time, sample.motor_angle, state.length, state.tension)
         self.correction = state.correction
-        self._here = _Here(sample.motor_angle, state.length, arm)
+        self._nearby = _Linearisation(sample.motor_angle, state.length, arm)
         self._asked = _NEVER
 
     def at(self, motor_angle: float) -> tuple[float, float]:
@@ -112,14 +112,14 @@ class CableMap:
         asked, answer = self._asked
         if motor_angle == asked:
             return answer
-        angle, length, arm = self._here
+        angle, length, arm = self._nearby
         change = (motor_angle - angle) * arm
         if -_FAR < change < _FAR or (self._now is not None and isfinite(change)):
             answer = (length - change, arm)
         else:
             answer = self._line.cable_length(motor_angle), self._line.arm(motor_angle)
             if self._now is None:
-                self._here = _Here(motor_angle, *answer)
+                self._nearby = _Linearisation(motor_angle, *answer)
         self._asked = (motor_angle, answer)
         return answer
 
@@ -135,7 +135,7 @@ class CableMap:
 
     def arm(self, motor_angle: float) -> float:
         """Cable wound in per motor angle, m/rad; that of an angle within 5 mm of cable."""
-        angle, _, arm = self._here
+        angle, _, arm = self._nearby
         return arm if abs((motor_angle - angle) * arm) < _FAR else self._line.arm(motor_angle)
 
     def _pulled(self, motor_angle: float) -> float:
@@ -144,9 +144,9 @@ class CableMap:
         return self._now.at_rest.cable_length(motor_angle, self._force())
 
     def _force(self) -> float:
-        return self._felt.tension if isfinite(self._felt.tension) else 0.0
+        return self._evaluated.tension if isfinite(self._evaluated.tension) else 0.0
 
     def _remembered(self) -> float:
         """Contribution of memory effects and temperature to the length, m."""
-        felt = self._felt
-        return felt.length - self._pulled(felt.angle) if isfinite(felt.length) else 0.0
+        last = self._evaluated
+        return last.length - self._pulled(last.angle) if isfinite(last.length) else 0.0

@@ -11,9 +11,9 @@ from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import MotionSource, PathStop, RunDown, StartGate, Stop, Target
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
-from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
 from winchkit.drivers.can.cia402.axis import AxisFeedback
-from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, State, Wish
+from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, RequestedState, State
 from winchkit.schema.bench import LimitSpec
 
 __all__ = ["AxisPort", "Controller"]
@@ -37,14 +37,14 @@ from here in between would abort the transfer, which may be that of a firmware."
 _MOVING = Phase.MOVING
 _FOLLOWING = (_MOVING, Phase.RUN_DOWN)
 _OPERATION_ENABLED = State.OPERATION_ENABLED
-_ENABLE, _DISABLE = Wish.ENABLE, Wish.DISABLE
+_ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
 _ENABLED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 
 class AxisPort(Protocol):
     """Interface of an axis to the control loop, such as ``Cia402Axis``."""
 
-    heartbeat: HeartbeatWatch
+    heartbeat: HeartbeatConsumer
 
     @property
     def feedback(self) -> AxisFeedback | None:
@@ -138,7 +138,7 @@ class AxisPort(Protocol):
 
     def send(
         self,
-        wish: Wish,
+        requested: RequestedState,
         *,
         velocity: float = 0.0,
         angle: float | None = None,
@@ -424,7 +424,7 @@ class Controller:
             return
         if enabled and self._held is None:
             self._held = feedback.angle
-        self._word = self.axis.send(Wish.ENABLE, angle=self._held)
+        self._word = self.axis.send(RequestedState.ENABLE, angle=self._held)
         if now - self._since > (_GATE_TIME if enabled else _ENABLE_TIME):
             waiting = "waits for a winch that was to start with it"
             stays = f"the drive stays {feedback.state} for {_ENABLE_TIME:g} s"
@@ -477,10 +477,12 @@ class Controller:
             return
         self._angle = target.angle if target.angle is not None else self._angle
         self._velocity = target.velocity
-        self._word = self.axis.send(Wish.RUN_DOWN, velocity=target.velocity, angle=target.angle)
+        self._word = self.axis.send(
+            RequestedState.RUN_DOWN, velocity=target.velocity, angle=target.angle
+        )
 
     def _stop(self, now: float, feedback: AxisFeedback) -> None:
-        self._word = self.axis.send(Wish.DISABLE)
+        self._word = self.axis.send(RequestedState.DISABLE)
         sampled = feedback.sync > self._stop_sync
         if self.escalation.rung is not None:
             self._escalate(now, feedback)
@@ -513,7 +515,7 @@ class Controller:
             axis.stop_by_nmt()
 
     def _reset(self, now: float, feedback: AxisFeedback) -> None:
-        self._word = self.axis.send(Wish.RESET)
+        self._word = self.axis.send(RequestedState.RESET)
         if feedback.state is not State.FAULT or now - self._since > _RESET_TIME:
             self._enter(Phase.DISABLED, now)
 

@@ -162,10 +162,10 @@ class Ramp:
         self._acceleration = acceleration
         self._time: float | None = None
 
-    def follow(self, wish: float, time: float) -> float:
+    def follow(self, requested: float, time: float) -> float:
         """Speed at ``time``; the first call starts the clock."""
         before, self._time = self._time, time
-        missing = wish - self.speed
+        missing = requested - self.speed
         if missing and before is not None:
             step = (time - before) * self._acceleration
             self.speed += max(-step, min(step, missing))
@@ -181,14 +181,14 @@ class Jog:
     def __init__(self, cable: CableMap, limits: LimitSpec) -> None:
         self._cable, self._limits = cable, limits
         self._ramp = Ramp(limits.acceleration)
-        self._wish = 0.0
+        self._requested = 0.0
         self._lag = limits.acceleration * limits.response_time
         self._expires = -math.inf
         self._angle = self._last = 0.0
 
     def refresh(self, winding_speed: float, expires: float) -> None:
         """Keep going at ``winding_speed`` (m/s) until ``expires`` (s on the bench's clock)."""
-        self._wish = max(-self._limits.speed, min(self._limits.speed, winding_speed))
+        self._requested = max(-self._limits.speed, min(self._limits.speed, winding_speed))
         self._expires = expires
 
     def start(self, time: float, angle: float, winding_speed: float) -> None:
@@ -200,26 +200,26 @@ class Jog:
         """Follow the commanded speed, slow down before a length limit, end at rest once expired."""
         live = now < self._expires
         length, arm = self._cable.at(angle)
-        wish = self._within(self._wish, length) if live else 0.0
-        speed = self._ramp.follow(wish, time)
+        requested = self._within(self._requested, length) if live else 0.0
+        speed = self._ramp.follow(requested, time)
         velocity = speed / arm
         self._angle += velocity * (time - self._last)
         self._last = time
         # What Target(...) makes, without the call of its constructor.
         return _new(Target, (velocity, self._angle, speed, not live and speed == 0.0, False))
 
-    def _within(self, wish: float, length: float) -> float:
+    def _within(self, requested: float, length: float) -> float:
         """Commanded speed, limited to the one from which the winch stops before a length limit.
 
         The drive's speed lags behind by up to the response time, in which the cable runs on.
         """
         if self._limits.length is None:
-            return wish
+            return requested
         low, high = self._limits.length
-        room = max(0.0, (length - low if wish > 0 else high - length) - _MARGIN)
+        room = max(0.0, (length - low if requested > 0 else high - length) - _MARGIN)
         lag = self._lag
         fastest = math.sqrt(lag * lag + 2 * self._limits.acceleration * room) - lag
-        return math.copysign(fastest, wish) if fastest < abs(wish) else wish
+        return math.copysign(fastest, requested) if fastest < abs(requested) else requested
 
 
 class RunDown:

@@ -164,27 +164,27 @@ class TensionControl:
         live = now < self._expires
         arm = self._cable.at(angle)[1]
         travelled = (angle - self._begin) * arm
-        wish = self._wish(now, travelled) if live else 0.0
-        speed = self._ramp.follow(wish, time)
+        requested = self._requested(now, travelled) if live else 0.0
+        speed = self._ramp.follow(requested, time)
         velocity = speed / arm
         self._angle += velocity * (time - self._last)
         self._last = time
         return Target(velocity, self._angle, speed, done=not live and speed == 0.0)
 
-    def _wish(self, now: float, travelled: float) -> float:
+    def _requested(self, now: float, travelled: float) -> float:
         setting = self.setting
         reading = self._reading(now)
         if not math.isfinite(reading.value) or reading.age > setting.max_age:
             return 0.0
-        wish = setting.gain * (setting.tension - reading.value)
+        requested = setting.gain * (setting.tension - reading.value)
         fastest = min(setting.speed, self._limits.speed)
-        wish = max(-fastest, min(fastest, wish))
-        room = setting.travel - math.copysign(1.0, wish) * travelled - _MARGIN
+        requested = max(-fastest, min(fastest, requested))
+        room = setting.travel - math.copysign(1.0, requested) * travelled - _MARGIN
         allowed = fastest_within(room, self._limits)
-        if self._used_up.at(now, used_up=allowed == 0.0 and wish != 0.0):
+        if self._used_up.at(now, used_up=allowed == 0.0 and requested != 0.0):
             self._trip(
                 f"the tension is {reading.value:.1f} N after {setting.travel * 1e3:.0f} mm of "
                 f"cable (the declared travel), set is {setting.tension:.1f} N; look for a broken "
                 "or jammed cable and a wrong load cell, then reset"
             )
-        return math.copysign(min(abs(wish), allowed), wish)
+        return math.copysign(min(abs(requested), allowed), requested)

@@ -88,8 +88,8 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     following_error, feedback_age, missed_syncs = 0.0, math.inf, sync
     fault, turns_known = False, True
     if feedback is not None:
-        if parts.cable.bends:
-            parts.cable.feel(_sample(parts, feedback, now))
+        if parts.cable.has_effects:
+            parts.cable.update(_sample(parts, feedback, now))
         cable_length, arm = parts.cable.at(feedback.angle)
         winding_speed = feedback.velocity * arm
         fault, turns_known = feedback.state in _FAULTS, feedback.turns_known

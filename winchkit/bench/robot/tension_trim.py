@@ -104,26 +104,26 @@ class ForceTrim:
             return
         before = self._speed
         over = self._stopped or time - self._begun >= self.setting.duration
-        wish = np.zeros_like(before) if over else self._wish(now)
-        change = wish - before
+        requested = np.zeros_like(before) if over else self._requested(now)
+        change = requested - before
         largest, most = float(np.abs(change).max()), self._acceleration * step
-        self._speed = before + change * min(1.0, most / largest) if largest > 0 else wish
+        self._speed = before + change * min(1.0, most / largest) if largest > 0 else requested
         self._travelled = self._travelled + (before + self._speed) / 2 * step
         self.ended = over and not self._speed.any()
 
-    def _wish(self, now: float) -> Array:
+    def _requested(self, now: float) -> Array:
         """Speeds by the deviation of the forces, within the limits; rest without all readings."""
         setting = self.setting
         error = setting.balanced @ (setting.force - self._readings(now))
         if not np.all(np.isfinite(error)):
             return np.zeros_like(error)
-        wish = LOOP / setting.delay * error / setting.stiffness
-        rooms = setting.travel - np.sign(wish) * self._travelled
+        requested = LOOP / setting.delay * error / setting.stiffness
+        rooms = setting.travel - np.sign(requested) * self._travelled
         scale, tightest = 1.0, 0
         for i, (room, limits) in enumerate(zip(rooms.tolist(), self._limits, strict=True)):
             fastest = min(setting.speed, limits.speed, fastest_within(room, limits))
-            if abs(wish[i]) * scale > fastest:
-                scale, tightest = fastest / abs(float(wish[i])), i
+            if abs(requested[i]) * scale > fastest:
+                scale, tightest = fastest / abs(float(requested[i])), i
         if self._used_up.at(now, used_up=scale < 1e-3):
             self._trip(
                 tightest,
@@ -131,7 +131,7 @@ class ForceTrim:
                 f"{setting.travel * 1e3:g} mm of cable (travel of the trim); look for a broken or "
                 "jammed cable and a wrong load cell, home the winches, then reset",
             )
-        return np.asarray(wish * scale)
+        return np.asarray(requested * scale)
 
 
 class CableTrim:

@@ -19,7 +19,7 @@ from winchkit.drivers.can.bus.health import BusHealth, BusState, ErrorTally
 from winchkit.drivers.can.bus.socketcan import Frame
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost
 
@@ -322,10 +322,10 @@ def test_the_frames_of_a_cycle_are_sent_together_and_in_their_order(
 def test_an_emergency_stop_takes_back_the_command_that_waits(commissioned: Commissioned) -> None:
     """Nothing of the cycle follows its quick stop; by what the drive receives."""
     drive, bus, axis = commissioned
-    cycle(bus, axis, Wish.ENABLE, 25, velocity=0.0)
+    cycle(bus, axis, RequestedState.ENABLE, 25, velocity=0.0)
     axis.begin_cycle(25, CLOCK.now())
     bus.gather()
-    axis.send(Wish.ENABLE, velocity=3.0)
+    axis.send(RequestedState.ENABLE, velocity=3.0)
     bus.post(0x202, b"other")
     axis.emergency_stop(sdo=False)
     until(lambda: (0x201, axis._stop_frames[0][1]) in drive.frames)
@@ -428,7 +428,7 @@ def test_an_interface_that_stays_away_is_reported_each_time(
 def test_a_drive_is_found_again_after_its_bus_was_reopened(commissioned: Commissioned) -> None:
     """Axis and handlers stay; nothing is enabled by it; the drive has stopped by itself."""
     drive, bus, axis = commissioned
-    cycle(bus, axis, Wish.ENABLE, 25, velocity=3.0)
+    cycle(bus, axis, RequestedState.ENABLE, 25, velocity=3.0)
     assert axis.state is State.OPERATION_ENABLED
     last = bus.sent
     until(lambda: drive.frames[-1][0] == 0x201)
@@ -439,18 +439,20 @@ def test_a_drive_is_found_again_after_its_bus_was_reopened(commissioned: Commiss
     until(lambda: drive.drive.state.name == "SWITCH_ON_DISABLED")
     assert drive.frames[before:] == []
     axis.commission()
-    cycle(bus, axis, Wish.ENABLE, 25, velocity=-3.0)
+    cycle(bus, axis, RequestedState.ENABLE, 25, velocity=-3.0)
     assert drive.shaft.motor_velocity == pytest.approx(-3.0, rel=0.05)
 
 
-def cycle(bus: CanBus, axis: Cia402Axis, wish: Wish, count: int, velocity: float) -> None:
+def cycle(
+    bus: CanBus, axis: Cia402Axis, requested: RequestedState, count: int, velocity: float
+) -> None:
     """A control loop in miniature."""
     for number in range(count):
         axis.begin_cycle(number, CLOCK.now())
         bus.sync()
         bus.heartbeat(127, 5)
         time.sleep(0.006)
-        axis.send(wish, velocity=velocity)
+        axis.send(requested, velocity=velocity)
 
 
 def test_sending_from_several_threads_loses_nothing(

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.drivers.can.canopen.emergency import error_text, parse_emergency
-from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, HeartbeatProducer, NmtState
 from winchkit.drivers.can.canopen.pdo import MappedObject, PdoCodec, parse_object
 from winchkit.errors import FileError
 from winchkit.schema.devices.servo import PdoSpec
@@ -66,7 +66,7 @@ def test_objects_are_written_as_the_standard_writes_them() -> None:
 
 
 def test_watch_arms_on_the_first_heartbeat() -> None:
-    watch = HeartbeatWatch(0.2)
+    watch = HeartbeatConsumer(0.2)
     assert not watch.lost(1e9)
     watch.receive(bytes([NmtState.OPERATIONAL]), 10.0)
     assert not watch.lost(10.2)

@@ -16,7 +16,7 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused, NoReply, NotPermitted
 
@@ -41,14 +41,16 @@ def axis_on(bus: CanBus, *, brake: bool = True, node: int = 1, cycle: float = 0.
     return Cia402Axis(bus, node, device(), watch, CLOCK)
 
 
-def run_cycles(bus: CanBus, axis: Cia402Axis, wish: Wish, count: int, velocity: float = 0) -> None:
+def run_cycles(
+    bus: CanBus, axis: Cia402Axis, requested: RequestedState, count: int, velocity: float = 0
+) -> None:
     """A control loop in miniature."""
     for _ in range(count):
         axis.begin_cycle(next(_syncs), CLOCK.now())
         bus.sync()
         bus.heartbeat(127, 5)
         time.sleep(0.006)
-        axis.send(wish, velocity=velocity)
+        axis.send(requested, velocity=velocity)
 
 
 def sdo_writes(drive: DriveOnBus) -> list[tuple[int, int, int]]:
@@ -143,16 +145,16 @@ def test_an_axis_moves_and_reports_si(rig: Rig) -> None:
     drive, bus = rig
     axis = axis_on(bus)
     axis.commission()
-    run_cycles(bus, axis, Wish.ENABLE, 20)
+    run_cycles(bus, axis, RequestedState.ENABLE, 20)
     assert axis.feedback is not None
     assert axis.feedback.state is State.OPERATION_ENABLED
-    run_cycles(bus, axis, Wish.ENABLE, 30, velocity=3.0)
+    run_cycles(bus, axis, RequestedState.ENABLE, 30, velocity=3.0)
     assert drive.shaft.motor_velocity == pytest.approx(3.0, rel=0.02)
     assert axis.feedback.velocity == pytest.approx(3.0, rel=0.05)
     assert axis.feedback.angle == pytest.approx(drive.shaft.motor_angle, abs=0.1)
     assert axis.feedback.torque == pytest.approx(0.25, abs=0.01)
     before = len(drive.words())
-    run_cycles(bus, axis, Wish.DISABLE, 60)
+    run_cycles(bus, axis, RequestedState.DISABLE, 60)
     assert drive.shaft.motor_velocity == pytest.approx(0.0, abs=0.05)
     assert drive.drive.state.name == "SWITCH_ON_DISABLED"
     assert set(drive.words()[before + 1 :]) <= {0x00, 0x02}
@@ -166,10 +168,10 @@ def test_stops_end_disabled_whatever_605a_says(rig: Rig, code: int) -> None:
         drive.drive.objects.put(0x605A, 0, code)
     axis = axis_on(bus)
     axis.commission()
-    run_cycles(bus, axis, Wish.ENABLE, 30, velocity=5.0)
+    run_cycles(bus, axis, RequestedState.ENABLE, 30, velocity=5.0)
     assert drive.shaft.motor_velocity > 3.0
     before = len(drive.words())
-    run_cycles(bus, axis, Wish.DISABLE, 60)
+    run_cycles(bus, axis, RequestedState.DISABLE, 60)
     assert drive.drive.state.name == "SWITCH_ON_DISABLED"
     assert set(drive.words()[before + 1 :]) <= {0x00, 0x02}
     assert abs(drive.shaft.motor_velocity) < 0.05
@@ -184,7 +186,7 @@ def test_garbage_on_the_bus_ends_nothing(rig: Rig) -> None:
     for _ in range(600):
         identifier = noise.choice([0x081, 0x181, 0x281, 0x381, 0x581, 0x701, 0x000, 0x7FF])
         drive.shout(identifier, noise.randbytes(noise.randint(0, 8)))
-    run_cycles(bus, axis, Wish.DISABLE, 10)
+    run_cycles(bus, axis, RequestedState.DISABLE, 10)
     assert bus.fault is None
     assert axis.short_frames > 0
     assert axis.feedback is not None
@@ -197,7 +199,7 @@ def test_a_drive_left_enabled_is_stopped_before_anything_else(rig: Rig) -> None:
     axis = axis_on(bus)
     axis.commission()
     other = axis_on(bus)
-    run_cycles(bus, axis, Wish.ENABLE, 30, velocity=2.0)
+    run_cycles(bus, axis, RequestedState.ENABLE, 30, velocity=2.0)
     assert drive.shaft.motor_velocity > 1.0
     drive.frames.clear()
     other.commission()
@@ -233,7 +235,7 @@ def test_offsets_that_another_master_left_do_not_move_the_drive(rig: Rig) -> Non
     axis = axis_on(bus)
     axis.commission()
     assert [drive.drive.objects.number(index) for index in (0x60B0, 0x60B1, 0x60B2)] == [0, 0, 0]
-    run_cycles(bus, axis, Wish.ENABLE, 30)
+    run_cycles(bus, axis, RequestedState.ENABLE, 30)
     assert axis.state is State.OPERATION_ENABLED
     assert drive.shaft.motor_velocity == pytest.approx(0.0, abs=0.01)
 
@@ -247,5 +249,5 @@ def test_a_drive_that_boots_while_it_is_waited_for_can_be_moved(rig: Rig) -> Non
     axis.commission()
     assert axis.heartbeat.boot_ups == 1
     assert not axis.mapping_lost
-    run_cycles(bus, axis, Wish.ENABLE, 20)
+    run_cycles(bus, axis, RequestedState.ENABLE, 20)
     assert axis.state is State.OPERATION_ENABLED

@@ -18,7 +18,7 @@ from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
 
@@ -44,7 +44,9 @@ def axis(rig: Rig) -> Cia402Axis:
     return axis
 
 
-def run(rig: Rig, axis: Cia402Axis, wish: Wish, count: int, velocity: float = 0.0) -> set[str]:
+def run(
+    rig: Rig, axis: Cia402Axis, requested: RequestedState, count: int, velocity: float = 0.0
+) -> set[str]:
     """Cycles of a control loop in miniature; the states that the drive went through."""
     drive, bus = rig
     seen = set()
@@ -54,7 +56,7 @@ def run(rig: Rig, axis: Cia402Axis, wish: Wish, count: int, velocity: float = 0.
         bus.heartbeat(127, 5)
         time.sleep(0.005)
         seen.add(drive.drive.state.name)
-        axis.send(wish, velocity=velocity)
+        axis.send(requested, velocity=velocity)
     return seen
 
 
@@ -72,12 +74,21 @@ def node_on(bus: CanBus, node: int = 1) -> SdoNode:
     return SdoNode(bus, node, Path(spec.path).parent / spec.servo.eds)
 
 
-@pytest.mark.parametrize("wish", [Wish.STOP, Wish.DISABLE, Wish.RUN_DOWN, Wish.HALT, Wish.RESET])
+@pytest.mark.parametrize(
+    "requested",
+    [
+        RequestedState.STOP,
+        RequestedState.DISABLE,
+        RequestedState.RUN_DOWN,
+        RequestedState.HALT,
+        RequestedState.RESET,
+    ],
+)
 def test_1_a_stop_of_a_disabled_drive_energises_nothing(
-    rig: Rig, axis: Cia402Axis, wish: Wish
+    rig: Rig, axis: Cia402Axis, requested: RequestedState
 ) -> None:
     """BaseNode402 goes through operation enabled on its way to quick stop active."""
-    assert run(rig, axis, wish, 20) == {"SWITCH_ON_DISABLED"}
+    assert run(rig, axis, requested, 20) == {"SWITCH_ON_DISABLED"}
 
 
 @pytest.mark.parametrize("option", [2, 6])
@@ -86,9 +97,9 @@ def test_2_a_quick_stop_is_not_followed_by_enabling(
 ) -> None:
     with rig[0].lock:
         rig[0].drive.objects.put(0x605A, 0, option)
-    run(rig, axis, Wish.ENABLE, 20, velocity=2.0)
-    run(rig, axis, Wish.STOP, 10)
-    after = run(rig, axis, Wish.STOP, 60)
+    run(rig, axis, RequestedState.ENABLE, 20, velocity=2.0)
+    run(rig, axis, RequestedState.STOP, 10)
+    after = run(rig, axis, RequestedState.STOP, 60)
     assert "OPERATION_ENABLED" not in after
     assert rig[0].shaft.motor_velocity == pytest.approx(0.0, abs=0.05)
 
@@ -96,16 +107,16 @@ def test_2_a_quick_stop_is_not_followed_by_enabling(
 def test_3_a_reset_ends_disabled(rig: Rig, axis: Cia402Axis) -> None:
     with rig[0].lock:
         rig[0].drive.inject("over-current")
-    run(rig, axis, Wish.DISABLE, 20)
+    run(rig, axis, RequestedState.DISABLE, 20)
     assert rig[0].drive.state.name == "FAULT"
-    assert run(rig, axis, Wish.RESET, 20) <= {"FAULT", "SWITCH_ON_DISABLED"}
+    assert run(rig, axis, RequestedState.RESET, 20) <= {"FAULT", "SWITCH_ON_DISABLED"}
     assert rig[0].drive.state.name == "SWITCH_ON_DISABLED"
 
 
 def test_4_a_refused_mode_is_an_error(rig: Rig, axis: Cia402Axis) -> None:
     """And nothing was written for it."""
     drive, _ = rig
-    run(rig, axis, Wish.DISABLE, 3)
+    run(rig, axis, RequestedState.DISABLE, 3)
     assert axis.drive is not None
     missing = next(m for m in ("IP", "CST", "PT", "XX") if m not in axis.drive.modes)
     before = len(drive.frames)
@@ -118,7 +129,7 @@ def test_4_a_refused_mode_is_an_error(rig: Rig, axis: Cia402Axis) -> None:
 def test_4_a_mode_that_the_drive_does_not_take_is_an_error(rig: Rig, axis: Cia402Axis) -> None:
     """It accepts 6060h and goes on showing the old one."""
     drive, _ = rig
-    run(rig, axis, Wish.DISABLE, 3)
+    run(rig, axis, RequestedState.DISABLE, 3)
     with drive.lock:
         drive.drive.objects.watchers[0x6060] = lambda _sub, _value: None
         shown = drive.drive.objects
@@ -131,9 +142,9 @@ def test_4_a_mode_that_the_drive_does_not_take_is_an_error(rig: Rig, axis: Cia40
 
 def test_5_the_control_word_is_sent_every_cycle(rig: Rig, axis: Cia402Axis) -> None:
     drive, bus = rig
-    run(rig, axis, Wish.DISABLE, 5)
+    run(rig, axis, RequestedState.DISABLE, 5)
     sent = bus.sent
-    run(rig, axis, Wish.DISABLE, 10)
+    run(rig, axis, RequestedState.DISABLE, 10)
     until(lambda: sum(i < 0x580 or i > 0x700 for i, _ in drive.frames) >= bus.sent)
     assert bus.sent == sent + 30, "SYNC, heartbeat and command"
     cycles = [i for i, _ in drive.frames if i in (0x080, 0x201)]
@@ -145,8 +156,8 @@ def test_6_a_cycle_costs_no_sdo_and_silence_is_not_a_state(rig: Rig, axis: Cia40
     assert axis.feedback is None
     assert axis.state is State.UNKNOWN
     before = len(drive.frames)
-    assert axis.send(Wish.ENABLE) == 0
-    run(rig, axis, Wish.ENABLE, 20)
+    assert axis.send(RequestedState.ENABLE) == 0
+    run(rig, axis, RequestedState.ENABLE, 20)
     assert axis.state is State.OPERATION_ENABLED
     assert [i for i, _ in drive.frames[before:] if i == 0x601] == []
     assert bus.fault is None

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from hand_made import CYCLE, NODE, RPDO, SCALE, TPDO, HandMade, codec
 from winchkit.drivers.can.cia402.feedback import Gathering, check_feedback
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 from winchkit.errors import FileError
 
 ENABLED, READY, DISABLED = 0x0237, 0x0231, 0x0250
@@ -100,7 +100,12 @@ def test_lost_frames_are_counted_and_nothing_is_made_of_the_rest() -> None:
     assert made.axis.health.complete == 1
 
 
-WISHES = (Wish.ENABLE, Wish.RUN_DOWN, Wish.HALT, Wish.DISABLE)
+REQUESTED_STATES = (
+    RequestedState.ENABLE,
+    RequestedState.RUN_DOWN,
+    RequestedState.HALT,
+    RequestedState.DISABLE,
+)
 STATUS = st.sampled_from([ENABLED, 0x0233, READY, DISABLED, 0x0217, 0x0218]) | st.integers(
     0, 0xFFFF
 )
@@ -110,7 +115,7 @@ STATUS = st.sampled_from([ENABLED, 0x0233, READY, DISABLED, 0x0217, 0x0218]) | s
 @given(
     events=st.lists(
         st.tuples(
-            st.sampled_from(["sync", "first", "second", "garbage", "boot", "beat", "wish"]),
+            st.sampled_from(["sync", "first", "second", "garbage", "boot", "beat", "requested"]),
             STATUS,
             st.integers(0, 7),
         ),
@@ -124,7 +129,7 @@ def test_no_frames_make_a_drive_enabled_that_does_not_say_so(
     """It counts as enabled only by a status word that says so, in a whole answer since it
     booted; a ramp is kept up only by one of the last five SYNCs.
     """
-    made, wish, said, booted = HandMade(), Wish.ENABLE, set[int](), False
+    made, requested, said, booted = HandMade(), RequestedState.ENABLE, set[int](), False
     for kind, status, number in events:
         booted = booted or kind == "boot"
         if kind == "sync":
@@ -136,8 +141,8 @@ def test_no_frames_make_a_drive_enabled_that_does_not_say_so(
             made.second()
         elif kind == "garbage":
             made.bus.deliver(0x180 + NODE, struct.pack("<Hi", ENABLED, 0)[: min(number, 6)])
-        elif kind == "wish":
-            wish = WISHES[number % len(WISHES)]
+        elif kind == "requested":
+            requested = REQUESTED_STATES[number % len(REQUESTED_STATES)]
         else:
             made.bus.deliver(0x700 + NODE, b"\0" if kind == "boot" else b"\x05")
         feedback, axis = made.axis.feedback, made.axis
@@ -146,12 +151,12 @@ def test_no_frames_make_a_drive_enabled_that_does_not_say_so(
             assert feedback.status in said
             assert feedback.status & 0x6F == 0x27
             assert not booted
-        word = axis.send(wish)
+        word = axis.send(requested)
         if word & 0x0F == 0x0F:
             assert feedback is not None
             assert not axis.mapping_lost
-            if wish is not Wish.ENABLE:
-                assert wish is not Wish.DISABLE
+            if requested is not RequestedState.ENABLE:
+                assert requested is not RequestedState.DISABLE
                 assert feedback.status & 0x6F == 0x27
                 assert feedback.sync >= made.sync - 5
 
@@ -161,12 +166,12 @@ def test_a_ramp_is_not_kept_up_on_old_words() -> None:
     made = HandMade()
     made.enable()
     made.answer(ENABLED)
-    words = [made.axis.send(Wish.RUN_DOWN)]
+    words = [made.axis.send(RequestedState.RUN_DOWN)]
     for _ in range(7):
         made.begin()
-        words.append(made.axis.send(Wish.RUN_DOWN))
+        words.append(made.axis.send(RequestedState.RUN_DOWN))
     made.answer(ENABLED)
-    words.append(made.axis.send(Wish.RUN_DOWN))
+    words.append(made.axis.send(RequestedState.RUN_DOWN))
     assert words == [0x0F] * 6 + [0x02] * 3, "nor taken up again after a quick stop"
 
 
@@ -178,7 +183,7 @@ def test_what_a_drive_said_long_ago_is_not_accepted() -> None:
     for _ in range(math.ceil(0.1 / CYCLE) + 1):
         made.begin()
     assert made.axis.state is State.UNKNOWN
-    assert made.axis.send(Wish.ENABLE) == 0x02
+    assert made.axis.send(RequestedState.ENABLE) == 0x02
 
 
 def test_a_reboot_ends_all_belief_until_it_is_commissioned_again() -> None:
@@ -189,7 +194,7 @@ def test_a_reboot_ends_all_belief_until_it_is_commissioned_again() -> None:
     assert not made.axis.operational
     made.answer(ENABLED)
     assert made.axis.state is State.UNKNOWN
-    assert made.axis.send(Wish.ENABLE, velocity=1.0) == 0x02
+    assert made.axis.send(RequestedState.ENABLE, velocity=1.0) == 0x02
 
 
 def slow(transmission: int, event_timer: float = 0.0) -> tuple[Gathering, object]:

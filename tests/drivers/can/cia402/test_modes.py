@@ -18,7 +18,7 @@ from winchkit.drivers.can.cia402.modes import (
     modes_of,
     status_words,
 )
-from winchkit.drivers.can.cia402.state_machine import Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState
 from winchkit.errors import FileError, NotPermitted
 
 ENABLED = 0x0237
@@ -90,14 +90,19 @@ def test_targets_go_only_to_a_drive_that_is_enabled() -> None:
     made = HandMade("CSP")
     for status, word in ((0x0250, 0x06), (0x0231, 0x07), (0x0233, 0x0F)):
         made.answer(status, angle=2.0, mode=8)
-        made.axis.send(Wish.ENABLE, velocity=5.0, angle=9.0, torque=1.0)
+        made.axis.send(RequestedState.ENABLE, velocity=5.0, angle=9.0, torque=1.0)
         assert words_and_targets(made.sent()) == (word, 0, 2000)
     made.answer(ENABLED, angle=2.0, mode=8)
-    made.axis.send(Wish.ENABLE, velocity=5.0, angle=9.0)
+    made.axis.send(RequestedState.ENABLE, velocity=5.0, angle=9.0)
     assert words_and_targets(made.sent())[::2] == (0x0F, 9000)
-    for wish in (Wish.DISABLE, Wish.STOP, Wish.HALT, Wish.RESET):
+    for requested in (
+        RequestedState.DISABLE,
+        RequestedState.STOP,
+        RequestedState.HALT,
+        RequestedState.RESET,
+    ):
         made.answer(ENABLED, angle=3.0, mode=8)
-        made.axis.send(wish, velocity=5.0, angle=9.0)
+        made.axis.send(requested, velocity=5.0, angle=9.0)
         assert words_and_targets(made.sent())[1:] == (0, 3000)
 
 
@@ -105,28 +110,28 @@ def test_halt_is_bit_8_of_an_enabled_drive_only() -> None:
     made = HandMade()
     made.enable()
     made.answer(ENABLED, velocity=3.0)
-    assert made.axis.send(Wish.HALT) == 0x10F
+    assert made.axis.send(RequestedState.HALT) == 0x10F
     made.answer(0x0233)
-    assert made.axis.send(Wish.HALT) == 0x02
+    assert made.axis.send(RequestedState.HALT) == 0x02
 
 
 @pytest.mark.parametrize("mode", ["PT", "CST"])
 def test_torque_is_a_per_mille_of_the_rated_one(mode: str) -> None:
     made = HandMade(mode)
     made.answer(ENABLED, mode=MODES[mode].number)
-    made.axis.send(Wish.ENABLE, torque=-2.5)
+    made.axis.send(RequestedState.ENABLE, torque=-2.5)
     target, offset = struct.unpack("<hh", made.sent()[0x401])
     assert target == round(-2.5 / SCALE.torque)
     assert offset == 0
     made.answer(ENABLED, mode=MODES[mode].number)
-    made.axis.send(Wish.STOP, torque=-2.5)
+    made.axis.send(RequestedState.STOP, torque=-2.5)
     assert made.sent()[0x401] == bytes(4)
 
 
 def test_torque_and_speed_are_fed_forward_where_they_are_mapped() -> None:
     made = HandMade("CSP", rpdo=(codec(1, 0x6040, 0x607A), codec(2, 0x60B1, 0x60B2)))
     made.answer(ENABLED, mode=8)
-    made.axis.send(Wish.ENABLE, angle=1.0, velocity=0.5, torque=0.2)
+    made.axis.send(RequestedState.ENABLE, angle=1.0, velocity=0.5, torque=0.2)
     assert struct.unpack("<ih", made.sent()[0x301]) == (500, 20)
 
 
@@ -134,21 +139,21 @@ def test_interpolated_position_sets_bit_4_while_it_follows() -> None:
     made = HandMade("IP")
     assert made.axis.position_mode
     made.answer(ENABLED, mode=7, angle=1.0)
-    assert made.axis.send(Wish.ENABLE, angle=1.5) == 0x1F
+    assert made.axis.send(RequestedState.ENABLE, angle=1.5) == 0x1F
     assert struct.unpack("<i", made.sent()[0x501]) == (1500,)
     made.answer(ENABLED, mode=7, angle=1.0)
-    assert made.axis.send(Wish.DISABLE) == 0x02
+    assert made.axis.send(RequestedState.DISABLE) == 0x02
 
 
 def test_homing_starts_by_bit_4_on_command() -> None:
     made = HandMade("HM", rpdo=(RPDO[0],))
     for start, word in ((False, 0x0F), (True, 0x1F), (True, 0x1F)):
         made.answer(ENABLED, mode=6)
-        assert made.axis.send(Wish.ENABLE, start=start) == word
+        assert made.axis.send(RequestedState.ENABLE, start=start) == word
     made.answer(ENABLED | 0x1400, mode=6)
     assert made.axis.homing is Homing.DONE
     made.answer(0x0233, mode=6)
-    assert made.axis.send(Wish.ENABLE, start=True) == 0x0F
+    assert made.axis.send(RequestedState.ENABLE, start=True) == 0x0F
 
 
 class ProfilePositioner:
@@ -195,14 +200,14 @@ def test_a_move_that_is_not_asked_for_is_not_made() -> None:
     """Enabling in PP offers no set-point until a target differs from where it stands."""
     made = HandMade("PP")
     made.answer(0x0233, angle=2.0, mode=1)
-    made.axis.send(Wish.ENABLE)
+    made.axis.send(RequestedState.ENABLE)
     for noise in (0.0, 0.001, -0.001, 0.002):
         made.answer(ENABLED, angle=2.0 + noise, mode=1)
-        assert made.axis.send(Wish.ENABLE) == 0x0F
+        assert made.axis.send(RequestedState.ENABLE) == 0x0F
     words = []
     for status in (ENABLED, ENABLED, ENABLED | 0x1000, ENABLED | 0x1000, ENABLED):
         made.answer(status, angle=2.0, mode=1)
-        words.append(made.axis.send(Wish.ENABLE, angle=4.0))
+        words.append(made.axis.send(RequestedState.ENABLE, angle=4.0))
         assert words_and_targets(made.sent())[2] == 4000
     assert words == [0x0F, 0x3F, 0x0F, 0x0F, 0x0F]
 
@@ -239,14 +244,18 @@ def test_a_mode_is_changed_only_while_the_drive_cannot_move() -> None:
 def test_running_down_halts_a_motion_that_the_drive_makes_itself(mode: str, number: int) -> None:
     made = HandMade(mode)
     made.enable()
-    for wish, word in ((Wish.RUN_DOWN, 0x10F), (Wish.STOP, 0x02), (Wish.DISABLE, 0x02)):
+    for requested, word in (
+        (RequestedState.RUN_DOWN, 0x10F),
+        (RequestedState.STOP, 0x02),
+        (RequestedState.DISABLE, 0x02),
+    ):
         made.answer(ENABLED, velocity=2.0, mode=number)
-        assert made.axis.send(wish, angle=5.0, start=True) == word
+        assert made.axis.send(requested, angle=5.0, start=True) == word
 
 
-@pytest.mark.parametrize("wish", [Wish.RUN_DOWN, Wish.HALT])
-def test_a_torque_cannot_be_run_down_so_it_is_a_quick_stop(wish: Wish) -> None:
+@pytest.mark.parametrize("requested", [RequestedState.RUN_DOWN, RequestedState.HALT])
+def test_a_torque_cannot_be_run_down_so_it_is_a_quick_stop(requested: RequestedState) -> None:
     """At zero torque a hanging load would fall."""
     made = HandMade("CST")
     made.answer(ENABLED, velocity=2.0, mode=10)
-    assert made.axis.send(wish, torque=1.0) == 0x02
+    assert made.axis.send(requested, torque=1.0) == 0x02

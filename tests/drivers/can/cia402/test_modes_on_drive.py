@@ -16,7 +16,7 @@ from winchkit.drivers.can.cia402.commission import WatchSpec
 from winchkit.drivers.can.cia402.limits import LimitsAtShaft
 from winchkit.drivers.can.cia402.modes import Homing
 from winchkit.drivers.can.cia402.profile_parameters import HomingSpec
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import DeviceRefused
 from winchkit.schema.devices.device import DeviceSpec
@@ -59,28 +59,31 @@ class Rig:
         self.bus.close()
         self.drive.__exit__()
 
-    def run(self, wish: Wish, count: int, **targets: object) -> None:
+    def run(self, requested: RequestedState, count: int, **targets: object) -> None:
         for _ in range(count):
             self.axis.begin_cycle(next(self._syncs), CLOCK.now())
             self.bus.sync()
             self.bus.heartbeat(127, 5)
             time.sleep(CYCLE)
-            self.axis.send(wish, **targets)  # type: ignore[arg-type]
+            self.axis.send(requested, **targets)  # type: ignore[arg-type]
 
-    def until(self, condition: Callable[[], bool], wish: Wish, **targets: object) -> None:
+    def until(
+        self, condition: Callable[[], bool], requested: RequestedState, **targets: object
+    ) -> None:
         """Cycles until something holds."""
         for _ in range(1500):
             if condition():
                 return
-            self.run(wish, 1, **targets)
+            self.run(requested, 1, **targets)
         raise AssertionError(f"it did not come to that; the drive is {self.axis.state}")
 
     def enable(self) -> None:
-        self.until(lambda: self.axis.state is State.OPERATION_ENABLED, Wish.ENABLE)
+        self.until(lambda: self.axis.state is State.OPERATION_ENABLED, RequestedState.ENABLE)
 
     def disable(self) -> None:
         self.until(
-            lambda: self.axis.state is State.SWITCH_ON_DISABLED and self.axis.at_rest, Wish.DISABLE
+            lambda: self.axis.state is State.SWITCH_ON_DISABLED and self.axis.at_rest,
+            RequestedState.DISABLE,
         )
 
     @property
@@ -112,8 +115,8 @@ def test_interpolated_positions_are_followed(rig_in: Callable[..., Rig], mode: s
     rig.enable()
     start = rig.angle
     for step in range(1, 41):
-        rig.run(Wish.ENABLE, 1, angle=start + 0.01 * step)
-    rig.run(Wish.ENABLE, 40, angle=start + 0.4)
+        rig.run(RequestedState.ENABLE, 1, angle=start + 0.01 * step)
+    rig.run(RequestedState.ENABLE, 40, angle=start + 0.4)
     assert rig.angle == pytest.approx(start + 0.4, abs=0.01)
     rig.disable()
 
@@ -121,36 +124,40 @@ def test_interpolated_positions_are_followed(rig_in: Callable[..., Rig], mode: s
 def test_profile_velocity_ramps_by_itself(rig_in: Callable[..., Rig]) -> None:
     rig = rig_in("PV", acceleration=100.0)
     rig.enable()
-    rig.until(lambda: abs(rig.speed - 5.0) < 0.05, Wish.ENABLE, velocity=5.0)
-    rig.until(lambda: "target reached" in rig.axis.status_words, Wish.ENABLE, velocity=5.0)
-    rig.until(lambda: rig.axis.at_rest, Wish.RUN_DOWN)
+    rig.until(lambda: abs(rig.speed - 5.0) < 0.05, RequestedState.ENABLE, velocity=5.0)
+    rig.until(
+        lambda: "target reached" in rig.axis.status_words, RequestedState.ENABLE, velocity=5.0
+    )
+    rig.until(lambda: rig.axis.at_rest, RequestedState.RUN_DOWN)
     assert rig.axis.state is State.OPERATION_ENABLED
 
 
 def test_profile_position_makes_one_move_for_each_target(rig_in: Callable[..., Rig]) -> None:
     rig = rig_in("CSV")
-    rig.run(Wish.DISABLE, 3)
+    rig.run(RequestedState.DISABLE, 3)
     rig.axis.switch_mode("PP")
-    rig.run(Wish.DISABLE, 3)
+    rig.run(RequestedState.DISABLE, 3)
     rig.axis.set_profile(speed=20.0, acceleration=200.0)
     rig.enable()
-    rig.run(Wish.ENABLE, 10)
+    rig.run(RequestedState.ENABLE, 10)
     assert rig.angle == pytest.approx(0.0, abs=0.01), "nothing was asked for"
     for target in (3.0, -1.0, 0.5):
-        rig.until(lambda t=target: abs(rig.angle - t) < 0.01, Wish.ENABLE, angle=target)
-        rig.until(lambda: "target reached" in rig.axis.status_words, Wish.ENABLE, angle=target)
+        rig.until(lambda t=target: abs(rig.angle - t) < 0.01, RequestedState.ENABLE, angle=target)
+        rig.until(
+            lambda: "target reached" in rig.axis.status_words, RequestedState.ENABLE, angle=target
+        )
     rig.disable()
 
 
 def test_a_profile_position_move_is_halted_by_running_down(rig_in: Callable[..., Rig]) -> None:
     rig = rig_in("CSV")
-    rig.run(Wish.DISABLE, 3)
+    rig.run(RequestedState.DISABLE, 3)
     rig.axis.switch_mode("PP")
-    rig.run(Wish.DISABLE, 3)
+    rig.run(RequestedState.DISABLE, 3)
     rig.axis.set_profile(speed=10.0, acceleration=200.0)
     rig.enable()
-    rig.until(lambda: rig.speed > 5.0, Wish.ENABLE, angle=1000.0)
-    rig.until(lambda: abs(rig.speed) < 0.05, Wish.RUN_DOWN)
+    rig.until(lambda: rig.speed > 5.0, RequestedState.ENABLE, angle=1000.0)
+    rig.until(lambda: abs(rig.speed) < 0.05, RequestedState.RUN_DOWN)
     assert rig.axis.state is State.OPERATION_ENABLED
     rig.disable()
 
@@ -158,12 +165,12 @@ def test_a_profile_position_move_is_halted_by_running_down(rig_in: Callable[...,
 @pytest.mark.parametrize("mode", ["CST", "PT"])
 def test_torque_accelerates_and_a_stop_needs_none(rig_in: Callable[..., Rig], mode: str) -> None:
     rig = rig_in("CSV")
-    rig.run(Wish.DISABLE, 3)
+    rig.run(RequestedState.DISABLE, 3)
     rig.axis.switch_mode(mode)
     rig.enable()
-    rig.until(lambda: rig.speed > 3.0, Wish.ENABLE, torque=0.5)
+    rig.until(lambda: rig.speed > 3.0, RequestedState.ENABLE, torque=0.5)
     assert rig.speed < 3.0 + 0.5 / INERTIA * 0.2, "as 0.5 N m does, and no more"
-    rig.until(lambda: abs(rig.speed) < 0.05, Wish.RUN_DOWN, torque=0.5)
+    rig.until(lambda: abs(rig.speed) < 0.05, RequestedState.RUN_DOWN, torque=0.5)
     rig.disable()
 
 
@@ -171,19 +178,19 @@ def test_torque_accelerates_and_a_stop_needs_none(rig_in: Callable[..., Rig], mo
 def test_homing_here_sets_the_zero(rig_in: Callable[..., Rig], method: int) -> None:
     rig = rig_in("CSV")
     rig.enable()
-    rig.run(Wish.ENABLE, 60, velocity=5.0)
+    rig.run(RequestedState.ENABLE, 60, velocity=5.0)
     rig.disable()
     before = rig.axis.feedback
     assert before is not None
     assert abs(before.angle) > 0.5
     rig.axis.prepare_homing(HomingSpec(method, 5.0, 1.0, 50.0))
     rig.enable()
-    rig.run(Wish.ENABLE, 10, start=True)
-    rig.until(lambda: rig.axis.homing is Homing.DONE, Wish.ENABLE, start=True)
-    rig.run(Wish.DISABLE, 3)
+    rig.run(RequestedState.ENABLE, 10, start=True)
+    rig.until(lambda: rig.axis.homing is Homing.DONE, RequestedState.ENABLE, start=True)
+    rig.run(RequestedState.DISABLE, 3)
     rig.disable()
     rig.axis.switch_mode("CSV")
-    rig.run(Wish.DISABLE, 3)
+    rig.run(RequestedState.DISABLE, 3)
     assert rig.axis.feedback is not None
     assert rig.axis.feedback.angle == pytest.approx(0.0, abs=0.05)
     assert rig.axis.mode_kept
@@ -193,7 +200,7 @@ def test_homing_here_sets_the_zero(rig_in: Callable[..., Rig], method: int) -> N
 
 def test_a_homing_method_that_the_drive_lacks_is_reported(rig_in: Callable[..., Rig]) -> None:
     rig = rig_in("CSV")
-    rig.run(Wish.DISABLE, 3)
+    rig.run(RequestedState.DISABLE, 3)
     with pytest.raises(DeviceRefused, match="6098h"):
         rig.axis.prepare_homing(HomingSpec(99, 5.0, 1.0, 50.0))
     assert rig.axis.mode == "CSV"
@@ -205,11 +212,11 @@ def test_halt_stays_enabled_whatever_605d_says(rig_in: Callable[..., Rig], code:
     rig = rig_in("CSV", options=OptionSpec(halt=code))
     assert rig.drive.drive.objects.number(0x605D) == code
     rig.enable()
-    rig.run(Wish.ENABLE, 25, velocity=5.0)
-    rig.until(lambda: abs(rig.speed) < 0.05, Wish.HALT)
-    rig.run(Wish.HALT, 5)
+    rig.run(RequestedState.ENABLE, 25, velocity=5.0)
+    rig.until(lambda: abs(rig.speed) < 0.05, RequestedState.HALT)
+    rig.run(RequestedState.HALT, 5)
     assert rig.axis.state is State.OPERATION_ENABLED
-    rig.until(lambda: rig.speed > 4.0, Wish.ENABLE, velocity=5.0)
+    rig.until(lambda: rig.speed > 4.0, RequestedState.ENABLE, velocity=5.0)
 
 
 def test_limits_at_the_shaft_are_the_drive_s_own_barrier(rig_in: Callable[..., Rig]) -> None:
@@ -224,8 +231,8 @@ def test_limits_at_the_shaft_are_the_drive_s_own_barrier(rig_in: Callable[..., R
     rig.enable()
     rig.until(
         lambda: rig.axis.feedback is not None and rig.axis.feedback.limited,
-        Wish.ENABLE,
+        RequestedState.ENABLE,
         velocity=10.0,
     )
-    rig.run(Wish.ENABLE, 100, velocity=10.0)
+    rig.run(RequestedState.ENABLE, 100, velocity=10.0)
     assert rig.angle < 2.05

@@ -15,7 +15,7 @@ from winchkit import catalog
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
-from winchkit.drivers.can.cia402.state_machine import Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import PdoSpec
 
@@ -153,7 +153,7 @@ def test_a_velocity_mode_goes_on_beyond_the_end() -> None:
     for number in range(9):
         frames_of(made, shown(number * 2**30, *I32))
         made.bus.sent.clear()
-        made.axis.send(Wish.ENABLE, velocity=1.0)
+        made.axis.send(RequestedState.ENABLE, velocity=1.0)
         assert [identifier for identifier, _ in made.bus.sent] == [0x200 + NODE]
     assert made.bus.sent[-1][1] == struct.pack("<Hi", 0x0F, 1000)
 
@@ -164,7 +164,7 @@ def test_a_mapped_target_position_holds_what_the_drive_shows() -> None:
     for number in range(9):
         frames_of(made, shown(number * 2**30, *I32))
         made.bus.sent.clear()
-        made.axis.send(Wish.ENABLE, velocity=-1.0)
+        made.axis.send(RequestedState.ENABLE, velocity=-1.0)
         sent = dict(made.bus.sent)
         assert sent[0x300 + NODE] == struct.pack("<ib", shown(number * 2**30, *I32), 9)
 
@@ -177,7 +177,7 @@ def test_a_position_mode_does_not_cross_the_end(angle: float) -> None:
     with pytest.raises(NotPermitted):
         made.axis.permit_angle(angle)
     with pytest.raises(NotPermitted):
-        made.axis.send(Wish.ENABLE, angle=angle)
+        made.axis.send(RequestedState.ENABLE, angle=angle)
     made.axis.permit_angle(2.1e6)
 
 
@@ -209,7 +209,7 @@ def test_an_unsigned_60ffh_is_written_as_twos_complement(tmp_path: Path) -> None
     frames_of(made, -5)
     assert made.axis.feedback is not None
     assert made.axis.feedback.angle == pytest.approx(-5 * SCALE.angle)
-    made.axis.send(Wish.ENABLE, velocity=-1.0)
+    made.axis.send(RequestedState.ENABLE, velocity=-1.0)
     assert made.bus.sent[-1] == (0x200 + NODE, bytes.fromhex("0f0018fcffff"))
     written: list[bytes] = []
     node.download = lambda _index, _sub, data: written.append(data)  # type: ignore[method-assign]
@@ -225,4 +225,4 @@ def test_a_speed_beyond_the_range_is_refused_by_name() -> None:
     made = HandMade()
     frames_of(made, 0)
     with pytest.raises(NotPermitted, match="beyond the drive's range"):
-        made.axis.send(Wish.ENABLE, velocity=3e6)
+        made.axis.send(RequestedState.ENABLE, velocity=3e6)

@@ -1,4 +1,4 @@
-"""The control word for every state and wish, against the standard's own bit patterns."""
+"""The control word for every state and requested state, against the standard's own bit patterns."""
 
 import pytest
 from hypothesis import assume, given
@@ -10,8 +10,8 @@ from winchkit.drivers.can.cia402.state_machine import (
     FAULT_RESET,
     QUICK_STOP,
     TRANSITIONS,
+    RequestedState,
     State,
-    Wish,
     control_word,
     state_of,
 )
@@ -25,41 +25,47 @@ ages = st.integers(0, 12)
 @given(
     believed=states,
     true=states,
-    wish=st.sampled_from(STOPS),
+    requested=st.sampled_from(STOPS),
     previous=words,
     age=ages,
     at_rest=st.booleans(),
 )
 def test_no_stop_ever_energises(
-    believed: State, true: State, wish: Wish, previous: int, age: int, at_rest: bool
+    believed: State, true: State, requested: RequestedState, previous: int, age: int, at_rest: bool
 ) -> None:
     """Not even when the drive is in another state than the host has received."""
-    word = control_word(believed, wish, previous=previous, age=age, at_rest=at_rest)
+    word = control_word(believed, requested, previous=previous, age=age, at_rest=at_rest)
     assert word & 0x0F != 0x07
     if word & 0x0F == 0x0F:
         assert age <= 5
         assert believed is State.OPERATION_ENABLED
-        assert wish in (Wish.RUN_DOWN, Wish.HALT)
+        assert requested in (RequestedState.RUN_DOWN, RequestedState.HALT)
         true = believed
     assert transition(true, previous, word) not in (2, 3, 4, 16)
 
 
 @given(
-    believed=states, wish=st.sampled_from(STOPS), previous=words, age=ages, at_rest=st.booleans()
+    believed=states,
+    requested=st.sampled_from(STOPS),
+    previous=words,
+    age=ages,
+    at_rest=st.booleans(),
 )
 def test_a_stale_state_gets_a_quick_stop(
-    believed: State, wish: Wish, previous: int, age: int, at_rest: bool
+    believed: State, requested: RequestedState, previous: int, age: int, at_rest: bool
 ) -> None:
     """A ramp goes on for five SYNCs without an answer, everything else for one."""
-    assume(age > (5 if wish in (Wish.RUN_DOWN, Wish.HALT) else 1))
-    word = control_word(believed, wish, previous=previous, age=age, at_rest=at_rest)
+    assume(age > (5 if requested in (RequestedState.RUN_DOWN, RequestedState.HALT) else 1))
+    word = control_word(believed, requested, previous=previous, age=age, at_rest=at_rest)
     assert word == QUICK_STOP
 
 
-@given(true=states, wish=st.sampled_from(STOPS), previous=words)
-def test_no_stop_lets_a_moving_drive_coast(true: State, wish: Wish, previous: int) -> None:
+@given(true=states, requested=st.sampled_from(STOPS), previous=words)
+def test_no_stop_lets_a_moving_drive_coast(
+    true: State, requested: RequestedState, previous: int
+) -> None:
     """Transitions 9 and 12 take the torque away; a moving drive never gets them."""
-    word = control_word(true, wish, previous=previous, at_rest=False)
+    word = control_word(true, requested, previous=previous, at_rest=False)
     assert transition(true, previous, word) not in (8, 9, 12)
 
 
@@ -68,7 +74,7 @@ def test_enabling_climbs_one_step_at_a_time_and_never_leaves_a_fault(start: Stat
     after = {row.number: row.target for row in TRANSITIONS}
     state, seen, previous = start, [], 0
     for _ in range(8):
-        word = control_word(state, Wish.ENABLE, previous=previous, at_rest=True)
+        word = control_word(state, RequestedState.ENABLE, previous=previous, at_rest=True)
         number = transition(state, previous, word)
         if number is not None:
             seen.append(number)
@@ -82,13 +88,13 @@ def test_enabling_climbs_one_step_at_a_time_and_never_leaves_a_fault(start: Stat
 
 
 def test_reset_is_an_edge_and_stays_disabled() -> None:
-    first = control_word(State.FAULT, Wish.RESET, previous=FAULT_RESET)
+    first = control_word(State.FAULT, RequestedState.RESET, previous=FAULT_RESET)
     assert not first & FAULT_RESET
-    second = control_word(State.FAULT, Wish.RESET, previous=first)
+    second = control_word(State.FAULT, RequestedState.RESET, previous=first)
     assert second == FAULT_RESET
     for state in State:
         if state is not State.FAULT:
-            assert control_word(state, Wish.RESET, previous=second) == QUICK_STOP
+            assert control_word(state, RequestedState.RESET, previous=second) == QUICK_STOP
 
 
 @pytest.mark.parametrize(
@@ -115,6 +121,6 @@ def test_every_status_word_is_one_state_whatever_the_other_bits(status: int) -> 
 
 
 def test_a_moving_quick_stop_is_not_left_for_enabling() -> None:
-    word = control_word(State.QUICK_STOP_ACTIVE, Wish.ENABLE, at_rest=False)
+    word = control_word(State.QUICK_STOP_ACTIVE, RequestedState.ENABLE, at_rest=False)
     assert word == QUICK_STOP
-    assert control_word(State.OPERATION_ENABLED, Wish.ENABLE) == ENABLE_OPERATION
+    assert control_word(State.OPERATION_ENABLED, RequestedState.ENABLE) == ENABLE_OPERATION

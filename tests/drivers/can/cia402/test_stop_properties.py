@@ -1,4 +1,4 @@
-"""Stops against an independent drive: every state, every 605Ah, every wish, late status words.
+"""Stops against an independent drive: every state, 605Ah and requested state, late status words.
 
 The drive here is a table of the standard's command patterns and of what quick stop leads to. The
 host sees its status words some cycles late, as on a bus, and one of them may be lost.
@@ -13,7 +13,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cia402_table import STOPS, transition
-from winchkit.drivers.can.cia402.state_machine import TRANSITIONS, State, Wish, control_word
+from winchkit.drivers.can.cia402.state_machine import (
+    TRANSITIONS,
+    RequestedState,
+    State,
+    control_word,
+)
 
 ENERGISING = {2, 3, 4, 16}
 RAMP_CYCLES = 3
@@ -64,14 +69,14 @@ class Drive:
 @given(
     start=st.sampled_from([s for s in State if s is not State.UNKNOWN]),
     option=st.sampled_from(OPTION_CODES),
-    wish=st.sampled_from(STOPS),
+    requested=st.sampled_from(STOPS),
     previous=st.sampled_from([0x00, 0x02, 0x06, 0x07, 0x0F, 0x80, 0x10F]),
     delay=st.integers(0, 3),
     lost=st.sets(st.integers(0, 30), max_size=12),
 )
 @settings(max_examples=400, deadline=None)
 def test_no_stop_takes_an_energising_transition_with_any_605a(
-    start: State, option: int, wish: Wish, previous: int, delay: int, lost: set[int]
+    start: State, option: int, requested: RequestedState, previous: int, delay: int, lost: set[int]
 ) -> None:
     drive = Drive(start, option, previous)
     seen: deque[tuple[int, State, bool]] = deque([(0, start, drive.moving)])
@@ -79,9 +84,9 @@ def test_no_stop_takes_an_energising_transition_with_any_605a(
     for cycle in range(30):
         known, state, moving = seen[0]
         age = cycle - known
-        word = control_word(state, wish, previous=word, age=age, at_rest=not moving)
+        word = control_word(state, requested, previous=word, age=age, at_rest=not moving)
         if word & 0x0F == 0x0F:
-            assert wish in (Wish.RUN_DOWN, Wish.HALT)
+            assert requested in (RequestedState.RUN_DOWN, RequestedState.HALT)
             assert age <= 5
             assert state is State.OPERATION_ENABLED
         drive.take(word)
@@ -90,7 +95,7 @@ def test_no_stop_takes_an_energising_transition_with_any_605a(
         while len(seen) > 1 and seen[1][0] <= cycle + 1 - delay:
             seen.popleft()
     assert not ENERGISING & set(drive.taken)
-    if wish is Wish.DISABLE and delay <= 1 and not lost:
+    if requested is RequestedState.DISABLE and delay <= 1 and not lost:
         # Nothing may hang half-way: a stop ends off, or in the fault that it began in.
         faults = (State.FAULT, State.FAULT_REACTION_ACTIVE)
         ended = State.FAULT if start in faults else State.SWITCH_ON_DISABLED
@@ -105,7 +110,7 @@ def test_a_reset_leads_a_faulty_drive_to_switch_on_disabled_and_no_further(
     seen = deque([State.FAULT] * (delay + 1))
     word = 0x0F
     for _ in range(10):
-        word = control_word(seen.popleft(), Wish.RESET, previous=word, at_rest=True)
+        word = control_word(seen.popleft(), RequestedState.RESET, previous=word, at_rest=True)
         drive.take(word)
         seen.append(drive.state)
     assert drive.taken == [15]
@@ -120,7 +125,7 @@ def test_a_quick_stop_that_stays_is_left_downwards_only(option: int, delay: int)
     word = 0x0F
     for _ in range(20):
         state, moving = seen.popleft()
-        word = control_word(state, Wish.DISABLE, previous=word, at_rest=not moving)
+        word = control_word(state, RequestedState.DISABLE, previous=word, at_rest=not moving)
         drive.take(word)
         seen.append((drive.state, drive.moving))
     assert drive.taken == [11, 12]

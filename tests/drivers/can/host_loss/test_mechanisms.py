@@ -9,7 +9,7 @@ import pytest
 from guarded_rig import CYCLE, HEARTBEAT, eds_of, generic, rig
 from slave import Nmt, Reactions, Slave, State
 from winchkit.drivers.can.bus.bus import CanBus
-from winchkit.drivers.can.cia402.state_machine import Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState
 from winchkit.drivers.can.host_loss.guarding import GuardingWatch
 from winchkit.errors import NotPermitted
 from winchkit.schema.host_loss import VendorObject, VendorWatchdog
@@ -135,7 +135,7 @@ def test_a_pause_of_the_host_before_it_sets_a_drive_up_again_is_no_loss(pause: f
     with rig(slave) as bench:
         axis = bench.axis(generic())
         axis.commission()
-        bench.cycles(axis, Wish.DISABLE, 60)
+        bench.cycles(axis, RequestedState.DISABLE, 60)
         bench.world.wait(pause)
         axis.commission()
         bench.world.wait(0.1)
@@ -172,7 +172,7 @@ def test_polls_come_from_the_control_loop_and_end_with_it() -> None:
     with rig(slave) as bench:
         axis = bench.axis(generic(host_loss="guarding"))
         axis.commission()
-        bench.cycles(axis, Wish.DISABLE, 60)
+        bench.cycles(axis, RequestedState.DISABLE, 60)
         begun = bench.time
         assert bench.polls()
         bench.world.wait(0.5)
@@ -188,7 +188,7 @@ def test_silence_stops_a_drive_while_the_loop_goes_on(mechanism: str) -> None:
         axis.commission()
         bench.moving(axis)
         assert axis.fall_silent() is False, "SYNC may go on"
-        bench.cycles(axis, Wish.ENABLE, round((LIMIT + SLACK) / CYCLE), velocity=3.0)
+        bench.cycles(axis, RequestedState.ENABLE, round((LIMIT + SLACK) / CYCLE), velocity=3.0)
         assert slave.power.state is not State.ENABLED
 
 

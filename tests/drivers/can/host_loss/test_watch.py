@@ -13,7 +13,7 @@ from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
-from winchkit.drivers.can.cia402.state_machine import State, Wish
+from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import NotPermitted
 
@@ -149,5 +149,5 @@ def test_nothing_is_enabled_before_the_host_s_heartbeat_began(rig: Rig) -> None:
         if number >= 10:
             bus.heartbeat(HOST, 5)
         time.sleep(0.006)
-        axis.send(Wish.ENABLE)
+        axis.send(RequestedState.ENABLE)
     assert axis.state is State.OPERATION_ENABLED

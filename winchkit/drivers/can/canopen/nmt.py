@@ -11,8 +11,8 @@ from enum import IntEnum
 
 __all__ = [
     "NMT_STATES",
+    "HeartbeatConsumer",
     "HeartbeatProducer",
-    "HeartbeatWatch",
     "NmtState",
     "command_text",
     "state_text",
@@ -53,7 +53,7 @@ def command_text(command: int) -> str:
 
 
 @dataclass
-class HeartbeatWatch:
+class HeartbeatConsumer:
     """Heartbeat consumer of one node; as in CiA 301, monitoring begins with the first heartbeat."""
 
     timeout: float

@@ -30,7 +30,12 @@ from winchkit.drivers.can.cia402.profile_parameters import (
 )
 from winchkit.drivers.can.cia402.sdo_stop import SdoStop
 from winchkit.drivers.can.cia402.second_master import SecondMaster
-from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, Wish, control_word
+from winchkit.drivers.can.cia402.state_machine import (
+    QUICK_STOP,
+    RequestedState,
+    State,
+    control_word,
+)
 from winchkit.drivers.can.host_loss.mechanism import Silence, Terms
 from winchkit.drivers.can.host_loss.watch import HostWatch
 from winchkit.drivers.clock import Clock
@@ -44,9 +49,9 @@ _STALE_SYNCS, _STALE_BEATS = 5, 2
 _LATE_REPLY = 0.05
 """Left for the reply to a single SDO request, s: a tenth of the time-out of a transfer."""
 _NMT_STOP = 0x02
-_ENABLE, _DISABLE = Wish.ENABLE, Wish.DISABLE
+_ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
 _new = tuple.__new__
-_RAMPS = (Wish.RUN_DOWN, Wish.HALT)
+_RAMPS = (RequestedState.RUN_DOWN, RequestedState.HALT)
 _OPERATIONAL = int(NmtState.OPERATIONAL)
 _POWERED = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
@@ -363,14 +368,14 @@ class Cia402Axis:
 
     def send(
         self,
-        wish: Wish,
+        requested: RequestedState,
         *,
         velocity: float = 0.0,
         angle: float | None = None,
         torque: float = 0.0,
         start: bool = False,
     ) -> int:
-        """Send the next control word towards ``wish`` with targets (rad/s, rad, N m).
+        """Send the next control word towards ``requested`` with targets (rad/s, rad, N m).
 
         Returns the word. The mode says which target counts; beside it, velocity and torque are
         fed forward where 60B1h and 60B2h are mapped. Without a target angle a
@@ -383,20 +388,20 @@ class Cia402Axis:
         commander, feedback = self._commander, self.feedback
         if commander is None or feedback is None:
             return self._previous
-        if wish in _RAMPS and not self._mode.can_run_down:
-            wish = Wish.STOP
-        if not self._watched and wish is _ENABLE and not self._note_life_sign():
+        if requested in _RAMPS and not self._mode.can_run_down:
+            requested = RequestedState.STOP
+        if not self._watched and requested is _ENABLE and not self._note_life_sign():
             # The drive's watchdog arms on the first life sign that it receives.
-            wish = _DISABLE
+            requested = _DISABLE
         word = control_word(
             self._certain(feedback),
-            wish,
+            requested,
             previous=self._previous,
             age=self._cycle[0] - feedback.sync,
             at_rest=self._position.at_rest(feedback),
         )
         # What Command(...) makes, without the call of its constructor.
-        command = _new(Command, (wish, velocity, angle, torque, start))
+        command = _new(Command, (requested, velocity, angle, torque, start))
         word, frames = commander.frames(word, command, feedback)
         if not self.host.silent or not self.host.withholds_rpdos:
             for identifier, data in frames:
@@ -433,7 +438,7 @@ class Cia402Axis:
         self._position.changed_mode(previous, mode, homed=homed)
 
     def prepare_homing(self, homing: HomingSpec) -> None:
-        """Set a homing up and change to HM, disabled; ``send(Wish.ENABLE, start=True)`` runs it.
+        """Set a homing up and change to HM, disabled; ``send`` with ENABLE and ``start`` runs it.
 
         Afterwards ``switch_mode(servo.motion_mode)`` leads back. Raises NotPermitted, NoReply,
         DeviceRefused.

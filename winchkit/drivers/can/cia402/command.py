@@ -16,8 +16,8 @@ from winchkit.drivers.can.cia402.state_machine import (
     ENABLE_OPERATION,
     HALT,
     QUICK_STOP,
+    RequestedState,
     State,
-    Wish,
 )
 from winchkit.errors import Fault, FileError, NotPermitted
 
@@ -68,14 +68,14 @@ Key = tuple[int, int]
 _CONTROL, _MODE = (0x6040, 0), (0x6060, 0)
 _VELOCITY_OFFSET, _TORQUE_OFFSET = (0x60B1, 0), (0x60B2, 0)
 _ALWAYS = {_CONTROL, _MODE, _VELOCITY_OFFSET, _TORQUE_OFFSET}
-_ENABLED, _RUN_DOWN = State.OPERATION_ENABLED, Wish.RUN_DOWN
-_MOVES = (Wish.ENABLE, _RUN_DOWN)
+_ENABLED, _RUN_DOWN = State.OPERATION_ENABLED, RequestedState.RUN_DOWN
+_MOVES = (RequestedState.ENABLE, _RUN_DOWN)
 
 
 class Command(NamedTuple):
     """Requested state and targets of one cycle; SI at the motor shaft."""
 
-    wish: Wish
+    requested: RequestedState
     velocity: float = 0.0
     """rad/s."""
     angle: float | None = None
@@ -137,8 +137,8 @@ class Commander:
         bits and targets, any other goes with zero and the actual position. Raises NotPermitted
         for targets beyond the drive's range.
         """
-        wish, velocity, angle, torque, start = command
-        moves = word == ENABLE_OPERATION and feedback.state is _ENABLED and wish in _MOVES
+        requested, velocity, angle, torque, start = command
+        moves = word == ENABLE_OPERATION and feedback.state is _ENABLED and requested in _MOVES
         actual = feedback.shown
         if actual is None:
             actual = self._drive.scale.angle_counts(feedback.angle)
@@ -149,7 +149,7 @@ class Commander:
             self._set_point.reset(actual)
         elif moves and start and self._homes:
             bits = START
-        if moves and wish is _RUN_DOWN and self._mode.moves_alone:
+        if moves and requested is _RUN_DOWN and self._mode.moves_alone:
             bits = HALT
         word |= bits
         values = self._zeros.copy()

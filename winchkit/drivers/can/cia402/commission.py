@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from winchkit.drivers.can.canopen.communication import set_communication
-from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec
 from winchkit.drivers.can.canopen.pdo_parameters import codecs, set_up
@@ -140,7 +140,7 @@ def commission(
 
 
 def await_booted(
-    node: SdoNode, boot_time: float, clock: Clock, heartbeat: HeartbeatWatch | None = None
+    node: SdoNode, boot_time: float, clock: Clock, heartbeat: HeartbeatConsumer | None = None
 ) -> None:
     """Ask for the device type until the drive has booted; raises NoReply.
 

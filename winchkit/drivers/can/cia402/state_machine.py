@@ -20,10 +20,10 @@ __all__ = [
     "STATE_BITS",
     "SWITCH_ON",
     "TRANSITIONS",
+    "RequestedState",
     "State",
     "StatusBit",
     "Transition",
-    "Wish",
     "control_word",
     "state_of",
 ]
@@ -61,7 +61,7 @@ class StatusBit(IntEnum):
     """In cyclic modes."""
 
 
-class Wish(Enum):
+class RequestedState(Enum):
     """Requested state of a drive."""
 
     ENABLE = "enable"
@@ -131,8 +131,8 @@ _FRESH = 1
 """A status word of the SYNC before is the newest where the answer to this one is on its way."""
 _RAMP_AGE = 5
 """SYNCs. A ramp survives late or lost answers as long as motion does (condition ``feedback``)."""
-_STAYING = {Wish.RUN_DOWN: ENABLE_OPERATION, Wish.HALT: ENABLE_OPERATION | HALT}
-_ENABLE = Wish.ENABLE
+_STAYING = {RequestedState.RUN_DOWN: ENABLE_OPERATION, RequestedState.HALT: ENABLE_OPERATION | HALT}
+_ENABLE = RequestedState.ENABLE
 """An attribute of an enum class takes 0.1 us in Python 3.11, too long for every cycle."""
 
 
@@ -159,9 +159,14 @@ def state_of(status: int) -> State:
 
 
 def control_word(
-    state: State, wish: Wish, *, previous: int = 0, age: int = 0, at_rest: bool = False
+    state: State,
+    requested: RequestedState,
+    *,
+    previous: int = 0,
+    age: int = 0,
+    at_rest: bool = False,
 ) -> int:
-    """Control word 6040h that leads from ``state`` towards ``wish``.
+    """Control word 6040h that leads from ``state`` towards ``requested``.
 
     Where nothing else is certain it is quick stop, which leads down from every state and, unlike
     disable voltage, never lets a moving drive coast.
@@ -171,13 +176,18 @@ def control_word(
     (605Ah from 5) while an older status word still says enabled. ``age`` is the age of the status
     word in SYNCs, ``at_rest`` says whether the motor stands still.
     """
-    if wish is _ENABLE and state in _ENABLING:
+    if requested is _ENABLE and state in _ENABLING:
         return _ENABLING[state]
     fresh = age <= _FRESH
-    stays = wish in _STAYING and state is State.OPERATION_ENABLED and age <= _RAMP_AGE
+    stays = requested in _STAYING and state is State.OPERATION_ENABLED and age <= _RAMP_AGE
     if stays and _enables(previous):
-        return _STAYING[wish]
-    if fresh and state is State.FAULT and wish is Wish.RESET and not previous & FAULT_RESET:
+        return _STAYING[requested]
+    if (
+        fresh
+        and state is State.FAULT
+        and requested is RequestedState.RESET
+        and not previous & FAULT_RESET
+    ):
         return FAULT_RESET
-    leaves = wish in (Wish.DISABLE, Wish.ENABLE) and fresh and at_rest
+    leaves = requested in (RequestedState.DISABLE, RequestedState.ENABLE) and fresh and at_rest
     return DISABLE_VOLTAGE if leaves and state is State.QUICK_STOP_ACTIVE else QUICK_STOP

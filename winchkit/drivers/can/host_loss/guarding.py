@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from winchkit.drivers.can.canopen.nmt import HeartbeatWatch
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, Mechanism, Silence
 from winchkit.errors import NotPermitted
 
@@ -28,7 +28,7 @@ def guard_time(limit: float) -> float:
 
 
 @dataclass
-class GuardingWatch(HeartbeatWatch):
+class GuardingWatch(HeartbeatConsumer):
     """Supervises a node by its guarding replies, in place of its heartbeat."""
 
     replies: int = 0

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from winchkit.drivers.can.canopen.emergency import Emergency
-from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.option_codes import BY_6007, OptionCode
 from winchkit.drivers.can.cia402.state_machine import DISABLE_VOLTAGE, FAULT_RESET, State, state_of
@@ -65,7 +65,7 @@ class HostLoss:
 
 def prove(
     mechanism: Mechanism,
-    watch: HeartbeatWatch,
+    watch: HeartbeatConsumer,
     emergencies: Collection[Emergency],
 ) -> Proof:
     """Withhold the life signs from a disabled, operational drive until it reports their absence.
@@ -139,7 +139,7 @@ def bring_back(node: SdoNode, clock: Clock, *, clears: bool) -> None:
 
 def _await_reaction(
     mechanism: Mechanism,
-    watch: HeartbeatWatch,
+    watch: HeartbeatConsumer,
     emergencies: Collection[Emergency],
     start: float,
     limit: float,

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from contextlib import suppress
 
 from winchkit.drivers.can.canopen.emergency import Emergency
-from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, HeartbeatWatch, NmtState
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, HeartbeatProducer, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import codecs
 from winchkit.drivers.can.cia402.option_codes import OptionCode
@@ -43,8 +43,8 @@ class HostWatch:
         self.hardware = hardware
         self._node, self._servo, self._terms, self._clock = node, servo, terms, clock
         guarded = not hardware and servo.host_loss == Guarding.name
-        self.heartbeat: HeartbeatWatch = (
-            GuardingWatch(terms.limit) if guarded else HeartbeatWatch(terms.limit)
+        self.heartbeat: HeartbeatConsumer = (
+            GuardingWatch(terms.limit) if guarded else HeartbeatConsumer(terms.limit)
         )
         self.mechanism: Mechanism = Mechanism(node, terms, clock)
         self._polls: HeartbeatProducer | None = None

@@ -12,7 +12,7 @@ import canopen
 
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.canopen.identity import Identity, fitting_device
-from winchkit.drivers.can.canopen.nmt import HeartbeatWatch, NmtState, state_text
+from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState, state_text
 from winchkit.drivers.can.canopen.node import ABSENT, ObjectPort
 from winchkit.drivers.can.canopen.sdo_client import sdo_client
 from winchkit.drivers.can.cia402.axis import Cia402Axis
@@ -134,7 +134,7 @@ class _NodeListener:
     def __init__(self, bus: CanBus, node: int, clock: Clock, listen: float) -> None:
         self.bus, self.node, self.clock = bus, node, clock
         self.start = clock.now()
-        self.watch = HeartbeatWatch(listen)
+        self.watch = HeartbeatConsumer(listen)
         self.beats = 0
         self.replies: Counter[bytes] = Counter()
         """Replies by their index and sub-index."""
@@ -240,7 +240,7 @@ def _number(port: ObjectPort, index: int, sub: int = 0) -> int | None:
     return None if data is None else int.from_bytes(data, "little")
 
 
-def _words(watch: HeartbeatWatch) -> str:
+def _words(watch: HeartbeatConsumer) -> str:
     if watch.state is None:
         return "no heartbeat"
     return state_text(watch.state)
