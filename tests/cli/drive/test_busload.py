@@ -99,6 +99,24 @@ def test_the_command_counts_the_pdos_of_the_device_file(tmp_path: Path) -> None:
     assert load["fastest_cycle"] == pytest.approx(1.2e-3)
 
 
+def test_the_bench_may_be_an_option_as_in_other_commands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = bench(tmp_path, 1, "4 ms")
+    expected = invoke("busload", file).stdout
+    assert expected
+    assert invoke("busload", "-b", file).stdout == expected
+    assert invoke("busload", "--bench", file, file).stdout == expected
+    two = invoke("busload", file, "-b", "other.toml")
+    assert two.exit_code == 2
+    assert "two bench files" in two.stderr
+    monkeypatch.chdir(tmp_path)
+    assert invoke("busload").stdout == expected
+    monkeypatch.setenv("WINCHKIT_BENCH", "other.toml")
+    assert invoke("busload", file).stdout == expected
+    assert "other.toml" in invoke("busload").stderr
+
+
 def test_a_bus_that_is_too_full_fails_the_check(tmp_path: Path) -> None:
     result = invoke("busload", bench(tmp_path, 8, "2 ms"))
     assert result.exit_code == 1

@@ -109,6 +109,57 @@ def test_a_certain_guess_needs_no_consent_and_the_mapping_makes_the_next_import_
     assert np.array_equal(by_python["motor_angle"], run["motor_angle"])
 
 
+def test_a_lost_sign_is_not_accepted_by_yes(tmp_path: Path) -> None:
+    """A servo's load of ±300 in 11 bits, of which the highest is the sign."""
+    loads = [round(300 * np.sin(k / 9)) for k in range(300)]
+    rows = (f"{k / 100},{k % 90}.5,{v if v >= 0 else 1024 - v}" for k, v in enumerate(loads))
+    path = tmp_path / "servo.csv"
+    path.write_text("time [s],position [deg],torque [mN m]\n" + "\n".join(rows) + "\n")
+    refused = command(path, "-o", tmp_path / "runs", "--yes")
+    assert refused.exit_code == 2
+    assert "11 bits stored without a sign (sign and magnitude" in refused.stderr
+    assert '--unsigned "torque"' in refused.stderr
+    assert not (tmp_path / "runs").exists()
+    taken = command(path, "-o", tmp_path / "runs", "--yes", "--unsigned", "torque")
+    assert taken.exit_code == 0, taken.output
+
+
+def test_a_file_without_a_motor_angle_is_told_so_when_it_is_looked_at(tmp_path: Path) -> None:
+    rows = (f"{k / 100},{50 + k % 7}" for k in range(100))
+    path = tmp_path / "cell.csv"
+    path.write_text("time [s],force [N]\n" + "\n".join(rows) + "\n")
+    looked = command(path)
+    assert looked.exit_code == 0
+    assert (
+        "no column is the motor angle or velocity, without which there is no run" in looked.stdout
+    )
+    found = json.loads(command(path, "--json").stdout)["files"][0]
+    assert any("motor_angle=COLUMN" in note for note in found["notes"])
+    drive = log(tmp_path / "drive.csv", HEAD.replace("[%]", "[Nm]"))
+    assert "without which" not in command(path, drive).stdout
+
+
+def test_quiet_prints_no_table(tmp_path: Path) -> None:
+    path = log(tmp_path / "log.csv", "t,q,dq [rpm],tau,force [N]")
+    quiet = command(path, "-o", tmp_path / "runs", "-q", "-y")
+    assert quiet.exit_code == 0
+    assert quiet.stdout == f"{tmp_path / 'runs' / 'log.csv'}\n"
+    assert "confidence" not in quiet.stderr
+    assert "confidence" in command(path, "-q").stdout, "without -o the table is the result"
+
+
+def test_quiet_prints_what_was_changed_as_warnings(tmp_path: Path) -> None:
+    m = motion()
+    rows = (
+        f"{a:.4f},{b:.6f},{-c:.6f}" for a, b, c in zip(m.time, m.angle, m.velocity, strict=True)
+    )
+    path = tmp_path / "log.csv"
+    path.write_text("t [s],angle [rad],speed [rad/s]\n" + "\n".join(rows) + "\n")
+    quiet = command(path, "-o", tmp_path / "runs", "-q", "-y")
+    assert quiet.exit_code == 0
+    assert "its sign is changed (warning)" in quiet.stderr
+
+
 def test_an_assumed_unit_needs_consent(tmp_path: Path) -> None:
     path = log(tmp_path / "log.csv", "t,q,dq [rpm],tau,force [N]")
     refused = command(path, "-o", tmp_path / "runs")

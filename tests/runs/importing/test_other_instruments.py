@@ -18,7 +18,7 @@ from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.can_trace import is_can_trace
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
-from winchkit.runs.importing.sign_bits import unsigned_note
+from winchkit.runs.importing.sign_bits import lost_sign
 from winchkit.runs.importing.streams import streams_of
 
 COUNT, STEP = 300, 0.01
@@ -219,14 +219,18 @@ def _stored(value: int, bits: int, how: str) -> int:
 
 
 @pytest.mark.parametrize(("bits", "how"), [(11, "sign and magnitude"), (16, "two's complement")])
-def test_a_lost_sign_has_a_note(bits: int, how: str, tmp_path: Path) -> None:
+def test_a_lost_sign_is_asked(bits: int, how: str, tmp_path: Path) -> None:
     """A servo's load of ±300 in a field without a sign."""
     head = "time,position,torque\n"
     loads = [round(300 * np.sin(k / 9)) for k in range(COUNT)]
     lines = [f"{k * STEP:g},{k % 90}.5,{_stored(v, bits, how)}" for k, v in enumerate(loads)]
     columns = ("motor_angle=position [deg]", "motor_torque=torque*0.01 [N m]")
-    guess = guessed(tmp_path / "servo.csv", head + "\n".join(lines) + "\n", *columns)
-    assert [f"{bits} bits stored without a sign ({how}" in note for note in guess.notes] == [True]
+    path = tmp_path / "servo.csv"
+    (question,) = guessed(path, head + "\n".join(lines) + "\n", *columns).questions
+    assert f"{bits} bits stored without a sign ({how}" in question.text
+    assert question.options == ('--unsigned "torque"', '--column "motor_torque="')
+    answers = Answers(tuple(read_column(text) for text in columns), unsigned=("torque",))
+    assert not guess_columns(read_table(path), answers).questions
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(8, 20))
@@ -237,7 +241,7 @@ def test_counts_and_levels_have_their_sign(seed: int, bits: int) -> None:
     levels = np.where(rng.random(500) < 0.5, 0, 1200) + rng.integers(0, 20, 500)
     signed = rng.integers(-(2**bits), 2**bits, 500).astype(float)
     for values in (counts, levels.astype(float), signed, np.full(500, 7.0)):
-        assert not unsigned_note("x", values)
+        assert not lost_sign("x", values)
 
 
 def test_components_of_a_six_axis_cell_are_asked(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from tracker_exports import (
     vicon,
 )
 from winchkit.arrays import Array
+from winchkit.errors import RunError
 from winchkit.model.robot.rotation import rotation_from_quaternion, rotation_of
 from winchkit.runs.importing.answers import Answers
 from winchkit.runs.importing.assignment import Guess
@@ -93,3 +94,76 @@ def test_poses_are_joined_row_by_row_with_the_motor_angles(tmp_path: Path) -> No
     assert run["2.motor_angle"][5] == pytest.approx(np.radians(-15))
     assert run["1.tension"][5] == 105
     assert run["platform_y"] == pytest.approx(poses()[1][:, 1], abs=1e-8)
+
+
+def _captured(kind: str) -> str:
+    """Text of an export of three markers, or of one body, by the poses of the other exports."""
+    time, position, yaw, _ = poses()
+    count, millimetres = len(time), 1e3 * position
+    c, s, zero = np.cos(yaw), np.sin(yaw), np.zeros(count)
+    if kind == "body":
+        keys, names = "NO_OF_BODIES\t1", "BODY_NAMES\tplatform"
+        # Rx Ry Rz with a turn about z alone; the matrix by columns.
+        entries = (c, s, zero, -s, c, zero, zero, zero, zero + 1)
+        columns = [*millimetres.T, zero, zero, np.degrees(yaw), zero, *entries]
+    else:
+        keys, names = "NO_OF_MARKERS\t3", "MARKER_NAMES\tleft\tright\ttop"
+        columns = [*(millimetres - 40).T, *(millimetres + 40).T, *millimetres.T]
+    rows = [[f"{value:.12g}" for value in row] for row in zip(*columns, strict=True)]
+    if kind == "TRC":
+        head = (
+            "PathFileType\t4\t(X/Y/Z)\tm.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n"
+            f"100\t100\t{count}\t3\tmm\nFrame#\tTime\tleft\t\t\tright\t\t\ttop\t\t\n"
+            "\t\tX1\tY1\tZ1\tX2\tY2\tZ2\tX3\tY3\tZ3\n\n"
+        )
+        rows = [
+            [str(k + 1), f"{t:.12g}", *row]
+            for k, (t, row) in enumerate(zip(time, rows, strict=True))
+        ]
+    else:
+        head = f"NO_OF_FRAMES\t{count}\nFREQUENCY\t100\n{keys}\nTIME_STAMP\t2026-01-02\n{names}\n"
+    return head + "\n".join("\t".join(row) for row in rows) + "\n"
+
+
+def test_a_body_of_qualisys_is_a_pose(tmp_path: Path) -> None:
+    path = tmp_path / "body.tsv"
+    path.write_text(_captured("body"))
+    guess = guess_columns(read_table(path))
+    assert not guess.questions
+    found = channels(guess)
+    _, position, yaw, _ = poses()
+    assert found["platform_x"] == pytest.approx(position[:, 0], abs=1e-8)
+    names = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
+    turned = rotation_from_quaternion(np.stack([found[name] for name in names], axis=1))
+    zero = np.zeros(len(yaw))
+    assert turned == pytest.approx(rotation_of(zero, zero, yaw), abs=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["markers", "TRC"])
+def test_markers_are_points_of_which_one_is_chosen(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "markers.tsv"
+    path.write_text(_captured(kind))
+    guess = guess_columns(read_table(path))
+    (question,) = guess.questions
+    assert question.options == ('--body "left"', '--body "right"', '--body "top"')
+    assert any("rigid body (6D)" in note for note in guess.notes + guess.table.notes)
+    chosen = guess_columns(read_table(path), Answers(body="top"))
+    found = channels(chosen)
+    assert set(found) == {"platform_x", "platform_y", "platform_z"}
+    assert found["platform_z"] == pytest.approx(poses()[1][:, 2], abs=1e-8)
+
+
+def test_positions_that_were_not_tracked_are_missing(tmp_path: Path) -> None:
+    path = tmp_path / "markers.tsv"
+    lines = _captured("markers").splitlines()
+    lines[20] = "\t".join(["0.000"] * 9)
+    path.write_text("\n".join(lines) + "\n")
+    table = read_table(path)
+    assert np.flatnonzero(np.isnan(table.columns[0].values)).tolist() == [15]
+
+
+def test_a_c3d_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "markers.c3d"
+    path.write_bytes(b"\x02P" + bytes(1022))
+    with pytest.raises(RunError, match="C3D"):
+        read_table(path)

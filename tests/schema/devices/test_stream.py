@@ -52,7 +52,8 @@ def test_a_small_file_is_enough(tmp_path: Path) -> None:
         (GOOD.replace('["{value}"]', "[]"), "give either 'frame'"),
         (
             GOOD.replace("{value}", "{valu}"),
-            "table letter.valu; did you mean 'value'?",
+            "no field is called {valu}; use value, gross, tare, unit, address, checksum, bits, "
+            "skip, or declare the texts of a status field in a table 'letter.valu'; did you mean",
         ),
         (GOOD.replace("{value}", "{bits:3}"), "has no field {value}"),
         (GOOD.replace("{value}", "{value"), "is not a template"),

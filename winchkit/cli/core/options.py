@@ -55,6 +55,7 @@ __all__ = [
 ]
 
 BENCH_VARIABLE = "WINCHKIT_BENCH"
+_ARGUMENT = "winchkit.bench_argument"
 _BITRATE = 1_000_000
 RUN = Readable("run", complete_run)
 PROFILE = Readable("profile", complete_profile)
@@ -112,14 +113,52 @@ effects_option: Decorator = click.option(
     shell_complete=complete_file,
     help="Python file with effects of your own that a profile has; may be given several times.",
 )
-bench_argument: Decorator = click.argument(
-    "bench",
-    required=False,
-    metavar="[BENCH]",
-    envvar=BENCH_VARIABLE,
-    shell_complete=complete_bench,
-    callback=bench_by_default,
-)
+
+
+def _keep_argument(ctx: click.Context, param: click.Parameter, value: str | None) -> None:
+    """Keep the bench that was given without the option, for the callback of the option."""
+    ctx.meta[_ARGUMENT] = value
+
+
+def _bench_of_either(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    """The bench that was given as argument or option; raises UsageError for two of them."""
+    argument: str | None = ctx.meta.get(_ARGUMENT)
+    if argument is None:
+        return bench_by_default(ctx, param, value)
+    is_typed = ctx.get_parameter_source("bench") is click.core.ParameterSource.COMMANDLINE
+    if is_typed and value != argument:
+        raise UsageError(f"two bench files, '{argument}' and --bench '{value}'; give one")
+    return argument
+
+
+def bench_argument(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The bench as an argument, and as the option ``-b`` that other commands have.
+
+    Parameters
+    ----------
+    function : callable
+        A command with the parameter ``bench``.
+    """
+    argument = click.argument(
+        "bench_file",
+        required=False,
+        metavar="[BENCH]",
+        shell_complete=complete_bench,
+        is_eager=True,
+        expose_value=False,
+        callback=_keep_argument,
+    )
+    option = click.option(
+        "-b",
+        "--bench",
+        metavar="FILE",
+        shell_complete=complete_bench,
+        callback=_bench_of_either,
+        help="Bench file.  [default: the only one of this folder]",
+    )
+    return argument(option(function))
+
+
 winch_argument: Decorator = click.argument("winch", required=False, shell_complete=complete_winch)
 take_over_option: Decorator = click.option(
     "--take-over",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,16 +11,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.messages import is_quiet, note, suggest_next
 from winchkit.cli.core.options import TABLE, output_option
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.files.import_dialogue import asked
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:
     from winchkit.runs.importing.answers import Answers
-    from winchkit.runs.importing.assignment import Guess, Question
+    from winchkit.runs.importing.assignment import Guess
     from winchkit.runs.importing.clocks import Joint
     from winchkit.runs.importing.streams import Streams
     from winchkit.runs.run import Run
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _MAPPING = "mapping.toml"
+_NO_ANGLE = (
+    "no column is the motor angle or velocity, without which there is no run: name it by --column "
+    '"motor_angle=COLUMN [deg]", or import the file together with the one that has it'
+)
 
 
 @click.command(
@@ -90,6 +94,12 @@ _MAPPING = "mapping.toml"
     metavar="COLUMN",
     help="Column that names the axis, where each row is of one axis; '' where it is not.",
 )
+@click.option(
+    "--unsigned",
+    multiple=True,
+    metavar="COLUMN",
+    help="Column that has no sign, where one seems to be lost; may be given several times.",
+)
 @click.option("--body", metavar="NAME", help="Body or marker of a tracker's export.")
 @click.option(
     "--load-mass",
@@ -146,8 +156,10 @@ def command(
         "sanity": [],
     }
     shown = "\n\n".join(tables_text(guess) for guess in guesses)
-    if is_new and not as_json:
+    if is_new and not as_json and (output is None or not is_quiet()):
         click.echo(shown, err=output is not None)
+    elif is_new and not as_json:
+        _warn(guesses)
     if output is None:
         if as_json:
             echo_json(report)
@@ -182,6 +194,13 @@ def command(
     suggest_next("check", [str(entry["path"]) for entry in report["runs"]])
 
 
+def _warn(guesses: Sequence[Guess]) -> None:
+    """Notes on what was read, without the table."""
+    for guess in guesses:
+        for text in (*guess.table.notes, *guess.notes):
+            click.echo(f"{one_line(guess.table.path)}: {text} (warning)", err=True)
+
+
 def _may_ask(yes: bool, as_json: bool) -> bool:
     """Whether somebody can answer: a terminal, and no request for silence."""
     return not yes and not as_json and sys.stdin.isatty() and sys.stderr.isatty()
@@ -198,7 +217,12 @@ def _answers(options: Mapping[str, Any]) -> Answers:
         columns = tuple(read_column(text) for text in options["columns"])
     except UsageError as error:
         raise UsageError(f"--column: {error}") from None
-    own = Answers(columns=columns, body=options["body"], axis=options["axis"])
+    own = Answers(
+        columns=columns,
+        body=options["body"],
+        axis=options["axis"],
+        unsigned=tuple(options["unsigned"]),
+    )
     return _with(own, **constants)
 
 
@@ -248,7 +272,7 @@ def _guesses(
             faults += error.faults
             continue
         if asking and declared is None:
-            guess, answers = _asked(guess, answers)
+            guess, answers = asked(guess, answers)
         guesses.append(guess)
     if faults:
         raise RunError(faults)
@@ -260,78 +284,14 @@ def _guesses(
     if not unknown:
         # A column of one file is no question about the others.
         guesses = [_without_foreign(guess) for guess in guesses] if len(guesses) > 1 else guesses
+    if declared is None and not _have(guesses, {"motor_angle", "motor_velocity"}):
+        guesses = [replace(guess, notes=(*guess.notes, _NO_ANGLE)) for guess in guesses]
     return guesses, declared
 
 
 def _without_foreign(guess: Guess) -> Guess:
     kept = tuple(q for q in guess.questions if not q.text.startswith("there is no column"))
     return replace(guess, questions=kept)
-
-
-def _asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
-    """Ask the open questions on the terminal, and guess again with the answers."""
-    from winchkit.cli.files.import_table import tables_text
-    from winchkit.runs.importing.guess import guess_columns
-
-    if guess.questions:
-        click.echo(tables_text(replace(guess, questions=())), err=True)
-    while guess.questions:
-        answers = _answered(guess, answers)
-        guess = guess_columns(guess.file, answers)
-    return guess, answers
-
-
-def _answered(guess: Guess, answers: Answers) -> Answers:
-    question = guess.questions[0]
-    click.echo(f"? {question.text}", err=True)
-    if question.key:
-        return _with(answers, **{question.key: _value(question)})
-    if question.options[0].startswith("--body"):
-        return replace(answers, body=_picked([o[8:-1] for o in question.options]))
-    own = [option[len('--column "') : -1] for option in question.options]
-    if len(own) == 1 and "[UNIT]" in own[0]:
-        unit = _until("  unit", lambda text: _column(own[0].replace("[UNIT]", f"[{text}]")))
-        return replace(answers, columns=(*answers.columns, unit))
-    if len(own) == 1 and "FACTOR" in own[0]:
-        factor = _until("  factor", lambda text: _column(own[0].replace("FACTOR", text)))
-        return replace(answers, columns=(*answers.columns, factor))
-    if any("COLUMN" in text for text in own):
-        text = _until(f"  CHANNEL=COLUMN [UNIT] (e.g. {own[0]})", _column)
-        return replace(answers, columns=(*answers.columns, text))
-    return replace(answers, columns=(*answers.columns, _column(_picked(own))))
-
-
-def _value(question: Question) -> Any:
-    """Answer to a question on a field of the answers: a constant, or the column of the axis."""
-    example = re.sub(r'^--\S+ |"', "", question.options[0])
-    if question.key == "axis":
-        return example if click.confirm("  separate the axes?", default=True, err=True) else ""
-    return _until(f"  {question.key.replace('_', ' ')} (e.g. {example})", question.key)
-
-
-def _column(text: str) -> Any:
-    from winchkit.runs.importing.answers import read_column
-
-    return read_column(text)
-
-
-def _picked(texts: Sequence[str]) -> str:
-    for number, text in enumerate(texts, start=1):
-        click.echo(f"  {number}  {one_line(text)}", err=True)
-    choice = click.prompt("  number", type=click.IntRange(1, len(texts)), err=True)
-    return texts[int(choice) - 1]
-
-
-def _until(words: str, read: str | Callable[[str], Any]) -> Any:
-    """Prompt until the answer can be read."""
-    from winchkit.runs.importing.answers import read_constant
-
-    while True:
-        text = click.prompt(words, err=True)
-        try:
-            return read_constant(read, text) if isinstance(read, str) else read(text)
-        except UsageError as error:
-            click.echo(f"  {error}", err=True)
 
 
 def _is_accepted(guesses: Sequence[Guess], yes: bool, as_json: bool) -> bool:
@@ -344,8 +304,14 @@ def _is_accepted(guesses: Sequence[Guess], yes: bool, as_json: bool) -> bool:
 
 def _are_integrated(guesses: Sequence[Guess]) -> bool:
     """Whether the motor angle is the integral of a velocity: no file has an angle."""
-    bases = {item.channel.rpartition(".")[2] for guess in guesses for item in guess.used}
-    return "motor_velocity" in bases and "motor_angle" not in bases
+    return _have(guesses, {"motor_velocity"}) and not _have(guesses, {"motor_angle"})
+
+
+def _have(guesses: Sequence[Guess], channels: set[str]) -> bool:
+    """Whether a file has one of some channels."""
+    return any(
+        item.channel.rpartition(".")[2] in channels for guess in guesses for item in guess.used
+    )
 
 
 def _unanswered(guesses: Sequence[Guess]) -> str:
@@ -363,6 +329,8 @@ def _unanswered(guesses: Sequence[Guess]) -> str:
                 for item in guess.used
                 if item.confidence in {"derived", "assumed"}
             ]
+    if any(_NO_ANGLE in guess.notes for guess in guesses):
+        lines.append(f"  {_NO_ANGLE}")
     if any(guess.questions for guess in guesses):
         return "\n".join(["not known, and no terminal to ask; give", *lines])
     if _are_integrated(guesses):

@@ -134,6 +134,8 @@ class Answers:
     """Body or marker of a tracker's export."""
     axis: str | None = None
     """Column that names the axis of each row; empty for a table whose rows are of all axes."""
+    unsigned: tuple[str, ...] = ()
+    """Columns whose numbers have no sign, although they look like signed ones that lost it."""
 
 
 def read_column(text: str) -> ColumnAnswer:

@@ -55,6 +55,8 @@ class Work:
     notes: list[str] = field(default_factory=list)
     measured: dict[str, float] = field(default_factory=dict)
     """SI value of 1 of a velocity without a unit, by its ratio to the angle; by column."""
+    doubts: dict[str, str] = field(default_factory=dict)
+    """Why a unit by convention is not taken; by column."""
 
 
 def clock_of(work: Work, item: ChosenColumn) -> ChosenColumn | None:

@@ -15,8 +15,7 @@ from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of
 from winchkit.runs.importing.consistency import from_velocity
 from winchkit.runs.importing.long_table import axes_of, likely_axis
-from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
-from winchkit.runs.importing.sign_bits import unsigned_note
+from winchkit.runs.importing.questions import ask_columns, ask_signs, ask_units, axis_question
 from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
 from winchkit.schema.mapping import DATE
@@ -59,9 +58,8 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     from_velocity(work)
     as_others(work)
     _drop_clocks(work)
-    signed = [item for item in work.columns if item.base not in {"time", DATE}]
-    work.notes += filter(None, (unsigned_note(i.column.source, i.column.values) for i in signed))
     ask_units(work)
+    ask_signs(work)
     rate = _rate(work)
     ask_columns(work, choice)
     assigned = {item.column.source: _assignment(item) for item in work.columns}

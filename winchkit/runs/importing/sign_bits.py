@@ -11,7 +11,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["unsigned_note"]
+__all__ = ["lost_sign"]
 
 _BITS = range(8, 33)
 _FEWEST = 8
@@ -24,13 +24,13 @@ _SMALL = 0.3
 """Share of the largest magnitude below which each sign has values: a signal passes zero."""
 
 
-def unsigned_note(name: str, values: Array) -> str:
-    """Note on a column whose sign seems to be lost; empty for another one.
+def lost_sign(name: str, values: Array) -> str:
+    """Description of a column whose sign seems to be lost; empty for another one.
 
     Parameters
     ----------
     name : str
-        Column, for the note.
+        Column, for the text.
     values : (n,) array
         Numbers as in the file; NaN where missing.
 
@@ -55,8 +55,8 @@ def unsigned_note(name: str, values: Array) -> str:
             continue
         return (
             f"'{name}' has values of {low[0]:.0f} to {low[-1]:.0f} and of {high[0]:.0f} to "
-            f"{high[-1]:.0f}, as signed numbers of {bits} bits stored without a sign ({how}); the "
-            "numbers are used as they are: restore the sign in the file"
+            f"{high[-1]:.0f}, as signed numbers of {bits} bits stored without a sign ({how}): "
+            "restore the sign in the file, or say that there is none"
         )
     return ""
 

@@ -36,6 +36,13 @@ _SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
 _SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "effort", "thetadot", "dtheta"}
 _GAINS = {"gtau", "ktau", "kt", "km", "torqueconstant", "torquegain", "gf", "forcegain"}
 
+_LARGEST_OF_JOINT = 1.02 * 2 * math.pi
+"""Joints of arms are limited to one turn to either side at most; 2 % for the overrun."""
+_LARGEST_IN_DEGREES = 720.0
+"""A joint's degrees are within two turns; a larger range is that of a motor."""
+_COARSE = 0.01
+"""0.01 rad is 0.6 deg: too coarse for a resolver or encoder, and usual for degrees."""
+
 
 def started(work: Work, candidate: Candidate, answer: ColumnAnswer | None) -> ChosenColumn:
     """A column with the unit that the user or the file gives."""
@@ -198,9 +205,48 @@ def by_convention(work: Work) -> None:
             item.base == "motor_angle" and is_counted(item)
         ):
             dimension = column_dimension(item.base)
-            if dimension is not None:
+            if doubt := _doubt(work, item):
+                work.doubts[item.column.source] = doubt
+            elif dimension is not None:
                 unit = next(iter(UNITS[dimension]))
                 item.settle(1.0, unit, "assumed", "no unit in the file: SI by convention")
+
+
+def _doubt(work: Work, item: ChosenColumn) -> str:
+    """Why an angle may not be in rad; messages of ROS are in rad."""
+    is_ros = work.table.layout == "MCAP" or item.column.name.startswith("/")
+    if item.base != "motor_angle" or is_ros:
+        return ""
+    return _doubt_of_radians(
+        item.column.values,
+        is_array=work.table.layout in _SI_LAYOUTS,
+        is_one_of_several=sum(other.base == "motor_angle" for other in work.columns) > 1,
+    )
+
+
+def _doubt_of_radians(values: Array, *, is_array: bool, is_one_of_several: bool) -> str:
+    """Why values that are rad by convention may be degrees; empty where they are rad.
+
+    The names of robotics (``q1``, ``theta``) and the formats of arrays stand for rad. Degrees of a
+    joint and radians of a motor that turns have the same range, beyond 2π and within 720; no
+    column but a velocity with a unit tells them apart.
+    """
+    known = values[np.isfinite(values)]
+    largest = float(np.max(np.abs(known), initial=0.0))
+    if not _LARGEST_OF_JOINT < largest <= _LARGEST_IN_DEGREES:
+        return ""
+    if _is_in_steps(known):
+        return (
+            f"; its values of {known.min():g} to {known.max():g} have steps of {_COARSE:g} or more"
+        )
+    if is_array and not is_one_of_several:
+        return ""
+    return f"; its values of {known.min():.4g} to {known.max():.4g} may be deg or rad"
+
+
+def _is_in_steps(values: Array) -> bool:
+    steps = values / _COARSE
+    return bool(np.all(np.abs(steps - np.round(steps)) < 1e-6 * np.maximum(1.0, np.abs(steps))))
 
 
 def _declared(table: Table, dimension: str | None) -> SpelledUnit | None:

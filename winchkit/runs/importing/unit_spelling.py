@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 from winchkit.units import UNITS
 
@@ -124,7 +125,7 @@ _DROPPED = re.compile(r"[\s·⋅*×•^_.]")
 _LONGEST = 200
 """Longest name with a unit, characters."""
 _PER_SECOND = re.compile(r"/\s*(sec|second|seconds|Sek|Sekunde)$")
-_BRACKETED = re.compile(r"(.*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|\{([^{}]*)\})\s*")
+_PAIRS = {"[": "]", "(": ")", "{": "}"}
 _NO_UNIT = {"", "-", "--", "none", "n/a", "1", "/", "[]", "()", "bool", "no unit", "unitless"}
 
 
@@ -160,6 +161,7 @@ _KNOWN = _known()
 _FOLDED = {key.casefold(): unit for key, unit in reversed(_KNOWN.items())}
 
 
+@lru_cache(4096)
 def read_unit(text: str) -> SpelledUnit | None:
     """The unit of a spelling, with or without brackets; None for another text.
 
@@ -207,14 +209,9 @@ def split_unit(text: str) -> tuple[str, str]:
         The unit is empty where the cell has none that is known; a unit in brackets is one also
         where it is not known.
     """
-    found = _BRACKETED.fullmatch(text)
-    if found and found[1]:
-        unit = next(part for part in found.groups()[1:] if part is not None).strip()
-        is_square = found[2] is not None
-        # "pos (1)" beside "pos (2)" has a number, "quaternion [1]" has the unit 1.
-        is_number = unit.isdecimal() and not is_square
-        if not is_number and (read_unit(unit) or unit.lower() in _NO_UNIT or is_square):
-            return found[1].strip(), "" if unit.lower() in _NO_UNIT else unit
+    bracketed = _in_brackets(text)
+    if bracketed is not None:
+        return bracketed
     plain = text.strip()
     best = plain, ""
     if len(plain) > _LONGEST:
@@ -227,6 +224,45 @@ def split_unit(text: str) -> tuple[str, str]:
             if known is not None and len(unit) > len(best[1]) and _is_safe(unit, mark, known):
                 best = plain[: cut.start()], unit
     return best
+
+
+def _in_brackets(text: str) -> tuple[str, str] | None:
+    """Name and unit of a cell by its brackets, which may be nested; None without a unit.
+
+    The last known unit is the unit: ``Force (Load Cell 1 (N))``, ``Torque [Nm] (filtered)``. A
+    bracket at the end that has no known unit has an unknown one where it is square: an index
+    (``pos[0]``) is part of the name.
+    """
+    found = [item for item in _brackets(text) if text[: item[0]].strip()]
+    end = len(text.rstrip())
+    for start, stop, inner in reversed(found):
+        known = read_unit(inner)
+        is_sure = stop == end or text[start] != "(" or inner.casefold() not in _SHORT_WORDS
+        if known is not None and is_sure and not inner.isdecimal():
+            rest = re.sub(r"\(\s*\)|\[\s*\]|\{\s*\}", "", f"{text[:start]} {text[stop:]}")
+            return re.sub(r"\s+([)\]}])", r"\1", " ".join(rest.split())), inner
+    last = next((item for item in found if item[1] == end), None)
+    if last is None:
+        return None
+    start, _, inner = last
+    is_square, is_apart = text[start] == "[", text[start - 1].isspace()
+    if inner.isdecimal() and not (is_square and is_apart and inner in _NO_UNIT):
+        return (text.strip(), "") if is_square else None
+    if inner.lower() in _NO_UNIT:
+        return text[:start].strip(), ""
+    return (text[:start].strip(), inner) if is_square else None
+
+
+def _brackets(text: str) -> list[tuple[int, int, str]]:
+    """Start, end and content of every pair of brackets, in the order of their ends."""
+    found, opened = [], list[int]()
+    for index, char in enumerate(text[:_LONGEST]):
+        if char in _PAIRS:
+            opened.append(index)
+        elif opened and char == _PAIRS[text[opened[-1]]]:
+            start = opened.pop()
+            found.append((start, index + 1, text[start + 1 : index].strip()))
+    return found
 
 
 _SHORT_WORDS = {

@@ -305,8 +305,11 @@ class StreamSpec(Table):
     def _broken_fields(self, parts: tuple[Part, ...], names: set[str]) -> Iterator[str]:
         status = {group.field for group in self.status}
         for name in sorted(names - {"", *_OWN, *self.letter, *status}):
-            near = suggest(name, [*_OWN, *self.letter, *sorted(status)])
-            yield f"{{{name}}} is unknown; use {', '.join(_OWN)} or a table letter.{name}{near}"
+            known = [*_OWN, *self.letter, *sorted(status)]
+            yield (
+                f"no field is called {{{name}}}; use {', '.join(known)}, or declare the texts of a "
+                f"status field in a table 'letter.{name}'{suggest(name, known)}"
+            )
         for part in parts:
             if part.field in status and part.width != 1:
                 yield f"{{{part.field}}} has status bits; write {{{part.field}:1}}"

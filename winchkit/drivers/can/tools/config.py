@@ -1,7 +1,8 @@
 """Settings of a drive: read as a whole, compared, written, and stored in its memory.
 
 Settings are parameters that an engineer sets and the drive keeps. Values that a bench writes at
-every opening (PDOs, heartbeats), commands, targets and measured values are not among them.
+every opening (PDOs, heartbeats), commands, targets, demand values and measured values are not among
+them.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ STORE, RESTORE = (0x1010, b"save"), (0x1011, b"load")
 """Object and signature that store all parameters, and bring back the maker's."""
 
 _NOT_SETTINGS = (
-    range(0x1003, 0x1004),  # error history
+    range(0x1001, 0x1004),  # error register, status and history
     range(0x1010, 0x1018),  # store and restore, COB-IDs, heartbeats
     range(0x1200, 0x1C00),  # SDO servers, PDOs
     range(0x1F50, 0x1F58),  # program download
@@ -62,6 +63,16 @@ _NOT_SETTINGS = (
     range(0x60B0, 0x60B3),
     range(0x60C1, 0x60C3),  # interpolation data and period
     range(0x60FE, 0x6100),  # digital outputs, target velocity
+    # Outputs of the drive by CiA 402-2, which some EDS files declare as rw.
+    range(0x603F, 0x6040),  # error code
+    range(0x6041, 0x6042),  # status word
+    range(0x6061, 0x6065),  # mode display; demand and actual positions
+    *(range(0x6069, 0x606A), range(0x606B, 0x606D)),  # demand and actual velocities
+    *(range(0x6074, 0x6075), range(0x6077, 0x607A)),  # demand and actual torque, current, voltage
+    *(range(0x60B9, 0x60BE), range(0x60D1, 0x60D9)),  # touch probe: status, positions, times
+    *(range(0x60E4, 0x60E6), range(0x60F4, 0x60F5)),  # further encoders, following error
+    *(range(0x60FA, 0x60FB), range(0x60FC, 0x60FE)),  # control effort, position demand, inputs
+    range(0x6502, 0x6503),  # supported modes
 )
 _TYPES = {*datatypes.NUMBER_TYPES, datatypes.BOOLEAN, datatypes.VISIBLE_STRING}
 _QUIET = (State.SWITCH_ON_DISABLED, State.READY_TO_SWITCH_ON, State.FAULT)

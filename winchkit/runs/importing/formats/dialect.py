@@ -9,10 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.formats.cell_units import has_unit
 from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.formats.stamps import is_stamp
 
-__all__ = ["BLANKS", "Dialect", "decode", "find_dialect", "split_line"]
+__all__ = ["BLANKS", "Dialect", "decode", "find_dialect", "has_cell_units", "split_line"]
 
 BLANKS = " "
 _DELIMITERS = ("\t", ";", "|", ",", BLANKS)
@@ -29,6 +30,8 @@ class Dialect:
     decimal: str
     width: int
     """Most frequent number of cells in a row of numbers."""
+    has_units: bool = False
+    """Whether cells are numbers with their units."""
 
     @property
     def text(self) -> str:
@@ -159,10 +162,26 @@ def _rated(
     if not widths:
         return None
     width = max(widths, key=lambda item: (widths[item], item))
-    return widths[width], Dialect(delimiter, decimal, width)
+    rows = [cells for cells in split if len(cells) == width]
+    return widths[width], Dialect(delimiter, decimal, width, has_cell_units(rows, decimal))
+
+
+def has_cell_units(rows: Sequence[Sequence[str]], decimal: str) -> bool:
+    """Whether at least half of the rows have a cell that is a number with its unit.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of str
+        Cells of each row.
+    decimal : str
+        Decimal sign.
+    """
+    return 2 * sum(any(has_unit(c, decimal) for c in cells) for cells in rows) >= max(len(rows), 1)
 
 
 def _values(cells: Sequence[str], decimal: str) -> tuple[int, int]:
     """Number of cells with a number or a stamp, and with any text."""
     given = [cell for cell in cells if cell]
-    return sum(number(c, decimal) is not None or is_stamp(c) for c in given), len(given)
+    return sum(
+        number(c, decimal) is not None or is_stamp(c) or has_unit(c, decimal) for c in given
+    ), len(given)

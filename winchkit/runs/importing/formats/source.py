@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import zipfile
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
 from winchkit.errors import Fault, RunError
 from winchkit.regular_file import regular
+from winchkit.runs.importing.formats.cell_units import with_cell_units
 from winchkit.runs.importing.table import LARGEST, Table
 
 __all__ = ["read_table"]
@@ -42,6 +44,12 @@ def read_table(path: str | Path) -> Table:
     UsageError
         Without the library of the format, with the name of the extra that installs it.
     """
+    table = _read(path)
+    return replace(table, columns=tuple(with_cell_units(item) for item in table.columns))
+
+
+def _read(path: str | Path) -> Table:
+    """Columns as they are in the file."""
     name, data = str(path), _content(Path(path))
     if data.startswith(b"PK\x03\x04"):
         return _packed(name, data)
@@ -66,12 +74,13 @@ def _of_text(name: str, data: bytes) -> Table:
     """JSON, or rows of text."""
     from winchkit.runs.importing.formats.can_trace import is_can_trace
     from winchkit.runs.importing.formats.json_file import is_json, read_json
+    from winchkit.runs.importing.formats.motion_capture import read_capture
     from winchkit.runs.importing.formats.text import read_text_table
 
     _refuse_known(name, data)
     if is_can_trace(data[:_TRACED].decode("latin-1").splitlines()[:-1]):
         raise RunError(Fault(_TRACE, name))
-    table = read_json(name, data) if is_json(data) else None
+    table = read_json(name, data) if is_json(data) else read_capture(name, data)
     return table or read_text_table(name, data)
 
 
@@ -127,6 +136,10 @@ def _is_mat4(path: str | Path, data: bytes) -> bool:
 _KNOWN = {
     b"\x1f\x8b": "is compressed by gzip; unpack it first",
     b"\xd0\xcf\x11\xe0": "is an old Excel file (XLS); save it as XLSX or CSV",
+    b"\x02P": (
+        "is a C3D file of motion capture; export a rigid body (6D) or markers from it as text "
+        "(TSV, TRC, CSV)"
+    ),
     b"%PDF": "is a PDF document",
     b"SQLite format 3": "is an SQLite database (perhaps a ROS 2 bag); convert it to MCAP or CSV",
 }

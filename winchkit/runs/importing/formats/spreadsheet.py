@@ -9,7 +9,7 @@ from dataclasses import replace
 from datetime import date, datetime, time, timedelta
 
 from winchkit.errors import Fault, RunError, UsageError
-from winchkit.runs.importing.formats.dialect import Dialect
+from winchkit.runs.importing.formats.dialect import Dialect, has_cell_units
 from winchkit.runs.importing.formats.header import Row
 from winchkit.runs.importing.formats.text import table_of_rows
 from winchkit.runs.importing.table import Table, named_apart, refuse_size
@@ -62,7 +62,8 @@ def read_workbook(path: str, data: bytes) -> Table:
         if not width:
             continue
         try:
-            dialect = Dialect("\t", ".", _width(rows))
+            spelled = has_cell_units([cells for _, cells in rows], ".")
+            dialect = Dialect("\t", ".", _width(rows), spelled)
             tables[title] = table_of_rows(path, _cut(rows, dialect.width), dialect, is_ended=True)
         except RunError:
             continue

@@ -11,6 +11,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.formats.cell_units import has_unit
 from winchkit.runs.importing.formats.cells import is_missing, number, numbers
 from winchkit.runs.importing.formats.dialect import (
     BLANKS,
@@ -234,6 +235,8 @@ def _is_numeric(cells: Sequence[str], dialect: Dialect) -> bool:
         return False
     given = [cell for cell in cells if cell]
     values = [c for c in given if number(c, dialect.decimal) is not None or is_stamp(c)]
+    if dialect.has_units:
+        values += [c for c in given if c not in values and has_unit(c, dialect.decimal)]
     certain = [c for c in values if not is_missing(c)]
     return bool(certain) and 2 * len(values) > len(given)
 
