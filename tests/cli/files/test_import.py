@@ -124,7 +124,7 @@ def test_a_lost_sign_is_not_accepted_by_yes(tmp_path: Path) -> None:
     assert taken.exit_code == 0, taken.output
 
 
-def test_a_file_without_a_motor_angle_is_told_so_when_it_is_looked_at(tmp_path: Path) -> None:
+def test_a_file_without_a_motor_angle_is_reported_when_it_is_looked_at(tmp_path: Path) -> None:
     rows = (f"{k / 100},{50 + k % 7}" for k in range(100))
     path = tmp_path / "cell.csv"
     path.write_text("time [s],force [N]\n" + "\n".join(rows) + "\n")

@@ -229,7 +229,7 @@ def _doubt_of_radians(values: Array, *, is_array: bool, is_one_of_several: bool)
 
     The names of robotics (``q1``, ``theta``) and the formats of arrays stand for rad. Degrees of a
     joint and radians of a motor that turns have the same range, beyond 2π and within 720; no
-    column but a velocity with a unit tells them apart.
+    column but a velocity with a unit distinguishes them.
     """
     known = values[np.isfinite(values)]
     largest = float(np.max(np.abs(known), initial=0.0))
