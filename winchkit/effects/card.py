@@ -33,10 +33,15 @@ _PLACES = {"all": "all lines equally", "one": "one line", "platform": "the platf
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"
 _WIDTH = 36
+"""Bars: half a terminal's line beside names and sizes."""
 _SAMPLES = 400
+"""Of a plotted signature: one a pixel of its figure."""
 _COLUMNS = 80
+"""Characters of a terminal's line."""
 _MARGIN = 15
+"""Characters: the longest title (``Confused with``) and two blanks."""
 _FLAT = 1e-9
+"""Relative to the largest value: a smaller span is rounding."""
 
 
 @dataclass(frozen=True)

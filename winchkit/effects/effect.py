@@ -271,6 +271,8 @@ def told_apart(first: Effect, second: Effect) -> str:
 
 
 _MOST = 1000.0
+"""Highest order of a file, far above those tested (40): at 1 kHz it is aliased from half a turn a
+second on."""
 MOTOR_ORDERS = (*map(float, range(1, 13)), 18.0, 24.0, 36.0)
 """Orders per motor turn at which effects of poles, slots and teeth are tested."""
 

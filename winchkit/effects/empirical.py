@@ -23,6 +23,7 @@ KNOTS = 9
 _VALUE = "value_"
 _ORDERS = tuple(float(order) for order in range(1, 41))
 _BOUND = 1e6
+"""SI: a bound that no curve reaches (1000 km, 1 MN), for optimisers that need one."""
 _AT: Mapping[Output, tuple[Stage, str, float]] = {
     "cable_length": (Stage.LENGTH_INSTRUMENT, "m", 1e-4),
     "tension": (Stage.CELL, "N", 0.5),

@@ -23,6 +23,7 @@ __all__ = [
 HOME = "home_length_"
 """Prefix of the home lengths that a cable's law has on a robot, one per line."""
 _HOME_TYPICAL = 1e-3
+"""m: a home pose is set to about a millimetre by hand."""
 
 
 @dataclass(frozen=True)

@@ -41,11 +41,17 @@ STANDARD_PROFILE = WinchProfile(
     pulley=(PulleySpec(0.04, pi / 2), PulleySpec(0.04, pi)),
 )
 _STEP = 0.02
+"""s: 50 Hz, the usual rate of a cell's log; several samples in the shortest phase of the motion."""
 _STROKE = 3.0
+"""m: eight turns of the standard drum (0.38 m each), so that layers and turns show."""
 _HOLD = 4.0
+"""s at rest after a stroke: long enough for creep of seconds to show."""
 _SPEEDS = 0.5, 0.12
+"""m/s: a fast and a slow stroke, a factor of four apart, to tell viscous from Coulomb friction."""
 _MASSES = 15.0, 45.0
+"""kg: a third and the whole load, to tell what is proportional to the load from what is not."""
 _WARM_FROM, _WARM_TO = 18.0, 26.0
+"""Degrees Celsius: a morning in an unheated hall."""
 
 
 @cache

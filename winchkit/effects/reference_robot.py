@@ -25,8 +25,12 @@ from winchkit.schema.profiles.winch import (
 __all__ = ["STANDARD_ROBOT", "robot_changes", "standard_poses"]
 
 _POSES = 120
+"""On the closed path: 40 on each period of its fastest coordinate."""
 _MIDDLE = 40.0
+"""N: middle of the force distribution, ten times the share of a cable in the weight (3 kg by eight
+cables), so that none is slack on the path."""
 _DURATION = 60.0
+"""s per path: about 0.1 m/s in a cube of one metre."""
 _WINCH = WinchProfile(
     name="standard",
     drum=DrumSpec(kind="spiral", winding_radius=0.06),

@@ -20,6 +20,7 @@ from winchkit.schema.profiles.robot import RobotProfile
 __all__ = ["Term", "act", "modifiers_of", "robot_with_terms"]
 
 _ORDERS_IN_LABEL = 6
+"""Numbers that a label lists; with the rest counted it fits a line of a report."""
 
 
 def act(effect: Effect, values: Values, value: Any, at: At) -> Any:

@@ -33,6 +33,8 @@ __all__ = [
 ]
 
 _SINGULAR = 1e-10
+"""Share of the largest singular value of scaled columns below which a combination is not
+identified: a condition of 1e10 leaves six of the sixteen digits (rule of thumb)."""
 
 
 def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> Array:
@@ -97,6 +99,7 @@ def correlation_time(residuals: Array, lengths: Sequence[int]) -> float:
 
 
 _LEAST_SAMPLES = 20
+"""Rule of thumb: three parameters a group; fewer samples than 20 determine no memory."""
 _BOUNDS = ((1e-5, 0.5), (1.0, 1e8), (0.05, 4.0))
 """Bounds of μ, σ (N/m) and β."""
 _BEGINNINGS = 3

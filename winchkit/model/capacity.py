@@ -34,6 +34,7 @@ Fibre cables of low friction need more: Samson requires eight for AmSteel-Blue (
 """
 _TURN = 2 * pi
 _ROUNDING = 1e-9
+"""Relative; a whole number of layers or turns stays whole in the division of rounded decimals."""
 
 
 @dataclass(frozen=True)

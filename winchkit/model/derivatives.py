@@ -35,6 +35,8 @@ _CALMER = 0.5
 _EVEN = 1e-3
 """Deviation of a step from the median step up to which samples count as even."""
 _LEAST_SAMPLES = 8
+"""Rule of thumb: the spline has six coefficients more than intervals, and its two variances are
+estimated from what remains; with fewer samples differences are taken."""
 
 
 def smooth_sign(rate: Array, creep: float, fastest: float) -> Array:

@@ -30,6 +30,8 @@ __all__ = ["Bearings", "Eyelets", "Presliding", "eq27_tension", "over_pulleys", 
 Step = Callable[[float, float, float, float, float], float]
 PulleyStep = Callable[..., Any]
 _NEWTON_STEPS = 8
+"""Three reach rounding for loss factors that add up to 0.6, six for 0.9 (measured over stiffnesses
+of 10 to 1e5 N/m and strokes to 0.5 m); two more are a margin."""
 
 
 @dataclass(frozen=True)

@@ -29,11 +29,14 @@ from winchkit.arrays import Array
 __all__ = ["Design", "SmoothingSpline"]
 
 _DEGREE = 5
+"""The function of least squared third derivative through given values is a spline of degree five.
+"""
 _PENALTY = np.array([-1.0, 3.0, -3.0, 1.0])
 """Third difference of the coefficients: the jerk of the motion."""
 _LOG_WEIGHTS = np.linspace(-18.0, 24.0, 8)
 """Natural logarithms of the weights from which the search begins; 1.5·10⁻⁸ to 2.6·10¹⁰."""
 _MOST_KNOTS = 200_000
+"""Bounds time and memory, both linear in it: each band of six rows is 10 MB."""
 _LONG_GAP, _SPAN = 300, 200
 """Knots without a sample above which every 200th coefficient between is held at a straight line.
 

@@ -12,18 +12,22 @@ from winchkit.model.stages import At
 
 __all__ = ["ANGLES", "COMPOUND", "VARIABLES", "VARIABLE_UNITS"]
 
-_CREEP = 1e-4
+_CREEP_SPEED = 1e-4
+"""m/s: a slower cable has no direction; above the noise of a differentiated encoder, far below the
+slowest motion (1 mm/s)."""
+_CREEP_LENGTH = 1e-4
+"""m: half the play that suppresses reversals by encoder noise at standstill."""
 
 
 def _direction(at: At) -> Array:
-    return np.sign(np.where(np.abs(at.speed) > _CREEP, at.speed, 0.0))
+    return np.sign(np.where(np.abs(at.speed) > _CREEP_SPEED, at.speed, 0.0))
 
 
 def _reversal_distance(at: At) -> Array:
     """Logarithm (base 10) of the distance run since the last change of direction, m."""
     length = at.free_length
     # A backlash of twice the creep length suppresses reversals by encoder noise at standstill.
-    moved = np.diff(play(length, 2 * _CREEP), prepend=length[:1])
+    moved = np.diff(play(length, 2 * _CREEP_LENGTH), prepend=length[:1])
     index = np.arange(len(moved))
     sign = np.sign(moved)
     held = sign[np.maximum.accumulate(np.where(sign != 0, index, 0))]

@@ -13,16 +13,17 @@ from typing import Any
 
 from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError, UsageError
+from winchkit.model.line import GRAVITY
 from winchkit.regular_file import regular
 from winchkit.runs.files import write_whole
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
 from winchkit.units import convert, format_quantity, suggest
 
-__all__ = ["GRAVITY", "calibration_toml", "read_points", "tares_toml", "write_text"]
+__all__ = ["calibration_toml", "read_points", "tares_toml", "write_text"]
 
-GRAVITY = 9.80665
-"""m/s²; a mass stands for the force of a hanging weight."""
 _DIGITS = 9
+"""Significant digits: 1 mN in 1 MN is below the resolution of every indicator, so that reading back
+changes nothing."""
 _COLUMNS = ("load", "indicated", "std", "going", "series")
 
 

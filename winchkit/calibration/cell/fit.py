@@ -25,6 +25,8 @@ from winchkit.schema.calibration import CalibrationPoint
 __all__ = ["CellFit", "Figure", "fit_cell"]
 
 _FEWEST_LOADS = 5
+"""Three coefficients leave two degrees of freedom per direction; ISO 376 asks for at least eight.
+"""
 _FOLLOWS = 5.0
 """Least slope in its standard deviations."""
 _FAR = 3.0

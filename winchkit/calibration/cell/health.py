@@ -20,6 +20,7 @@ __all__ = ["Creep", "Health", "Hum", "Samples", "examine", "samples_of"]
 
 _MAINS = (50.0, 60.0)
 _FEWEST = 20
+"""A standard deviation from 20 readings is known to 16 % (1/√(2·19))."""
 _SIGNIFICANT = 4.0
 """In standard errors."""
 _SETTLED = 0.5
@@ -29,8 +30,12 @@ _LONG_ENOUGH = 5.0
 _STEP = 20.0
 """Change of load in standard deviations of the noise."""
 _THIRTY_MINUTES = 1800.0
+"""s; OIML R 60 and data sheets state creep 30 min after a change of load."""
 _ONE_MINUTE = 60.0
+"""s, from which creep counts: before it the time of the change itself is uncertain (rule of thumb;
+from 10 min on, a third of the creep would be stated)."""
 _FADED = 0.05
+"""Autocorrelation at which its sum ends: the noise of an estimate from 400 readings (1/√400)."""
 _ALIASED = 0.02
 """Distance of a tone from zero and from half the rate, as a share of the rate, to be separable."""
 

@@ -39,6 +39,9 @@ _HYSTERESIS = 3
 _UNIT_TENSION = 500.0
 """As in the effect ``cell-nonlinearity``: q (T/500 N)²."""
 _ROUNDING = 1e-9
+"""Relative: residuals below it are rounding of readings with nine digits
+(:mod:`~winchkit.calibration.cell.files`), and a column that differs less from the others is none of
+its own."""
 
 
 @dataclass(frozen=True)

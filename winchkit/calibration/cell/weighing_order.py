@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from math import nan
 
-from winchkit.calibration.cell.files import GRAVITY
 from winchkit.errors import UsageError
+from winchkit.model.line import GRAVITY
 from winchkit.schema.calibration import CalibrationPoint
 from winchkit.units import UNITS, convert
 

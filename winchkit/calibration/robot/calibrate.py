@@ -59,6 +59,8 @@ from winchkit.tabular import Columns, Tabular
 __all__ = ["Calibrated", "Options", "calibrate", "equations_of", "split"]
 
 _HELD_OUT_EVERY = 10
+"""Every tenth pose: the fit loses 5 % of its accuracy, and 100 poses leave ten for the held-out
+error."""
 _NAMES = {"closure": "lengths by the drums", "position": "positions"}
 _LARGEST_ERROR = 0.05
 """Held-out position error as a share of the largest distance of two exit points, above which a

@@ -41,7 +41,9 @@ thumb: five standard deviations)."""
 _LEAST_COMPLEMENT = 0.1
 """Least singular value of a direction that others do not span (rule of thumb)."""
 _NAMED = 4
+"""Parameters in a line, the largest shares first; four fit a terminal's line."""
 _LISTED = 6
+"""Combinations in the report; the rest are counted."""
 
 
 @dataclass(frozen=True)
@@ -216,7 +218,11 @@ def _scaled(equations: Equations, shift: dict[str, Array]) -> Array:
 
 
 _FEW, _MOST = 3, 20_000
+"""Rows: three poses determine a frame; more than 20 000 are the log of a motion and no poses at
+rest (rule of thumb)."""
 _REACH = 2.0
+"""In the largest distance of two exit points: a platform is between them, so that poses measured at
+twice that distance are in another unit or frame."""
 
 
 def refuse_unfit(equations: Equations) -> None:

@@ -23,7 +23,10 @@ _LIMIT = 10.0
 _NORMAL = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
 _MOST_SHARE = 0.1
+"""Readings beyond the limit that are more than a tenth are a wrong standard deviation or law, no
+gross errors (rule of thumb)."""
 _LISTED = 5
+"""Poses in the warning; the rest are counted."""
 _SHARE = 0.5
 """Share of an instrument's variance that the fit has to explain: half."""
 _CAUSES = {

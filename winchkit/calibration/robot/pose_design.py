@@ -26,9 +26,15 @@ from winchkit.runs.poses import Measured
 __all__ = ["NextPose", "next_poses"]
 
 _CANDIDATES = 400
+"""Rule of thumb: of 400 random poses the best is within the best 1 % with a probability of 98 %."""
 _WIDER = 1.25
+"""Outer poses are the most informative; a quarter beyond those measured may still be free of
+collisions, which are not checked (rule of thumb)."""
 _LEAST_BOX, _LEAST_TILT = 0.02, np.radians(5.0)
+"""m and rad, half sizes of the box where one pose was measured: poses that differ by less than the
+noise and the play of a platform say nothing new (rule of thumb)."""
 _SEED = 20
+"""Any: equal data give equal proposals."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ from winchkit.model.robot.rotation import rotation_vector
 __all__ = ["PoseErrors", "cable_errors", "errors_at", "predicted_poses", "rms", "start_of"]
 
 _ROUNDS = 4
+"""Each multiplies the error of the lengths by the strain, at most some per cent: four reach 1e-6 of
+the elongation."""
 
 
 @dataclass(frozen=True)

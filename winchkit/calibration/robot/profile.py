@@ -30,7 +30,10 @@ __all__ = ["Provenance", "write_calibrated"]
 
 _SHOWN = {"m": "mm"}
 _DIGITS = 9
+"""Significant digits: 1 nm in 1 m, below every uncertainty of a geometry."""
 _STD_DIGITS = 3
+"""Significant digits of an uncertainty: GUM 7.2.6 asks for two at most, and one more against
+rounding."""
 
 
 @dataclass(frozen=True)

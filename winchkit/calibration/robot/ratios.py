@@ -44,6 +44,8 @@ _LEAST_SHARE = 5e-3
 _DELTA_CHI_SQUARE = 9.0
 """Difference of χ² below which two sets count as equal (probability at most 1/740)."""
 _STEP = 1e-6
+"""Relative, of a forward difference: truncation (1e-6, since the wound length is nearly linear in
+the ratio) and rounding (2e-16/1e-6) are below what a derivative of a fit needs."""
 _MOST_LINES = 8
 """Most lines of a robot of which all subsets are compared."""
 

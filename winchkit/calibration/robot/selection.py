@@ -59,6 +59,8 @@ from winchkit.model.robot.identification.tracker import Tracker
 __all__ = ["Fitted", "fitted_with_instruments"]
 
 _NOISE_ROUNDS = 8
+"""Rule of thumb: the components converge linearly; where two of them exchange variance they do not
+settle in any number of rounds."""
 _SETTLED_CHANGE = 0.03
 """Relative change of a standard deviation at which variance components have settled."""
 _LEAST_FALL = 0.7

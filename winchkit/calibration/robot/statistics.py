@@ -19,6 +19,7 @@ from winchkit.model.robot.identification.bundle_adjustment import Solution, Weig
 __all__ = ["calibration_statistics"]
 
 _95 = 1.959964
+"""Standard deviations: 97.5 % quantile of the normal distribution, for 95 % two-sided."""
 
 
 def calibration_statistics(

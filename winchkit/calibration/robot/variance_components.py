@@ -39,6 +39,8 @@ NOISE: dict[str, KindNoise] = {
 """Kinds of equations; ``closure`` is the length by the drum against the length by geometry."""
 
 _LEAST_REDUNDANCY = 12.0
+"""Degrees of freedom: a standard deviation from twelve is known to 20 % (1/√(2·12)); with fewer the
+declared one is better."""
 
 
 def re_estimated_weights(

@@ -11,9 +11,16 @@ from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
 
 _SOFTEST = 0.1
+"""Least slope in that of the linear law: beyond it a polynomial turns over outside the loads of its
+fit, and a cable ten times softer has failed."""
 _TABLE = 513
+"""Samples of the inverse: linear interpolation is exact to (1/512)² = 4e-6 of the largest strain,
+so that the first Newton step is below `_LAST_STEP`."""
 _NEWTON_STEPS = 4
+"""From the table one reaches `_LAST_STEP`; three more for a start beside the kink at the softest
+slope."""
 _LAST_STEP = 1e-5
+"""Share of the largest strain: the next step would be of its square, 1e-10."""
 
 
 def apply(length: Array, at: At, values: Values) -> Array:

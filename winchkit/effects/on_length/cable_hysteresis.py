@@ -9,6 +9,9 @@ from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
 
 _STUCK = 0.5
+"""Share of a change of the elastic strain that is withheld right after a reversal, when all strands
+stick (rule of thumb: twice the stiffness; at 0.05 the loop would need 10 times its tension range to
+close)."""
 
 
 def apply(length: Array, at: At, values: Values) -> Array:

@@ -5,6 +5,7 @@ from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.stages import At, Stage
 
 _AT_DECLARED_LENGTH = 20.0
+"""Degrees Celsius: reference temperature of lengths (ISO 1)."""
 
 
 def apply(length: Array, at: At, values: Values) -> Array:

@@ -9,6 +9,8 @@ from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
 
 _UNIT_TENSION = 500.0
+"""N: middle of a bench's tensions, so that the fraction is the strain at it; another would scale
+the parameter and its declared sizes."""
 
 
 def apply(length: Array, at: At, values: Values) -> Array:

@@ -6,6 +6,8 @@ from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Path, Stage
 
 _DURATION = 0.4
+"""s: several samples at 50 Hz, so that a fit's derivative by the time of the slip exists; short
+against a stroke."""
 
 
 def apply(path: Path, at: At, values: Values) -> Path:

@@ -9,6 +9,8 @@ from winchkit.model.friction import dahl
 from winchkit.model.stages import At, Stage
 
 _REACH = 0.1
+"""Share of the tension over which the loop builds up after a reversal (rule of thumb: it is closed
+well within the ranges of 20 % and more that a cell is loaded over; tenfold it would not close)."""
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

@@ -5,6 +5,8 @@ from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
 
 _UNIT_TENSION = 500.0
+"""N: middle of a bench's tensions, so that the parameter is the error there; another would scale
+the parameter and its declared sizes."""
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

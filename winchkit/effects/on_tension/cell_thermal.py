@@ -5,6 +5,8 @@ from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At, Stage
 
 _AT_CALIBRATION = 20.0
+"""Degrees Celsius: usual temperature of a calibration; another shifts the zero, which is fitted
+beside it."""
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

@@ -56,6 +56,8 @@ __all__ = [
 ]
 
 _FEWEST = 4
+"""A cubic spline with third derivatives continuous at the second and last but one pose (not-a-knot)
+has four coefficients at least."""
 
 
 @dataclass(frozen=True)

@@ -17,11 +17,10 @@ from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.line import GRAVITY
 from winchkit.model.robot.kernels import PLAIN, RobotKernels
+from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.model.robot.robot import Robot, cables_of
 
 __all__ = ["DynamicTarget", "DynamicsCycle"]
-
-_LEAST_LINES = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +88,7 @@ class DynamicsCycle:
         kernels: RobotKernels = PLAIN,
     ) -> None:
         count = len(robot.names)
-        if count < _LEAST_LINES:
+        if count < PLATFORM_DOF:
             raise UsageError(
                 f"{count} lines do not constrain the platform; its forces and motion come from "
                 "winchkit.model.robot.forward and winchkit.model.robot.integration"

@@ -15,7 +15,10 @@ from winchkit.errors import UsageError
 __all__ = ["ElongationLaw", "Exponential", "Linear", "Quartic"]
 
 _STEPS = 60
+"""Convergence is quadratic on the rising branch; a force still without a strain after 60 is not on
+it."""
 _TOLERANCE = 1e-13
+"""Absolute and relative, of a strain: above its rounding (2e-16), below 1 nm on 1 km of cable."""
 
 
 @dataclass(frozen=True)

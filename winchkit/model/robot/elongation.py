@@ -16,6 +16,8 @@ from winchkit.arrays import Array
 __all__ = ["strain_of"]
 
 _NEWTON_STEPS = 30
+"""At the least slope an error falls by a constant factor only, else quadratically: bound of the
+time, not of the accuracy."""
 _LEAST_SLOPE = 0.1
 """Least slope d(c T)/dε of the quartic law in Newton's method: beyond it the law turns over."""
 

@@ -28,8 +28,14 @@ __all__ = [
 ]
 
 _RANK = 1e-9
+"""Singular values below this share of the largest count as zero: far above rounding (1e-16), far
+below those of a robot that can be controlled (rule of thumb)."""
 _BALANCE = 1e-9
+"""Residual wrench as a share of the wrench and the forces: a million times their rounding, and less
+than 1 µN on 1 kN."""
 _WITHIN = 1e-9
+"""Share of the range between the limits by which a force may pass one by rounding: less than 1 µN
+on 1 kN."""
 
 
 @dataclass(frozen=True)

@@ -30,13 +30,29 @@ from winchkit.schema.profiles.robot import PlatformSpec
 __all__ = ["Found", "forward"]
 
 _TOLERANCE = 1e-10
+"""Last step, m and rad: above rounding (1e-15 on 1 m), a thousandth of the resolution of a laser
+tracker (0.1 µm)."""
 _RANK = 1e-7
+"""Singular values of the length derivatives below this share of the largest count as zero; its
+square is `_RIDGE`, so that both forms of the equations leave out the same motions."""
 _FLAT = 1e-9
+"""Curvatures of the energy below this share of the largest count as zero: above the rounding
+(1e-16) of the largest, and no step along them (rule of thumb)."""
 _LONGEST = (0.5, 0.2, 0.08, 0.03)
+"""Longest step, m and rad, in each of the first dozens of iterations: shorter ones end an
+oscillation between two poses (rule of thumb)."""
 _EARLY, _PATIENCE = 12, 9
+"""Iterations with one longest step, and between two tests of the taut cables (rule of thumb: Newton
+converges in fewer than nine where the set is right)."""
 _RIDGE = 1e-14
+"""Of a normal matrix with a unit diagonal: fifty times its rounding (2e-16), so that it can be
+solved where a motion keeps every length."""
 _LOOSE = 1e-11
+"""Eigenvalue of the same matrix from which on a motion changes lengths: 3e-6 of a singular value,
+above what the last step leaves of a singular pose (rule of thumb)."""
 _PUSH, _SHORT = 1e-9, 1e-9
+"""Force, as a share of the platform's weight, and excess length, m, up to which a cable is neither
+pushing nor too short: ten times the last step."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.model.robot.loops import LEAST_WRAP
 from winchkit.model.robot.rotation import angles_of, rotation_of
 
 if TYPE_CHECKING:
@@ -44,7 +45,8 @@ __all__ = [
 PLATFORM_DOF = 6
 """Degrees of freedom of a platform; fewer cables leave it hanging."""
 _CHUNK = 1024
-_BEHIND = -1e-6
+"""Poses: an array of eight cables is then 64 KB, and a dozen of them fit the second-level cache (1
+MB)."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,7 @@ def _tangent(geometry: Geometry, position: Array, rotation: Array) -> _Tangent:
     sine, cosine = over * free + along * r, along * free - over * r
     wrap = np.arctan2(sine, cosine)
     # Round the back of the pulley the sum of the two passes half a turn.
-    wrap += np.where(wrap < _BEHIND, 2 * np.pi, 0.0)
+    wrap += np.where(wrap < LEAST_WRAP, 2 * np.pi, 0.0)
     return _Tangent(arm, (hx, hy, hz), distance, free, wrap, cosine, sine)
 
 

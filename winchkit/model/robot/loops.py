@@ -11,12 +11,15 @@ from dataclasses import dataclass
 from math import atan2, floor, nan, pi, sqrt
 from typing import Any
 
-__all__ = ["CableLine", "cables_loop", "motors_loop", "wound_angle"]
+__all__ = ["LEAST_WRAP", "CableLine", "cables_loop", "motors_loop", "wound_angle"]
 
 Function = Callable[..., Any]
 _TURN = 2.0 * pi
-_BEHIND = -1e-6
+LEAST_WRAP = -1e-6
+"""rad: a wrap of zero may come out negative by rounding (1e-16; 1e-8 near an anchor at the tangent)
+and is no full turn."""
 _EDGE = 1e-12
+"""Turns: a whole number of turns stays whole in spite of the rounding (1e-16 of 100 turns)."""
 
 
 @dataclass(slots=True)
@@ -77,7 +80,7 @@ def cables_loop(steep: bool) -> Function:
             free = sqrt(inside) if inside >= 0.0 else nan
             sine, cosine = over * free + along * radius, along * free - over * radius
             wrap = atan2(sine, cosine)
-            if wrap < _BEHIND:
+            if wrap < LEAST_WRAP:
                 wrap += _TURN
             g = width * i
             rows[g] = radius * wrap + free

@@ -10,7 +10,11 @@ __all__ = ["cholesky", "find_loop", "forces_loop", "normal", "straighten", "turn
 
 Function = Callable[..., Any]
 _SINGULAR = 1e-13
+"""Of a pivot as a share of its diagonal element: five hundred times the rounding (2e-16), below
+which no digit of the pivot is known."""
 _LONGEST = 0.5
+"""m and rad: over a longer step the linear form of the lengths does not hold in a robot of some
+metres (rule of thumb)."""
 
 
 def normal(rows: Any, values: Any, width: int, system: Any) -> None:

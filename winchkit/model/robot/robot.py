@@ -33,6 +33,8 @@ __all__ = ["Robot", "cables_of", "robot_of", "standing"]
 
 _TURN = 2 * np.pi
 _NEWTON_STEPS = 5
+"""As for one line (four reach 1e-7 of the start's error), and one more since the cable force, too,
+may be far from the reference's."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Literal
 __all__ = ["Row", "down", "up"]
 
 _EXACT = 1e-6
+"""Relative: declared decimals of six digits agree."""
 
 
 def up(value: float, digits: int = 4) -> str:
