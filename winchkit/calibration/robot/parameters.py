@@ -95,7 +95,7 @@ EFFECTS = (*LAWS, "home-length", "gear-ratio", "payload-mass", "payload-centre")
 """Effects that are fitted where they are named; ``gear-ratio/LINE`` on one line."""
 
 _MASS_SHARE, _MASS_LEAST = 0.2, 0.1
-"""Standard deviation of the prior: a fifth of the mass, at least 0.1 kg for a tool or a cable carrier
+"""Standard deviation of the prior: a fifth of the mass, at least 0.1 kg for a tool or cable carrier
 that is in no drawing (rule of thumb)."""
 _CENTRE = 20e-3
 """Standard deviation of the prior, m: a centre of mass is known from a drawing to some centimetres
