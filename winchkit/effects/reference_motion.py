@@ -47,7 +47,7 @@ _STROKE = 3.0
 _HOLD = 4.0
 """s at rest after a stroke: long enough for creep of seconds to show."""
 _SPEEDS = 0.5, 0.12
-"""m/s: a fast and a slow stroke, a factor of four apart, to separate viscous and Coulomb friction."""
+"""m/s: a fast and a slow stroke, a factor of four apart, to separate viscous from Coulomb."""
 _MASSES = 15.0, 45.0
 """kg: a third and the whole load, to separate errors in proportion to the load."""
 _WARM_FROM, _WARM_TO = 18.0, 26.0
