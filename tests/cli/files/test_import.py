@@ -137,6 +137,11 @@ def test_a_file_without_a_motor_angle_is_reported_when_it_is_looked_at(tmp_path:
     assert any("motor_angle=COLUMN" in note for note in found["notes"])
     drive = log(tmp_path / "drive.csv", HEAD.replace("[%]", "[Nm]"))
     assert "without which" not in command(path, drive).stdout
+    rows = (f"{k / 100},{k % 9}.5,{k % 7}.5,{k % 5}" for k in range(100))
+    path.write_text("time [s],position [deg],position [rad],force [N]\n" + "\n".join(rows) + "\n")
+    asked = command(path).stdout
+    assert "which column is motor_angle?" in asked
+    assert "without which" not in asked
 
 
 def test_quiet_prints_no_table(tmp_path: Path) -> None:

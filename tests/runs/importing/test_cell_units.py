@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from winchkit.errors import RunError
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
@@ -141,3 +142,50 @@ def test_radians_of_a_joint_are_not_asked(tmp_path: Path) -> None:
     guess = guessed(tmp_path / "log.csv", "time [s],q1,tau1", *columns)
     assert not guess.questions
     assert next(item for item in guess.used if item.source == "q1").factor == 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("rpm", 2 * math.pi / 60), ("speed_rpm_left", 2 * math.pi / 60), ("rpm 2", 2 * math.pi / 60)],
+)
+def test_a_word_of_a_name_may_be_its_unit(name: str, factor: float, tmp_path: Path) -> None:
+    columns = (cells(TIME), cells(np.cos(TIME)), cells(np.sin(TIME)))
+    guess = guessed(tmp_path / "log.csv", f"time [s],{name},angle [rad]", *columns)
+    found = next(item for item in guess.used if item.source == name)
+    assert found.channel.endswith("motor_velocity")
+    assert found.factor == pytest.approx(factor)
+
+
+def test_a_word_that_is_also_a_unit_of_another_quantity_is_none(tmp_path: Path) -> None:
+    """``min`` and ``count`` are words of names."""
+    columns = (cells(TIME), cells(np.cos(TIME)), cells(np.sin(TIME)))
+    guess = guessed(tmp_path / "log.csv", "time [s],force min left,torque count x", *columns)
+    assert len(guess.questions) == 2
+
+
+def test_a_quoted_cell_may_have_line_ends(tmp_path: Path) -> None:
+    """Names with a line break, as of a spreadsheet, and numbers with one."""
+    path = tmp_path / "log.csv"
+    rows = (f'{t:.2f},"{math.sin(t):.6f}\n",{math.cos(t):.6f}' for t in TIME)
+    head = 'time [s],"Motor angle\n[rad]","Force\n[N]"'
+    path.write_text("\n".join([head, *rows]) + "\n")
+    table = read_table(path)
+    assert [column.name for column in table.columns] == ["time", "Motor angle", "Force"]
+    assert table.columns[1].values == pytest.approx(np.sin(TIME), abs=1e-6)
+    assert table.line_of(1) == 6
+
+
+def test_inches_are_no_quoted_cells(tmp_path: Path) -> None:
+    rows = (f'{t:.2f},{math.sin(t):.6f},5"' for t in TIME)
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time [s],angle [rad],diameter", *rows]) + "\n")
+    table = read_table(path)
+    assert len(table.columns[1]) == COUNT
+    assert table.columns[1].values == pytest.approx(np.sin(TIME), abs=1e-6)
+
+
+def test_a_bag_of_ros_1_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "log.bag"
+    path.write_bytes(b"#ROSBAG V2.0\n" + bytes(500))
+    with pytest.raises(RunError, match="rostopic echo"):
+        read_table(path)

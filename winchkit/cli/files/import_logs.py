@@ -284,7 +284,7 @@ def _guesses(
     if not unknown:
         # A column of one file is no question about the others.
         guesses = [_without_foreign(guess) for guess in guesses] if len(guesses) > 1 else guesses
-    if declared is None and not _have(guesses, {"motor_angle", "motor_velocity"}):
+    if declared is None and _lack_angle(guesses):
         guesses = [replace(guess, notes=(*guess.notes, _NO_ANGLE)) for guess in guesses]
     return guesses, declared
 
@@ -305,6 +305,16 @@ def _is_accepted(guesses: Sequence[Guess], yes: bool, as_json: bool) -> bool:
 def _are_integrated(guesses: Sequence[Guess]) -> bool:
     """Whether the motor angle is the integral of a velocity: no file has an angle."""
     return _have(guesses, {"motor_velocity"}) and not _have(guesses, {"motor_angle"})
+
+
+def _lack_angle(guesses: Sequence[Guess]) -> bool:
+    """Whether channels of a run were found in the files, and none that may be the motor angle."""
+    needed = ("motor_angle", "motor_velocity")
+    asked = " ".join(o for guess in guesses for q in guess.questions for o in q.options)
+    is_found = any(item.channel not in {"", "time"} for guess in guesses for item in guess.used)
+    is_body = "--body" in asked
+    is_asked = any(f"{name}=" in asked for name in needed)
+    return (is_found or is_body) and not is_asked and not _have(guesses, set(needed))
 
 
 def _have(guesses: Sequence[Guess], channels: set[str]) -> bool:

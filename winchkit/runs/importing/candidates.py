@@ -25,6 +25,7 @@ from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
     COUNTS,
     SpelledUnit,
+    named_unit,
     read_unit,
 )
 from winchkit.runs.importing.winches import FEWEST, choose_channels
@@ -143,6 +144,7 @@ def _by_name(column: Column, meaning: Meaning, unit: SpelledUnit | None) -> Cand
         return Candidate(column, "", reason=f"'{meaning.text}': {_NOT_USED}")
     if base == CURRENT:
         base, unit = "motor_torque", unit or _current_unit(column)
+    unit = unit or named_unit(column.name, permitted(base)) if not column.unit else unit
     channel = base if meaning.channel == CURRENT else meaning.channel
     dimension = column_dimension(base)
     fits = unit is None or unit.dimension in permitted(base) or dimension == "ratio"

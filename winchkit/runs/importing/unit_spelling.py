@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -21,6 +22,7 @@ __all__ = [
     "SHARE",
     "SpelledUnit",
     "is_unit_row",
+    "named_unit",
     "read_unit",
     "split_unit",
 ]
@@ -285,6 +287,10 @@ _SHORT_WORDS = {
 }
 
 
+_PLAIN_WORDS = {"count", "counts", "steps", "rotation", "rotations", "cycles", "pulses", "tour"}
+"""Words of names that are also units."""
+
+
 def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
     """Whether a word at the end of a name is a unit, and not a part of the name.
 
@@ -296,10 +302,33 @@ def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
     word = unit.strip()
     if _key(word).casefold() in _SHORT_WORDS:
         return False
-    plain = {"count", "counts", "steps", "rotation", "rotations", "cycles", "pulses", "tour"}
-    if word.casefold() in plain:
+    if word.casefold() in _PLAIN_WORDS:
         return known.dimension == COUNTS
     return word not in {"m", "s", "N", "V", "min"} or mark == "_"
+
+
+def named_unit(name: str, dimensions: Collection[str]) -> SpelledUnit | None:
+    """The unit that one word of a name is: ``rpm``, ``speed_rpm_left``, ``Nm 2``.
+
+    Parameters
+    ----------
+    name : str
+        Name of a column without a unit at its end or in brackets.
+    dimensions : collection of str
+        Of the channel for which the name stands.
+
+    Returns
+    -------
+    SpelledUnit, optional
+        None without such a word, and for several.
+    """
+    found = set()
+    for word in re.split(r"[^A-Za-z°]+", name[:_LONGEST]):
+        unit = read_unit(word)
+        is_word = len(word) < 2 or word.casefold() in {*_SHORT_WORDS, *_PLAIN_WORDS}
+        if unit is not None and not is_word and unit.dimension in dimensions:
+            found.add(unit)
+    return found.pop() if len(found) == 1 else None
 
 
 def is_unit_row(cells: list[str]) -> bool:

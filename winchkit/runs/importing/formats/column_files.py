@@ -15,6 +15,11 @@ from winchkit.runs.importing.unit_spelling import split_unit
 
 __all__ = ["read_numpy", "read_parquet"]
 
+_OBJECTS = (
+    "has Python objects, which may hold code; load it in Python where you trust it, and write its "
+    "arrays by numpy.savez"
+)
+
 
 def read_numpy(path: str, data: bytes) -> Table:
     """Read NPY or NPZ; raises RunError, also for arrays of Python objects, which may hold code.
@@ -40,7 +45,7 @@ def read_numpy(path: str, data: bytes) -> Table:
     except RunError:
         raise
     except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError, MemoryError) as error:
-        reason = "has Python objects, which may hold code" if "pickle" in str(error) else error
+        reason = _OBJECTS if "pickle" in str(error) else error
         raise RunError(Fault(f"is not a readable NumPy file: {reason}", path)) from None
     if arrays is None:
         names = loaded.dtype.names

@@ -13,12 +13,24 @@ from winchkit.runs.importing.formats.cell_units import has_unit
 from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.formats.stamps import is_stamp
 
-__all__ = ["BLANKS", "Dialect", "decode", "find_dialect", "has_cell_units", "split_line"]
+__all__ = [
+    "BLANKS",
+    "Dialect",
+    "decode",
+    "find_dialect",
+    "has_cell_units",
+    "split_line",
+    "whole_lines",
+]
 
 BLANKS = " "
 _DELIMITERS = ("\t", ";", "|", ",", BLANKS)
 _CALLED = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", BLANKS: "blanks"}
 _SAMPLED = 240
+_CELL_LINES = 8
+"""Line ends that a quoted cell may have."""
+_OPENED = re.compile(r'(?:^|[,;\t|])\s*"[^"]*$')
+_CLOSED = re.compile(r'[^"]*"\s*(?:$|[,;\t|])')
 _TEXT_LINES = re.compile(r"\r\n|\n|\r")
 
 
@@ -79,6 +91,39 @@ def _encodings(data: bytes) -> list[tuple[str, str]]:
     if len(sample) > 8 and sample[::2].count(0) > 0.8 * len(sample[::2]):
         return [("utf-16-be", "UTF-16")]
     return [("utf-8-sig", ""), ("cp1252", "Windows-1252"), ("latin-1", "Latin-1")]
+
+
+def whole_lines(lines: list[str]) -> tuple[list[str], list[int] | None]:
+    """Lines joined where a quoted cell has a line end, as spreadsheets write it.
+
+    Parameters
+    ----------
+    lines : list of str
+        Lines of the file.
+
+    Returns
+    -------
+    lines : list of str
+        A line end within a cell is a blank.
+    numbers : list of int or None
+        Line of the file of each; None where no line was joined.
+    """
+    odd = [n for n, line in enumerate(lines) if line.count('"') % 2]
+    # A quotation mark within a cell is one of inches.
+    pairs = [
+        (start, end)
+        for start, end in zip(odd[::2], odd[1::2], strict=False)
+        if end - start <= _CELL_LINES and _OPENED.search(lines[start]) and _CLOSED.match(lines[end])
+    ]
+    if 2 * len(pairs) < len(odd):
+        return lines, None
+    ends, joined, numbers, start = dict(pairs), list[str](), list[int](), 0
+    while start < len(lines):
+        end = ends.get(start, start)
+        joined.append(" ".join(lines[start : end + 1]))
+        numbers.append(start + 1)
+        start = end + 1
+    return (joined, numbers) if pairs else (lines, None)
 
 
 def split_line(line: str, delimiter: str) -> list[str]:

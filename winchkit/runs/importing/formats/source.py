@@ -140,6 +140,10 @@ _KNOWN = {
         "is a C3D file of motion capture; export a rigid body (6D) or markers from it as text "
         "(TSV, TRC, CSV)"
     ),
+    b"#ROSBAG": (
+        "is a bag of ROS 1; export the topic with the joints as text, by rostopic echo -b FILE -p "
+        "TOPIC > log.csv, and import that"
+    ),
     b"%PDF": "is a PDF document",
     b"SQLite format 3": "is an SQLite database (perhaps a ROS 2 bag); convert it to MCAP or CSV",
 }

@@ -19,6 +19,7 @@ from winchkit.runs.importing.formats.dialect import (
     decode,
     find_dialect,
     split_line,
+    whole_lines,
 )
 from winchkit.runs.importing.formats.header import KEYS, Header, Row, keyed_width, read_header
 from winchkit.runs.importing.formats.stamps import is_stamp
@@ -58,12 +59,13 @@ def read_text_table(path: str, data: bytes) -> Table:
         For a binary file, and for one without rows of numbers.
     """
     lines, encoding = decode(data, path)
+    lines, numbers = whole_lines(lines)
     dialect = find_dialect(lines[_end_of_header(lines) :])
     if dialect is None:
         shown = next((line for line in lines if line.strip()), "")[:60]
         message = f"has no rows of numbers; its first line is {shown!r}"
         raise RunError(Fault(message, path))
-    rows = _SplitLines(lines, dialect.delimiter)
+    rows = _SplitLines(lines, dialect.delimiter, numbers)
     is_ended = data[-1:] in b"\r\n" or data[-2:] in (b"\n\0", b"\0\n")
     table = table_of_rows(path, rows, dialect, is_ended=is_ended)
     layout = f"text in {encoding}, {dialect.text}" if encoding else f"text, {dialect.text}"
@@ -88,8 +90,10 @@ def _end_of_header(lines: Sequence[str]) -> int:
 class _SplitLines(Sequence[Row]):
     """Lines with their number, split when they are read: the cells of a long file are not kept."""
 
-    def __init__(self, lines: Sequence[str], delimiter: str) -> None:
-        self._lines, self._delimiter = lines, delimiter
+    def __init__(
+        self, lines: Sequence[str], delimiter: str, numbers: Sequence[int] | None = None
+    ) -> None:
+        self._lines, self._delimiter, self._numbers = lines, delimiter, numbers
 
     def __len__(self) -> int:
         return len(self._lines)
@@ -104,7 +108,8 @@ class _SplitLines(Sequence[Row]):
         if isinstance(index, slice):
             return [self[n] for n in range(*index.indices(len(self)))]
         number = index if index >= 0 else len(self) + index
-        return number + 1, split_line(self._lines[number], self._delimiter)
+        line = number + 1 if self._numbers is None else self._numbers[number]
+        return line, split_line(self._lines[number], self._delimiter)
 
 
 @dataclass
