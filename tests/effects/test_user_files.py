@@ -84,7 +84,18 @@ def test_an_entry_point_brings_effects(
         return [Point("mine", "mine_package:MINE", group)]
 
     monkeypatch.setattr(module, "entry_points", entry_points)
+    monkeypatch.setattr(module, "_installed", module._installed.__wrapped__)
     assert load_catalogue()["my-own"] is effect
+
+
+def test_entry_points_are_searched_once_in_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    first = load_catalogue()
+
+    def entry_points(*, group: str) -> list[EntryPoint]:
+        raise AssertionError(group)
+
+    monkeypatch.setattr(module, "entry_points", entry_points)
+    assert list(load_catalogue()) == list(first)
 
 
 def test_an_unknown_effect_suggests_a_name() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
@@ -67,15 +68,13 @@ def load_catalogue(files: Sequence[str | Path] = ()) -> Catalogue:
     FileError
         For a file that cannot be loaded or has no effect, and for an effect that changes its input
         at the null or returns no finite value.
+
+    Notes
+    -----
+    Entry points are searched once in a process; files are read at every call.
     """
     require_types(files, (str, Path), "files")
-    found: list[Effect] = []
-    for room in _ROOMS:
-        package = import_module(f"winchkit.effects.{room}")
-        for module in iter_modules(package.__path__):
-            found.append(import_module(f"{package.__name__}.{module.name}").EFFECT)
-    for point in entry_points(group="winchkit.effects"):
-        found.extend(_effects_in(point.load(), point.name))
+    found = list(_installed())
     for path in dict.fromkeys(Path(file).absolute() for file in files):
         for effect in _from_file(path):
             if any(other.id == effect.id for other in found):
@@ -83,6 +82,19 @@ def load_catalogue(files: Sequence[str | Path] = ()) -> Catalogue:
                 raise FileError(Fault(message, str(path)))
             found.append(effect)
     return Catalogue(sorted(found, key=lambda effect: (len(effect.parameters), effect.id)))
+
+
+@cache
+def _installed() -> tuple[Effect, ...]:
+    """Effects of the package and of entry points; these are searched in every distribution."""
+    found: list[Effect] = []
+    for room in _ROOMS:
+        package = import_module(f"winchkit.effects.{room}")
+        for module in iter_modules(package.__path__):
+            found.append(import_module(f"{package.__name__}.{module.name}").EFFECT)
+    for point in entry_points(group="winchkit.effects"):
+        found.extend(_effects_in(point.load(), point.name))
+    return tuple(found)
 
 
 def _from_file(path: Path) -> list[Effect]:

@@ -91,10 +91,11 @@ def state(served: Path) -> tuple[float, str]:
     return float(found[1]), found[2]
 
 
-def until_moving(served: Path) -> None:
+def until_moving(served: Path, command: subprocess.Popen[str]) -> None:
     begin, _ = state(served)
     deadline = time.monotonic() + 90
     while abs(state(served)[0] - begin) < 0.01:
+        assert command.poll() is None, f"the command has ended: {command.communicate()}"
         assert time.monotonic() < deadline, "it did not move"
         time.sleep(0.02)
 
@@ -129,7 +130,7 @@ def jogging(
     """A jog in a process of its own, once the winch moves; it is ended at the end."""
     with start("jog", "-b", str(served), way, "0.02 m/s", "--for", "60s", *arguments) as jog:
         try:
-            until_moving(served)
+            until_moving(served, jog)
             yield jog
         finally:
             if jog.poll() is None:
@@ -206,7 +207,7 @@ def test_a_suspended_command_moves_nothing(served: Path, order: tuple[str, ...])
     """SIGSTOP of the client, and not of the process that owns the bench."""
     with start(*order, "-b", str(served)) as client:
         try:
-            until_moving(served)
+            until_moving(served, client)
             client.send_signal(signal.SIGSTOP)
             stopped = time.monotonic()
             until(lambda: state(served)[1] != "operation enabled", "it moves on", within=10)
@@ -268,13 +269,13 @@ def test_a_second_jog_is_refused_by_name_and_the_first_goes_on(served: Path) -> 
         moved = winchkit("move", "A", "-b", str(served), "--wind-in", "5mm")
         assert moved.returncode == 5
         assert jog.poll() is None, "nothing changes for the first"
-        until_moving(served)
+        until_moving(served, jog)
 
 
 def test_who_is_overtaken_ends_with_5_and_by_whose_hand(served: Path) -> None:
     length = f"{state(served)[0] + 0.4} m"
     with start("move", "A", "-b", str(served), "--to", length, "--speed", "20mm/s") as move:
-        until_moving(served)
+        until_moving(served, move)
         taker = start("jog", "-b", str(served), "--wind-in", "30mm", "--take-over")
         with taker:
             code, words = ended(move)
@@ -292,7 +293,7 @@ def test_a_killed_bench_process_is_missed_by_the_drive_and_reported_to_its_clien
         code, words = ended(jog)
     assert code == 4, words
     assert "the process that owned the bench has ended; its drives stop" in words
-    time.sleep(3.0)
+    until(lambda: state(served)[1] != "operation enabled", "it is still enabled", 3.0)
     assert_stands_still(served)
     assert winchkit("stop", "-b", str(served)).returncode == 0
     again = winchkit("jog", "-b", str(served), "--pay-out", "10mm", "--reset")
