@@ -15,6 +15,8 @@ __all__ = ["FrozenDetector"]
 _BLOCK = 40
 """Trials in a block. With a noise of one step a block alike throughout has a chance of 4e-16."""
 _BLOCKS = 10
+"""Noisy blocks, 400 trials, before constant counts are judged: an instrument that is quiet at times
+shows it in them (rule of thumb)."""
 _NOISE = 1.0
 """Steps of the counts; below it a value in the middle of a step may stand for ever.
 

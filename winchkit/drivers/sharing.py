@@ -8,7 +8,32 @@ from math import inf
 from statistics import median
 from typing import Protocol, TypeVar
 
-__all__ = ["LineShare", "Polled", "fair_rates", "next_of"]
+__all__ = [
+    "LATE",
+    "QUICK_RETRIES",
+    "RECONNECT",
+    "RETRY",
+    "STALE_TIMEOUTS",
+    "LineShare",
+    "Polled",
+    "fair_rates",
+    "next_of",
+]
+
+QUICK_RETRIES = 2
+"""Failures in a row after which an instrument is polled at once again; a further one makes it rare,
+so that others on the line keep their rates."""
+RETRY = 0.5
+"""s between attempts then: a cable that is plugged in again is noticed without a wait, and a
+time-out of 0.1 s takes at most a fifth of the line."""
+RECONNECT = 0.3
+"""s between attempts to open a port or a connection."""
+STALE_TIMEOUTS = 2
+"""One lost answer is no reason to stop a winch, two are."""
+LATE = 0.02
+"""s from request to answer, beyond its time on the wire, above which the time of the sample is
+uncertain by more than the cell's response (flag ``LATE``); rule of thumb, 1 mm of motion at 0.05
+m/s."""
 
 _USE = 0.95
 """Of a line: the rest is for commands, retries and the machine's own jitter."""

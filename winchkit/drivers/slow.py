@@ -15,6 +15,8 @@ __all__ = ["Identifying", "SlowDevices", "SlowLine"]
 
 T = TypeVar("T")
 _COMMAND_TIME = 5.0
+"""s: a tare or a write into an EEPROM takes up to some seconds, and waits for the reads before it.
+"""
 
 
 class SlowLine(Protocol):

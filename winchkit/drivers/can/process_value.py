@@ -15,6 +15,7 @@ from winchkit.drivers.can.canopen.pdo_parameters import cob_id, codecs, set_up
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import Quality, Sensor
+from winchkit.drivers.sharing import RETRY
 from winchkit.drivers.status_word import StatusWord
 from winchkit.errors import ConnectionLost, DeviceRefused, Fault, FileError, NoReply, NotPermitted
 from winchkit.schema.devices.device import DeviceSpec
@@ -27,6 +28,7 @@ __all__ = [
 ]
 
 _REAL32_BITS = 32
+"""CiA 301, data type 0008h."""
 _TINIEST = 1e-30
 """A float below it, but not zero, is no measurement: its bytes are of another type."""
 
@@ -70,7 +72,8 @@ class ProcessDecoder:
 
 _PRE_OPERATIONAL, _START = 0x80, 0x01
 _SILENT_PERIODS = 10
-_RETRY = 0.5
+"""A device that sends by an event timer may leave out readings, or have another rate than declared
+by a factor of a few; ten periods are certain (rule of thumb)."""
 _FRAME = 135 / 1e6
 """The longest frame with eight bytes at 1 Mbit/s, s: what a value is older for having been sent."""
 _SERIAL = (0x1018, 4)
@@ -254,7 +257,7 @@ class ProcessLine:
                 await self._watch(instrument)
             except ConnectionLost as error:
                 instrument.failed(error)
-                await asyncio.sleep(_RETRY)
+                await asyncio.sleep(RETRY)
 
     async def _watch(self, instrument: ProcessInstrument) -> None:
         due = self._clock.now()

@@ -16,6 +16,7 @@ Framing = Literal["rtu", "tcp"]
 Kind = Literal["crc", "malformed", "late", "resynchronised"]
 _READS = (3, 4)
 _REFUSED = 0x80
+"""Added to the function code in an exception response (Modbus application protocol, section 7)."""
 _LONGEST, _KEPT = 1024, 300
 """Bytes of babble on a line, and how many of them are kept: more than the longest frame."""
 _HEAD = {"rtu": 0, "tcp": 6}

@@ -13,17 +13,13 @@ from winchkit.drivers.modbus.decoder import Decoded, Decoder
 from winchkit.drivers.modbus.late_replies import LISTENING, LateReplies
 from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import Quality
+from winchkit.drivers.sharing import LATE, QUICK_RETRIES, RETRY, STALE_TIMEOUTS
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.modbus import ReadBlock
 
 __all__ = ["Instrument"]
 
-_QUICK_RETRIES = 2
-_RETRY = 0.5
-_STALE_TIMEOUTS = 2
-"""One lost answer is no reason to stop a winch, two are."""
-_LATE = 0.02
 _STALLED = 0.01
 """By which this process may be late with an answer that came just in time, s."""
 _FRESH = 0.06
@@ -86,7 +82,7 @@ class Instrument(InstrumentReadings):
         self.period = period
         self._late.tagged = tagged
         self._wire = wire
-        self.max_age = max(_STALE_TIMEOUTS * self._timeout, 5 * period)
+        self.max_age = max(STALE_TIMEOUTS * self._timeout, 5 * period)
         """A reading older than this is stale, s."""
 
     @property
@@ -99,7 +95,7 @@ class Instrument(InstrumentReadings):
     @property
     def dead(self) -> bool:
         """Whether it has failed so often that it is to be asked less often."""
-        return self._failures > _QUICK_RETRIES
+        return self._failures > QUICK_RETRIES
 
     def reconnected(self, *, again: bool) -> None:
         """Note that the line was opened: nothing of an old one can come any more."""
@@ -234,7 +230,7 @@ class Instrument(InstrumentReadings):
         self._failures += 1
         self.publisher.tally.drops += 1
         self._status_before = None
-        pause = max(_RETRY, 4 * self._timeout) if self.dead else 0.0
+        pause = max(RETRY, 4 * self._timeout) if self.dead else 0.0
         self.due = max(self._clock.now() + pause, self._late.until)
 
     def _publish(
@@ -245,7 +241,7 @@ class Instrument(InstrumentReadings):
         self._status_before, self._status_at = status or None, times[1]
         t_request, t_receive = times
         spec, (there, back) = self.decoder.spec, self._wire
-        if t_receive - t_request > _LATE + there + back:
+        if t_receive - t_request > LATE + there + back:
             quality |= Quality.LATE
         sampled = Sampled(
             t_request,

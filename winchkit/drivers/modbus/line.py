@@ -10,13 +10,12 @@ from winchkit.drivers.modbus.commands import command_of, confirm, identity, send
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.timing import exchange, silence_of, wire_times
 from winchkit.drivers.reading import Sensor
-from winchkit.drivers.sharing import LineShare, next_of
+from winchkit.drivers.sharing import RECONNECT, LineShare, next_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
 __all__ = ["ModbusLine"]
 
-_RECONNECT = 0.3
 _OPENING, _POLL = 1.0, 0.01
 _LEAST = {"modbus-rtu": 1e-4, "modbus-tcp": 1e-3}
 """What a reading is reckoned with at least, s: over TCP no line is in the way, but this process
@@ -57,7 +56,7 @@ class ModbusLine:
         # A cancellation that meets an answer is lost in asyncio.wait_for (Python 3.11).
         while not self._closing:
             if not self._client.connected and not await self._connect():
-                await asyncio.sleep(_RECONNECT)
+                await asyncio.sleep(RECONNECT)
                 continue
             instrument = next_of(self.sensors, self._clock.now(), self._due)
             await asyncio.sleep(max(0.0, self._due(instrument) - self._clock.now()))

@@ -11,9 +11,11 @@ from winchkit.schema.devices.modbus import ModbusSpec, ReadBlock
 __all__ = ["Exchange", "exchange", "silence_of", "wire_times"]
 
 _REQUEST = 8
+"""Bytes of a read request: unit, function, address, count and check sum."""
 _ANSWER = 5
 """Unit, function, byte count and check sum around the registers."""
 _SILENT_CHARACTERS = 3.5
+"""Silence between RTU frames, in characters (Modbus over serial line, section 2.5.1.1)."""
 _SHORTEST_SILENCE = 1.75e-3
 """Above 19200 Bd the specification fixes the silence between frames to this, s."""
 _TURNAROUND = {"modbus-rtu": 2e-3, "modbus-tcp": 0.3e-3}

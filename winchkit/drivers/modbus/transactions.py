@@ -14,6 +14,7 @@ __all__ = ["LAST", "Transactions"]
 LAST = 65_000
 """The library begins again at 1 after it."""
 _SIZE = 256
+"""Numbers with the same upper byte."""
 _PAGES = LAST // _SIZE
 _MARGIN = 4
 """Pages on each side. A register that changes by more than 1024 while a number is remembered passes

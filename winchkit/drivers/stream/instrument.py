@@ -9,6 +9,7 @@ from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Tally
 from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import REPLY_HORIZON, Quality
+from winchkit.drivers.sharing import LATE, QUICK_RETRIES, RETRY, STALE_TIMEOUTS
 from winchkit.drivers.stream.decoder import Decoded
 from winchkit.drivers.stream.parser import (
     Item,
@@ -22,11 +23,6 @@ from winchkit.schema.devices.device import DeviceSpec
 
 __all__ = ["StreamInstrument", "Wire"]
 
-_STALE_TIMEOUTS = 2
-"""One lost answer is no reason to stop a winch, two are."""
-_RETRY = 0.5
-_QUICK_RETRIES = 2
-_LATE = 0.02
 _JITTER = 0.8
 """Two frames come at least this share of a conversion apart."""
 
@@ -89,7 +85,7 @@ class StreamInstrument(InstrumentReadings):
     def on_line(self, period: float) -> None:
         """Take the period that is to be expected, s."""
         self.period = period
-        self.max_age = max(_STALE_TIMEOUTS * self._timeout, 5 * period)
+        self.max_age = max(STALE_TIMEOUTS * self._timeout, 5 * period)
         """A reading older than this is stale, s."""
 
     @property
@@ -121,7 +117,7 @@ class StreamInstrument(InstrumentReadings):
         t_receive = max(t_request, t_chunk - item.behind * wire.byte_time)
         earliest = t_request - 1.0 / self.spec.rate
         latest = max(t_request, t_receive - item.size * wire.byte_time)
-        late = Quality.LATE if t_receive - t_request > _LATE else Quality.GOOD
+        late = Quality.LATE if t_receive - t_request > LATE else Quality.GOOD
         when = self._sampled(t_request, t_receive, earliest, latest)
         if self._outstanding:
             self._outstanding, self.problem, self._failures = False, None, 0
@@ -171,10 +167,10 @@ class StreamInstrument(InstrumentReadings):
         tally.timeouts += timeout
         self.problem = error
         self._failures += 1
-        often = self._failures > _QUICK_RETRIES
+        often = self._failures > QUICK_RETRIES
         if often:
             self.started = False
-        pause = _RETRY if often else 0.0
+        pause = RETRY if often else 0.0
         if timeout and self.spec.mode == "polled":
             # Its answers have no number: nothing is asked until the reply cannot come any more,
             # and the first answer after it is discarded.

@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
-from winchkit.drivers.sharing import LineShare, next_of
+from winchkit.drivers.sharing import RECONNECT, RETRY, LineShare, next_of
 from winchkit.drivers.stream.conversation import Conversation, exchange_time
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.drivers.stream.port import Port, open_serial
@@ -16,8 +16,6 @@ from winchkit.schema.bench import BusSpec
 
 __all__ = ["StreamLine"]
 
-_RECONNECT = 0.3
-_RETRY = 0.5
 _LISTEN = 0.05
 """A command waits at most this long for a line that listens, s."""
 
@@ -91,7 +89,7 @@ class StreamLine:
         while not self._closing:
             talk = self._talk or await self._open()
             if talk is None:
-                await self._pause(_RECONNECT)
+                await self._pause(RECONNECT)
                 continue
             try:
                 if self.sensors[0].spec.mode == "continuous":
@@ -101,7 +99,7 @@ class StreamLine:
                     await self._poll(talk, next_of(self.sensors, now, lambda one: one.due))
             except ConnectionLost as error:
                 self._lost(error)
-                await self._pause(_RECONNECT)
+                await self._pause(RECONNECT)
 
     async def command(self, sensor: Sensor, name: str) -> None:
         """Send a command to one of its instruments between two readings."""
@@ -182,7 +180,7 @@ class StreamLine:
                     raise talk.silent(instrument)
             except DeviceRefused as error:
                 instrument.refused(error)
-                await talk.idle(self._clock.now() + _RETRY, instrument)
+                await talk.idle(self._clock.now() + RETRY, instrument)
             except NoReply as error:
                 instrument.failed(error, timeout=True)
                 instrument.started = False

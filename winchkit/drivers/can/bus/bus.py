@@ -29,6 +29,7 @@ from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
 __all__ = [
+    "SDO_SIZE",
     "CanBus",
     "FrameTime",
     "Handler",
@@ -84,15 +85,24 @@ Handler = Callable[[bytes, float], None]
 _SYNC = 0x080
 _NMT = 0x000
 _HEARTBEAT = 0x700
+"""COB-IDs of the predefined connection set (CiA 301): SYNC, NMT, and heartbeats, to which the node
+id is added."""
 _SDO_REPLY = range(0x581, 0x600)
 _WAIT = 0.05
+"""s: upper bound of the time that closing waits for the receive thread; a frame ends the wait at
+once."""
 _MAX_FAILURES = 5
+"""In a row, without a frame in between: about 50 ms with the pause, in which a driver may report
+one event several times (rule of thumb)."""
 _FAILURE_PAUSE = 0.01
+"""s: a failing call does not keep a core busy."""
 _FULL_TIME = 0.1
 """For which the queue of the interface may be full before the bus counts as dead, s."""
 _GONE = (errno.ENETDOWN, errno.ENODEV, errno.ENXIO)
-_SDO_SIZE = 8
+SDO_SIZE = 8
+"""Bytes: an SDO frame always has eight (CiA 301); others are of another protocol."""
 _LAST_NODE = 127
+"""Node ids are 1 to 127 (CiA 301)."""
 
 for _library in ("canopen", "can"):
     logging.getLogger(_library).addHandler(logging.NullHandler())
@@ -403,7 +413,7 @@ class CanBus:
                 handler = handler_of(identifier)
                 if handler is not None:
                     handler(data, stamp_to_clock(stamp, now) if stamp else now)
-                elif identifier in _SDO_REPLY and len(data) == _SDO_SIZE:
+                elif identifier in _SDO_REPLY and len(data) == SDO_SIZE:
                     self.network.notify(identifier, bytearray(data), now)
             except Exception as raised:  # noqa: BLE001 - a defect: it is named, the bench stops
                 self.fault = (

@@ -8,8 +8,13 @@ from enum import Enum
 __all__ = ["BusHealth", "BusState", "ErrorTally"]
 
 _CONTROLLER, _BUS_OFF, _RESTARTED = 0x004, 0x040, 0x100
+"""Classes of an error frame (linux/can/error.h: CAN_ERR_CRTL, CAN_ERR_BUSOFF, CAN_ERR_RESTARTED).
+"""
 _OVERFLOW = 0x01
+"""Data byte 1: CAN_ERR_CRTL_RX_OVERFLOW."""
 _WARNING, _PASSIVE, _ACTIVE = 0x0C, 0x30, 0x40
+"""Data byte 1: receive and transmit bits of CAN_ERR_CRTL warning and passive, and
+CAN_ERR_CRTL_ACTIVE."""
 
 
 class BusState(Enum):

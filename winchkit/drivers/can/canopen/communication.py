@@ -13,6 +13,7 @@ _PRODUCES = 1 << 30
 _INVALID = 1 << 31
 """Of 1014h: no EMCY is sent."""
 _IDENTIFIER = 0x1FFFFFFF
+"""Bits 0 to 28 of 1005h and 1014h (CiA 301): CAN-ID, with those of extended frames."""
 
 
 def set_communication(node: SdoNode) -> tuple[str, ...]:

@@ -19,13 +19,15 @@ from winchkit.drivers.can.canopen.declared import (
     unmappable,
     writable,
 )
-from winchkit.drivers.can.canopen.identity import Identity
+from winchkit.drivers.can.canopen.identity import SERVO_PROFILE, Identity
 from winchkit.drivers.can.canopen.node import object_name
+from winchkit.drivers.can.canopen.pdo_parameters import MOST_PDOS
 from winchkit.drivers.can.cia402.modes import MODES, modes_of
 from winchkit.drivers.can.cia402.option_codes import OPTIONS
 
 __all__ = [
     "ALWAYS",
+    "PDO_BITS",
     "DriveDescription",
     "HostLoss",
     "OptionEntry",
@@ -51,12 +53,12 @@ ALWAYS = (0x6040, 0x6041, 0x6060, 0x6061, 0x6064, 0x606C)
 _MOTION = ("CSV", "CSP", "PV", "IP")
 _FEEDBACK = (0x6041, 0x6064, 0x606C, 0x6077, 0x6061, 0x603F)
 _CONTROL = 0x6040
+"""Control word, the one of these that the host sends."""
 _CARRIED = (_CONTROL, 0x6041, 0x6064, 0x606C)
 """Objects without which in a PDO winchkit moves no drive."""
 _RPDO, _TPDO, _MAPPING = 0x1400, 0x1800, 0x200
-_PDOS = 512
-_FIRST_PDOS, _PDO_BITS = 4, 64
-_SERVO = 402
+_FIRST_PDOS, PDO_BITS = 4, 64
+"""PDOs with a predefined COB-ID, and bits of eight data bytes (CiA 301)."""
 _OWN, _VALUES = 0x6000, range(0x2000, 0xA000)
 """Below 6000h objects are the maker's own (CiA 301)."""
 _FURTHER_AXES = range(0x6840, 0xA000, 0x800)
@@ -167,7 +169,7 @@ def _profile(dictionary: Any) -> int | None:
 
 def _is_drive(dictionary: Any) -> bool:
     """Whether the objects are a drive's; some makers write another device profile into 1000h."""
-    return _profile(dictionary) == _SERVO or (0x6040 in dictionary and 0x6041 in dictionary)
+    return _profile(dictionary) == SERVO_PROFILE or (0x6040 in dictionary and 0x6041 in dictionary)
 
 
 def _values(dictionary: Any) -> Iterator[str]:
@@ -262,7 +264,7 @@ def _target_obstacle(dictionary: Any, mode: str) -> str:
 
 
 def _pdos(dictionary: Any, first: int) -> Iterator[PdoEntry]:
-    for number in range(1, _PDOS + 1):
+    for number in range(1, MOST_PDOS + 1):
         if first + number - 1 in dictionary:
             fixed = fixed_mapping(dictionary, first == _RPDO, number)
             mapping = first + _MAPPING + number - 1
@@ -336,7 +338,7 @@ def _no_room(dictionary: Any, entries: tuple[PdoEntry, ...], keys: list[Any]) ->
     """Object that no PDO has room for beside the others; empty where all have room."""
     first = [entry for entry in entries if entry.number <= _FIRST_PDOS]
     held = {name for entry in first if entry.fixed for name in entry.objects}
-    free = [_PDO_BITS for entry in first if not entry.fixed]
+    free = [PDO_BITS for entry in first if not entry.fixed]
     for index, sub in keys:
         variable = declared(dictionary, index, sub)
         if variable is None or (f"0x{index:04X}:{sub}" if sub else f"0x{index:04X}") in held:
@@ -398,7 +400,7 @@ def _differences(
 def _kind_differences(dictionary: Any) -> Iterator[str]:
     """Another device profile, and axes beside the first."""
     profile = _profile(dictionary)
-    if profile not in (None, _SERVO):
+    if profile not in (None, SERVO_PROFILE):
         yield (
             f"1000h says device profile {profile}, not 402; 6040h and 6041h are there, so it is "
             "described as a drive of CiA 402"

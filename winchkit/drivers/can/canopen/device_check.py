@@ -17,6 +17,7 @@ from winchkit.drivers.can.canopen.declared import (
 )
 from winchkit.drivers.can.canopen.description import (
     ALWAYS,
+    PDO_BITS,
     HostLoss,
     host_loss_ways,
     lacking,
@@ -36,7 +37,6 @@ from winchkit.schema.reading.source import open_source
 
 __all__ = ["EdsReport", "check_drive", "check_process", "host_loss_problem"]
 
-_LONGEST = 64
 _NODE = 1
 """For which the EDS is read: $NODEID of its identifiers."""
 _INVALID, _IDENTIFIER = 1 << 31, 0x7FF
@@ -203,8 +203,8 @@ def _pdo_faults(dictionary: Any, kind: str, spec: PdoSpec, *, real: bool = False
         bits += len(variable)
         if reason := unmappable(variable, receive=receive, real=real):
             yield f"{text} ({variable.name}) cannot be mapped: {reason}"
-    if bits > _LONGEST:
-        yield f"{kind} {spec.number} would have {bits} bits; a PDO carries {_LONGEST}"
+    if bits > PDO_BITS:
+        yield f"{kind} {spec.number} would have {bits} bits; a PDO carries {PDO_BITS}"
     else:
         yield from _fixed_faults(dictionary, receive, spec)
 

@@ -61,6 +61,7 @@ _FAMILY: dict[int, str] = {
 
 
 _KEPT = 64
+"""Messages: more than any bring-up gives, and a storm of EMCY has a bounded memory."""
 
 
 @dataclass(frozen=True)

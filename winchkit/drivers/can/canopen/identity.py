@@ -8,10 +8,11 @@ from pathlib import Path
 
 from winchkit import catalog
 
-__all__ = ["Identity", "fitting_device"]
+__all__ = ["SERVO_PROFILE", "Identity", "fitting_device"]
 
 _NUMBER = re.compile(r"^\s*(VendorNumber|ProductNumber)\s*=\s*(\w+)\s*$", re.MULTILINE)
-_SERVO = 402
+SERVO_PROFILE = 402
+"""Device profile number in the lower 16 bits of 1000h: CiA 402, drives."""
 _GENERIC = "generic-cia402"
 
 
@@ -44,7 +45,7 @@ def fitting_device(identity: Identity, device_type: int | None) -> str:
     same = [name for name, (vendor, _) in shipped.items() if vendor and vendor == identity.vendor]
     if len(same) == 1:
         return same[0]
-    servo = device_type is not None and device_type & 0xFFFF == _SERVO
+    servo = device_type is not None and device_type & 0xFFFF == SERVO_PROFILE
     return _GENERIC if servo and _GENERIC in shipped else ""
 
 

@@ -37,9 +37,11 @@ UNCONFIGURED = 255
 """Node id of a device that has none."""
 
 _REPLY = 0x7E4
+"""COB-ID from LSS slave to master (CiA 305)."""
 _SCAN_TIME = 0.05
 """For an answer in the fast scan, of which there are up to 133, s."""
 _ANSWER_TIME = 0.5
+"""s, as of an SDO request: a device that stores its node id writes a flash memory first."""
 _INQUIRIES = (
     CS_INQUIRE_VENDOR_ID,
     CS_INQUIRE_PRODUCT_CODE,

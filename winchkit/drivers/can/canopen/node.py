@@ -120,6 +120,8 @@ def object_name(index: int, sub: int = 0) -> str:
 ABSENT = frozenset({0x06020000, 0x06090011, 0x08000024})
 """SDO abort codes of an object or sub-index that does not exist, or has no data (CiA 301)."""
 _TIMEOUT = 0.5
+"""s: drives answer within some ms, and within some tenths while they write a flash memory; tenfold,
+a dead drive would delay every opening of a bench by 5 s a request (rule of thumb)."""
 _FULL_TRIES, _FULL_PAUSE = 20, 0.005
 """How often, and after which pause (s), a full queue of the interface is tried again."""
 

@@ -10,7 +10,7 @@ from winchkit.drivers.can.canopen.pdo import PdoCodec, parse_object
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import PdoSpec
 
-__all__ = ["Direction", "cob_id", "codecs", "set_up"]
+__all__ = ["MOST_PDOS", "Direction", "cob_id", "codecs", "set_up"]
 
 Direction = Literal["tpdo", "rpdo"]
 
@@ -20,8 +20,10 @@ _COMMUNICATION = {"tpdo": 0x1800, "rpdo": 0x1400}
 _MAPPING = {"tpdo": 0x1A00, "rpdo": 0x1600}
 _FIRST_COB = {"tpdo": 0x180, "rpdo": 0x200}
 _PREDEFINED = range(1, 5)
-_MOST = 512
+MOST_PDOS = 512
+"""In each direction (CiA 301: 1400h to 15FFh, 1800h to 19FFh)."""
 _INHIBIT_UNIT, _MS = 1e-4, 1e-3
+"""s: units of the inhibit time (sub-index 3) and of the event timer (sub-index 5)."""
 
 
 def cob_id(direction: Direction, number: int, node: int) -> int:
@@ -64,7 +66,7 @@ def _beyond(node: SdoNode, direction: Direction) -> list[int]:
     first = _COMMUNICATION[direction]
     return [
         number
-        for number in range(_PREDEFINED.stop, _MOST + 1)
+        for number in range(_PREDEFINED.stop, MOST_PDOS + 1)
         if first + number - 1 in node.dictionary
     ]
 

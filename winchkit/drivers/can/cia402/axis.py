@@ -49,6 +49,7 @@ _STALE_SYNCS, _STALE_BEATS = 5, 2
 _LATE_REPLY = 0.05
 """Left for the reply to a single SDO request, s: a tenth of the time-out of a transfer."""
 _NMT_STOP = 0x02
+"""NMT command specifier "stop remote node" (CiA 301)."""
 _ENABLE, _DISABLE = RequestedState.ENABLE, RequestedState.DISABLE
 _new = tuple.__new__
 _RAMPS = (RequestedState.RUN_DOWN, RequestedState.HALT)

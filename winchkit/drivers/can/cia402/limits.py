@@ -13,7 +13,10 @@ from winchkit.errors import NotPermitted
 __all__ = ["DriveLimits", "LimitsAtShaft", "read_limits", "set_limits"]
 
 _U32_OFF = 0xFFFFFFFF
+"""6065h and 607Fh: all bits set switch the limit off (CiA 402 for 6065h; drives do so for 607Fh).
+"""
 _MS = 1e-3
+"""s: unit of 6066h."""
 
 
 @dataclass(frozen=True)

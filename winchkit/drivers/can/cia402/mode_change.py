@@ -11,7 +11,10 @@ from winchkit.schema.devices.servo import ServoSpec
 __all__ = ["change_mode", "rest_targets", "supported_modes"]
 
 _MODE_TIME = 0.5
+"""s: a drive changes its mode within some cycles of its control; as long as an SDO request may take
+(rule of thumb)."""
 _POLL = 0.01
+"""s: 50 looks within the time."""
 _OFFSETS = (0x60B0, 0x60B1, 0x60B2)
 """Of position, velocity and torque."""
 

@@ -16,6 +16,7 @@ __all__ = ["HERE", "HomingSpec", "check_homing", "set_homing", "set_profile", "s
 _RAMP_SPEED = 3000 * 2 * pi / 60
 """Speed that a ramp declared as a time reaches from standstill, rad/s."""
 _MS = 1e-3
+"""s: unit of 6083h to 6085h where a drive takes ramps as times."""
 METHODS = range(-128, 128)
 HERE = (37, 35)
 """Methods that take the present position for the zero: the present number and the old one."""

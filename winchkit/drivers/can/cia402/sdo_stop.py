@@ -7,7 +7,7 @@ stop. Expedited transfers of CiA 301: download 2Bh, reply 60h; upload 40h, reply
 
 from __future__ import annotations
 
-from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.bus.bus import SDO_SIZE, CanBus
 from winchkit.drivers.can.cia402.state_machine import State, state_of
 
 __all__ = ["SdoStop"]
@@ -18,7 +18,6 @@ _WROTE = bytes.fromhex("604060")
 _ASK = bytes.fromhex("4041600000000000")
 _TOLD = bytes.fromhex("416000")
 _REFUSED = bytes.fromhex("80406000")
-_SIZE = 8
 
 
 class SdoStop:
@@ -65,7 +64,9 @@ class SdoStop:
             self.taken = True
         elif data[:4] == _REFUSED and not self.taken:
             self.refused = True
-        elif self._asked and len(data) == _SIZE and data[0] & 0xE2 == 0x42 and data[1:4] == _TOLD:
+        elif (
+            self._asked and len(data) == SDO_SIZE and data[0] & 0xE2 == 0x42 and data[1:4] == _TOLD
+        ):
             self._asked = False
             self.state = state_of(int.from_bytes(data[4:6], "little"))
         else:

@@ -24,7 +24,9 @@ _INVALID, _IDENTIFIER = 1 << 31, 0x7FF
 _DOWNLOAD, _BLOCK_DOWNLOAD = 1, 6
 """Command specifiers of requests (CiA 301); a block download begins where bit 0 is 0."""
 _HEAD = 4
+"""Bytes of an SDO request: command, index and sub-index."""
 _CONTROL_WORD = 0x6040
+"""Object (CiA 402) whose writes are counted."""
 
 
 class SecondMaster:

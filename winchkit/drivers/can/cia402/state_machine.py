@@ -93,6 +93,7 @@ QUICK_STOP = 0x02
 DISABLE_VOLTAGE = 0x00
 FAULT_RESET = 0x80
 HALT = 0x100
+"""Bits of the control word 6040h for each command of CiA 402's table of commands; halt is bit 8."""
 
 TRANSITIONS: tuple[Transition, ...] = (
     Transition(1, State.NOT_READY_TO_SWITCH_ON, State.SWITCH_ON_DISABLED, None),

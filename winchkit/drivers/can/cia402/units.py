@@ -16,6 +16,7 @@ _I32, _I16 = 2**31 - 1, 2**15 - 1
 _COARSEST = 16
 """Position units a turn: with fewer, the objects cannot be meant."""
 _PER_MILLE = 1e-3
+"""Unit of 6071h, 6077h and 6078h: thousandths of the rated torque (6076h) and current (6075h)."""
 
 _ANGLES = {0x10: 1.0, 0x41: pi / 180, 0xB4: _TURN}
 """rad of the rotary units of CiA 303-2: radian, degree, revolution."""

@@ -5,12 +5,14 @@ from __future__ import annotations
 from winchkit.drivers.can.canopen.pdo import PdoCodec
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.modes import MODES
-from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, Mechanism, Silence
+from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, MS, Mechanism, Silence
 
 __all__ = ["RPDO_TIMEOUT", "RpdoTimeout", "SyncLoss"]
 
 RPDO_TIMEOUT = 0x8250
-_MS, _US = 1e-3, 1e-6
+"""EMCY error code of CiA 301."""
+_US = 1e-6
+"""s: unit of 1006h."""
 _INVALID = 1 << 31
 _CONTROL, _MODE = (0x6040, 0), (0x6060, 0)
 _POSITIONS = ((0x607A, 0), (0x60C1, 1))
@@ -34,7 +36,7 @@ class RpdoTimeout(Mechanism):
 
     def set_up(self) -> None:
         """Written while the PDO is invalid, as some drives ask for."""
-        self._set(round(self.limit / _MS))
+        self._set(round(self.limit / MS))
 
     def withhold(self) -> float:
         """A few RPDOs with disable voltage, each before a SYNC, then none."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
-from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, Mechanism, Silence
+from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, MS, Mechanism, Silence
 from winchkit.errors import NotPermitted
 
 __all__ = ["FACTOR", "Guarding", "GuardingWatch", "guard_time"]
@@ -19,12 +19,11 @@ FACTOR = 3
 _LONG_GUARD_TIME, _LONG_FACTOR = 1.0, 60
 """s, and how many of them: a commissioning takes some seconds."""
 _TOGGLE, _STATE = 0x80, 0x7F
-_MS = 1e-3
 
 
 def guard_time(limit: float) -> float:
     """Period of the polls whose threefold is the longest life time within ``limit``, s."""
-    return max(1, int(limit / _MS / FACTOR + 1e-9)) * _MS
+    return max(1, int(limit / MS / FACTOR + 1e-9)) * MS
 
 
 @dataclass
@@ -120,7 +119,7 @@ class Guarding(Mechanism):
         Some drives count on from the last poll that they had, however long ago. Error control by
         heartbeat in between ends that: a node has one or the other.
         """
-        self.node.write(0x1017, 0, round(self.terms.period / _MS))
+        self.node.write(0x1017, 0, round(self.terms.period / MS))
         self.node.write_verified(0x1017, 0, 0)
         self._set(self.guard_time, FACTOR)
         self.watch.begin_anew()
@@ -131,5 +130,5 @@ class Guarding(Mechanism):
             self.node.write_verified(index, 0, 0)
 
     def _set(self, guard_time: float, factor: int) -> None:
-        self.node.write_verified(0x100C, 0, round(guard_time / _MS))
+        self.node.write_verified(0x100C, 0, round(guard_time / MS))
         self.node.write_verified(0x100D, 0, factor)

@@ -19,6 +19,7 @@ from winchkit.drivers.clock import Clock
 __all__ = [
     "HEARTBEAT_LOST",
     "LIFE_SIGNS",
+    "MS",
     "Heartbeat",
     "Mechanism",
     "Silence",
@@ -27,12 +28,14 @@ __all__ = [
 ]
 
 HEARTBEAT_LOST = 0x8130
+"""EMCY error code of CiA 301: life guard or heartbeat error."""
 LIFE_SIGNS = 3
 """Given before the silence of a proof."""
 _NODES = range(127, 0, -1)
 _PROOF_TIME = 0.1
 """Limit of the heartbeat during its proof at most, s: what is proved is that it watches."""
-_MS = 1e-3
+MS = 1e-3
+"""s: unit of 100Ch, 1016h, 1017h and of event timers."""
 
 
 class Silence(Enum):
@@ -160,4 +163,4 @@ class Heartbeat(Mechanism):
 
 def consumer_entry(host: int, timeout: float) -> int:
     """A heartbeat consumer's entry: node and time in ms."""
-    return host << 16 | round(timeout / _MS)
+    return host << 16 | round(timeout / MS)

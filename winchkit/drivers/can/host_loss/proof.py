@@ -23,7 +23,9 @@ _PATIENCE = 0.4
 _GUARDED_PATIENCE = 0.1
 """After which a guarded drive is asked by a poll, s."""
 _SETTLING = 1.0
+"""s: for the transition after a fault reset or a quick stop at rest; drives take some tenths."""
 _POLL = 0.002
+"""s: resolution of the measured delay, 2 % of the shortest limit (0.1 s)."""
 _FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
 _STOPPING = (1, 2, 3)
 """Of 6007h: fault, disable voltage, quick stop."""

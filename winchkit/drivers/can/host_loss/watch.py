@@ -12,7 +12,7 @@ from winchkit.drivers.can.canopen.pdo_parameters import codecs
 from winchkit.drivers.can.cia402.option_codes import OptionCode
 from winchkit.drivers.can.host_loss.cyclic import RpdoTimeout, SyncLoss
 from winchkit.drivers.can.host_loss.guarding import Guarding, GuardingWatch
-from winchkit.drivers.can.host_loss.mechanism import Heartbeat, Mechanism, Silence, Terms
+from winchkit.drivers.can.host_loss.mechanism import MS, Heartbeat, Mechanism, Silence, Terms
 from winchkit.drivers.can.host_loss.proof import HostLoss, Proof, bring_back, prove, reaction
 from winchkit.drivers.can.host_loss.vendor import VendorWatch
 from winchkit.drivers.clock import Clock
@@ -23,7 +23,7 @@ from winchkit.schema.host_loss import HARDWARE, VENDOR
 __all__ = ["HostWatch"]
 
 _POLL = 0.005
-_MS = 1e3
+"""s: a tenth of the shortest usual heartbeat (50 ms)."""
 _BEATS = 4
 """Of the drive, within which the first must come after its start."""
 _KINDS: dict[str, type[Mechanism]] = {
@@ -66,7 +66,7 @@ class HostWatch:
                 '(host_loss = "hardware"); `winchkit check` lists what its EDS offers'
             )
         beats = self.mechanism.supervised_by_heartbeat
-        period = round(self._terms.period * _MS) if beats else 0
+        period = round(self._terms.period / MS) if beats else 0
         if beats:
             self.mechanism.set_up()
         self._node.write_verified(0x1017, 0, period)

@@ -50,6 +50,7 @@ _TPDO = {0x180: 1, 0x280: 2, 0x380: 3, 0x480: 4}
 _RPDO = {0x200: 1, 0x300: 2, 0x400: 3, 0x500: 4}
 _SDO_REQUEST, _SDO_REPLY, _HEARTBEAT = 0x600, 0x580, 0x700
 _SEGMENT = 7
+"""Data bytes in a segment of an SDO transfer (CiA 301)."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 import can
 import canopen
 
-from winchkit.drivers.can.bus.bus import CanBus
+from winchkit.drivers.can.bus.bus import SDO_SIZE, CanBus
 from winchkit.drivers.can.canopen.identity import Identity, fitting_device
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState, state_text
 from winchkit.drivers.can.canopen.node import ABSENT, ObjectPort
@@ -26,7 +26,6 @@ NODES = range(1, 128)
 _DEVICE_TYPE, _SERIAL = b"\x00\x10\x00", b"\x18\x10\x04"
 """Index and sub-index of 1000h and 1018h:4 as SDO carries them."""
 _UPLOAD_DEVICE_TYPE, _UPLOAD_SERIAL = (b"\x40" + key + bytes(4) for key in (_DEVICE_TYPE, _SERIAL))
-_SDO_SIZE = 8
 _DUPLICATE_TIME = 0.05
 """For a second answer to one request, s."""
 _TOO_MANY = 1.5
@@ -35,6 +34,7 @@ _SDO_REQUEST, _SDO_REPLY, _HEARTBEAT = 0x600, 0x580, 0x700
 _PACE_BITS = 1000
 """Of bus time from one question to the next, so that no adapter's queue overflows."""
 _TIMEOUT = 0.3
+"""s: shorter than that of a known drive, as most of the 127 node ids do not exist."""
 _DICTIONARY: Any = canopen.ObjectDictionary
 
 
@@ -152,7 +152,7 @@ class _NodeListener:
     def reply(self, data: bytes, now: float) -> None:
         """Take an SDO reply, and hand it on to whoever asked."""
         self.replies[bytes(data[1:4])] += 1
-        if len(data) == _SDO_SIZE:
+        if len(data) == SDO_SIZE:
             self.bus.pass_on(_SDO_REPLY + self.node, data, now)
 
 
