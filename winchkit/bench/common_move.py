@@ -14,6 +14,7 @@ from winchkit.errors import MotionError, UsageError
 __all__ = ["begin_together", "wait_together"]
 
 _POLL = 0.01
+"""s: delay with which the others are stopped after one has ended early."""
 
 
 def begin_together(

@@ -20,7 +20,10 @@ from winchkit.schema.devices.servo import ServoSpec
 __all__ = ["Stopped", "stop_on_bus"]
 
 _STOP_TIME = 5.0
+"""s: five times the quick stop from 1 m/s with 1 m/s²; then the operator has to use the emergency
+stop."""
 _POLL = 0.02
+"""s: each look is two SDO requests (2 ms at 1 Mbit/s) per drive."""
 _MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 

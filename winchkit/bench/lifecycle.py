@@ -29,11 +29,18 @@ __all__ = [
 ]
 
 _POLL = 0.01
+"""s: two or more cycles at the usual 4 ms."""
 _FIRST_FEEDBACK = 2.0
+"""s: the first SYNC comes within a cycle; drives map their PDOs within some tenths."""
 _FIRST_READING = 1.5
+"""s: several time-outs of a slow line; more would delay a bench with a dead cell."""
 _REST_TIME = 5.0
+"""s: five times the ramp from 1 m/s with 1 m/s² (rule of thumb)."""
 _HANGS = 1.0
+"""s beyond the cycles: a process that stands still for less goes on by itself (a trip for late
+cycles reports it)."""
 _RESET_TIME = 2.0
+"""s: twice the time that a controller gives its drive."""
 
 
 @contextmanager

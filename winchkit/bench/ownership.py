@@ -20,6 +20,7 @@ from winchkit.schema.bench import BenchSpec
 __all__ = ["Ownership", "connect_to_owner", "digest_of", "listen", "log_path", "owner_process"]
 
 _CONNECT_TIME = 2.0
+"""s: an owner accepts at once; one under load within some tenths."""
 
 
 def digest_of(spec: BenchSpec) -> str:

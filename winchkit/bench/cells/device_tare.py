@@ -9,7 +9,9 @@ from winchkit.errors import NoReply
 __all__ = ["await_device_tare"]
 
 _POLL = 0.01
+"""s: a reading of the fastest usual cell."""
 _WITHIN = 2.0
+"""s: an indicator waits for a stable load, usually 1 s, before it takes a tare."""
 _SETTLING = 3
 """Readings that were requested after the command, before one counts."""
 

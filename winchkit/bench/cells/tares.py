@@ -15,6 +15,7 @@ from winchkit.schema.calibration import HostTare, TareBook, tare_book_path
 __all__ = ["clear_device_tare", "clear_tare", "device_tare", "device_zero", "host_tare"]
 
 _CHECK = 0.3
+"""s: an indicator's filter of some readings has settled, and a fast cell gives ten readings."""
 
 
 def host_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:

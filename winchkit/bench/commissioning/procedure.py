@@ -44,7 +44,10 @@ _COMMAND = "commission"
 _SLIP = 5e-3
 """Of the cable within two seconds after the drive was disabled, m."""
 _SLOW = 0.1
+"""Share of ``limits.speed``, between `_SLOWEST` and `_FASTEST`."""
 _SLOWEST, _FASTEST = 0.005, 0.05
+"""m/s: static friction is overcome at the lower one; at the upper one an operator can stop within 5
+cm (1 s)."""
 _LIBRARIES = ("canopen", "python-can", "numpy")
 _LIMITS = (
     ("speed", "m/s"),

@@ -31,6 +31,7 @@ __all__ = [
 ]
 
 SCHEMA = 1
+"""Of the record, which counts on with each change of its keys."""
 
 
 @dataclass(frozen=True)

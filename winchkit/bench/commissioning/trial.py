@@ -34,18 +34,28 @@ from winchkit.schema.bench import BenchSpec
 __all__ = ["Trial", "Trials"]
 
 _ENABLE_TIME = 2.0
+"""s: drives take some tenths, and with a brake to open about one."""
 _SETTLE_TIME = 0.3
+"""s: oscillation at rest after enabling has decayed before a trial."""
 _MOVE_TIME = 0.8
+"""s: a ramp and several heartbeats at constant speed before the host falls silent."""
 _PATIENCE = 0.5
 """For the drive beyond its limit, s."""
 _HARDWARE_PATIENCE = 5.0
+"""s: a safety relay with a delay of category 1 stop (up to some seconds)."""
 _NMT_TIME = 0.15
+"""s: three heartbeats of 50 ms, after which the drive shows its reaction."""
 _BRAKE_TIME = 2.0
+"""s: a brake that does not hold lets the load slip visibly within it."""
 _REST_TIME = 3.0
+"""s, as in :mod:`winchkit.drivers.can.cia402.commission`: three times the quick stop from 1 m/s
+with 1 m/s²."""
 _POLL = 0.002
+"""s: resolution of a measured reaction, 2 % of the shortest limit."""
 _REPLY_TIME = 0.1
 """Within which a drive has answered an SDO request that needs no ramp, s."""
 _PRE_OPERATIONAL = 0x80
+"""NMT command specifier "enter pre-operational" (CiA 301)."""
 _HALF = 1 << 31
 
 

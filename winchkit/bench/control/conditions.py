@@ -29,6 +29,7 @@ _SLACK_TIME = 0.2
 _LENGTH_TOLERANCE = 5e-3
 """Overshoot of a position loop at a length limit, m."""
 _SPEED_TOLERANCE = 1.2
+"""Overshoot of a velocity loop with the usual damping is below 20 % of its step."""
 _REST_TIME = 0.1
 """A brake that closes lets the motor settle for less, s."""
 _DEVIATION = 0.25
@@ -40,7 +41,9 @@ _RUNAWAY_TIME = 0.03
 _FOLLOWING_TIME = 0.25
 """At ``limits.speed``, the lag of a position loop of gain 4/s, s."""
 _FOLLOWING_DEBOUNCE = 0.05
+"""s: a step of the load's inertia, or one late SYNC, is over."""
 _SLIP_TIME = 0.5
+"""s: lag of a length instrument behind the motor, with its filter, is over."""
 
 Test = Callable[[WinchInput, Supervised, Memory], bool]
 Words = Callable[[WinchInput, Supervised, Memory], str]

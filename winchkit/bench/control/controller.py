@@ -19,10 +19,15 @@ from winchkit.schema.bench import LimitSpec
 __all__ = ["AxisPort", "Controller"]
 
 _ENABLE_TIME = 2.0
+"""s, as in the trials of a commissioning: drives take some tenths, and about one with a brake."""
 _GATE_TIME = 5.0
 """Time for which an enabled drive waits for others that start with it, s."""
 _RESET_TIME = 1.0
+"""s: as a drive needs after a fault reset at commissioning; in a fault with a cause it stays there.
+"""
 _RUN_DOWN_MARGIN = 1.0
+"""s beyond the planned ramp: the following error and the window of the standstill; then the quick
+stop follows."""
 _FRESH_SYNCS = 2
 """A status word of these SYNCs was sampled after the stop was sent."""
 _UNSEEN_SYNCS = 5

@@ -30,6 +30,7 @@ from math import erfc, exp, inf, isfinite, log, nan, pi, sqrt
 from statistics import NormalDist, median
 
 from winchkit.drivers.reading import Quality, Reading
+from winchkit.model.line import GRAVITY
 
 __all__ = ["Frozen", "FrozenCell", "HangingLoad"]
 
@@ -54,6 +55,8 @@ _WIDER, _LEAST = 1.3, 0.05
 _WRONG = 0.2
 """Share of a predicted change that a wrong profile makes up."""
 _BEGUN = 6.07
+"""In s (see above): the normal distribution is beyond it with 6e-10, one run of equal counts in
+1.6e9."""
 _NORMAL = NormalDist()
 _KEPT, _SPACING = 1.0, 5e-3
 """Span of the predictions that are kept, and their least distance, s."""
@@ -67,7 +70,6 @@ _CALM = 1.0
 """At rest for so long before noise is learned, s: the load swings after a motion."""
 _WINDOW = 0.04
 """Time over which accelerations are averaged, s."""
-_GRAVITY = 9.80665
 _SAME = 0.999
 """Share of a step below which a difference is a finer step and not rounding."""
 _KEEPS_COUNTING = Quality.DUPLICATE | Quality.LATE | Quality.UNSTABLE | Quality.FROZEN
@@ -341,10 +343,10 @@ class HangingLoad:
             speeds.popleft()
         time, first, seen = speeds[0]
         if now - time < _WINDOW / 2:
-            return self._mass * _GRAVITY
+            return self._mass * GRAVITY
         wanted, done = (commanded - first) / (now - time), (measured - seen) / (now - time)
         acceleration = min(wanted, done, key=abs) if wanted * done > 0 else 0.0
-        return self._mass * (_GRAVITY + acceleration)
+        return self._mass * (GRAVITY + acceleration)
 
 
 def _divisor(raw: float) -> float:

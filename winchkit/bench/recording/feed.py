@@ -42,6 +42,8 @@ _NUMBERS = tuple(
 )
 _of_reading = attrgetter("t_sample", "t_receive", *_NUMBERS)
 _FAST_GAP = 0.1
+"""s: values of a drive or tracker further apart are not interpolated; 25 cycles at the usual 4 ms.
+"""
 _BARE_PERIOD = 0.0095
 """Rows of a bench without instruments: a hundredth of a second, less the jitter of a cycle."""
 _TRACKER = Source(

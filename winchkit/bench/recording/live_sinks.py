@@ -13,6 +13,7 @@ from winchkit.errors import ConnectionLost, UsageError
 __all__ = ["JsonLines", "LiveSink", "UdpJson"]
 
 _LARGEST = 65_000
+"""Bytes: a datagram of UDP over IPv4 has 65 507 at most."""
 
 
 class LiveSink(Protocol):

@@ -16,6 +16,7 @@ __all__ = ["git_state", "origin"]
 
 _LIBRARIES = ("numpy", "canopen", "python-can", "pymodbus", "pyserial", "mcap")
 _PATIENCE = 2.0
+"""s: git answers within some ms; a repository on a dead network drive does not delay a log."""
 _ROLES = ("cell", "load", "length", "temperature")
 
 

@@ -42,6 +42,7 @@ _CHUNK_PERIOD = 0.075
 """A quarter of what a log by channels may lose, s: each chunk is whole on its own, and a machine
 that is busy elsewhere may let it wait for two of them more."""
 _COUNT_PERIOD = 1.0
+"""s: counters change slowly, and a log that was moved is noticed within it."""
 _DEVICE_TARE = {
     True: "the device shows net",
     False: "the device shows gross",

@@ -20,6 +20,7 @@ from winchkit.runs.read import read_log
 __all__ = ["Replay", "open_replay"]
 
 _LEAST_WAIT = 2e-3
+"""s: shorter waits are longer than ordered on most systems, and the next one makes up for them."""
 _MEASURED = ("motor_angle", "motor_velocity", "motor_torque", "tension", "load", "temperature")
 _SHOWN = ("cable_length", "cable_speed")
 _PHASES = {phase.value: phase for phase in Phase}

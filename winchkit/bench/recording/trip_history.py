@@ -18,6 +18,7 @@ _CHANNELS = (
     *("cable_length", "cable_speed", "commanded_speed"),
 )
 _DIGITS = 6
+"""Significant digits: 10 µs in the seconds before a trip, and 0.1 mm in 10 m of cable."""
 _WORDS = {
     Direction.NONE: "nothing",
     Direction.WIND_IN: "winding in",

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["OwnerGone", "RemoteCells", "RemoteStation", "attach"]
 
 _ANSWER_TIME = 10.0
+"""s: longer than the longest answer without a motion, a reset of several drives (some seconds)."""
 _CELL_TIME = 20.0
 """Longer than any command to an instrument with the readings before and after it, s."""
 

@@ -19,6 +19,7 @@ _CLOSING = 2.0
 _OPENING = 8.0
 """For an owner that is opening the bench, s."""
 _POLL = 0.02
+"""s: not noticed by an operator."""
 
 
 def own(spec: BenchSpec, name: str) -> Ownership:

@@ -19,6 +19,7 @@ _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 _ENDING = 10.0
 """Time to come to rest, s: signals that repeat the first one within it change nothing."""
 _SIGNAL_EXIT = 128
+"""Exit code of a process that signal n ended: 128 + n (POSIX shells)."""
 
 
 class Terminated(KeyboardInterrupt):

@@ -34,6 +34,7 @@ LINGER = 3.0
 _FIRST = 10.0
 """For the first client, which waits for the opening, s."""
 _POLL = 0.02
+"""s: the process ends that much later than it could."""
 _OWNED = "owned"
 """In the first line: somebody else owns the bench; attach there."""
 

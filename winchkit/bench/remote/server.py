@@ -61,6 +61,8 @@ OPERATIONS = (
 """Methods of a station that may be called from outside."""
 
 _MAX_LINE = 65_536
+"""Bytes: the longest request, a programme by name with its options, has some hundreds; a longer one
+is no client."""
 
 
 @dataclass(eq=False)

@@ -26,6 +26,7 @@ __all__ = ["at_station", "attach"]
 _PATIENCE = 15.0
 """For an owner that opens, closes or hands over the bench, s."""
 _POLL = 0.05
+"""s: not noticed by an operator."""
 
 
 def attach(

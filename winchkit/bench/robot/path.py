@@ -26,6 +26,7 @@ __all__ = ["Path", "Waypoint", "paths_through"]
 _SPACING = 2e-3
 """Of samples along the path, m."""
 _FEWEST = 33
+"""On each piece of a path: a curve of half a turn in 32 chords is off by 0.1 % of its radius."""
 _SAME = 1e-7
 """Points closer than this are one, m."""
 _STRAIGHT = 1e-6

@@ -21,6 +21,7 @@ from winchkit.schema.robot_programme import PoseStep, RobotProgramme
 __all__ = ["planned_motions", "programme_files", "run_robot_programme"]
 
 _POLL = 0.02
+"""s: a hold ends that soon after a stop."""
 Motions = list[PlatformTrajectory | float]
 """Motions from stop to stop, and holds (s)."""
 

@@ -43,6 +43,7 @@ _AXES = ("x", "y", "z", "roll", "pitch", "yaw")
 _CHANNELS = tuple(f"platform_{axis}" for axis in _AXES)
 _UNITS = ("m", "m", "m", "rad", "rad", "rad")
 _POLL = 0.05
+"""s: 20 readings of all instruments in a dwell of 1 s."""
 _ROUNDS = 6
 """Times that poses are added to reach a wanted accuracy."""
 

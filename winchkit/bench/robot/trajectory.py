@@ -25,7 +25,9 @@ __all__ = ["PlatformTrajectory", "motion_at", "plan_along"]
 _STEP = 0.02
 """Of the samples between which motor angles are interpolated, s."""
 _MOST = 20_000
+"""Samples: 400 s at `_STEP`; longer motions have longer steps."""
 _FEWEST = 16
+"""Samples: a motion of less than 0.3 s has them in place of a few steps of 20 ms."""
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ __all__ = ["SimulatedEventLoop"]
 _LATENCY = 2e-4
 """Delay from one end of a connection to the other, s."""
 _FIRST_PORT = 20_000
+"""Below it are registered services; the ports are of the simulated network only."""
 
 
 class _Clock(Protocol):

@@ -12,6 +12,7 @@ from winchkit.sim.instruments.stream import StreamInstrument
 __all__ = ["SimulatedSerialLine"]
 
 _TICK = 2e-3
+"""s, as of the line in real time."""
 _TIMEOUT = 0.1
 """Time-out of a read, s."""
 

@@ -28,6 +28,7 @@ _BOOT_SHARE = 0.8
 """Default boot time as a share of the longest one that the device file declares."""
 _HEARTBEAT_LOST = FaultKind(0x8130)
 _PDO_TOO_SHORT = 0x8210
+"""EMCY error code of CiA 301: PDO not processed due to length error."""
 _NMT_COMMANDS = {
     0x01: NmtState.OPERATIONAL,
     0x02: NmtState.STOPPED,

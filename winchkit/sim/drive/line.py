@@ -10,6 +10,7 @@ __all__ = ["Line"]
 _SLOW = 0.3
 """Delay of a slow SDO answer, s."""
 _STORM_PERIOD = 1e-3
+"""s: 1000 EMCY messages a second, an eighth of the bus time at 1 Mbit/s."""
 _STORM_CODE = 0x8120
 """CAN error passive."""
 

@@ -12,9 +12,13 @@ from winchkit.sim.drive.object_dictionary import Abort, ObjectDictionary
 __all__ = ["Heartbeats", "NmtState", "emergency_frame", "error_register"]
 
 _HISTORY = 0x1003
+"""CiA 301: pre-defined error field."""
 _CONSUMER = 0x1016
+"""CiA 301: consumer heartbeat time."""
 _PRODUCER = 0x1017
+"""CiA 301: producer heartbeat time."""
 _MS = 1e-3
+"""s: unit of the two times."""
 
 
 class NmtState(IntEnum):

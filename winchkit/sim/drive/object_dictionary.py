@@ -29,12 +29,15 @@ _SET_POINTS = frozenset((0x6040, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60C1,
 """Objects that a master writes in every cycle."""
 _FORMATS = {0x02: "b", 0x03: "h", 0x04: "i", 0x05: "B", 0x06: "H", 0x07: "I", 0x15: "q", 0x1B: "Q"}
 _BOOLEAN = 0x01
+"""Data type 0001h of CiA 301."""
 _LIMITS = {0x6065, 0x6072, 0x6073, 0x607F, 0x6080, 0x60E0, 0x60E1}
 """Defaults without effect for limits whose default the EDS does not declare."""
 _FIRST_OBJECT = 0x1000
 """Lowest index of objects; lower ones are data types."""
 _SAVE = 0x65766173
+"""Signature of 1010h, "save" in ASCII, little-endian (CiA 301)."""
 _LOAD = 0x64616F6C
+"""Signature of 1011h, "load" in ASCII, little-endian (CiA 301)."""
 
 
 class Abort(IntEnum):

@@ -11,16 +11,24 @@ from winchkit.sim.drive.object_dictionary import Abort, Entry, Key, ObjectDictio
 __all__ = ["Pdos"]
 
 _INVALID = 1 << 31
+"""Bit 31 of sub-index 1 (CiA 301): the PDO does not exist."""
 _NO_RTR = 1 << 30
+"""Bit 30 of sub-index 1: no remote request."""
 _IDENTIFIER = 0x7FF
+"""Bits 0 to 10 of sub-index 1: CAN-ID of a base frame."""
 _LONGEST = 64
+"""Bits of eight data bytes."""
 _PDOS = range(0x200)
 _RESERVED_TYPES = range(241, 252)
 _RTR_TYPES = (252, 253)
 _LAST_SYNCHRONOUS = 240
+"""Transmission types 0 to 240 are synchronous (CiA 301)."""
 _LAST_DUMMY = 0x1F
+"""Data types 0001h to 001Fh may be mapped as dummies (CiA 301)."""
 _TICK_INHIBIT = 1e-4
+"""s: unit of the inhibit time (sub-index 3)."""
 _TICK_EVENT = 1e-3
+"""s: unit of the event timer (sub-index 5)."""
 
 
 @dataclass

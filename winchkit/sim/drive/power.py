@@ -22,6 +22,7 @@ __all__ = [
 
 FAULT_RESET = 0x0080
 HALT = 0x0100
+"""Bits 7 and 8 of the control word 6040h (CiA 402)."""
 
 
 class State(IntEnum):

@@ -11,6 +11,7 @@ __all__ = ["SdoServer"]
 
 _DOWNLOAD_SEGMENT, _DOWNLOAD, _UPLOAD, _UPLOAD_SEGMENT, _ABORT = range(5)
 _SEGMENT = 7
+"""Data bytes in a segment (CiA 301)."""
 
 
 @dataclass

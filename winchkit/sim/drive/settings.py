@@ -18,10 +18,12 @@ _TIMES = (0x6083, 0x6084, 0x6085, 0x609A)
 _STEP = 1e6
 """Ramp of a drive without such an object, rad/s²."""
 _MS = 1e-3
+"""s: unit of times in 6066h to 6070h, and of ramps that are declared as times."""
 _NO_LIMITS = (-(2**31), 2**31 - 1)
 _INSTEAD = {0x6084: 0x6083, 0x6085: 0x6084, 0x60C6: 0x6085}
 """Ramps that replace a missing one."""
 _UNWATCHED = 0xFFFFFFFF
+"""6065h with all bits set: no following error (CiA 402)."""
 _NARROW = 100
 """Default of a missing window, counts."""
 

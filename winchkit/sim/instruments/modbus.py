@@ -30,6 +30,7 @@ __all__ = [
 
 _BITS = {"u16": 16, "i16": 16, "u32": 32, "i32": 32}
 _DECIMALS = 2
+"""Of a simulated indicator, as usual for some hundred newtons."""
 _SIGNED = ("i16", "i32")
 _ORDERS = {"ABCD": (0, 1, 2, 3), "CDAB": (2, 3, 0, 1), "BADC": (1, 0, 3, 2), "DCBA": (3, 2, 1, 0)}
 _SHORT_ORDERS = {"ABCD": (0, 1), "CDAB": (0, 1), "BADC": (1, 0), "DCBA": (1, 0)}
@@ -80,6 +81,8 @@ def encode_number(kind: ValueType, order: Order, number: float) -> list[int]:
 
 
 _STABLE_COUNTS = 100
+"""Change of the count between conversions below which the load is stable: above the noise at rest
+(some tens of counts), below a load that is put on (rule of thumb)."""
 _IDENTITY = 4711
 """Serial number and similar data of every simulated instrument."""
 

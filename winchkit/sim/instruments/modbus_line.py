@@ -26,7 +26,9 @@ __all__ = [
 ]
 
 _AT_ONCE = 4096
+"""Bytes: more than a frame (256), the buffer of a pseudo-terminal."""
 _WAIT = 0.05
+"""s: the thread ends at most that late."""
 
 
 class PtyCable:
@@ -70,7 +72,9 @@ class PtyCable:
 
 _WRITE_ONE, _WRITE_MANY = 6, 16
 _BAUDRATE = 115_200
+"""Of a pseudo-terminal, which has no rate of its own; it has to be set to some value."""
 _START_TIMEOUT = 5.0
+"""s: a server starts within some tenths on a loaded machine."""
 
 # A client that was killed is not reported at the simulation's terminal.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())

@@ -21,6 +21,7 @@ __all__ = ["ProcessInstrument"]
 _NMT = {0x01: NmtState.OPERATIONAL, 0x02: NmtState.STOPPED, 0x80: NmtState.PRE_OPERATIONAL}
 _RESET = (0x81, 0x82)
 _SYNC = 0x1005
+"""CiA 301: COB-ID SYNC."""
 _NO_NUMBER = 0x7FC00000
 """A quiet NaN as REAL32."""
 

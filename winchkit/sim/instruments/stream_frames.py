@@ -126,6 +126,8 @@ def _sum(checksum: ChecksumSpec, line: str, width: int) -> int:
 
 
 _STABLE_DIGITS = 100
+"""Change in digits between conversions below which the load is stable, as of the Modbus
+instruments."""
 _ALARMS: tuple[Says, ...] = ("fault", "overload")
 _IN_BITS: tuple[Says, ...] = ("overload", "underload", "fault", "unstable", "stable", "net")
 

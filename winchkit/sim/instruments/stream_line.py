@@ -17,8 +17,11 @@ from winchkit.sim.instruments.stream import StreamInstrument
 __all__ = ["StreamLine"]
 
 _TICK = 2e-3
+"""s: a conversion is sent that much late, a tenth of the period of a cell of 50 Hz."""
 _JOIN = 5.0
+"""s: the thread ends within a tick; longer is a defect."""
 _AT_ONCE = 4096
+"""Bytes: more than any command, the buffer of a pseudo-terminal."""
 
 
 class StreamLine:

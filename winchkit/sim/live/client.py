@@ -17,6 +17,7 @@ __all__ = ["REFUSED", "address_file", "answer", "is_simulated", "send"]
 REFUSED = "refused: "
 """Start of the reply to a line that could not be executed."""
 _TIMEOUT = 5.0
+"""s: a simulation answers between two steps, within some tenths under load."""
 
 
 def address_file(bench_file: str | Path) -> Path:

@@ -8,8 +8,11 @@ import time
 __all__ = ["PacedClock"]
 
 _SLACK = 0.008
+"""s: two cycles of 4 ms; a drive then reacts to the host's silence as late as a real one would."""
 _PATIENCE = 1.0
+"""s: a participant without a report is ended; a suspension by the scheduler is shorter."""
 _NAP = 1e-3
+"""s: resolution of the sleeps."""
 
 
 class PacedClock:

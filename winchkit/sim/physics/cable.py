@@ -29,6 +29,7 @@ __all__ = [
 ]
 
 _WARM = 20.0
+"""Degrees Celsius: reference temperature of lengths (ISO 1)."""
 
 
 @dataclass

@@ -18,6 +18,8 @@ from winchkit.sim.physics.state import State
 __all__ = ["MaxwellPulleys"]
 
 _ELEMENTS = 4
+"""The chords of four elements differ from the parabola of infinitely many by at most 1.6 % (1/64)
+of the sliding force."""
 _SHARES = tuple((2 * n + 1) / _ELEMENTS**2 for n in range(_ELEMENTS))
 """Share of each element in the sliding force; the sum is one."""
 

@@ -7,6 +7,8 @@ from math import ceil
 __all__ = ["relax"]
 
 _SMALL = 0.2
+"""Step of the classical Runge-Kutta method in relaxation distances: its error (0.2^5/120) is 3e-6
+of the limit."""
 _ABRUPT = 0.01
 """Largest step below shape 1, where the force reaches the limit with a discontinuous slope."""
 _LONG = 100.0

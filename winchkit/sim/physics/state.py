@@ -7,6 +7,7 @@ from dataclasses import dataclass
 __all__ = ["GRAVITY", "State"]
 
 GRAVITY = 9.80665
+"""Standard acceleration of gravity, m/s² (3rd CGPM, 1901; exact)."""
 
 
 @dataclass(slots=True)

@@ -24,6 +24,7 @@ __all__ = [
 ]
 
 _SLIP_TIME = 0.4
+"""s: short against a stroke, many steps of the integration."""
 
 
 @dataclass

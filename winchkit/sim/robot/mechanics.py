@@ -25,7 +25,9 @@ __all__ = ["CABLE", "ROW", "WORK", "cables", "compiled_step", "rotated", "solve"
 
 CABLE, ROW, WORK = 10, 8, 72
 _SMALL = 1e-8
+"""rad: below it the series is exact to rounding (1e-8² = 1e-16)."""
 _BEHIND = -1e-9
+"""rad: rounding of a wrap of zero, which is no full turn."""
 _TURN = 2.0 * pi
 
 
