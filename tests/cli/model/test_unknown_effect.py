@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -16,10 +17,25 @@ def cornered(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     return record_files(folder, "five-cornered drum, amplitude=0.3 mm")
 
 
-def test_the_curve_is_offered_added_and_marked(cornered: list[Path], tmp_path: Path) -> None:
-    found = answer("diagnose", *cornered, "-p", "bench-spiral")
-    assert found["verdict"] == "unknown"
-    offered = found["unexplained"]["empirical"]
+@pytest.fixture(scope="module")
+def unknown(cornered: list[Path]) -> dict[str, Any]:
+    return answer("diagnose", *cornered, "-p", "bench-spiral")
+
+
+def test_where_an_unknown_is(unknown: dict[str, Any]) -> None:
+    assert unknown["verdict"] == "unknown"
+    assert unknown["steps"] == []
+    for where in unknown["unexplained"]["where"]:
+        assert {"output", "variable", "share"} <= set(where)
+        assert set(where) <= {"output", "variable", "share", "order", "frequency"}
+    orders = [w["order"] for w in unknown["unexplained"]["where"] if "order" in w]
+    assert 5 in orders
+
+
+def test_the_curve_is_offered_added_and_marked(
+    unknown: dict[str, Any], cornered: list[Path], tmp_path: Path
+) -> None:
+    offered = unknown["unexplained"]["empirical"]
     assert "empirical-motor-torque-drum-angle" in offered
     assert (
         f"winchkit add {offered[0]}" in invoke("diagnose", *cornered, "-p", "bench-spiral").stdout
