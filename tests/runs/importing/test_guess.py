@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from logger_layouts import motion
 from winchkit.runs.columns import POSE_DIMENSIONS
@@ -685,3 +686,14 @@ def test_a_first_column_that_seldom_changes_is_no_clock(tmp_path: Path) -> None:
     path = tmp_path / "log.txt"
     path.write_text("".join(f"{24 + k // 20} {2.5 + 0.1 * (k % 7)}\n" for k in range(600)))
     assert not guess_columns(read_table(path)).used
+
+
+def test_a_vector_of_few_values_beside_a_recording_is_a_parameter(tmp_path: Path) -> None:
+    """``q`` of a robot's start pose, beside the recorded angles."""
+    m = motion()
+    path = tmp_path / "log.mat"
+    arrays = {"t": m.time, "position": m.angle, "torque": m.torque, "q": np.arange(7) / 3}
+    savemat(path, arrays)
+    found = guess_columns(read_table(path))
+    assert of(found, "motor_angle").source == "position"
+    assert "parameter" in next(a.reason for a in found.assignments if a.source == "q")

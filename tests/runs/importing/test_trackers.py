@@ -20,7 +20,7 @@ from tracker_exports import (
 from winchkit.arrays import Array
 from winchkit.errors import RunError
 from winchkit.model.robot.rotation import rotation_from_quaternion, rotation_of
-from winchkit.runs.importing.answers import Answers
+from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.clocks import joined
 from winchkit.runs.importing.formats.source import read_table
@@ -167,3 +167,19 @@ def test_a_c3d_file_is_named(tmp_path: Path) -> None:
     path.write_bytes(b"\x02P" + bytes(1022))
     with pytest.raises(RunError, match="C3D"):
         read_table(path)
+
+
+def test_the_unit_of_one_axis_of_a_pose_holds_for_the_others(tmp_path: Path) -> None:
+    """An export that does not declare its unit of length; it is asked once, and given once."""
+    path = tmp_path / "poses.csv"
+    optitrack(path)
+    lines = path.read_text().replace("Millimeters", "").replace("Meters", "")
+    path.write_text(lines)
+    (question,) = guess_columns(read_table(path)).questions
+    (option,) = question.options
+    answer = read_column(option.removeprefix('--column "').rstrip('"').replace("UNIT", "m"))
+    guess = guess_columns(read_table(path), Answers(columns=(answer,)))
+    assert not guess.questions
+    used = {item.channel: item.factor for item in guess.used}
+    assert [used[f"platform_{axis}"] for axis in "xyz"] == [1.0, 1.0, 1.0]
+    assert {"platform_qw", "platform_qx", "platform_qy", "platform_qz"} <= set(used)

@@ -80,6 +80,7 @@ def choose(
     numbered = quaternion_names([item.name for item in table.columns])
     vectors = vector_names([item.name for item in table.columns])
     free: list[Candidate] = []
+    longest = max((len(item) for item in table.columns), default=0)
     for column in table.columns:
         if column.source in given:
             channel, unit = given[column.source], read_unit(column.unit)
@@ -88,6 +89,9 @@ def choose(
             )
         else:
             found = _candidate(column, numbered)
+            if len(column) < min(FEWEST, longest / FEWEST):
+                few = f"{len(column)} values, of a parameter: others have {longest}"
+                found = Candidate(column, "", reason=few)
             if found.channel in _SCALAR and column.name in vectors:
                 found = replace(found, rank=_BY_RANK, reason=f"{found.reason}, one of x, y, z")
             (free if found.channel else choice.unused).append(found)
@@ -285,17 +289,20 @@ def _needs_date(item: Candidate) -> bool:
 
 
 def _choose_pose(poses: list[Candidate], body: str | None, choice: Choice) -> None:
-    """Pose channels of one body, where they are complete."""
+    """Pose channels of one body, where they are complete with those that are given."""
     if not poses:
         return
-    chosen, bodies = chosen_body([item.column for item in poses], body)
+    given = [item for item in choice.chosen if item.channel in (*POSE_DIMENSIONS, *MATRIX)]
+    if body is None and given:
+        body = body_of(given[0].column)
+    chosen, bodies = chosen_body([item.column for item in (*given, *poses)], body)
     if chosen is None:
         wanted = f"no body '{body}'" if body is not None else "which body is the platform?"
         options = tuple(f'--body "{name}"' for name in bodies)
         choice.questions.append(Question(f"{wanted} The file has {', '.join(bodies)}", options))
         choice.unused += [replace(i, channel="", reason="one of several bodies") for i in poses]
         return
-    own: dict[str, Candidate] = {}
+    own = {item.channel: item for item in given}
     for item in poses:
         if body_of(item.column) == chosen:
             own.setdefault(item.channel, item)

@@ -62,11 +62,12 @@ def ask_signs(work: Work) -> None:
 def ask_units(work: Work) -> None:
     """Ask the unit or the constant of every column that has none.
 
-    Of columns of several winches that are named alike the first one is asked.
+    Of columns of several winches that are named alike, and of the axes of a pose, the first one is
+    asked.
     """
     unknown = [item for item in work.columns if item.factor is None]
     for number, item in enumerate(unknown):
-        if any(o.base == item.base and is_alike(o, item) for o in unknown[:number]):
+        if any(is_alike(o, item) for o in unknown[:number]):
             continue
         _ask_unit(work, item)
 

@@ -31,6 +31,10 @@ from winchkit.units import UNITS
 __all__ = ["as_others", "by_convention", "is_alike", "started"]
 
 _TURN = 2 * math.pi
+_AXES = (
+    {"platform_x", "platform_y", "platform_z"},
+    {"platform_roll", "platform_pitch", "platform_yaw"},
+)
 _TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
 _SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
 _SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "effort", "thetadot", "dtheta"}
@@ -164,21 +168,26 @@ def _gain(table: Table) -> float | None:
 
 
 def as_others(work: Work) -> None:
-    """Units of columns that are named like one of another winch whose unit is known."""
+    """Units of columns that are named like one of another winch, and of the axes of a pose."""
     for item in work.columns:
         winch = item.candidate.channel.rpartition(".")[0]
-        if item.factor is not None or not winch or item.column.unit:
+        is_one_of_several = winch or any(item.base in axes for axes in _AXES)
+        if item.factor is not None or not is_one_of_several or item.column.unit:
             continue
         for other in work.columns:
-            same = other.base == item.base and not other.column.unit
-            if same and other.factor is not None and is_alike(item, other):
+            is_known = other.factor is not None and not other.column.unit
+            if is_known and is_alike(item, other):
                 text = f"as '{other.column.source}'"
-                item.settle(abs(other.factor), other.unit, "derived", text)
+                item.settle(abs(other.factor or math.nan), other.unit, "derived", text)
                 break
 
 
 def is_alike(one: ChosenColumn, other: ChosenColumn) -> bool:
-    """Whether the names of two columns differ in the name of the winch only."""
+    """Whether two columns have one unit: names that differ in the winch only, axes of a pose."""
+    if any({one.base, other.base} <= axes for axes in _AXES):
+        return True
+    if one.base != other.base:
+        return False
     pairs = [(item.column, item.candidate.channel) for item in (one, other)]
     return stem_of(*pairs[0]) == stem_of(*pairs[1])
 
