@@ -50,6 +50,7 @@ CONTROL_CHARACTERS = re.compile(
 """Control and format characters of Unicode (Cc, Cf, Zl, Zp) and lone surrogates, except line feed
 and tab: they control a terminal, or make one text look like another."""
 _MOST_SUGGESTIONS = 5
+"""Names in a suggestion: one line; more are no help."""
 
 
 class WinchkitError(Exception):

@@ -22,9 +22,11 @@ __all__ = ["MulticastPort"]
 _QUEUE = 1 << 20
 """Bytes of the socket's queue."""
 _LONGEST = 4096
+"""Bytes: more than a CAN frame in python-can's encoding, some hundred."""
 _SO_ATTACH_FILTER, _SO_TIMESTAMPNS = 26, 35
 _STAMP = struct.Struct("@ll")
 _ANCILLARY = 64
+"""Bytes: one control message with a time stamp of two longs has 32."""
 _INSTRUCTION = struct.Struct("=HBBI")
 _LOAD_WORD, _LOAD_HALF, _JUMP_EQUAL, _RETURN = 0x20, 0x28, 0x15, 0x06
 """Classic BPF; a datagram begins with the sender's port."""

@@ -63,6 +63,7 @@ UNITS: dict[str, dict[str, float]] = {
 }
 _QUANTITY = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?inf)\s*(.*)", re.ASCII)
 _ZERO_CELSIUS = 273.15
+"""K (exact by the definition of the degree Celsius)."""
 
 
 def article(noun: str) -> str:

@@ -18,6 +18,8 @@ from winchkit.estimation.kernels import PLAIN, STATE_SLOTS, Kernels
 __all__ = ["DahlEstimator", "PlatformTension"]
 
 _UNIFORM = 3.0**-0.5
+"""Standard deviation of a uniform distribution from −1 to 1: friction that is unknown within its
+limit."""
 
 
 class PlatformTension(NamedTuple):

@@ -20,6 +20,7 @@ _AHEAD = 4
 _LOSSES = 3
 """Lost workers after which a task counts as the cause and fails."""
 _PATIENCE = 30.0
+"""s: a scheduler answers at once, and workers of a cluster that is starting come within it."""
 
 
 def cluster_outcomes(

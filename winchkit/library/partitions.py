@@ -33,6 +33,7 @@ FOLDER = ".winchkit-library"
 _EMPTY = "%"
 """Folder of a winch without a name: never the encoding of one."""
 _POLL = 0.05
+"""s: not noticed by a user."""
 Row = dict[str, Any]
 """A row of a table by column."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from math import pi
 from typing import Annotated, Literal
 from urllib.parse import urlsplit
 
@@ -19,7 +20,7 @@ __all__ = ["LostWinch", "RobotWiring", "TrackerWiring"]
 
 LostWinch = Literal["stop-together"]
 """Declared reaction of the other winches where one is lost: all make a quick stop."""
-_DEG = 0.017453292519943295
+_DEG = pi / 180
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,8 @@ __all__ = [
 _DEMO = "demo-"
 _PROGRAMME = "programme-"
 _SIZES = (0.8, 1.3)
+"""Factors of hidden effects in a random bench: sizes differ from the declared ones by more than any
+uncertainty, and stay plausible."""
 
 
 def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:

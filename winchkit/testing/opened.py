@@ -22,9 +22,11 @@ from winchkit.testing.recording import Recording
 __all__ = ["OpenedBench"]
 
 _POLL = 2e-3
+"""s: half a cycle of the usual 4 ms."""
 _WALL = 10.0
 """How many times longer than on the bench's clock a wait may last on a machine that is busy."""
 _LEAST_WALL = 20.0
+"""s: a process that starts, and a machine that stands still, are no failure."""
 
 
 class OpenedBench:

@@ -35,6 +35,7 @@ _BATCHES = 10
 """The mean's standard error by batch means holds for correlated noise; ten batches give it with 24
 % (1/√(2·9))."""
 _FEWEST, _ENOUGH = 2, 20
+"""Readings: two have a standard deviation; 20 have a mean with a quarter of their noise."""
 _PATIENCE = 5.0
 """So long it waits for enough readings of a slow instrument, s."""
 

@@ -57,6 +57,7 @@ _REPLY_TIME = 0.1
 _PRE_OPERATIONAL = 0x80
 """NMT command specifier "enter pre-operational" (CiA 301)."""
 _HALF = 1 << 31
+"""Half the range of 6064h (INTEGER32), past which its counts wrap."""
 
 
 @dataclass(frozen=True)

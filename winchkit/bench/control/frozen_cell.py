@@ -37,6 +37,7 @@ __all__ = ["Frozen", "FrozenCell", "HangingLoad"]
 _CONFIDENCE = 1e-9
 """Probability of a live cell that a run of repeats as long as the one that trips begins."""
 _HOURS = 1000 * 3600.0
+"""s: one false alarm in 1000 hours of readings at most."""
 _BLOCK, _BLOCKS = 200, 10
 """Conversions at rest of one estimate of the noise, and number of estimates that are kept."""
 _BY_STEPS = (1, 2, 4, 8, 16, 32)

@@ -45,7 +45,9 @@ SWITCH = 1e-4
 YOUNG = 2000
 """Objects in the young generation of the garbage collector."""
 _NEVER = 2**30
+"""Collections of a younger generation before one of an older: none in a run of any length."""
 _CURRENT, _FUTURE, _ON_FAULT = 1, 2, 4
+"""MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT (sys/mman.h)."""
 
 _Scheduling = tuple[int, int]
 """Policy and priority of a thread."""

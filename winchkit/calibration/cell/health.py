@@ -19,6 +19,7 @@ from winchkit.errors import RunError
 __all__ = ["Creep", "Health", "Hum", "Samples", "examine", "samples_of"]
 
 _MAINS = (50.0, 60.0)
+"""Hz: the two mains frequencies in use."""
 _FEWEST = 20
 """A standard deviation from 20 readings is known to 16 % (1/√(2·19))."""
 _SIGNIFICANT = 4.0

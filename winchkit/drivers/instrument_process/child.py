@@ -48,6 +48,7 @@ _TICK = 0.02
 """Between two reports of what has changed beside the readings, s; a message goes out at least every
 second time, so that a silent process is known within a fraction of the age limit of a reading."""
 _CHUNK = 1 << 16
+"""Bytes: capacity of a pipe on Linux."""
 _END = 4.0
 """Closing the lines takes at most so long, s; then the process ends all the same."""
 

@@ -35,6 +35,7 @@ __all__ = ["InstrumentProcess"]
 
 _MODULE = "winchkit.drivers.instrument_process.child"
 _CHUNK = 1 << 16
+"""Bytes: capacity of a pipe on Linux."""
 _START = 30.0
 """The interpreter and its imports take 1 s, on a computer under load several times as long, s."""
 _END = 5.0

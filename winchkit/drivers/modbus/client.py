@@ -31,9 +31,12 @@ from winchkit.schema.devices.modbus import ReadBlock
 __all__ = ["ModbusClient"]
 
 _NEVER = 1 << 30
+"""The library closes a connection after so many unanswered requests: here one silent unit does not
+close the line of others."""
 _KEPT = 256
 """Events kept of a unit that is not read, e.g. of another master's devices."""
 _ACKNOWLEDGE, _BUSY = 5, 6
+"""Exception codes 05 and 06 of the Modbus application protocol."""
 _EXCEPTIONS = {
     1: "illegal function",
     2: "illegal address",

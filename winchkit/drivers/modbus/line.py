@@ -17,6 +17,8 @@ from winchkit.schema.bench import BusSpec
 __all__ = ["ModbusLine"]
 
 _OPENING, _POLL = 1.0, 0.01
+"""s that a command waits for a line that is being opened, a few attempts to connect; and between
+two looks."""
 _LEAST = {"modbus-rtu": 1e-4, "modbus-tcp": 1e-3}
 """What a reading is reckoned with at least, s: over TCP no line is in the way, but this process
 has a control loop to run."""

@@ -14,6 +14,7 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, variables_of
 from winchkit.diagnosis.residuals.traces import Trace, traces_of
+from winchkit.model.line import GRAVITY
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import (
@@ -44,7 +45,6 @@ _SAME = 1e-3
 _SPREAD = 0.2
 _DEGREES = 360.0
 _TURN = 2 * np.pi
-_GRAVITY = 9.81
 _COMMON = pattern(r"^(?:motion[-_ ])?programme[-_ ]")
 
 
@@ -128,7 +128,7 @@ def run_names(dataset: Dataset) -> list[str]:
         signals = recording.signals
         mass = signals.load_mass
         if mass is None and signals.load is not None:
-            mass = float(np.nanmedian(signals.load)) / _GRAVITY
+            mass = float(np.nanmedian(signals.load)) / GRAVITY
         programme = _COMMON.sub("", recording.programme)
         load = "" if mass is None or not np.isfinite(mass) else f"{plain(mass, 3)} kg"
         texts.append(f"{programme} {load}".strip() or recording.name)

@@ -19,6 +19,7 @@ from winchkit.schema.eds.repair import Findings, Section, canonical, canonical_k
 __all__ = ["EdsText", "read_eds_text"]
 
 _LARGEST = 8_000_000
+"""Bytes: an EDS has some hundred kilobytes; a wrong file does not fill the memory."""
 _SECTION = re.compile(r"\[\s*(.*?)\s*\]\s*$")
 _INLINE_COMMENT = re.compile(r"\s;.*$")
 _LISTS = ("mandatoryobjects", "optionalobjects", "manufacturerobjects")

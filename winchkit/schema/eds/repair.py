@@ -116,6 +116,7 @@ def canonical_key(key: str) -> str:
 
 _VAR, _DOMAIN, _ARRAY, _RECORD = 0x7, 0x2, 0x8, 0x9
 _FIRST_OBJECT = 0x1000
+"""Lower indices are data types (CiA 301)."""
 _MANDATORY = (0x1000, 0x1001, 0x1018)
 _LISTS = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
 _NUMBERS = (
@@ -144,6 +145,7 @@ _OCTAL = re.compile(r"0[0-7]+$")
 _NODE_ID = re.compile(r"\$NODEID", re.IGNORECASE)
 _BYTES = "0x000F"
 _LAST_STANDARD = 0x1B
+"""Data types to 001Bh are the standard's (UNSIGNED64); later ones are structures or a maker's."""
 _ACCESS = ("ro", "rw", "wo", "const", "rwr", "rww")
 
 

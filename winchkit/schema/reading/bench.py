@@ -27,6 +27,7 @@ ROLES = ("servo", "cell", "load", "length", "temperature")
 _MEASURED = {"cell": "force", "load": "force", "length": "length", "temperature": "temperature"}
 """What an instrument of each role measures."""
 _FORCE_OF_MASS = 9.80665
+"""Standard acceleration of gravity, m/s²."""
 DeviceReader = Callable[[str | Path], DeviceSpec]
 RobotReader = Callable[[str | Path], RobotProfile]
 _FITTING = {

@@ -32,7 +32,9 @@ KINDS = (
     "mapping",
 )
 SCHEMA = 1
+"""Of declarations, which counts on with each change that an older winchkit does not read."""
 _LARGEST = 4_000_000
+"""Bytes: a declaration has some kilobytes; a wrong file does not fill the memory."""
 _LOGGER = logging.getLogger(__name__)
 
 

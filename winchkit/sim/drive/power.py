@@ -87,6 +87,7 @@ def command_of(word: int) -> Command:
 
 
 _ABORT_FAULT, _ABORT_DISABLE, _ABORT_QUICK_STOP = 1, 2, 3
+"""Values of 6007h, abort connection option code (CiA 402)."""
 _STAYS = 5
 """Lowest quick-stop option code with which the drive stays in Quick Stop Active."""
 

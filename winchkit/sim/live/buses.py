@@ -133,6 +133,8 @@ _BETWEEN_PROCESSES = 0.2
 """Least heartbeat period of a bench that is served to other processes, s: its drives run in a
 program of normal priority, which may be suspended for up to 0.25 s."""
 _PROBE = 0x7FF, b""
+"""An empty frame with the lowest priority, which no CANopen device uses (CiA 301: 701h to 77Fh are
+heartbeats)."""
 _ROUTE = (
     "this machine has no route for multicast; add one with: ip route add 239.0.0.0/8 dev lo "
     "(as root), or keep to one process with the interface 'virtual'"

@@ -24,6 +24,8 @@ from typing import Any
 __all__ = ["CABLE", "ROW", "WORK", "cables", "compiled_step", "rotated", "solve", "step"]
 
 CABLE, ROW, WORK = 10, 8, 72
+"""Floats of a cable, of a row of results, and of the working space: lengths of the sequences above.
+"""
 _SMALL = 1e-8
 """rad: below it the series is exact to rounding (1e-8² = 1e-16)."""
 _BEHIND = -1e-9
