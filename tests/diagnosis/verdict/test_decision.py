@@ -8,12 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
-from winchkit.diagnosis.diagnose import diagnose
+from diagnosis_runs import CATALOGUE, GROOVED, Array, Ride, made, term, with_channel
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.results import Diagnosis
+from winchkit.diagnosis.selection.stepwise import initial_result
+from winchkit.diagnosis.verdict.decision import judge
 from winchkit.effects.term import Term
 from winchkit.report.words.sentence import sentence
-from winchkit.runs.run import Run
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import EffectTable
 
 RIDE = Ride(samples=400)
@@ -142,3 +147,39 @@ def test_candidates_are_ranked_and_the_first_ones_fitted() -> None:
         found.outputs["motor_torque"].heldout_rms_after, rel=0.05
     )
     assert found.candidates[-1].heldout_rms == {}
+
+
+def test_the_verdict_holds_out_what_the_other_runs_determine() -> None:
+    """Cogging and a ripple of the friction of one order: one direction determines their sum only.
+
+    The model is right. A run left out is predicted by values that the other one does not determine,
+    whether or not a lack of fit remains.
+    """
+    noise_rms, order = 2e-4, 24
+    moves = []
+    for index, direction in enumerate((1.0, -1.0)):
+        time = np.arange(0.0, 30.0, 0.01)
+        angle = direction * (0.5 * time + 0.2 * np.sin(time))
+        torque = direction * 0.01 * (1 + 0.05 * np.sin(order * angle + 0.4))
+        torque += 5e-4 * np.cos(order * angle + 1.0)
+        torque += noise_rms * np.random.default_rng(index).standard_normal(len(time))
+        channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+        moves.append(Run(f"{index}", time, channels, {}))
+    joint = AxisProfile(name="joint")
+    engine = selection_engine(prepare(moves, joint, fast=True), CATALOGUE)
+    hypothesis = engine.initial_model
+    for one in (
+        term("motor-coulomb", torque=0.01),
+        term("motor-cogging", amplitude=5e-4, phase=1.0, order=order),
+        term("torque-ripple", amplitude=0.05, phase=0.4, order=order),
+    ):
+        hypothesis = hypothesis.with_term(one, engine.regression.n_runs)
+    fit, noise = engine.fit_with_noise(hypothesis)
+    first = initial_result(engine)
+    regression = engine.regression
+    assert held_out_rms(regression, fit, noise, regression.groups)["motor_torque"] > 2 * noise_rms
+    for lacking in (False, True):
+        result = replace(first, final=fit, noise=noise, lack_of_fit=lacking)
+        found = judge(engine, result)
+        assert found.outputs["motor_torque"].heldout_rms_after < 1.1 * noise_rms
+        assert found.verdict == "explained"

@@ -25,9 +25,14 @@ class DetectionThreshold:
     score_threshold: float
     """1 % level of the largest score under noise alone."""
 
-    def required_ss(self, n_parameters: int) -> float:
-        """Decrease of χ² that an effect with this number of parameters must reach."""
-        return max(self.score_threshold, 0.0) + self.penalty_per_parameter * n_parameters
+    def required_ss(self, n_parameters: int, by_chance: float = np.inf) -> float:
+        """Decrease of χ² that an effect with this number of parameters must reach.
+
+        ``by_chance`` is the threshold of this effect alone, see
+        :class:`~winchkit.diagnosis.selection.scores.Score`; the lower one counts.
+        """
+        threshold = min(self.score_threshold, by_chance)
+        return max(threshold, 0.0) + self.penalty_per_parameter * n_parameters
 
     def power(self, noncentrality: float, n_parameters: int) -> float:
         """Probability that an effect of noncentrality λ reaches it."""
@@ -60,9 +65,8 @@ def detectable(scores: tuple[Score, ...], threshold: DetectionThreshold) -> tupl
         effect = item.candidate.effect
         if item.noncentrality <= 0:
             continue
-        size = (
-            np.sqrt(threshold.required_ss(item.candidate.n_parameters)) + _POWER_QUANTILE
-        ) / np.sqrt(item.noncentrality)
+        required = threshold.required_ss(item.candidate.n_parameters, item.by_chance)
+        size = (np.sqrt(required) + _POWER_QUANTILE) / np.sqrt(item.noncentrality)
         usual_step = item.candidate.usual_steps[0]
         name = next(iter(usual_step))
         parameter = effect.parameter(name)

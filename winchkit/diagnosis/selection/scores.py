@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtri
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
@@ -25,11 +26,21 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.projection import inverse_information
 from winchkit.diagnosis.selection.signatures import Candidate, Signatures
 
-__all__ = ["Projected", "Score", "null_maxima", "score", "zero_score"]
+__all__ = [
+    "Projected",
+    "Score",
+    "effective_dof",
+    "null_maxima",
+    "score",
+    "score_by_chance",
+    "zero_score",
+]
 
 _NOTHING = 1e-300
 _SIMULATIONS = 400
 _WELL_KNOWN = 100.0
+_LEVEL = 0.01
+_MOST_DOF = 1e6
 _UNIDENTIFIABLE = 1e-7
 _ROUNDING = 1e-9
 
@@ -50,6 +61,9 @@ class Score:
         Best amplitudes, in usual-size steps.
     noncentrality : float
         λ of one usual size: squared length of its whitened, projected signature.
+    by_chance : float
+        Score that noise alone exceeds for this or any other candidate in at most 1 % of cases, by
+        the degrees of freedom of the noise where this one acts.
     """
 
     candidate: Candidate
@@ -57,6 +71,11 @@ class Score:
     net_gain: float
     amplitudes: Array
     noncentrality: float
+    by_chance: float = np.inf
+
+    def is_significant(self, threshold: float) -> bool:
+        """Whether it exceeds what noise gives it, or the threshold of the largest of all scores."""
+        return self.net_gain > min(threshold, self.by_chance)
 
 
 class Projected:
@@ -97,6 +116,7 @@ class Projected:
         self.inner = _projected(gram, cross, normal, self._through)
         """Inner products of the whitened, projected columns, (p, p)."""
         plain = np.einsum("b,bii->i", share, signatures.gram)
+        self._dof_of_column = self._degrees_of_freedom()
         self._roots = [self._root(candidate, plain) for candidate in signatures.candidates]
 
     def products(self, residual: Array) -> Array:
@@ -124,6 +144,26 @@ class Projected:
         """λ of one usual size of a candidate; zero where it is not identifiable."""
         first = self.signatures.candidates[index].columns.start
         return float(self.inner[first, first]) if self._roots[index].shape[1] else 0.0
+
+    def degrees_of_freedom(self, index: int) -> float:
+        """Degrees of freedom of the noise variance in a candidate's score."""
+        candidate = self.signatures.candidates[index]
+        return float(np.min(self._dof_of_column[candidate.columns]))
+
+    def _degrees_of_freedom(self) -> Array:
+        """Satterthwaite's degrees of freedom of the variance of every column's amplitude, (p,).
+
+        A column has the share sᵢ of its information in a band of νᵢ degrees of freedom:
+        1/ν = Σ sᵢ²/νᵢ.
+        """
+        own = np.einsum("bii->bi", self.signatures.gram)
+        mixed = np.einsum("bqi,qi->bi", self._cross, self._through)
+        there = np.einsum(
+            "qi,bqr,ri->bi", self._through, self._normal, self._through, optimize=True
+        )
+        parts = np.maximum(self._share[:, None] * (own + 2 * mixed + there), 0.0)
+        shares = parts / np.maximum(np.sum(parts, axis=0), _NOTHING)
+        return effective_dof(shares, self._dof)
 
     def simulated(self, samples: int = _SIMULATIONS) -> Array:
         """Products that noise alone gives, its variance drawn too; shape (p, n_samples)."""
@@ -175,6 +215,48 @@ class Projected:
         return np.asarray((vectors[:, kept] / np.sqrt(values[kept])) / size[:, None])
 
 
+def effective_dof(shares: Array, dof: Array) -> Array:
+    """Satterthwaite's degrees of freedom of a weighted sum of variances.
+
+    Parameters
+    ----------
+    shares
+        Share of every band in the sum, shape (n_bands,) or (n_bands, p).
+    dof
+        Degrees of freedom of the bands, shape (n_bands,).
+
+    References
+    ----------
+    Satterthwaite, F. E. (1946). An approximate distribution of estimates of variance components.
+    Biometrics Bulletin 2, 110-114.
+    """
+    return np.asarray(1 / np.maximum(np.sum((shares.T**2) / dof, axis=-1), 1 / _MOST_DOF))
+
+
+def score_by_chance(penalty: float, columns: int, dof: float, candidates: int) -> float:
+    """Score that noise alone exceeds for one of all candidates in at most 1 % of cases.
+
+    Parameters
+    ----------
+    penalty
+        Penalty of the effect's parameters.
+    columns
+        Number of amplitudes that are fitted linearly.
+    dof
+        Degrees of freedom of the noise variance where the effect acts.
+    candidates
+        Number of candidates at all points of their shape grids (Bonferroni).
+
+    Returns
+    -------
+    float
+        k F(k, ν), its quantile at 1 % over the candidates, less the penalty; at least zero.
+    """
+    columns = max(1, columns)
+    quantile = columns * float(fdtri(columns, dof, 1 - _LEVEL / max(1, candidates)))
+    return max(0.0, quantile - penalty)
+
+
 def _projected(gram: Array, cross: Array, normal: Array, through: Array) -> Array:
     """Inner products of columns after partialling out by ``through``, shape (p, p)."""
     mixed = cross.T @ through
@@ -210,14 +292,20 @@ def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
     for index, explained_ss in enumerate(projected.explained_ss(products).tolist()):
         candidate = projected.signatures.candidates[index]
         net_gain = explained_ss - candidate.n_parameters * float(np.log(rows))
-        noncentrality = projected.noncentrality(index)
+        by_chance = score_by_chance(
+            explained_ss - net_gain,
+            candidate.columns.stop - candidate.columns.start,
+            projected.degrees_of_freedom(index),
+            len(projected.signatures.candidates),
+        )
         out.append(
             Score(
                 candidate,
                 explained_ss,
                 net_gain,
                 projected.amplitudes(index, products),
-                noncentrality,
+                projected.noncentrality(index),
+                by_chance,
             )
         )
     return sorted(out, key=lambda s: -s.net_gain)

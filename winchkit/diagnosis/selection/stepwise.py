@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import dropwhile
 
 import numpy as np
 
@@ -158,7 +159,8 @@ def _forward_selection(
     while present.labels not in seen:
         seen.add(present.labels)
         larger = None
-        if scores and scores[0].net_gain > threshold:
+        # Where the noise is hardly known, it gives large scores to what acts there alone.
+        if scores := list(dropwhile(lambda item: not item.is_significant(threshold), scores)):
             trials = _short_list(engine, present, noise, scores)
             larger = best_accepted(engine, present, noise, trials)
             if larger is None and any(trial.fit.abandoned for trial in trials):
@@ -217,11 +219,11 @@ def _has_lack_of_fit(
 ) -> bool:
     """Whether the residual contains more than noise.
 
-    With repeats by the lack-of-fit test alone; without repeats by the largest score.
+    With repeats by the lack-of-fit test alone; without repeats by the scores.
     """
     if np.isfinite(lack_of_fit_test.p_value):
         return lack_of_fit_test.p_value < _LACK_OF_FIT_LEVEL
-    return bool(scores) and scores[0].net_gain > threshold
+    return any(item.is_significant(threshold) for item in scores)
 
 
 def _short_list(

@@ -67,9 +67,8 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     two.
     """
     share = _unexplained(engine, result)
-    folds = _folds(engine, result)
     outputs = output_fits(
-        engine, (result.initial_model, result.initial_noise), (result.final, result.noise), folds
+        engine, (result.initial_model, result.initial_noise), (result.final, result.noise)
     )
     verdict = _verdict(result, outputs, share)
     added = result.final.labels[engine.n_initial_terms :]
@@ -94,7 +93,7 @@ def withheld(
 def named(engine: SelectionEngine, result: SelectionResult, judgement: Judgement) -> Judgement:
     """The same verdict with the names of all additions, which explain a part."""
     before, after = (result.initial_model, result.initial_noise), (result.final, result.noise)
-    outputs = output_fits(engine, before, after, _folds(engine, result))
+    outputs = output_fits(engine, before, after)
     return Judgement(judgement.verdict, judgement.share, outputs, result, ())
 
 
@@ -105,7 +104,7 @@ def reweighted_judgement(engine: SelectionEngine, judgement: Judgement) -> Judge
     if best.fit is reported.final:
         return judgement
     before, after = (reported.initial_model, reported.initial_noise), (best.fit, best.noise)
-    outputs = output_fits(engine, before, after, _folds(engine, reported))
+    outputs = output_fits(engine, before, after)
     return replace(
         judgement,
         outputs=outputs,
@@ -118,7 +117,7 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     """Share of the excess over the noise that the final model leaves, larger of two estimates."""
     if not result.lack_of_fit_at_start:
         return 0.0
-    folds = _folds(engine, result)
+    folds = engine.folds(result.final, result.noise)
     held_out_errors = [
         held_out_rms(engine.regression, fitted, result.noise, folds)
         for fitted in (result.initial_model, result.final)
@@ -150,13 +149,6 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
             share if share > _HELD_OUT_SHARE else 0.0, after / before if before > 0 else 0.0
         )
     return min(1.0, share)
-
-
-def _folds(engine: SelectionEngine, result: SelectionResult) -> Folds:
-    """Groups of runs while lack of fit remains, where imitations fail; else folds of the fit."""
-    return (
-        engine.regression.groups if result.lack_of_fit else engine.folds(result.final, result.noise)
-    )
 
 
 def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: float) -> Verdict:

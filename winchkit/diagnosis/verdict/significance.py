@@ -18,12 +18,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.intervals import Spread, spread_of
+from winchkit.diagnosis.regression.intervals import Spread, spread_of, whitened_jacobian
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.scores import effective_dof, score_by_chance
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.effects.parametrization import Coordinates
@@ -31,6 +34,7 @@ from winchkit.effects.parametrization import Coordinates
 __all__ = ["excess_evidence", "insignificant_addition", "variance_inflation"]
 
 _UNIDENTIFIABLE = 1e-9
+_NOTHING = 1e-300
 
 
 def insignificant_addition(
@@ -117,13 +121,36 @@ def excess_evidence(
     -------
     float
         Decrease of χ² by the effect, the others refitted, over its variance inflation, less the
-        penalty of its parameters and the threshold.
+        penalty of its parameters and the threshold, or less what noise gives this effect by the
+        degrees of freedom where it acts.
     """
     without = fitted.hypothesis.without(index)
     penalty = engine.penalty(fitted.hypothesis) - engine.penalty(without)
     decrease = engine.refit(without, noise).chi_square - fitted.chi_square
     inflation = variance_inflation(engine.regression, fitted, spread, index)
-    return decrease / inflation - penalty - threshold
+    by_chance = score_by_chance(
+        penalty,
+        _amplitudes(engine.regression, fitted, index).size,
+        _degrees_of_freedom(engine.regression, fitted, noise, index),
+        len(engine.signatures.candidates),
+    )
+    return decrease / inflation - penalty - min(threshold, by_chance)
+
+
+def _amplitudes(regression: Regression, fit: Fit, index: int) -> NDArray[np.intp]:
+    """Places of an effect's amplitudes among the unknowns."""
+    amplitudes = Coordinates(fit.hypothesis.terms[index].effect).amplitudes
+    return np.flatnonzero(regression.unknowns_of(index, fit.hypothesis))[: len(amplitudes)]
+
+
+def _degrees_of_freedom(regression: Regression, fit: Fit, noise: Noise, index: int) -> float:
+    """Degrees of freedom of the noise variance where an effect acts beside the others."""
+    own = _amplitudes(regression, fit, index)
+    columns = whitened_jacobian(regression, fit, noise)
+    beside = partialled_out(np.delete(columns, own, axis=1), columns[:, own])
+    information, bands = np.sum(beside**2, axis=1), regression.band_of_row
+    shares = np.bincount(bands, weights=information, minlength=len(regression.bands))
+    return float(effective_dof(shares / max(float(np.sum(shares)), _NOTHING), noise.dof))
 
 
 def variance_inflation(regression: Regression, fit: Fit, spread: Spread, index: int) -> float:
@@ -152,8 +179,7 @@ def variance_inflation(regression: Regression, fit: Fit, spread: Spread, index: 
     correlations of the linearised fit. For one amplitude it is the squared widening; of several
     amplitudes it is the inflation of the combination that the fit found.
     """
-    amplitudes = Coordinates(fit.hypothesis.terms[index].effect).amplitudes
-    own = np.flatnonzero(regression.unknowns_of(index, fit.hypothesis))[: len(amplitudes)]
+    own = _amplitudes(regression, fit, index)
     if not own.size:
         return 1.0
     covariance = spread.covariance[np.ix_(own, own)]
