@@ -697,3 +697,26 @@ def test_a_vector_of_few_values_beside_a_recording_is_a_parameter(tmp_path: Path
     found = guess_columns(read_table(path))
     assert of(found, "motor_angle").source == "position"
     assert "parameter" in next(a.reason for a in found.assignments if a.source == "q")
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["linear_acceleration.x", "linear.y", "angular.z", "angular_velocity.x", "wrench.force.y",
+     "twist.linear.x", "magnetic_field.z", "imu acc x", "gyro_z"],
+)  # fmt: skip
+def test_components_of_motion_are_no_position(name: str) -> None:
+    meaning = meaning_of(name)
+    assert meaning is not None
+    assert meaning.channel == ""
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [("pose.position.x", "platform_x"), ("transform.translation.z", "platform_z"),
+     ("pose.orientation.x", "platform_qx"), ("position.y", "platform_y"),
+     ("linear_position.x", "platform_x")],
+)  # fmt: skip
+def test_components_of_a_pose_are_its_position(name: str, channel: str) -> None:
+    meaning = meaning_of(name)
+    assert meaning is not None
+    assert meaning.channel == channel

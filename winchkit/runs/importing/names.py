@@ -72,6 +72,14 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         1,
         IGNORED,
     ),
+    # Components of an acceleration, a twist, a wrench or a magnetic field: no position.
+    (
+        r"^(?!.*\b(position|pos|translation|orientation|rotation)\b).*"
+        r"\b(acceleration|accel\w*|acc|gyro\w*|gravity|magnetic|magnetometer|mag|twist|wrench|"
+        r"linear|angular)\b.* [xyz]$",
+        1,
+        IGNORED,
+    ),
     # Quantities of the tool of a robot.
     (r"\btcp\b", 1, IGNORED),
     # Torques of what the motor drives: of a brake on a test bench, of the load.
