@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -100,6 +102,14 @@ def test_a_socket_without_the_token_or_from_elsewhere_is_closed(client: TestClie
         ):
             pass
         assert refused.value.code == 1008
+
+
+def test_the_server_starts_without_the_statistics_of_a_fleet() -> None:
+    code = "import sys; import winchkit.web.application; print('scipy.stats' in sys.modules)"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert done.stdout == "False\n"
 
 
 def test_nothing_but_this_server_may_be_loaded(client: TestClient) -> None:

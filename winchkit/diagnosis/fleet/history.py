@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy.stats import false_discovery_control
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.fleet.changes import Change, Series, change_of, session_variance
@@ -318,6 +317,9 @@ def _p_value(change: Change | None) -> float:
 
 def _adjusted(p_values: Sequence[float], *, dependent: bool) -> list[float]:
     """Adjusted p-values; NaN stays."""
+    # As long to import as everything else that the page of a server needs before it starts.
+    from scipy.stats import false_discovery_control
+
     p = np.array(p_values, dtype=np.float64)
     there = np.isfinite(p)
     if there.any():
