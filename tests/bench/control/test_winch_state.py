@@ -48,7 +48,7 @@ def parts(*, faulty: bool) -> Any:
     return Made(
         axis=axis,
         controller=controller,
-        cable=Made(bends=False, at=lambda angle: (angle + 1.0, 0.5)),
+        cable=Made(has_effects=False, at=lambda angle: (angle + 1.0, 0.5)),
         frozen=Made(unstable="unstable", update=lambda *_, **__: "frozen"),
         sensors={"cell": Made(latest=None)},
         load=Made(tension=lambda *_: 0.0),
