@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from scipy.stats import f, norm
 
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Array, Ride, made, term, with_channel
 from winchkit.cli.model.plan import _silent
@@ -204,7 +204,11 @@ def test_half_the_noise_shows_half_the_size() -> None:
 
 @pytest.mark.parametrize("effect", ["cell-gain", "motor-coulomb", "drum-radius"])
 def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
-    """λ of the smallest size by its own signature in the noise that is there."""
+    """λ of the smallest size by its own signature in the noise that is there.
+
+    The level is that of the largest score or, where lower, F of this signature alone: one over all
+    candidates, with Satterthwaite's degrees of freedom.
+    """
     engine = selection_engine(dataset(), CATALOGUE)
     item = smallest(1.0)[effect]
     regression = engine.regression
@@ -220,7 +224,11 @@ def test_the_smallest_size_is_what_matched_filters_say(effect: str) -> None:
     if other.shape[1]:
         left = left - other @ np.linalg.lstsq(other, left, rcond=None)[0]
     chance = null_maxima(engine.projected(present, known), regression.n_rows)
-    needed = max(0.0, float(np.quantile(chance, 0.99))) + engine.penalty_per_parameter
+    information = np.bincount(regression.band_of_row, weights=left**2, minlength=len(known.dof))
+    dof = np.sum(information) ** 2 / np.sum(information**2 / known.dof)
+    alone = f.isf(0.01 / len(engine.signatures.candidates), 1, dof)
+    largest = float(np.quantile(chance, 0.99)) + engine.penalty_per_parameter
+    needed = max(engine.penalty_per_parameter, min(largest, alone))
     assert np.sqrt(left @ left) == pytest.approx(np.sqrt(needed) + norm.ppf(0.9), rel=0.02)
 
 
