@@ -701,7 +701,7 @@ def test_a_vector_of_few_values_beside_a_recording_is_a_parameter(tmp_path: Path
 
 @pytest.mark.parametrize(
     "name",
-    ["linear_acceleration.x", "linear.y", "angular.z", "angular_velocity.x", "wrench.force.y",
+    ["linear_acceleration.x", "linear.y", "angular.z", "angular_velocity.x",
      "twist.linear.x", "magnetic_field.z", "imu acc x", "gyro_z"],
 )  # fmt: skip
 def test_components_of_motion_are_no_position(name: str) -> None:

@@ -72,10 +72,10 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         1,
         IGNORED,
     ),
-    # Components of an acceleration, a twist, a wrench or a magnetic field: no position.
+    # Components of an acceleration, a twist or a magnetic field: no position.
     (
         r"^(?!.*\b(position|pos|translation|orientation|rotation)\b).*"
-        r"\b(acceleration|accel\w*|acc|gyro\w*|gravity|magnetic|magnetometer|mag|twist|wrench|"
+        r"\b(acceleration|accel\w*|acc|gyro\w*|gravity|magnetic|magnetometer|mag|twist|"
         r"linear|angular)\b.* [xyz]$",
         1,
         IGNORED,
