@@ -127,18 +127,19 @@ def _whole_lines(path: Path) -> list[list[str]]:
 def _rows_are_recovered(path: Path, folder: Path, angles: np.ndarray) -> bool:
     """Recover every part, and compare."""
     saved = _emptied(folder / "saved")
-    for file in _files(path):
-        if _whole_lines(file):
-            recover(file, saved / file.name)
-            continue
-        try:  # killed before a row of this part was whole: there is nothing to recover
-            recover(file, saved / file.name)
-        except RunError:
-            continue
-        return False
+    parts = [_is_part_recovered(f, saved, bool(_whole_lines(f))) for f in _files(path)]
     if not len(angles):
-        return True
-    return np.array_equal(read_run(saved / path.name)["W1.motor_angle"], angles)
+        return all(parts)
+    return all(parts) and np.array_equal(read_run(saved / path.name)["W1.motor_angle"], angles)
+
+
+def _is_part_recovered(file: Path, saved: Path, has_samples: bool) -> bool:
+    """Recover one part; refused where it was killed before a sample of this part was whole."""
+    try:
+        recover(file, saved / file.name)
+    except RunError:
+        return not has_samples
+    return has_samples
 
 
 def _messages(path: Path) -> int:
@@ -183,12 +184,15 @@ def _gaps(log: Log) -> int:
 def _is_recovered(log: Log, path: Path, folder: Path) -> bool:
     """Recover every part, and compare."""
     saved = _emptied(folder / "saved")
-    for file in folder.glob("killed*"):
-        recover(file, saved / file.name)
+    parts = [_is_part_recovered(f, saved, bool(_messages(f))) for f in _files(path)]
     again = read_log(saved / path.name)
-    return again.closed is True and all(
-        np.array_equal(again.samples[topic].values, samples.values, equal_nan=True)
-        for topic, samples in log.samples.items()
+    return (
+        all(parts)
+        and again.closed is True
+        and all(
+            np.array_equal(again.samples[topic].values, samples.values, equal_nan=True)
+            for topic, samples in log.samples.items()
+        )
     )
 
 
