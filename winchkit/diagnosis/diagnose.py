@@ -43,7 +43,7 @@ from winchkit.diagnosis.verdict.decision import (
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.plausibility import implausible
-from winchkit.diagnosis.verdict.significance import insignificant_addition
+from winchkit.diagnosis.verdict.significance import insignificant_additions
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -331,7 +331,7 @@ def _answer(
         judgement = reweighted_judgement(engine, judgement)
         reported = judgement.reported
     found, spread = reported, _spread(engine, reported)
-    if (index := insignificant_addition(engine, reported, spread, sets)) is not None:
+    for index in insignificant_additions(engine, reported, spread, sets):
         fewer = without_term(engine, reported, index)
         if judge_with_specification_test(engine, fewer).reported is fewer:
             note = _insignificant_note(sets[index - added.start])

@@ -13,8 +13,14 @@ from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.selection.stepwise import initial_result
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.verdict.significance import excess_evidence, variance_inflation
+from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
+from winchkit.diagnosis.verdict.significance import (
+    excess_evidence,
+    insignificant_additions,
+    variance_inflation,
+)
 from winchkit.effects.term import Term
 
 DRAG = term("motor-coulomb", torque=0.02)
@@ -63,6 +69,24 @@ def test_evidence_is_the_decrease_of_chi_square_beyond_penalty_and_threshold() -
     assert excess_evidence(engine, final, noise, wider, 0, threshold=5.0) == pytest.approx(
         0.0, abs=1e-6
     )
+
+
+def test_insignificant_effects_come_the_weakest_first() -> None:
+    """One that has to stay must not keep the next one in the model."""
+    engine = engine_of((DRAG,))
+    terms = (term("gear-ratio", ratio_error=1e-7), DRAG, term("motor-viscous", viscosity=1e-7))
+    final, noise, spread = fitted_with(engine, terms)
+    result = replace(initial_result(engine), final=final, noise=noise, threshold=5.0)
+    sets = [
+        EquivalenceSet(one, (one.effect.id,), (one,), (final,), {})
+        for one in final.hypothesis.terms
+    ]
+    evidence = [
+        excess_evidence(engine, final, noise, spread, index, threshold=5.0) for index in range(3)
+    ]
+    assert evidence[1] > 0.0 > max(evidence[0], evidence[2])
+    found = list(insignificant_additions(engine, result, spread, sets))
+    assert found == sorted((0, 2), key=lambda index: evidence[index])
 
 
 def test_the_variance_of_one_amplitude_is_that_of_its_interval() -> None:

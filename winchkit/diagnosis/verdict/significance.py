@@ -15,7 +15,7 @@ Kent, J. T. (1982). Robust properties of likelihood ratio tests. Biometrika 69, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,19 +31,19 @@ from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["excess_evidence", "insignificant_addition", "variance_inflation"]
+__all__ = ["excess_evidence", "insignificant_additions", "variance_inflation"]
 
 _UNIDENTIFIABLE = 1e-9
 _NOTHING = 1e-300
 
 
-def insignificant_addition(
+def insignificant_additions(
     engine: SelectionEngine,
     result: SelectionResult,
     spread: Spread,
     sets: Sequence[EquivalenceSet],
-) -> int | None:
-    """The weakest addition beside others of whose set no member is significant.
+) -> Iterator[int]:
+    """Additions beside others of whose set no member is significant, the weakest first.
 
     Parameters
     ----------
@@ -56,14 +56,14 @@ def insignificant_addition(
     sets
         Equivalence set of every addition.
 
-    Returns
-    -------
-    int or None
-        Its index in the final model; None where all are significant, and for a single addition.
+    Yields
+    ------
+    int
+        Index in the final model; none for a single addition.
     """
     final, noise, first = result.final, result.noise, engine.n_initial_terms
     if len(sets) < 2:
-        return None
+        return
     excess = [
         excess_evidence(engine, final, noise, spread, first + place, threshold=result.threshold)
         for place in range(len(sets))
@@ -76,8 +76,7 @@ def insignificant_addition(
             for rival in sets[place].fits
             if rival is not final
         ):
-            return first + int(place)
-    return None
+            yield first + int(place)
 
 
 def _last_is_significant(
