@@ -317,6 +317,7 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path: Path) 
         (("--column", "tenson=x"), "did you mean 'tension'?"),
         (("--load-mass", "1 kg", "--load-mass", "2 kg"), "2 --load-mass for 1 files"),
         (("--column", "tension=nowhere"), "there is no column 'nowhere'"),
+        (("--yes", "--unsigned", "nowhere"), "--unsigned: there is no column 'nowhere'; there are"),
     ],
 )
 def test_invalid_options_are_refused_in_words(

@@ -281,6 +281,10 @@ def _guesses(
         for item in answers.columns
         if item.source and declared is None and not any(g.file.column(item.source) for g in guesses)
     ]
+    for name in answers.unsigned:
+        if not any(guess.file.column(name) for guess in guesses):
+            has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
+            raise UsageError(f"--unsigned: there is no column '{name}'; there are {has}")
     if not unknown:
         # A column of one file is no question about the others.
         guesses = [_without_foreign(guess) for guess in guesses] if len(guesses) > 1 else guesses
