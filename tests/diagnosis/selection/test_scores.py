@@ -12,8 +12,9 @@ from scipy import stats
 
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.regression.noise import satterthwaite_dof
 from winchkit.diagnosis.results import Diagnosis
-from winchkit.diagnosis.selection.scores import effective_dof, score_by_chance
+from winchkit.diagnosis.selection.scores import score_by_chance
 from winchkit.diagnosis.selection.stepwise import initial_result
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.runs.run import Channel, Run
@@ -80,11 +81,11 @@ def test_noise_alone_names_nothing() -> None:
 
 def test_degrees_of_freedom_add_where_the_bands_have_equal_shares() -> None:
     dof = np.full(4, 12.0)
-    assert effective_dof(np.full(4, 0.25), dof) == pytest.approx(48.0)
-    assert effective_dof(np.array([0.0, 1.0, 0.0, 0.0]), dof) == pytest.approx(12.0)
+    assert satterthwaite_dof(np.full(4, 0.25), dof) == pytest.approx(48.0)
+    assert satterthwaite_dof(np.array([0.0, 1.0, 0.0, 0.0]), dof) == pytest.approx(12.0)
     shares = np.array([[0.5, 0.9], [0.5, 0.1]])
     expected = [1 / (0.25 / 1 + 0.25 / 300), 1 / (0.81 / 1 + 0.01 / 300)]
-    assert effective_dof(shares, np.array([1.0, 300.0])) == pytest.approx(expected)
+    assert satterthwaite_dof(shares, np.array([1.0, 300.0])) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("columns", "dof"), [(1, 1.0), (2, 5.0), (2, 400.0)])

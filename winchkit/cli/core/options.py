@@ -97,14 +97,19 @@ def _only_bench() -> str | None:
     return str(here[0])
 
 
-bench_option: Decorator = click.option(
-    "-b",
-    "--bench",
-    metavar="FILE",
-    shell_complete=complete_bench,
-    callback=bench_by_default,
-    help="Bench file.  [default: the only one of this folder]",
-)
+def _bench_option(callback: Callable[..., Any] | None = None) -> Decorator:
+    """The option ``-b`` of a bench file."""
+    return click.option(
+        "-b",
+        "--bench",
+        metavar="FILE",
+        shell_complete=complete_bench,
+        callback=callback,
+        help="Bench file.  [default: the only one of this folder]",
+    )
+
+
+bench_option = _bench_option(bench_by_default)
 effects_option: Decorator = click.option(
     "--effects",
     "effects",
@@ -148,15 +153,7 @@ def bench_argument(function: Callable[..., Any]) -> Callable[..., Any]:
         expose_value=False,
         callback=_keep_argument,
     )
-    option = click.option(
-        "-b",
-        "--bench",
-        metavar="FILE",
-        shell_complete=complete_bench,
-        callback=_bench_of_either,
-        help="Bench file.  [default: the only one of this folder]",
-    )
-    return argument(option(function))
+    return argument(_bench_option(_bench_of_either)(function))
 
 
 winch_argument: Decorator = click.argument("winch", required=False, shell_complete=complete_winch)
@@ -235,13 +232,7 @@ class BusChoice:
 def bus_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add --bench or, in its place, the options of a CAN bus."""
     options = [
-        click.option(
-            "-b",
-            "--bench",
-            metavar="FILE",
-            shell_complete=complete_bench,
-            help="Bench file.  [default: the only one of this folder]",
-        ),
+        _bench_option(),
         click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
         click.option("--channel", help="Without a bench: e.g. can0."),
         click.option("--bitrate", default=_BITRATE, show_default=True, help="bit/s."),

@@ -21,7 +21,7 @@ from scipy.special import chdtrc, fdtrc, ndtri, stdtrit
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise, sums_per_band
+from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof, sums_per_band
 from winchkit.diagnosis.regression.projection import orthonormal
 
 __all__ = ["excess_p_value", "fits_worse", "largest_loss", "overdispersed"]
@@ -141,7 +141,7 @@ def fits_worse(regression: Regression, rival: Fit, best: Fit, noise: Noise) -> b
         return False
     change = (rival.residual**2 - best.residual**2) * noise.inverse_sigma(regression) ** 2
     by_band = sums_per_band(change, regression.band_of_row, len(regression.bands))
-    dof = float(np.sum(np.abs(by_band)) ** 2 / np.sum(by_band**2 / noise.dof))
+    dof = float(satterthwaite_dof(np.abs(by_band), noise.dof))
     return difference > largest_loss(dof)
 
 

@@ -32,7 +32,7 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof
 from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.results import Estimate
 from winchkit.effects.effect import Parameter
@@ -325,9 +325,10 @@ def _dof_of_q(weights: Array, informative: NDArray[np.bool_], excess: Array) -> 
 
 def effective_dof(variance: Array, kinds: Sequence[BetweenParts]) -> Array:
     """Degrees of freedom of variances (n_unknowns,) that are partly estimated (Satterthwaite)."""
-    spread = sum((kind.uncertain**2 / kind.dof for kind in kinds), np.zeros_like(variance))
-    share = np.divide(spread, variance**2, out=np.zeros_like(spread), where=variance > 0.0)
-    return np.asarray(np.clip(1 / np.maximum(share, 1e-9), 1.0, 1e9))
+    shape = len(kinds), len(variance)
+    parts = np.reshape([kind.uncertain for kind in kinds], shape)
+    dof = np.reshape([kind.dof for kind in kinds], shape)
+    return np.clip(satterthwaite_dof(parts, dof, variance), 1.0, 1e9)
 
 
 def _by_part(

@@ -34,6 +34,7 @@ __all__ = [
     "noise_saturated",
     "replicate_contrasts",
     "replicate_rms",
+    "satterthwaite_dof",
     "sums_per_band",
 ]
 
@@ -330,6 +331,34 @@ def _fewest_rows(regression: Regression) -> int:
 def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
     """Sums of values per noise band, shape (count,)."""
     return np.asarray(np.bincount(bands, weights=values, minlength=count))
+
+
+def satterthwaite_dof(parts: Array, dof: Array, total: Array | None = None) -> Array:
+    """Degrees of freedom of a sum of independently estimated variances.
+
+    Parameters
+    ----------
+    parts
+        Estimated parts of the variance, not negative, shape (k,) or (k, n).
+    dof
+        Their degrees of freedom, of the same shape, or (k, 1).
+    total
+        The whole variance where known parts are in it as well, shape (n,); by default the sum.
+
+    Returns
+    -------
+    ndarray of shape (n,), or a scalar
+        (Σ v)²/Σ (v²/ν); infinite where nothing is estimated.
+
+    References
+    ----------
+    Satterthwaite, F. E. (1946). An approximate distribution of estimates of variance components.
+    Biometrics Bulletin 2, 110-114.
+    """
+    whole = np.sum(parts, axis=0) if total is None else total
+    spread = np.asarray(np.sum(parts**2 / dof, axis=0))
+    infinite = np.full_like(spread, np.inf)
+    return np.asarray(np.divide(whole**2, spread, out=infinite, where=spread > 0.0))
 
 
 def _smooth(regression: Regression, power: Array, dof: Array) -> tuple[Array, Array]:

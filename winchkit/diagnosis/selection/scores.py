@@ -22,14 +22,13 @@ from scipy.special import fdtri
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof
 from winchkit.diagnosis.regression.projection import inverse_information
 from winchkit.diagnosis.selection.signatures import Candidate, Signatures
 
 __all__ = [
     "Projected",
     "Score",
-    "effective_dof",
     "null_maxima",
     "score",
     "score_by_chance",
@@ -153,8 +152,7 @@ class Projected:
     def _degrees_of_freedom(self) -> Array:
         """Satterthwaite's degrees of freedom of the variance of every column's amplitude, (p,).
 
-        A column has the share sᵢ of its information in a band of νᵢ degrees of freedom:
-        1/ν = Σ sᵢ²/νᵢ.
+        Its parts are the column's information in the bands.
         """
         own = np.einsum("bii->bi", self.signatures.gram)
         mixed = np.einsum("bqi,qi->bi", self._cross, self._through)
@@ -162,8 +160,7 @@ class Projected:
             "qi,bqr,ri->bi", self._through, self._normal, self._through, optimize=True
         )
         parts = np.maximum(self._share[:, None] * (own + 2 * mixed + there), 0.0)
-        shares = parts / np.maximum(np.sum(parts, axis=0), _NOTHING)
-        return effective_dof(shares, self._dof)
+        return satterthwaite_dof(parts, self._dof[:, None])
 
     def simulated(self, samples: int = _SIMULATIONS) -> Array:
         """Products that noise alone gives, its variance drawn too; shape (p, n_samples)."""
@@ -215,24 +212,6 @@ class Projected:
         return np.asarray((vectors[:, kept] / np.sqrt(values[kept])) / size[:, None])
 
 
-def effective_dof(shares: Array, dof: Array) -> Array:
-    """Satterthwaite's degrees of freedom of a weighted sum of variances.
-
-    Parameters
-    ----------
-    shares
-        Share of every band in the sum, shape (n_bands,) or (n_bands, p).
-    dof
-        Degrees of freedom of the bands, shape (n_bands,).
-
-    References
-    ----------
-    Satterthwaite, F. E. (1946). An approximate distribution of estimates of variance components.
-    Biometrics Bulletin 2, 110-114.
-    """
-    return np.asarray(1 / np.maximum(np.sum((shares.T**2) / dof, axis=-1), 1 / _MOST_DOF))
-
-
 def score_by_chance(penalty: float, columns: int, dof: float, candidates: int) -> float:
     """Score that noise alone exceeds for one of all candidates in at most 1 % of cases.
 
@@ -253,7 +232,7 @@ def score_by_chance(penalty: float, columns: int, dof: float, candidates: int) -
         k F(k, ν), its quantile at 1 % over the candidates, less the penalty; at least zero.
     """
     columns = max(1, columns)
-    quantile = columns * float(fdtri(columns, dof, 1 - _LEVEL / max(1, candidates)))
+    quantile = columns * float(fdtri(columns, min(dof, _MOST_DOF), 1 - _LEVEL / max(1, candidates)))
     return max(0.0, quantile - penalty)
 
 

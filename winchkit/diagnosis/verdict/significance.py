@@ -23,10 +23,10 @@ from numpy.typing import NDArray
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread, spread_of, whitened_jacobian
-from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof, sums_per_band
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.scores import effective_dof, score_by_chance
+from winchkit.diagnosis.selection.scores import score_by_chance
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.effects.parametrization import Coordinates
@@ -34,7 +34,6 @@ from winchkit.effects.parametrization import Coordinates
 __all__ = ["excess_evidence", "insignificant_additions", "variance_inflation"]
 
 _UNIDENTIFIABLE = 1e-9
-_NOTHING = 1e-300
 
 
 def insignificant_additions(
@@ -148,8 +147,8 @@ def _degrees_of_freedom(regression: Regression, fit: Fit, noise: Noise, index: i
     columns = whitened_jacobian(regression, fit, noise)
     beside = partialled_out(np.delete(columns, own, axis=1), columns[:, own])
     information, bands = np.sum(beside**2, axis=1), regression.band_of_row
-    shares = np.bincount(bands, weights=information, minlength=len(regression.bands))
-    return float(effective_dof(shares / max(float(np.sum(shares)), _NOTHING), noise.dof))
+    parts = sums_per_band(information, bands, len(regression.bands))
+    return float(satterthwaite_dof(parts, noise.dof))
 
 
 def variance_inflation(regression: Regression, fit: Fit, spread: Spread, index: int) -> float:
