@@ -85,7 +85,7 @@ def test_degrees_of_freedom_add_where_the_bands_have_equal_shares() -> None:
     assert satterthwaite_dof(np.array([0.0, 1.0, 0.0, 0.0]), dof) == pytest.approx(12.0)
     shares = np.array([[0.5, 0.9], [0.5, 0.1]])
     expected = [1 / (0.25 / 1 + 0.25 / 300), 1 / (0.81 / 1 + 0.01 / 300)]
-    assert satterthwaite_dof(shares, np.array([1.0, 300.0])) == pytest.approx(expected)
+    assert satterthwaite_dof(shares, np.array([[1.0], [300.0]])) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(("columns", "dof"), [(1, 1.0), (2, 5.0), (2, 400.0)])
