@@ -18,42 +18,110 @@ metres (rule of thumb)."""
 
 
 def normal(rows: Any, values: Any, width: int, system: Any) -> None:
-    """GᵀG, its lower half by rows, then Gᵀ v, with one of the ``values`` every ``width``."""
-    for k in range(42):
-        system[k] = 0.0
+    """GᵀG, its lower half by rows, then Gᵀ v, with one of the ``values`` every ``width``.
+
+    Every sum is a variable of its own: six columns a to f of G, v the value.
+    """
+    aa = ba = bb = ca = cb = cc = da = db = dc = dd = 0.0
+    ea = eb = ec = ed = ee = fa = fb = fc = fd = fe = ff = 0.0
+    va = vb = vc = vd = ve = vf = 0.0
     for i in range(len(rows) // 7):
-        g, value = 7 * i + 1, values[width * i]
-        for a in range(6):
-            slope = rows[g + a]
-            for b in range(a + 1):
-                system[6 * a + b] += slope * rows[g + b]
-            system[36 + a] += slope * value
+        g, v = 7 * i, values[width * i]
+        a, b, c = rows[g + 1], rows[g + 2], rows[g + 3]
+        d, e, f = rows[g + 4], rows[g + 5], rows[g + 6]
+        aa += a * a
+        ba += b * a
+        bb += b * b
+        ca += c * a
+        cb += c * b
+        cc += c * c
+        da += d * a
+        db += d * b
+        dc += d * c
+        dd += d * d
+        ea += e * a
+        eb += e * b
+        ec += e * c
+        ed += e * d
+        ee += e * e
+        fa += f * a
+        fb += f * b
+        fc += f * c
+        fd += f * d
+        fe += f * e
+        ff += f * f
+        va += v * a
+        vb += v * b
+        vc += v * c
+        vd += v * d
+        ve += v * e
+        vf += v * f
+    system[0] = aa
+    system[6], system[7] = ba, bb
+    system[12], system[13], system[14] = ca, cb, cc
+    system[18], system[19], system[20], system[21] = da, db, dc, dd
+    system[24], system[25], system[26], system[27], system[28] = ea, eb, ec, ed, ee
+    system[30], system[31], system[32] = fa, fb, fc
+    system[33], system[34], system[35] = fd, fe, ff
+    system[36], system[37], system[38] = va, vb, vc
+    system[39], system[40], system[41] = vd, ve, vf
 
 
-def cholesky(system: Any) -> bool:
-    """Solve a system of :func:`normal` in place; false where it is singular."""
-    for a in range(6):
-        most = system[7 * a]
-        for b in range(a):
-            total = system[6 * a + b]
-            for k in range(b):
-                total -= system[6 * a + k] * system[6 * b + k]
-            system[6 * a + b] = total * system[7 * b]
-        total, right = most, system[36 + a]
-        for k in range(a):
-            total -= system[6 * a + k] * system[6 * a + k]
-            right -= system[6 * a + k] * system[36 + k]
-        # Also false for NaN.
-        if not total > _SINGULAR * most:
-            return False
-        # The diagonal holds its inverse: six divisions instead of 33.
-        system[7 * a] = 1.0 / sqrt(total)
-        system[36 + a] = right * system[7 * a]
-    for a in range(5, -1, -1):
-        right = system[36 + a]
-        for k in range(a + 1, 6):
-            right -= system[6 * k + a] * system[36 + k]
-        system[36 + a] = right * system[7 * a]
+def cholesky(system: Any) -> bool:  # noqa: PLR0911 - one for every pivot
+    """Solve a system of :func:`normal` in place; false where it is singular.
+
+    Cholesky factor by rows, ``l10`` to ``l54``; the diagonal ``i0`` to ``i5`` holds its inverse:
+    six divisions instead of 33. The comparisons of a pivot are also false for NaN.
+    """
+    if not system[0] > 0.0:
+        return False
+    i0 = 1.0 / sqrt(system[0])
+    l10, l20, l30 = system[6] * i0, system[12] * i0, system[18] * i0
+    l40, l50 = system[24] * i0, system[30] * i0
+    pivot = system[7] - l10 * l10
+    if not pivot > _SINGULAR * system[7]:
+        return False
+    i1 = 1.0 / sqrt(pivot)
+    l21 = (system[13] - l20 * l10) * i1
+    l31 = (system[19] - l30 * l10) * i1
+    l41 = (system[25] - l40 * l10) * i1
+    l51 = (system[31] - l50 * l10) * i1
+    pivot = system[14] - l20 * l20 - l21 * l21
+    if not pivot > _SINGULAR * system[14]:
+        return False
+    i2 = 1.0 / sqrt(pivot)
+    l32 = (system[20] - l30 * l20 - l31 * l21) * i2
+    l42 = (system[26] - l40 * l20 - l41 * l21) * i2
+    l52 = (system[32] - l50 * l20 - l51 * l21) * i2
+    pivot = system[21] - l30 * l30 - l31 * l31 - l32 * l32
+    if not pivot > _SINGULAR * system[21]:
+        return False
+    i3 = 1.0 / sqrt(pivot)
+    l43 = (system[27] - l40 * l30 - l41 * l31 - l42 * l32) * i3
+    l53 = (system[33] - l50 * l30 - l51 * l31 - l52 * l32) * i3
+    pivot = system[28] - l40 * l40 - l41 * l41 - l42 * l42 - l43 * l43
+    if not pivot > _SINGULAR * system[28]:
+        return False
+    i4 = 1.0 / sqrt(pivot)
+    l54 = (system[34] - l50 * l40 - l51 * l41 - l52 * l42 - l53 * l43) * i4
+    pivot = system[35] - l50 * l50 - l51 * l51 - l52 * l52 - l53 * l53 - l54 * l54
+    if not pivot > _SINGULAR * system[35]:
+        return False
+    i5 = 1.0 / sqrt(pivot)
+    y0 = system[36] * i0
+    y1 = (system[37] - l10 * y0) * i1
+    y2 = (system[38] - l20 * y0 - l21 * y1) * i2
+    y3 = (system[39] - l30 * y0 - l31 * y1 - l32 * y2) * i3
+    y4 = (system[40] - l40 * y0 - l41 * y1 - l42 * y2 - l43 * y3) * i4
+    y5 = (system[41] - l50 * y0 - l51 * y1 - l52 * y2 - l53 * y3 - l54 * y4) * i5
+    x5 = y5 * i5
+    x4 = (y4 - l54 * x5) * i4
+    x3 = (y3 - l43 * x4 - l53 * x5) * i3
+    x2 = (y2 - l32 * x3 - l42 * x4 - l52 * x5) * i2
+    x1 = (y1 - l21 * x2 - l31 * x3 - l41 * x4 - l51 * x5) * i1
+    x0 = (y0 - l10 * x1 - l20 * x2 - l30 * x3 - l40 * x4 - l50 * x5) * i0
+    system[36], system[37], system[38] = x0, x1, x2
+    system[39], system[40], system[41] = x3, x4, x5
     return True
 
 
@@ -132,11 +200,12 @@ def forces_loop(cables: Function, normal: Function, solve: Function) -> Function
             system[36 + a] = wrench[a] - system[36 + a]
         if not solve(system):
             return False
+        a, b, c = system[36], system[37], system[38]
+        d, e, f = system[39], system[40], system[41]
         for i in range(len(lines)):
-            total = initial[i]
-            for a in range(6):
-                total += rows[7 * i + 1 + a] * system[36 + a]
-            out[i] = total
+            g = 7 * i
+            total = initial[i] + rows[g + 1] * a + rows[g + 2] * b + rows[g + 3] * c
+            out[i] = total + rows[g + 4] * d + rows[g + 5] * e + rows[g + 6] * f
         return True
 
     return forces
