@@ -6,6 +6,8 @@ phase in both. In the lowest band nearly every row is explained by some candidat
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -72,6 +74,21 @@ def test_a_candidate_of_well_known_bands_is_held_to_its_own_quantile() -> None:
     assert first.threshold > 1000.0
     assert by_effect["motor-cogging", 24].by_chance < 30.0
     assert by_effect["motor-coulomb", None].by_chance > 1000.0
+
+
+@pytest.mark.parametrize(("size", "verdict"), [(0.1, "adequate"), (0.2, "explained")])
+def test_without_repeats_evidence_counts_where_an_error_falls(size: float, verdict: str) -> None:
+    runs = [move(direction, seed, hidden=False) for seed, direction in enumerate((1.0, -1.0))]
+    with_cogging = []
+    for run in runs:
+        torque = run["motor_torque"] + size * NOISE * np.cos(24 * run["motor_angle"] + 1.0)
+        channels = {**run.channels, "motor_torque": Channel(torque, "N m")}
+        with_cogging.append(replace(run, channels=channels))
+    answer = diagnose(with_cogging, JOINT)
+    found = answer.diagnosis
+    assert answer.result.lack_of_fit_at_start
+    assert found.verdict == verdict
+    assert found.unexplained_share < 0.15
 
 
 def test_noise_alone_names_nothing() -> None:

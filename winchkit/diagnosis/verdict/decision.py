@@ -13,6 +13,7 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.residuals.stop_band_leakage import StopBandLeakage
 from winchkit.diagnosis.results import OutputFit, Verdict
+from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.selection.weighting import reweighted
@@ -66,18 +67,32 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     noise (held out) and, with repeats, of the lack of fit in the rejected bands; the larger of the
     two.
     """
-    share = _unexplained(engine, result)
     outputs = output_fits(
         engine, (result.initial_model, result.initial_noise), (result.final, result.noise)
     )
-    verdict = _verdict(result, outputs, share)
     added = result.final.labels[engine.n_initial_terms :]
+    if not result.lack_of_fit_at_start:
+        return Judgement("adequate", 0.0, outputs, result, ())
+    if not added and not result.noise.from_repeats and _error_ratio(outputs) < 1 / RELEVANT_RATIO:
+        return Judgement("adequate", 0.0, outputs, result, (_irrelevant(result),))
+    share = _unexplained(engine, result)
+    verdict = _verdict(result, outputs, share)
     # Only the effect itself explains nearly all of a residual far above the noise floor.
     explained_but_detectable = share < _EXPLAINED_SHARE and result.noise.from_repeats
     if verdict == "explained" or explained_but_detectable or not added:
         return Judgement(verdict, share, outputs, result, ())
     note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
     return withheld(engine, result, share, note)
+
+
+def _irrelevant(result: SelectionResult) -> str:
+    """Note on the most evident candidate where no error is above the noise by a relevant ratio."""
+    significant = (item for item in result.scores if item.is_significant(result.threshold))
+    best = next(significant, result.scores[0]).candidate.effect.id
+    return (
+        f"the evidence for {best} is significant, but no held-out error is above the noise by "
+        f"{100 * (1 / RELEVANT_RATIO - 1):.0f} %: what it would change is not named"
+    )
 
 
 def withheld(
@@ -115,8 +130,6 @@ def reweighted_judgement(engine: SelectionEngine, judgement: Judgement) -> Judge
 
 def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     """Share of the excess over the noise that the final model leaves, larger of two estimates."""
-    if not result.lack_of_fit_at_start:
-        return 0.0
     folds = engine.folds(result.final, result.noise)
     held_out_errors = [
         held_out_rms(engine.regression, fitted, result.noise, folds)
@@ -151,19 +164,22 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     return min(1.0, share)
 
 
+def _error_ratio(outputs: Mapping[str, OutputFit]) -> float:
+    """Held-out error of the final model over the noise, in the output where it is largest."""
+    return max(
+        fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
+        for fitted in outputs.values()
+    )
+
+
 def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
-    if not result.lack_of_fit_at_start:
-        return "adequate"
     has_additions = len(result.final.hypothesis.terms) > len(result.initial_model.hypothesis.terms)
     if not has_additions or share > _UNKNOWN_SHARE:
         return "unknown"
     if not result.lack_of_fit or not result.noise.from_repeats:
         return "explained" if share < _HELD_OUT_SHARE else "partly"
     # A trace below the noise, e.g. a load that bounces on its cable, is reported and has no effect.
-    error_ratio = max(
-        fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
-        for fitted in outputs.values()
-    )
+    error_ratio = _error_ratio(outputs)
     # An effect that imitates an unknown one leaves a share of this size; where the lack of fit is
     # certain, the limit is therefore small.
     limit = 0.0
