@@ -8,6 +8,7 @@ from pathlib import Path
 from winchkit.arguments import path_of, require_types
 from winchkit.errors import RunError, UsageError
 from winchkit.runs.log import aligned, log_of_run
+from winchkit.runs.overwriting import refuse_existing
 from winchkit.runs.read import read_log, read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
@@ -17,7 +18,9 @@ __all__ = ["FORMATS", "export"]
 FORMATS = (".csv", ".mcap", ".parquet", ".mf4")
 
 
-def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> Run:
+def export(
+    paths: Sequence[str | Path], output: str | Path, winch: str = "", *, replace: bool = False
+) -> Run:
     """Write a run, or the parts of a log, to one file.
 
     Parameters
@@ -29,6 +32,8 @@ def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> 
         have rows.
     winch : str
         Only this winch, with its columns without prefix.
+    replace : bool
+        Write over a file of that name.
 
     Returns
     -------
@@ -38,7 +43,8 @@ def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> 
     Raises
     ------
     RunError, FileError, UsageError
-        For an invalid run, a file that cannot be written, an unknown suffix.
+        For an invalid run, a file that cannot be written, an unknown suffix, and an output that
+        exists and is not to be replaced.
     """
     require_types(paths, (str, Path), "paths")
     if not paths:
@@ -48,6 +54,7 @@ def export(paths: Sequence[str | Path], output: str | Path, winch: str = "") -> 
         raise UsageError(f"{output}: '{suffix}' is no format of a run; use {', '.join(FORMATS)}")
     if any(Path(path).resolve() == Path(output).resolve() for path in paths):
         raise UsageError(f"{output}: would replace the file that is exported; name another")
+    refuse_existing(Path(output), replace)
     log = None if len(paths) == 1 and suffix != ".mf4" else read_log(paths)
     run = (read_run(paths[0]) if log is None else aligned(log)).of_winch(winch)
     if log is not None and suffix == ".mf4":

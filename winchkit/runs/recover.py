@@ -25,6 +25,7 @@ from winchkit.runs.formats.mcap_records import (
     is_intact,
     records,
 )
+from winchkit.runs.overwriting import refuse_existing
 
 __all__ = ["Recovered", "recover", "recovered_path"]
 
@@ -87,11 +88,7 @@ def recover(
     suffix = source.suffix.lower()
     if target.resolve() == source.resolve():
         raise UsageError(f"{target}: would replace the file that is to be recovered; name another")
-    if target.exists() and not replace:
-        raise UsageError(
-            f"{target} exists already; name another file, or write over it "
-            "(--replace, in Python replace=True)"
-        )
+    refuse_existing(target, replace)
     data = read_bytes(source, may_be_empty=True)
     if suffix == ".mcap":
         saved, found = _mcap(data, source, target)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from can_commands import Served, invoke, served
+from winchkit.bench.emergency_stop import stop_on_bus
 from winchkit.sim.drive.nmt import NmtState
 
 
@@ -80,6 +81,24 @@ def test_info_says_what_the_drive_holds(bench: Served) -> None:
     assert "8611h following error" in text
     assert "brake: declared" in text
     drive.objects.put(0x1003, 0, 0)
+
+
+def test_a_drive_that_is_nmt_stopped_is_named_as_such(bench: Served) -> None:
+    drive = bench.live.winches["B"].drive
+    with bench.live.up_to_date():
+        drive.receive(0x602, bytes.fromhex("2B17100032000000"), bench.live._now())  # 1017h = 50 ms
+        drive.receive(0x000, bytes([0x02, 2]), bench.live._now())
+    assert drive.nmt is NmtState.STOPPED
+    try:
+        result = invoke("info", "B", "-b", bench.file)
+        assert result.exit_code == 4, result.output
+        assert "NMT stopped" in result.stderr
+        assert "wiring" not in result.stderr
+        (_, stopped) = stop_on_bus(bench.live.bench_spec)
+        assert not stopped.confirmed
+        assert "NMT stopped" in stopped.message
+    finally:
+        restart(bench)
 
 
 def test_info_of_a_node_by_its_identity_alone(bench: Served) -> None:

@@ -88,6 +88,21 @@ def test_a_log_is_not_exported_onto_itself(log: Path) -> None:
     assert log.read_bytes() == whole
 
 
+@pytest.mark.parametrize("suffix", ["csv", "mcap", "mf4", "parquet"])
+def test_an_export_writes_over_no_file_unasked(log: Path, suffix: str) -> None:
+    earlier = log.with_name(f"earlier.{suffix}")
+    earlier.write_bytes(b"another log")
+    assert "--replace" in run("export", log, "-o", earlier, code=2).stderr
+    assert earlier.read_bytes() == b"another log"
+
+
+def test_an_export_replaces_a_file_where_asked(log: Path) -> None:
+    earlier = log.with_name("earlier.csv")
+    earlier.write_bytes(b"another log")
+    run("export", log, "-o", earlier, "--replace")
+    assert len(read_run(earlier)) == len(read_run(log))
+
+
 def test_an_earlier_log_is_not_written_over_unasked(log: Path) -> None:
     bench = log.with_name("bench.toml")
     told = run("-b", bench, "-o", log, "--for", "1s", code=2).stderr

@@ -24,8 +24,11 @@ __all__ = ["command"]
 @runs_argument
 @output_option("Where to: a .csv, .mcap, .parquet or .mf4 file.", required=True)
 @click.option("--winch", metavar="NAME", help="Only this winch, its columns without its name.")
+@click.option("--replace", is_flag=True, help="Write over a file of that name.")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
-def command(runs: tuple[str, ...], output: str, winch: str | None, as_json: bool) -> None:
+def command(
+    runs: tuple[str, ...], output: str, winch: str | None, replace: bool, as_json: bool
+) -> None:
     """Convert RUN to CSV, MCAP, Parquet or MF4, in SI units; several are the parts of one log.
 
     A line on stderr says how many rows there are, at what rate, and what is missing.
@@ -35,7 +38,7 @@ def command(runs: tuple[str, ...], output: str, winch: str | None, as_json: bool
 
     with progress_bar() as progress:
         progress(f"converting to {output}", None)
-        recording = export(runs, output, winch or "")
+        recording = export(runs, output, winch or "", replace=replace)
     for remark in recording.notes:
         click.echo(f"{recording.path}: {remark} (warning)", err=True)
     summary = summary_of(recording)

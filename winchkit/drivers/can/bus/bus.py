@@ -136,7 +136,8 @@ class CanBus:
         self._foreign: dict[int, list[Handler]] = {}
         self._handlers: dict[int, Handler] = {}
         self._errors = ErrorTally()
-        self._heard: set[int] = set()
+        self._heard: dict[int, int] = {}
+        """NMT state of the newest heartbeat, by node."""
         self._dropped = 0
         self.foreign_syncs = 0
         """SYNC frames on the bus that were not sent here."""
@@ -198,7 +199,12 @@ class CanBus:
     def nodes(self) -> frozenset[int]:
         """Nodes that are known here, or whose heartbeat was received."""
         known = (identifier - _HEARTBEAT for identifier in tuple(self._handlers))
-        return frozenset(self._heard.union(node for node in known if 0 < node <= _LAST_NODE))
+        heard = frozenset(tuple(self._heard))
+        return heard.union(node for node in known if 0 < node <= _LAST_NODE)
+
+    def nmt_state(self, node: int) -> int | None:
+        """State in the newest heartbeat of a node; None before the first."""
+        return self._heard.get(node)
 
     @property
     def foreign_sync(self) -> str:
@@ -409,7 +415,7 @@ class CanBus:
                 if self.tap is not None:
                     self._show(now, identifier, data)
                 if identifier > _HEARTBEAT:
-                    self._heard.add(identifier - _HEARTBEAT)
+                    self._heard[identifier - _HEARTBEAT] = data[0] & 0x7F if data else 0
                 handler = handler_of(identifier)
                 if handler is not None:
                     handler(data, stamp_to_clock(stamp, now) if stamp else now)

@@ -13,6 +13,7 @@ from canopen.objectdictionary import ODVariable, datatypes
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.bus.interface import queue_full
 from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.canopen.pdo import MappedObject
 from winchkit.drivers.can.canopen.sdo_client import sdo_client
 from winchkit.drivers.scheduling import lock_of
@@ -256,7 +257,13 @@ class SdoNode:
         return DeviceRefused(f"{self.place(index, sub)}: the device refused to {what} it: {error}")
 
     def _silent(self, index: int, sub: int, error: Exception) -> NoReply:
+        if self.bus.nmt_state(self.node) == NmtState.STOPPED:
+            action = (
+                "by its heartbeat it is NMT stopped, which ends SDO; look for another NMT master, "
+                "then open the bench (winchkit monitor), which makes it pre-operational"
+            )
+        else:
+            action = "check power, wiring, bit rate and node id"
         return NoReply(
-            f"{self.place(index, sub)}: no answer within {_TIMEOUT:g} s ({error}); "
-            "check power, wiring, bit rate and node id"
+            f"{self.place(index, sub)}: no answer within {_TIMEOUT:g} s ({error}); {action}"
         )
