@@ -13,11 +13,12 @@ from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec, parse_object
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id, codecs, set_up
 from winchkit.drivers.clock import Clock
+from winchkit.drivers.device_command import confirm, permitted_command
 from winchkit.drivers.publisher import InstrumentReadings, Publisher, Sampled
 from winchkit.drivers.reading import Quality, Sensor
 from winchkit.drivers.sharing import RETRY
 from winchkit.drivers.status_word import StatusWord
-from winchkit.errors import ConnectionLost, DeviceRefused, Fault, FileError, NoReply, NotPermitted
+from winchkit.errors import ConnectionLost, DeviceRefused, Fault, FileError, NoReply
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.units import convert, dimension_of
 
@@ -157,34 +158,18 @@ class ProcessInstrument(InstrumentReadings):
 
     def command(self, name: str) -> None:
         """Send a command of the device file; raises NotPermitted, NoReply, DeviceRefused."""
-        commands = self.spec.command
-        if name not in commands:
-            known = ", ".join(commands) or "none"
-            raise NotPermitted(f"{self.name} has no command '{name}'; its device file has {known}")
-        command = commands[name]
-        if command.permanent and not self.may_store:
-            raise NotPermitted(
-                f"{self.name}: '{name}' writes the device's EEPROM, which wears out; "
-                f"`winchkit cell store --command {name}` does it on purpose"
-            )
+        command = permitted_command(self.name, self.spec.command, name, may_store=self.may_store)
         self._node.write(*parse_object(command.object), command.value)
 
     async def confirm(self, name: str) -> None:
         """Wait for the status that a command must bring or end; raises DeviceRefused."""
-        command = self.spec.command[name]
-        if command.comes is None and command.goes is None:
-            return
-        sent = self._clock.now()
-        while self._clock.now() < sent + command.within:
-            await asyncio.sleep(self.period / 2)
-            reading, has = self.latest, self._decoder.status.has
-            came = command.comes is None or has(command.comes, self.status)
-            gone = command.goes is None or not has(command.goes, self.status)
-            if reading is not None and reading.t_request > sent and came and gone:
-                return
-        raise DeviceRefused(
-            f"{self.name} accepted the command '{name}' but did not confirm it within "
-            f"{command.within:g} s"
+        await confirm(
+            self,
+            name,
+            self.spec.command[name],
+            lambda meaning: self._decoder.status.has(meaning, self.status),
+            sent=self._clock.now(),
+            clock=self._clock,
         )
 
     def identify(self) -> dict[str, float]:

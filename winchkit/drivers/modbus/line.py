@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 
 from winchkit.drivers.clock import Clock
+from winchkit.drivers.device_command import confirm, permitted_command
 from winchkit.drivers.modbus.client import ModbusClient
-from winchkit.drivers.modbus.commands import command_of, confirm, identity, send
+from winchkit.drivers.modbus.commands import identity, send
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.timing import exchange, silence_of, wire_times
 from winchkit.drivers.reading import Sensor
@@ -68,12 +69,22 @@ class ModbusLine:
     async def command(self, sensor: Sensor, name: str) -> None:
         """Send a command to an instrument between two polls, and wait for its confirmation."""
         instrument = self._own(sensor)
-        command = command_of(instrument, name)
+        spec, status = instrument.decoder.spec, instrument.decoder.status
+        command = permitted_command(
+            instrument.name, spec.command, name, may_store=instrument.may_store
+        )
         await self._wait_until_open()
         async with self._lock:
             await send(self._client, instrument, command)
             sent = self._clock.now()
-        await confirm(instrument, name, sent, self._clock)
+        await confirm(
+            instrument,
+            name,
+            command,
+            lambda meaning: status.has(meaning, instrument.status),
+            sent=sent,
+            clock=self._clock,
+        )
 
     async def identify(self, sensor: Sensor) -> dict[str, float]:
         """Ask one of its instruments for its serial number and the like."""

@@ -10,12 +10,13 @@ from contextlib import suppress
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Counters
+from winchkit.drivers.device_command import declared_command
 from winchkit.drivers.reading import Quality
 from winchkit.drivers.stream.decoder import Meaning, ParsedFrame
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.drivers.stream.parser import Item, StreamParser
 from winchkit.drivers.stream.port import Chunk, Port
-from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted
+from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.stream import AskSpec
 
@@ -113,13 +114,7 @@ class Conversation:
 
     async def command(self, instrument: StreamInstrument, name: str) -> None:
         """Send a command of the device file, e.g. ``tare``, and wait for its answer."""
-        spec = instrument.spec
-        command = spec.command.get(name)
-        if command is None:
-            known = ", ".join(spec.command) or "none"
-            raise NotPermitted(
-                f"{instrument.name} has no command '{name}'; its device file has {known}"
-            )
+        command = declared_command(instrument.name, instrument.spec.command, name)
         await self._stop_sending(instrument)
         await self._select(instrument)
         await self._exchange(instrument, command, _COMMAND_TIME)
