@@ -6,7 +6,6 @@ import socketserver
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
 
 from winchkit.errors import FileError, UsageError, WinchkitError
 from winchkit.schema.programme import ALL
@@ -110,12 +109,7 @@ class ControlServer:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.unlink(missing_ok=True)
         self._server.shutdown()
         self._server.server_close()
