@@ -12,6 +12,7 @@ import re
 from winchkit.errors import UsageError, suggest
 
 __all__ = [
+    "GRAVITY",
     "UNITS",
     "article",
     "convert",
@@ -23,6 +24,8 @@ __all__ = [
     "suggest",
 ]
 
+GRAVITY = 9.80665
+"""Standard acceleration of gravity, m/s² (3rd CGPM, 1901; exact)."""
 _TURN = 2 * math.pi
 _DEG = math.pi / 180
 

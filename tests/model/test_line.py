@@ -11,11 +11,12 @@ import pytest
 
 from model_lines import line_with, profile_with, swing
 from winchkit.model.derivatives import Clock
-from winchkit.model.line import GRAVITY, Line
+from winchkit.model.line import Line
 from winchkit.model.stages import ROBOT_STAGES, Modifier, Signals, Stage
 from winchkit.schema.profiles.winch import (
     ReferenceSpec,
 )
+from winchkit.units import GRAVITY
 
 
 def test_positive_motor_angle_winds_in_and_positive_torque_holds_the_load() -> None:

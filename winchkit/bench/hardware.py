@@ -34,10 +34,10 @@ from winchkit.drivers.instrument_process.process import InstrumentProcess
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import ConnectionLost, Fault, FileError
-from winchkit.model.line import GRAVITY
 from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
 from winchkit.schema.bench_warnings import bench_warnings
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.units import GRAVITY
 from winchkit.version import __version__
 
 if TYPE_CHECKING:

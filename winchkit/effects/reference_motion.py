@@ -13,7 +13,7 @@ from math import pi
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.line import GRAVITY, Line, Motion
+from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 from winchkit.model.trajectory import plan
 from winchkit.schema.profiles.winch import (
@@ -26,6 +26,7 @@ from winchkit.schema.profiles.winch import (
     ReferenceSpec,
     WinchProfile,
 )
+from winchkit.units import GRAVITY
 
 __all__ = ["STANDARD_PROFILE", "standard_motion"]
 

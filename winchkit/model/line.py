@@ -20,11 +20,10 @@ from winchkit.model.derivatives import Clock, smooth_sign
 from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage, WinchKinematics
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.units import GRAVITY
 
-__all__ = ["GRAVITY", "Line", "Motion"]
+__all__ = ["Line", "Motion"]
 
-GRAVITY = 9.80665
-"""Standard acceleration of gravity, m/s² (3rd CGPM, 1901; exact)."""
 _CREEP_SPEED = 1e-3
 """m/s, and with `_CREEP_RATE`, rad/s at the motor, the rates over which a direction of motion is
 smooth. Rule of thumb: above the noise of differentiated encoders, below the slowest programmed

@@ -6,7 +6,7 @@ import re
 from difflib import get_close_matches
 
 from winchkit.runs.run import CHANNEL_DIMENSIONS
-from winchkit.units import UNITS, dimension_of, suggest
+from winchkit.units import GRAVITY, UNITS, dimension_of, suggest
 
 __all__ = ["POSE_DIMENSIONS", "column_dimension", "header_of", "near_miss", "unit_fault"]
 
@@ -57,7 +57,7 @@ def unit_fault(name: str, unit: str, dimension: str) -> str | None:
     if dimension == "force" and other == "mass":
         return (
             f"column '{name}' is in [{unit}], a mass, and a force is needed: multiply by "
-            "g = 9.80665 m/s^2 and write [N]; a known weight goes into the metadata, "
+            f"g = {GRAVITY} m/s^2 and write [N]; a known weight goes into the metadata, "
             "# load_mass: 15 kg"
         )
     if other is not None:

@@ -37,6 +37,7 @@ from winchkit.runs.poses import Measured, read_poses
 from winchkit.runs.read import read_run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.read import read_any, read_robot
+from winchkit.units import GRAVITY
 
 __all__ = ["RobotWork", "is_robot", "pose_picture"]
 
@@ -252,7 +253,7 @@ class RobotWork:
         )
 
     def _limits(self, robot: Robot) -> tuple[float, float]:
-        weight = 9.81 * robot.platform.mass
+        weight = GRAVITY * robot.platform.mass
         if weight <= 0:
             return _NO_MASS
         low, high = (float(f"{factor * weight:.1g}") for factor in (_LOWEST, _HIGHEST))

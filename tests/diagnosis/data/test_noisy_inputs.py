@@ -15,8 +15,8 @@ from diagnosis_runs import GROOVED, UNITS, Array
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import Diagnosis
-from winchkit.model.line import GRAVITY
 from winchkit.runs.run import Channel, Run
+from winchkit.units import GRAVITY
 
 RATE, COUNT, FINER = 25.0, 1500, 64
 RATIO = GROOVED.gearbox.ratio

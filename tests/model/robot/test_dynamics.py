@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from robot_cases import near, random_poses, shipped
 from winchkit.errors import UsageError
-from winchkit.model.line import GRAVITY
 from winchkit.model.robot import ForceLimits, Geometry, Pose, gravity_wrench
 from winchkit.model.robot.dynamics import (
     PlatformMotion,
@@ -25,6 +24,7 @@ from winchkit.model.robot.dynamics import (
 from winchkit.model.robot.integration import ElasticCables, cable_forces, integrate
 from winchkit.model.robot.rotation import rotation_by
 from winchkit.schema.profiles.robot import PlatformSpec
+from winchkit.units import GRAVITY
 
 Array = np.ndarray
 BODY = PlatformSpec(3.0, (0.05, -0.02, 0.04), (0.02, 0.05, 0.06))

@@ -10,7 +10,6 @@ from scipy.optimize import LinearConstraint, minimize
 
 from robot_cases import near, random_geometry, shipped
 from winchkit.errors import UsageError
-from winchkit.model.line import GRAVITY
 from winchkit.model.robot import (
     ForceLimits,
     Pose,
@@ -25,6 +24,7 @@ from winchkit.model.robot import (
 )
 from winchkit.model.robot.rotation import rotation_by
 from winchkit.schema.profiles.robot import PlatformSpec
+from winchkit.units import GRAVITY
 
 Array = np.ndarray
 seeds = st.integers(0, 10_000)

@@ -13,9 +13,9 @@ from scipy.spatial.transform import Rotation
 from winchkit.arrays import Array
 from winchkit.model.robot import Pose, rotation_of
 from winchkit.model.robot.kinematics import Geometry, lengths, structure_matrix, wrap_angle
-from winchkit.sim.physics.state import GRAVITY
 from winchkit.sim.robot.platform import Body, CablePlatform, Pulleys
 from winchkit.sim.robot.rotation import quaternion, rotation, turned
+from winchkit.units import GRAVITY
 
 angle = st.floats(-1.5, 1.5)
 small = st.floats(-0.3, 0.3)

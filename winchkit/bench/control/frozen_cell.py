@@ -30,7 +30,7 @@ from math import erfc, exp, inf, isfinite, log, nan, pi, sqrt
 from statistics import NormalDist, median
 
 from winchkit.drivers.reading import Quality, Reading
-from winchkit.model.line import GRAVITY
+from winchkit.units import GRAVITY
 
 __all__ = ["Frozen", "FrozenCell", "HangingLoad"]
 

@@ -13,11 +13,10 @@ from typing import Any
 
 from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError, UsageError
-from winchkit.model.line import GRAVITY
 from winchkit.regular_file import regular
 from winchkit.runs.files import write_whole
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
-from winchkit.units import convert, format_quantity, suggest
+from winchkit.units import GRAVITY, convert, format_quantity, suggest
 
 __all__ = ["calibration_toml", "read_points", "tares_toml", "write_text"]
 

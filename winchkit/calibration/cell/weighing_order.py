@@ -6,9 +6,8 @@ import re
 from math import nan
 
 from winchkit.errors import UsageError
-from winchkit.model.line import GRAVITY
 from winchkit.schema.calibration import CalibrationPoint
-from winchkit.units import UNITS, convert
+from winchkit.units import GRAVITY, UNITS, convert
 
 __all__ = ["plan", "spoken"]
 

@@ -14,8 +14,8 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.spectrum import fast_count
-from winchkit.model.line import GRAVITY
 from winchkit.model.stages import Signals
+from winchkit.units import GRAVITY
 
 __all__ = ["Repeats", "find_repeats", "mean_load"]
 

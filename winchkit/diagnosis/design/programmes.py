@@ -10,11 +10,12 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset, assemble
 from winchkit.diagnosis.data.repeats import mean_load
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.model.line import GRAVITY, Line
+from winchkit.model.line import Line
 from winchkit.model.stages import Signals
 from winchkit.model.trajectory import plan
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.bench import LimitSpec
+from winchkit.units import GRAVITY
 
 __all__ = [
     "CANDIDATE_PROGRAMMES",

@@ -6,8 +6,8 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
-from winchkit.model.line import GRAVITY
 from winchkit.model.stages import At, Stage
+from winchkit.units import GRAVITY
 
 
 def apply(length: Array, at: At, values: Values) -> Array:

@@ -4,8 +4,8 @@ from math import sin
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
-from winchkit.model.line import GRAVITY
 from winchkit.model.stages import At, Stage
+from winchkit.units import GRAVITY
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:

@@ -35,7 +35,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
-from winchkit.model.line import GRAVITY
 from winchkit.model.robot.force_distribution import ForceLimits, distributed_forces
 from winchkit.model.robot.kinematics import Pose
 from winchkit.model.robot.robot import Robot
@@ -43,6 +42,7 @@ from winchkit.model.robot.rotation import skew
 from winchkit.model.robot.wrench import gravity_wrench
 from winchkit.model.stages import Signals
 from winchkit.schema.profiles.robot import PlatformSpec
+from winchkit.units import GRAVITY
 
 __all__ = [
     "InverseDynamics",

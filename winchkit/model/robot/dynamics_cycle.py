@@ -15,10 +15,10 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
-from winchkit.model.line import GRAVITY
 from winchkit.model.robot.kernels import PLAIN, RobotKernels
 from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.model.robot.robot import Robot, cables_of
+from winchkit.units import GRAVITY
 
 __all__ = ["DynamicTarget", "DynamicsCycle"]
 

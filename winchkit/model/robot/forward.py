@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
-from winchkit.model.line import GRAVITY
 from winchkit.model.robot.identification.hessian import length_hessian
 from winchkit.model.robot.kinematics import Geometry, Pose, lengths, linearised
 from winchkit.model.robot.rotation import rotation_by
 from winchkit.model.robot.wrench import gravity_wrench, weight_hessian
 from winchkit.schema.profiles.robot import PlatformSpec
+from winchkit.units import GRAVITY
 
 __all__ = ["Found", "forward"]
 

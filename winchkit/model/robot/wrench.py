@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.line import GRAVITY
 from winchkit.schema.profiles.robot import PlatformSpec
+from winchkit.units import GRAVITY
 
 __all__ = ["gravity_wrench", "weight_by_payload", "weight_hessian"]
 

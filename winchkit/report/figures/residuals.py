@@ -14,7 +14,6 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, variables_of
 from winchkit.diagnosis.residuals.traces import Trace, traces_of
-from winchkit.model.line import GRAVITY
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import (
@@ -30,6 +29,7 @@ from winchkit.report.figures.reduction import bin_edges, bin_means, decimated, s
 from winchkit.report.words.numbers import Scale, percent, plain, scale_for
 from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.units import GRAVITY
 
 __all__ = ["OutputFigures", "Residuals", "residual_figures", "run_names"]
 

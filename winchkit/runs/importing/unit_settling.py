@@ -19,14 +19,13 @@ from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
     COUNT_RATE,
     COUNTS,
-    GRAVITY,
     SHARE,
     SpelledUnit,
     read_unit,
 )
 from winchkit.runs.importing.winches import stem_of
 from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
-from winchkit.units import UNITS
+from winchkit.units import GRAVITY, UNITS
 
 __all__ = ["as_others", "by_convention", "is_alike", "started"]
 
@@ -133,7 +132,9 @@ def _settle_unit(
             text = f"{answers.capacity:g} N at {answers.sensitivity:g} mV/V"
             item.settle(factor, unit.text, "given", text)
     elif dimension == "mass":
-        item.settle(unit.factor * GRAVITY * scale, unit.text, confidence, "weight at 9.80665 m/s^2")
+        item.settle(
+            unit.factor * GRAVITY * scale, unit.text, confidence, f"weight at {GRAVITY} m/s^2"
+        )
     else:
         item.settle(unit.factor * scale, unit.text, confidence, item.reason)
         item.offset = unit.offset

@@ -12,13 +12,12 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 
-from winchkit.units import UNITS
+from winchkit.units import GRAVITY, UNITS
 
 __all__ = [
     "BRIDGE",
     "COUNTS",
     "COUNT_RATE",
-    "GRAVITY",
     "SHARE",
     "SpelledUnit",
     "is_unit_row",
@@ -28,8 +27,6 @@ __all__ = [
 ]
 
 COUNTS, COUNT_RATE, SHARE, BRIDGE = "counts", "counts per second", "share", "bridge"
-GRAVITY = 9.80665
-"""Standard acceleration of gravity, m/s^2."""
 
 
 @dataclass(frozen=True)

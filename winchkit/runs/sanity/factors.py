@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import floor, log, log10, pi
 
+from winchkit.units import GRAVITY
+
 __all__ = ["KNOWN_FACTORS", "Slope", "named_factor", "slope_text"]
 
-_GRAVITY = 9.80665
 _TOLERANCE = 0.05
 """Relative difference that errors of a profile's values may make on top of the uncertainty."""
 _SIGMAS = 3.0
@@ -30,9 +31,9 @@ _UNITS: tuple[tuple[float, str], ...] = (
     ),
 )
 _OF_LOADS: tuple[tuple[float, str], ...] = (
-    (_GRAVITY, "9.81: kilograms and newtons"),
-    (_GRAVITY * 1e3, "9.81·10³: tonnes or grams and newtons"),
-    (_GRAVITY / 10, "0.981: decanewtons and kilograms"),
+    (GRAVITY, "9.81: kilograms and newtons"),
+    (GRAVITY * 1e3, "9.81·10³: tonnes or grams and newtons"),
+    (GRAVITY / 10, "0.981: decanewtons and kilograms"),
     (25.4, "25.4: inches and millimetres"),
     (1 / 0.0254, "1/0.0254: inches and metres"),
     (1 / 0.3048, "1/0.3048: feet and metres"),

@@ -19,15 +19,13 @@ from winchkit.schema.reading.tables import marker_at
 from winchkit.schema.robot_bench import RobotWiring
 from winchkit.schema.sim_platform import PlatformTruth
 from winchkit.schema.simbench import FaultSpec, HiddenSpec, NoiseSpec, SimBench, WinchTruth
-from winchkit.units import suggest
+from winchkit.units import GRAVITY, suggest
 
 __all__ = ["bench", "sim_bench"]
 
 ROLES = ("servo", "cell", "load", "length", "temperature")
 _MEASURED = {"cell": "force", "load": "force", "length": "length", "temperature": "temperature"}
 """What an instrument of each role measures."""
-_FORCE_OF_MASS = 9.80665
-"""Standard acceleration of gravity, m/s²."""
 DeviceReader = Callable[[str | Path], DeviceSpec]
 RobotReader = Callable[[str | Path], RobotProfile]
 _FITTING = {
@@ -252,7 +250,7 @@ def _check_measured(reading: Reading, device: DeviceSpec, at: Key) -> None:
         f"as {at[-1]} it has to measure {wanted}"
     )
     if (wanted, found) == ("force", "mass"):
-        message += f': in its device file write unit = "N" and a scale {_FORCE_OF_MASS} N per kg'
+        message += f': in its device file write unit = "N" and a scale {GRAVITY} N per kg'
     reading.fault((*at, "device"), message)
 
 

@@ -16,7 +16,8 @@ from winchkit.schema.quantity import (
 )
 from winchkit.sim.physics.base import Expansion, Physics, Stiffness
 from winchkit.sim.physics.presliding import relax
-from winchkit.sim.physics.state import GRAVITY, State
+from winchkit.sim.physics.state import State
+from winchkit.units import GRAVITY
 
 __all__ = [
     "CreepingCable",

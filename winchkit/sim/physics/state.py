@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["GRAVITY", "State"]
-
-GRAVITY = 9.80665
-"""Standard acceleration of gravity, m/s² (3rd CGPM, 1901; exact)."""
+__all__ = ["State"]
 
 
 @dataclass(slots=True)

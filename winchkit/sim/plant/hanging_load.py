@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import Protocol
 
-from winchkit.sim.physics.state import GRAVITY
+from winchkit.units import GRAVITY
 
 __all__ = ["HangingLoad", "Load"]
 

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.sim.physics.state import GRAVITY
 from winchkit.sim.robot.mechanics import CABLE, ROW, WORK, cables, compiled_step, step
+from winchkit.units import GRAVITY
 
 __all__ = ["Body", "CablePlatform", "Pulleys"]
 
