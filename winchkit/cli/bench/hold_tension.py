@@ -20,9 +20,7 @@ from winchkit.cli.core.terminal import status_line
 
 __all__ = ["command"]
 
-_REFRESH = 0.05
 _NEEDS_CELL = "needs a bench with a load cell"
-_HOLD = 0.2
 
 
 @click.command(
@@ -90,6 +88,7 @@ def command(
     The winch moves with a speed proportional to the tension error. It comes to rest within 0.2 s
     of the end of this command, without a fresh reading, and at the declared travel.
     """
+    from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
     from winchkit.cli.core.dry_run import station_for
     from winchkit.cli.core.quantities import optional, quantity, seconds
 
@@ -106,10 +105,10 @@ def command(
         clock = station.clock
         end = math.inf if limit is None else clock.now() + limit
         while (left := end - clock.now()) > 0:
-            station.hold_tension(winch, wanted, _HOLD, bounds)
-            clock.sleep(min(_REFRESH, left))
+            station.hold_tension(winch, wanted, DEAD_MAN, bounds)
+            clock.sleep(min(REFRESH, left))
         while station.moving(winch):
-            clock.sleep(_REFRESH)
+            clock.sleep(REFRESH)
         status = station.status()
     if as_json and not dry_run:
         echo_json(status)

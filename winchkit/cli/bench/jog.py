@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["command"]
 
-_REFRESH = 0.05
-_HOLD = 0.2
 _SPEED = "0.05 m/s"
 _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
 
@@ -149,18 +147,22 @@ def _read(
 
 def _jog_for(station: Station, winch: str | None, winding_speed: float, duration: float) -> None:
     """Keep a dead-man alive from here for a time."""
+    from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
+
     clock = station.clock
     end = clock.now() + duration
     while (left := end - clock.now()) > 0:
-        station.jog(winch, winding_speed, min(_HOLD, left + _REFRESH))
-        clock.sleep(min(_REFRESH, left))
-    station.jog(winch, 0.0, _REFRESH)
+        station.jog(winch, winding_speed, min(DEAD_MAN, left + REFRESH))
+        clock.sleep(min(REFRESH, left))
+    station.jog(winch, 0.0, REFRESH)
     _wait(station, winch)
 
 
 def _wait(station: Station, winch: str | None) -> None:
+    from winchkit.bench.control.dead_man import REFRESH
+
     while station.moving(winch):
-        station.clock.sleep(_REFRESH)
+        station.clock.sleep(REFRESH)
 
 
 def _jog_by_keys(station: Station, winch: str | None, speed: float) -> None:
