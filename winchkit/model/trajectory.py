@@ -45,8 +45,18 @@ class Trajectory:
         phase = np.clip(np.searchsorted(self.start, clipped, side="right") - 1, 0, 7)
         t = clipped - self.start[phase]
         j, a, v = self.jerk[phase], self.acceleration[phase], self.speed[phase]
-        position = self.position[phase] + t * (v + t * (a / 2 + t * j / 6))
-        return position, v + t * (a + t * j / 2), a + t * j
+        return _advanced(t, self.position[phase], v, a, j)
+
+
+def _advanced(
+    t: Array, position: Array, speed: Array, acceleration: Array, jerk: Array
+) -> tuple[Array, Array, Array]:
+    """Position, speed and acceleration after a time ``t`` of constant jerk."""
+    return (
+        position + t * (speed + t * (acceleration / 2 + t * jerk / 6)),
+        speed + t * (acceleration + t * jerk / 2),
+        acceleration + t * jerk,
+    )
 
 
 def _peak_speed(distance: float, speed: float, acceleration: float, jerk: float) -> float:
@@ -109,9 +119,8 @@ def plan(distance: float, speed: float, acceleration: float, jerk: float) -> Tra
     start, position, velocity, accel = (np.zeros(8) for _ in range(4))
     start[1:] = np.cumsum(times)
     for k, t in enumerate(times):
-        j, a, v = jerks[k], accel[k], velocity[k]
-        position[k + 1] = position[k] + t * (v + t * (a / 2 + t * j / 6))
-        velocity[k + 1] = v + t * (a + t * j / 2)
-        accel[k + 1] = a + t * j
+        position[k + 1], velocity[k + 1], accel[k + 1] = _advanced(
+            t, position[k], velocity[k], accel[k], jerks[k]
+        )
     position[-1], velocity[-1], accel[-1] = distance, 0.0, 0.0
     return Trajectory(start, position, velocity, accel, jerks)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
@@ -42,10 +42,15 @@ if TYPE_CHECKING:
 __all__ = ["addition_text", "compare_text", "error_lines", "report_text"]
 
 _MOST_LINES = 70
+"""Lines of a text, two or three screens."""
 _FEW = 3
+"""Correlations and patterns that are listed, largest first."""
 _SOONEST = 4
+"""Most sensitive effects that are listed; ``--json`` has all."""
 _MOST_OFFSETS = 6
+"""Offsets of runs that are listed."""
 _BARS = 40
+"""Characters of a curve; with its scale within 80."""
 
 
 def report_text(answer: Answer) -> str:
@@ -117,7 +122,7 @@ def compare_text(comparison: Comparison) -> str:
     if comparison.offset is not None:
         blocks.append([offset_text(comparison.offset)])
     blocks += [*_data(comparison), _notes(comparison.notes)]
-    return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
+    return _joined(blocks)
 
 
 def addition_text(addition: Addition | Removal) -> str:
@@ -147,7 +152,7 @@ def addition_text(addition: Addition | Removal) -> str:
         error_lines(addition.outputs, extended=True),
         _notes(addition.notes),
     ]
-    return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")
+    return _joined(blocks)
 
 
 def error_lines(
@@ -351,3 +356,8 @@ def _data(result: Comparison | Diagnosis) -> list[list[str]]:
 def _notes(notes: tuple[str, ...]) -> list[str]:
     lines = [line for note in notes for line in paragraph(note, "  ", "    ")]
     return ["notes", *lines] if lines else []
+
+
+def _joined(blocks: Iterable[Sequence[str]]) -> str:
+    """Blocks of lines with an empty line between them; empty blocks are left out."""
+    return "\n".join(line for block in blocks if block for line in (*block, "")).rstrip("\n")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
@@ -11,7 +11,7 @@ from winchkit.schema.quantity import Duration, PositiveDuration, PositiveMass, Q
 from winchkit.schema.sim_platform import PlatformTruth
 from winchkit.schema.table import Table
 
-__all__ = ["FaultSpec", "HiddenSpec", "NoiseSpec", "SimBench", "WinchTruth"]
+__all__ = ["FaultSpec", "HiddenSpec", "NoiseSpec", "SimBench", "WinchTruth", "dotted_keys"]
 
 
 @dataclass(frozen=True)
@@ -74,3 +74,12 @@ class SimBench(Table):
     description: str = ""
     platform: PlatformTruth | None = None
     """True platform of a robot; None for winches with a load each."""
+
+
+def dotted_keys(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Values of tables within tables by dotted keys, as of :attr:`WinchTruth.overrides`."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from dotted_keys(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value

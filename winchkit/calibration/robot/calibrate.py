@@ -119,8 +119,7 @@ class Calibrated(Plotted, Tabular):
                 "nothing was written. Check that the poses are of this robot, record more of them, "
                 "or fit a missing effect beside the geometry (--effect)"
             )
-        exits = self.equations.robot.geometry.exit_point
-        size = float(np.max(np.linalg.norm(exits[:, None] - exits, axis=2)))
+        size = self.equations.robot.geometry.size
         if after > _LARGEST_ERROR * size:
             return (
                 f"not calibrated: the held-out position error is {after * 1e3:.4g} mm rms, in a "

@@ -24,7 +24,7 @@ from winchkit.model.robot.identification.bundle_adjustment import (
     Weights,
     linearise,
 )
-from winchkit.model.robot.rotation import rotation_by, rotation_vector, skew
+from winchkit.model.robot.rotation import mean_rotation, rotation_by, rotation_vector, skew
 
 __all__ = [
     "Observability",
@@ -95,7 +95,7 @@ def _significant_information(equations: Equations, solution: Solution, weights: 
     make exit and anchor points seem identifiable. Zeros of instruments are eliminated.
     """
     pose, many = solution.state.pose, len(solution.state.pose.rotation)
-    mean, home = _mean_rotation(pose.rotation), equations.robot.home.rotation[0]
+    mean, home = mean_rotation(pose.rotation), equations.robot.home.rotation[0]
     turned = rotation_vector(pose.rotation @ mean.T)
     noise = _rotation_noise(solution.linear)
     home_difference = rotation_vector(mean @ home.T)
@@ -126,12 +126,6 @@ def _rotation_noise(linear: Linear) -> Array:
     spread = (by_parameters @ posterior).reshape(len(inverse), 3, -1)
     spread = spread @ np.swapaxes(by_parameters.reshape(len(inverse), 3, -1), 1, 2)
     return np.asarray(np.mean(inverse[:, 3:, 3:] + spread, axis=0))
-
-
-def _mean_rotation(rotation: Array) -> Array:
-    """Mean rotation: the one nearest to the mean of matrices (p, 3, 3)."""
-    left, _, right = np.linalg.svd(np.mean(rotation, axis=0))
-    return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
 
 
 def _words(equations: Equations, data: Array, unidentifiable: Array, floor: float) -> Iterator[str]:
@@ -259,8 +253,8 @@ def _refuse_out_of_reach(equations: Equations) -> None:
     """Refuse positions that a robot of this size cannot reach: wrong unit or frame."""
     if equations.instruments is not None and "frame" in equations.instruments.free:
         return
-    exits, home = equations.robot.geometry.exit_point, equations.robot.home.position
-    size = float(np.max(np.linalg.norm(exits[:, None] - exits, axis=2)))
+    home = equations.robot.home.position
+    size = equations.robot.geometry.size
     distance = np.linalg.norm(equations.measured.position - home, axis=1)
     distance = distance[np.isfinite(distance)]
     if len(distance) and float(np.median(distance)) > _REACH * size:

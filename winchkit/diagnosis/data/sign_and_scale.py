@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.sampling import bridged, bridged_channel
@@ -223,8 +224,7 @@ def _slope(measured: Array, columns: Array) -> Slope | None:
 
     None where it is not five standard deviations from zero.
     """
-    rows = np.flatnonzero(np.isfinite(measured) & np.all(np.isfinite(columns), axis=1))
-    rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
+    rows = _complete_rows(measured, columns)
     if len(rows) < _LEAST_SAMPLES:
         return None
     x, y = columns[rows], measured[rows]
@@ -234,6 +234,12 @@ def _slope(measured: Array, columns: Array) -> Slope | None:
     value = float(np.linalg.lstsq(x, y, rcond=None)[0][0]) / scale
     slope = Slope(value, _jackknife_std(without))
     return slope if abs(slope.value) > _SIGMAS * slope.std else None
+
+
+def _complete_rows(measured: Array, columns: Array) -> NDArray[np.intp]:
+    """Rows without a missing value, decimated to about `_MOST_SAMPLES`."""
+    rows = np.flatnonzero(np.isfinite(measured) & np.all(np.isfinite(columns), axis=1))
+    return rows[:: max(1, len(rows) // _MOST_SAMPLES)]
 
 
 def _jackknifed(x: Array, y: Array) -> Array:
@@ -266,8 +272,7 @@ def _passivity(run: Run, profile: WinchProfile) -> Iterator[Finding]:
     conservative += [np.cos(at.motor_angle), at.motor_acceleration]
     columns = np.column_stack([np.sign(at.motor_rate), at.motor_rate, *conservative])
     measured = run["motor_torque"]
-    rows = np.flatnonzero(np.isfinite(measured) & np.all(np.isfinite(columns), axis=1))
-    rows = rows[:: max(1, len(rows) // _MOST_SAMPLES)]
+    rows = _complete_rows(measured, columns)
     if len(rows) < _LEAST_SAMPLES or not np.any(at.motor_rate):
         return
     x = columns[rows]

@@ -213,8 +213,12 @@ def binned_share(variable: Array, error: Array, kept: int) -> float:
 
 def quantile_bins(variable: Array) -> NDArray[np.intp]:
     """Bin of every sample; bins hold equal counts as far as ties allow."""
-    edges = np.unique(np.quantile(variable, np.linspace(0, 1, BINS + 1)[1:-1]))
-    return np.searchsorted(edges, variable, side="right")
+    return np.searchsorted(quantile_edges(variable, BINS), variable, side="right")
+
+
+def quantile_edges(values: Array, bins: int) -> Array:
+    """Inner edges, sorted, of at most ``bins`` bins of equal counts as far as ties allow."""
+    return np.unique(np.quantile(values, np.linspace(0, 1, bins + 1)[1:-1]))
 
 
 def half_of_samples_per_turn(angles: Iterable[Array]) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.residuals.attribution import Attribution, quantile_edges
 from winchkit.diagnosis.robot.errors import Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.robot import angles_of
@@ -140,7 +140,7 @@ def _taken(values: Array, error: Array) -> _Share:
         total, count = total + float(e @ e), count + len(e)
         if len(e) < _LEAST_POSES or np.ptp(x) <= 1e-9 * max(1.0, float(np.abs(x).max())):
             continue
-        edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)[1:-1]))
+        edges = quantile_edges(x, _BINS)
         number = np.searchsorted(edges, x, side="right")
         many = np.bincount(number)
         used = many > 0

@@ -23,6 +23,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Segment
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import orthonormal_of_projected
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.verdict.curve_fits import UNIDENTIFIABLE, BasisProducts, PartialRegression
 from winchkit.diagnosis.verdict.spline_alternatives import CurveFamily
@@ -96,7 +97,9 @@ class _Design:
         families: Sequence[CurveFamily],
     ) -> None:
         self._regression, self._partial, self._families = regression, partial, families
-        self._own = np.column_stack([named.change, _orthonormal(named.columns)])
+        self._own = np.column_stack(
+            [named.change, orthonormal_of_projected(named.columns, UNIDENTIFIABLE)]
+        )
         self.n_own = self._own.shape[1]
         counts = [len(family.knots) for family in families]
         self._ends = self.n_own + np.cumsum([0, *counts])
@@ -176,10 +179,3 @@ class _Design:
                 at = slice(int(self._ends[index]), int(self._ends[index + 1]))
                 out[:, at] = (own * self._partial.inverse_sigma[rows]).T
         return out
-
-
-def _orthonormal(columns: Array) -> Array:
-    """Orthonormal basis of projected columns; directions that are rounding are left out."""
-    values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = values > UNIDENTIFIABLE
-    return np.asarray(columns @ (vectors[:, kept] / np.sqrt(values[kept])))

@@ -62,6 +62,12 @@ class Geometry:
     swivel_axis: Array
     """Unit vectors of the cable's direction when it reaches the pulley, base frame, (n, 3)."""
 
+    @property
+    def size(self) -> float:
+        """Largest distance of two exit points, m."""
+        between = self.exit_point[:, None] - self.exit_point
+        return float(np.max(np.linalg.norm(between, axis=2)))
+
 
 @dataclass(frozen=True)
 class Pose:

@@ -120,6 +120,18 @@ def rotation_by(vector: ArrayLike) -> Array:
     return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
 
 
+def mean_rotation(rotation: Array) -> Array:
+    """Rotation nearest to the mean of rotation matrices (p, 3, 3), in the Frobenius norm; (3, 3).
+
+    References
+    ----------
+    Moakher, M. (2002). Means and averaging in the group of rotations. SIAM J. Matrix Anal. Appl.
+    24, 1-16.
+    """
+    left, _, right = np.linalg.svd(np.mean(rotation, axis=0))
+    return np.asarray(left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right)
+
+
 def rotation_vector(rotation: ArrayLike) -> Array:
     """The rotation vector of rotations (..., 3, 3), at most π long; returns (..., 3), rad.
 

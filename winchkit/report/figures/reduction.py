@@ -16,6 +16,7 @@ from winchkit.diagnosis.residuals.attribution import (
     Attribution,
     attributions,
     harmonics,
+    quantile_edges,
     variables_of,
 )
 from winchkit.model.variables import VARIABLE_UNITS
@@ -33,6 +34,7 @@ __all__ = [
 ]
 
 _FEW = 5
+"""Distinct values up to which each is a bin of its own, such as loads."""
 
 
 def decimated(series: Sequence[Array], intervals: int) -> NDArray[np.intp]:
@@ -83,7 +85,7 @@ def filled_edges(x: Array, bins: int) -> Array:
     distinct = np.unique(x)
     if len(distinct) <= _FEW:
         return np.asarray((distinct[1:] + distinct[:-1]) / 2)
-    return np.unique(np.quantile(x, np.linspace(0, 1, bins + 1)[1:-1]))
+    return quantile_edges(x, bins)
 
 
 def bin_means(x: Array, values: Sequence[Array], edges: Array) -> tuple[Array, list[Array]]:
@@ -99,9 +101,13 @@ def bin_means(x: Array, values: Sequence[Array], edges: Array) -> tuple[Array, l
 
 
 _BINS = 20
+"""Bins over a variable: enough to see its shape, with many samples in each."""
 _PER_PERIOD = 8
+"""Bins per period of a harmonic, so that its amplitude is drawn within 3 %."""
 _WORTH_DRAWING = 0.05
+"""Share of the variance below which a trend is not seen among the samples."""
 _DIGITS = 5
+"""Significant digits, more than a pixel resolves."""
 
 
 @dataclass(frozen=True)

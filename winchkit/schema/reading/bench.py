@@ -18,7 +18,14 @@ from winchkit.schema.reading.source import spelled
 from winchkit.schema.reading.tables import marker_at
 from winchkit.schema.robot_bench import RobotWiring
 from winchkit.schema.sim_platform import PlatformTruth
-from winchkit.schema.simbench import FaultSpec, HiddenSpec, NoiseSpec, SimBench, WinchTruth
+from winchkit.schema.simbench import (
+    FaultSpec,
+    HiddenSpec,
+    NoiseSpec,
+    SimBench,
+    WinchTruth,
+    dotted_keys,
+)
 from winchkit.units import GRAVITY, suggest
 
 __all__ = ["bench", "sim_bench"]
@@ -126,20 +133,11 @@ def _truth(reading: Reading, name: str, raw: object, hidden: object) -> WinchTru
         reading.fault(at, f"expected a table, not {raw!r}")
         return None
     own = {key: raw[key] for key in ("load_mass", "temperature", "temperature_drift") if key in raw}
-    overrides = dict(_flat({key: value for key, value in raw.items() if key not in own}))
+    overrides = dict(dotted_keys({key: value for key, value in raw.items() if key not in own}))
     for key, value in overrides.items():
         _check_override(reading, at, key, value)
     pieces = tuple(_numbered(reading, HiddenSpec, hidden, ("winch", name, "hidden")))
     return reading.table(WinchTruth, {**own, "overrides": overrides, "hidden": pieces}, at)
-
-
-def _flat(tree: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Tables within tables as dotted keys."""
-    for key, value in tree.items():
-        if isinstance(value, dict):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
 
 
 def _check_override(reading: Reading, at: Key, key: str, value: object) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, get_args, get_type_hints
 
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Quantity
+from winchkit.schema.simbench import dotted_keys
 from winchkit.units import UNITS, suggest
 
 __all__ = ["number_names", "overridden", "read_numbers", "with_unit"]
@@ -73,7 +74,7 @@ def overridden(profile: WinchProfile, overrides: Mapping[str, Any]) -> WinchProf
     Raises FileError with every key that does not exist and every number that cannot be read.
     """
     faults: list[Fault] = []
-    for key, raw in _flat(overrides, ""):
+    for key, raw in dotted_keys(overrides):
         try:
             profile = _replaced(profile, key.split("."), raw)
         except UsageError as error:
@@ -81,14 +82,6 @@ def overridden(profile: WinchProfile, overrides: Mapping[str, Any]) -> WinchProf
     if faults:
         raise FileError(faults)
     return profile
-
-
-def _flat(table: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", value
 
 
 def _replaced(owner: Any, path: list[str], raw: Any) -> Any:

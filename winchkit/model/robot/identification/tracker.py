@@ -38,6 +38,7 @@ from winchkit.model.robot.constraints import Constraint, rotation_residual
 from winchkit.model.robot.kinematics import Pose
 from winchkit.model.robot.rotation import (
     angle_rates,
+    mean_rotation,
     rotation_by,
     rotation_of,
     rotation_vector,
@@ -335,9 +336,7 @@ def _mounted(start: Tracker, pose: Pose, angles: Array) -> Tracker:
         return start
     bare = replace(start, mounting=None)
     shown = reading_of(bare, Pose(pose.position[whole], pose.rotation[whole])).rotation
-    mean = np.mean(np.swapaxes(shown, 1, 2) @ rotation_of(*angles[whole].T), axis=0)
-    left, _, right = np.linalg.svd(mean)
-    turned = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+    turned = mean_rotation(np.swapaxes(shown, 1, 2) @ rotation_of(*angles[whole].T))
     return replace(start, mounting=rotation_vector(turned))
 
 
