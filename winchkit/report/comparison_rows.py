@@ -12,6 +12,7 @@ __all__ = ["HEAD", "followed", "map_lines", "offset_text", "size_rows"]
 
 HEAD = ("error", "rms", "bias", "largest", "noise", "measured, rms")
 _FOLLOWED = 3
+"""Variables of an attribution that a row has room for; ``--json`` has all."""
 
 
 def size_rows(comparison: Comparison) -> list[list[str]]:

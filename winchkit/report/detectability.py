@@ -16,6 +16,7 @@ from winchkit.report.words.vocabulary import parameter_name, parameter_unit
 __all__ = ["Visible", "effects_of", "smallest_shown", "untestable", "visible"]
 
 _FEW = 4
+"""Effects that a sentence lists; the table has all."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from winchkit.report.html.markup import Markup, compact, details, element, folde
 __all__ = ["Command", "repeat"]
 
 _FEW = 3
+"""Runs that a command names; more are written with a wildcard."""
 
 
 @dataclass(frozen=True)

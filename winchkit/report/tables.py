@@ -45,6 +45,7 @@ __all__ = [
 ]
 
 _TOP = 10
+"""Rows of a table that are open; the others are folded."""
 
 
 def output_scale(output: OutputFit) -> Scale:

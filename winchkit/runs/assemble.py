@@ -17,6 +17,7 @@ from winchkit.units import UNITS, convert, factor, parse, suggest
 __all__ = ["Recording", "assemble", "refuse"]
 
 _SHOWN = 20
+"""Faults of a file that are listed; the others are counted. About one screen."""
 _LATEST = 9.2e9
 """Largest time stamp, s: nanoseconds in 64 bits, as MCAP and most instruments count."""
 

@@ -39,8 +39,11 @@ is at rest for some rows too."""
 _MOST_NOISE = 0.05
 """Largest noise of an angle, in its spread, in a log: rows that are poses have a ratio near one."""
 _QUARTILE = 0.25
+"""Lower quartile of absolute differences: up to three quarters of the samples may move."""
 _ONE_COUNT = 1.5
+"""Changes below this many counts are those of one count; midway between one and two."""
 _ROUNDING = 1e-9
+"""Relative to the largest angle: far above rounding of floating point (1e-16), below a count."""
 _OF_NORMAL = 0.31864
 """Lower quartile of |x| of a standard normal x."""
 _THIRD = sqrt(20.0)

@@ -23,6 +23,8 @@ __all__ = [
 ]
 
 _GAP = 1.5
+"""Steps beyond this many usual ones are gaps: midway between one and two, which is one sample
+lost."""
 _QUALITY = "quality"
 
 

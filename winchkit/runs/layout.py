@@ -15,6 +15,7 @@ from winchkit.errors import Fault, RunError
 __all__ = ["Layout", "RowRule", "Samples", "Signal", "Source", "read_layout", "write_layout"]
 
 _LARGEST = 1 << 62
+"""ns: offsets beyond are damaged, and would overflow 64 bits in a sum."""
 
 
 @dataclass(frozen=True)

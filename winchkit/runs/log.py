@@ -17,6 +17,7 @@ from winchkit.runs.run import Run
 __all__ = ["Log", "Note", "aligned", "joined", "known_event", "log_of_run", "tables_in"]
 
 _BRIDGED = 1.5
+"""In sampling intervals: midway between the usual step and one lost sample."""
 
 
 @dataclass(frozen=True)

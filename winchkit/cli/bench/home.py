@@ -22,6 +22,7 @@ from winchkit.errors import UsageError
 __all__ = ["command"]
 
 _POLL = 0.02
+"""s, below what a hand or a drive notices."""
 
 
 @click.command(

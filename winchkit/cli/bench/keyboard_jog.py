@@ -32,6 +32,7 @@ __all__ = [
 _ARROWS = {"\x1b[A": "up", "\x1b[B": "down", "\x1bOA": "up", "\x1bOB": "down"}
 _WINDOWS_ARROWS = {"H": "up", "P": "down"}
 _POLL = 0.01
+"""s, below the repetition of keys (30 ms and more)."""
 
 
 class Keys(Protocol):
@@ -135,7 +136,9 @@ HELP = (
 INCHES = (0.001, 0.01, 0.1)
 """Steps of the inch mode, m."""
 _FASTER = 1.25
+"""Factor of the speed at a key press: three presses double it."""
 _PICTURE = 0.1
+"""s between two pictures of the bench; ten a second look continuous."""
 _WIND_IN, _PAY_OUT = "up", "down"
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _POLL = 0.05
+"""s between two looks at a programme; it delays the end of the command only."""
 
 
 @click.command(

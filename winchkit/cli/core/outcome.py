@@ -18,7 +18,9 @@ from winchkit.errors import Fault, FileError, WinchkitError
 __all__ = ["INTERNAL", "INTERRUPTED", "finish", "threads_abandoned"]
 
 INTERRUPTED = 130
+"""128 + SIGINT (2), the convention of shells."""
 INTERNAL = 70
+"""``EX_SOFTWARE`` of ``sysexits.h``: an error of winchkit itself."""
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 """Numbers of errors that have no file name when a stream is written: no space, a quota, a limit."""
 _DEBUG = "WINCHKIT_DEBUG"

@@ -39,6 +39,7 @@ _TEXT = (
     (rb"\A\s*\{", ".json"),
 )
 _HEAD = 4000
+"""Bytes by which the format is recognised; the header of every format is shorter."""
 
 
 class Readable(click.ParamType):  # type: ignore[type-arg]

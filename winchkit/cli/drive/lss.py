@@ -27,6 +27,8 @@ _BUS = "can"
 _SELECTED = {0x43: 0x44}
 """Answers whose first byte is not that of the question."""
 _ANSWERED = (0x11, 0x13, 0x17, 0x43, 0x5A, 0x5B, 0x5C, 0x5D, 0x5E)
+"""Command specifiers of CiA 305 that have an answer of the node; the others have none to wait
+for."""
 
 
 @contextmanager

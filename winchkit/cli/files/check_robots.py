@@ -15,6 +15,8 @@ __all__ = ["faults_and_warnings"]
 
 Said = list[tuple["Key", str]]
 _NEAR = 1e-3
+"""m and rad: far above the tolerance of the solution, below what a profile can mean by another
+pose."""
 
 
 def faults_and_warnings(file: str, value: Declared) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:

@@ -13,8 +13,11 @@ if TYPE_CHECKING:
 __all__ = ["entry_of", "tables_text"]
 
 _WIDEST = 24
+"""Characters of a name or of values, so that a row fits on a usual terminal."""
 _PLOT = 16
+"""Characters of a plot: enough for the shape of a motion."""
 _FIRST = 3
+"""Values of a column that are shown: enough to see its unit and first step."""
 _HEAD = ("column", "channel", "unit", "SI of 1", "confidence", "first values", "plot", "reason")
 
 

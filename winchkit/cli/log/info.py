@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _SHOWN = 100
+"""Characters of a metadata value that are shown; ``--json`` has all."""
 
 
 @click.command(

@@ -38,7 +38,9 @@ COMMANDS = {
     "replay": At("winchkit.cli.log.replay", "Play a log as if it came from the bench."),
 }
 _CHECK_PERIOD = 0.1
+"""s between two looks at the recorder, so that a full disk is reported at once."""
 _SHOW_PERIOD = 0.5
+"""s between two pictures of the counts: fast enough to follow, slow enough to read."""
 
 
 @click.group(

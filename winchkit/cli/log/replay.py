@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _SHOW_PERIOD = 0.1
+"""s between two pictures; ten a second look continuous."""
 
 
 @click.command(

@@ -219,6 +219,7 @@ html_option = click.option(
     help="Also write the answer as one page.",
 )
 _RUNS_NAMED = 3
+"""Runs that a title names; more are counted."""
 
 
 def _check_figures(folder: str, option: str) -> None:

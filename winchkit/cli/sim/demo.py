@@ -23,10 +23,12 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _RECORDING_SECONDS = 62.0
+"""s of simulated time of the programme; the progress bar needs its length only."""
 _BEFORE_THE_END = 0.98
 """Largest share that the bar shows, since the diagnosis follows the recording."""
 _LONG = "takes half a minute; .ci/run executes it"
 _SHARES_SHOWN = 2
+"""Variables of an attribution in one sentence."""
 _OPENING = (
     "A simulated bench with seed {seed}: a winch, a CiA 402 drive on CAN, a load cell, a length "
     "and a temperature instrument on Modbus. It has at most one effect that its profile lacks."

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["command"]
 
 _CHECK_EVERY = 0.1
+"""s between two looks at the simulation; it delays the end of the command only."""
 _TURN = 1e-4
 _DETERMINED = 6
 """Cables from which they determine the pose of a platform, so that it can be moved as one."""

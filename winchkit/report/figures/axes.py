@@ -18,8 +18,11 @@ from winchkit.report.words.vocabulary import VARIABLE_NAMES
 __all__ = ["Range", "Reading", "range_of", "reading"]
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
+"""Round steps between ticks, of one decade."""
 _FEWEST = 3
+"""Ticks from which a reader sees the scale of an axis."""
 _MARGIN = 0.06
+"""Share of the range that stays free beyond the data, so that no line lies on the frame."""
 _DECADES = 4
 """Decades of a logarithmic axis from which only its powers of ten have ticks."""
 

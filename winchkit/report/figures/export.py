@@ -21,11 +21,14 @@ if TYPE_CHECKING:
 __all__ = ["png", "require_png", "write_figures"]
 
 _POINTS_PER_INCH = 72.0
+"""Of PostScript and matplotlib."""
 _DPI = 192.0
 """Twice the 96 dots per inch of a screen."""
 _PX = _POINTS_PER_INCH / 96.0
+"""Points in a pixel of CSS, of which an inch has 96."""
 _ANCHORS = {"start": "left", "middle": "center", "end": "right"}
 _MARGIN = (12.0, 8.0)
+"""px across and down, the padding of the page's cards."""
 
 
 def require_png() -> None:

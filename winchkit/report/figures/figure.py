@@ -20,6 +20,7 @@ from winchkit.plain_json import significant
 __all__ = ["Axis", "Cells", "Figure", "Panel", "RunMark", "Series", "Table"]
 
 _DIGITS = 7
+"""Significant digits of data in a file: the float of the run, without its rounding errors."""
 _FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")
 
 

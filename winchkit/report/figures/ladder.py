@@ -17,6 +17,7 @@ from winchkit.report.words.vocabulary import OUTPUT_NAMES
 __all__ = ["error_ladder", "fleet_ladders", "present"]
 
 _ROW = 30.0
+"""px per output: a line of text and a bar."""
 _LEAST, _MOST = 0.8, 1.3
 """Ends of the axis: below the noise, and beyond the largest ratio by this factor."""
 

@@ -26,13 +26,18 @@ __all__ = ["NARROW", "WIDE", "Area", "Rule", "Scene", "Shape", "Text", "density_
 WIDE, NARROW = 700, 340
 """Widths of the two layouts of a page, px."""
 _MARGIN_LEFT, _MARGIN_RIGHT = 50, 12
+"""px beside the axes: labels of the ticks, and half of the last one."""
 _TITLE, _LINE, _SWATCH = 20, 18, 22
+"""px: lines of the title, of the legend, and its swatches."""
 _RUNS, _HEADING, _TICKS, _GAP = 18, 18, 36, 10
+"""px: names of the runs, headings, ticks with their label, and between two axes."""
 _CHARACTER = 0.55
+"""Mean width of a character in its height, of sans-serif fonts."""
 _BOLD = 1.16
 """Width of bold text over that of regular text, of the widest usual sans-serif (DejaVu)."""
 """Mean width of a character as a share of the font size."""
 _PER_TICK_X, _PER_TICK_Y = 80, 48
+"""px between two ticks at least, so that their labels do not touch."""
 _SCALE_STEP = 34
 """Width of a class on the colour scale, px."""
 

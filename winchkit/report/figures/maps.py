@@ -56,6 +56,7 @@ def signed(value: float, scale: Scale) -> str:
 
 
 _MOST = 2
+"""Maps that a page draws; a third explains little more."""
 _ABOVE_NOISE = 2.0
 """Least value of full colour as a multiple of the noise, so that values near it are pale."""
 

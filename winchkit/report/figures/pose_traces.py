@@ -26,7 +26,9 @@ __all__ = ["NUMBER", "Trace", "trace_over", "traces", "unit_of"]
 NUMBER = "number"
 """Number of the pose, for an error that no variable explains."""
 _BINS = 12
+"""Bins over a variable: about eight poses in each of a hundred."""
 _DIGITS = 5
+"""Significant digits, more than a pixel resolves."""
 _POOLED = ("winch", "pose", NUMBER)
 """Variables for which all lines are drawn; else the line with the largest share."""
 

@@ -38,11 +38,15 @@ _INTERVALS = 300
 _DOTS = 1500
 """Samples up to which each is a dot; more are drawn as a density."""
 _CELLS_X, _CELLS_Y = 56, 28
+"""Cells of the density map: about 10 px each."""
 _TAILS = 0.001
+"""Quantile at which the axis of frequencies begins: single low values would fill half of it."""
 _EMPTY = 0.1
 """Part of the range of a variable that is a gap of its mean where it holds no sample."""
 _SAME = 1e-3
+"""Relative: two errors that differ by less are drawn as one."""
 _SPREAD = 0.2
+"""Of the distance between two places: points of equal value are drawn beside each other."""
 _DEGREES = 360.0
 _TURN = 2 * np.pi
 _COMMON = pattern(r"^(?:motion[-_ ])?programme[-_ ]")

@@ -28,9 +28,13 @@ if TYPE_CHECKING:
 __all__ = ["answer_figure", "calibration_figure", "result_figure", "run_figure"]
 
 _OUTPUT_HEIGHT, _CHANNEL_HEIGHT, _POSE_HEIGHT = 2.5, 1.15, 2.0
+"""Inches per output, channel and pose trace."""
 _POINTS = 4000
+"""Points of a line, several for each pixel of its width."""
 _NAMED_RUNS = 8
+"""Runs that a legend names; more would cover the axes."""
 _CHANNELS = 8
+"""Channels that are drawn without a choice: about one screen."""
 _GAP = 0.02
 """Gap between runs that follow each other, as a share of the whole time."""
 

@@ -41,8 +41,11 @@ __all__ = [
 _TONES = {"adequate": "#2b7a4b", "explained": "#2b7a4b", "partly": "#9a6a00", "unknown": "#a83232"}
 _BOX = "border-left:4px solid {tone};padding:.3em 1em;margin:.3em 0"
 _FIRST = 12
+"""Rows of a table that are open: about one screen."""
 _STROKE = (120.0, 18.0)
+"""px of a line of the values in a table."""
 _POINTS = 60
+"""Points of that line, one for two pixels."""
 
 
 def run_cell(run: Run) -> str:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["robot_figure", "winch_figure"]
 
 _LENGTHS = 400
+"""Points of a curve, one for two or three pixels."""
 _TURN = 2 * np.pi
 
 

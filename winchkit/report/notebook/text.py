@@ -40,7 +40,9 @@ __all__ = [
 _LINES = 24
 """Lines of a terminal window."""
 _CHANNELS = 12
+"""Rows of a table in a console; with the others a screen."""
 _PROGRAMMES = 5
+"""Programmes of a plan that are listed, best first."""
 
 
 def screen(text: str, more: str = "") -> str:

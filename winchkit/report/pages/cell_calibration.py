@@ -31,7 +31,9 @@ __all__ = [
 NAMES = ("c0 [N]", "c1 [1]", "c2 [1/N]")
 """Names of the coefficients."""
 _WIDTH = 56
+"""Characters of the plot of residuals; with its scale within 80."""
 _ROWS = 11
+"""Lines of that plot; odd, so that one is zero."""
 _MARKS = {"up": "^", "down": "v"}
 
 

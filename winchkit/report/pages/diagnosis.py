@@ -25,6 +25,8 @@ from winchkit.report.words.vocabulary import VERDICT_NAMES, listed
 __all__ = ["sections"]
 
 _TRACE = 0.005
+"""Unexplained share from which an explained diagnosis says that something remains; 0 % when rounded
+below."""
 
 
 def sections(

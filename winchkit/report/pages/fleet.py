@@ -38,8 +38,11 @@ __all__ = [
 ]
 
 _FOLLOWED = 3
+"""Variables of an attribution in one cell of a table."""
 _CAUSES = 4
+"""Effects in the lead of the page; all stand below."""
 _SIDE = 560
+"""px: width of a figure, two of which stand beside each other."""
 _ORDER = ("unknown", "partly", "explained", "adequate")
 _SOME = {0: "No effect is", 1: "1 effect is"}
 _BY_CHANCE = 0.01

@@ -19,9 +19,13 @@ from winchkit.report.words.numbers import unbroken
 __all__ = ["fleet_history_html"]
 
 _MOST_FIGURES = 24
+"""Parameters that are drawn, most significant first; a longer page is not read."""
 _SIDE = 340
+"""px: width of a figure, three of which stand beside each other."""
 _HEIGHT = 120.0
+"""px of its axes."""
 _DAY = 86400.0
+"""s."""
 
 
 def fleet_history_html(history: FleetHistory, title: str, swapped: Sequence[Swap] = ()) -> str:

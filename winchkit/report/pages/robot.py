@@ -46,7 +46,9 @@ __all__ = [
 ]
 
 _SPREAD = 0.25
+"""Of the distance between two places: points of equal value are drawn beside each other."""
 _CHANGED = 1.02
+"""Ratio of the errors (rms) from which an output counts as changed by the added effects."""
 _FEW_POSES = 400
 """Poses up to which a point is large."""
 

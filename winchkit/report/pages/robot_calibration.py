@@ -26,7 +26,9 @@ __all__ = ["calibration_figures", "calibration_html", "headline", "largest_chang
 
 _MM = 1e3
 _MOST = 5
+"""Parameters in the lead, largest change first; the table has all."""
 _SIDE = 560
+"""px: width of a figure, two of which stand beside each other."""
 
 
 def calibration_html(

@@ -24,6 +24,7 @@ _CAVEATS = {
 }
 """Sentence, without a full stop, of every code of ``caveats``."""
 _SHOWN = 4
+"""Findings or names that are listed; more are counted."""
 
 
 def caveat_text(code: str) -> str:

@@ -10,6 +10,7 @@ from winchkit.report.words.numbers import unbroken
 __all__ = ["aligned", "hanging", "paragraph"]
 
 _WIDTH = 80
+"""Characters of a terminal."""
 
 
 def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:

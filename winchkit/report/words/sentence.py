@@ -34,9 +34,12 @@ __all__ = [
 ]
 
 _MOVED = 1.05
+"""Ratio of held-out errors before and after above which a sentence names the output: 5 % is seen in
+two digits."""
 CLEAR_ORDER = 0.2
 """Least share of the residual variance from which an order within a turn precedes a trend."""
 _ABOVE = 1.5
+"""Ratio of error to noise from which a sentence says that an output is above its noise."""
 _WHOLE = (
     "the geometry of the robot differs as a whole: no small set of effects explains these poses as "
     "well as all points and radii together"

@@ -124,6 +124,7 @@ _CLAUSES = {
     "torque-lead": "the torque signal is the command, ahead of the torque",
 }
 _ORDERS_SHOWN = 8
+"""Amplitudes of a series in one line."""
 _MAIN_ORDERS = 0.1
 """Share of the largest amplitude: smaller orders do not enter the guess of poles and slots."""
 _SYMBOLS = {"axial_stiffness": "EA"}

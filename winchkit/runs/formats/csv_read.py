@@ -32,6 +32,7 @@ __all__ = [
 ]
 
 _PIECE = 1 << 20
+"""Bytes read at a time, so that a large file needs no memory of its size."""
 
 
 def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:

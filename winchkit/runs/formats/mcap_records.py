@@ -29,8 +29,12 @@ __all__ = [
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = 22
+"""Bytes of a Message record before its data: channel (2), sequence (4), two times (8 each)."""
 _LARGEST = 1 << 30
+"""Bytes of a chunk; a larger size in its header is that of a damaged file."""
 _FIRST_LOOK, _LOOK_GROWTH = 16, 16
+"""Messages that are compared with the first for equal length, and growth of their number while all
+agree: few comparisons in a chunk of mixed channels, few steps in a chunk of one."""
 
 
 class Op:

@@ -47,6 +47,8 @@ _BY_DIMENSION = {
     "current": "motor_torque",
 }
 _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
+"""Ranks of candidates after those by a whole name: a component or part of a name, the unit alone,
+the order of the columns."""
 _UNKNOWN = "unknown name"
 _NOT_USED = "set point, error, state, counter, constant or a quantity of another body"
 _SCALAR = {"tension", "load", "motor_torque"}

@@ -20,6 +20,7 @@ __all__ = ["CLOCKS", "Ratio", "from_velocity", "likely_counts", "ratio_of"]
 _CLEAR = 0.98
 """Least correlation of angle and integral at which their ratio is used."""
 _TOLERANCE = 0.02
+"""Relative: factors of units differ by more, and calibrations of one machine by less."""
 _TURN = 2 * math.pi
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "turn": _TURN}
 _SPEEDS = {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": _TURN / 60, "turn/s": _TURN}

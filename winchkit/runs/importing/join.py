@@ -46,8 +46,12 @@ _MOST = 200_000
 _LEAST_OVERLAP = 0.4
 """Least share of the shorter recording that overlaps at a lag."""
 _LEAST_CORRELATION = 0.8
+"""Of two recordings of one motion; noise of velocities leaves more. Rule of thumb."""
 _CHANCE = 1e-4
+"""Level of the F test that the best lag is better than its rival: a wrong join is worse than
+none."""
 _WINDOWS = 6
+"""Parts of a recording in which the delay is estimated again, to see a drift of the clocks."""
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from winchkit.units import UNITS
 __all__ = ["ask_columns", "ask_signs", "ask_units", "axis_question"]
 
 _SHOWN = 8
+"""Names listed in a question; about one line."""
 
 
 def _ask_current(work: Work, item: ChosenColumn) -> None:

@@ -14,6 +14,7 @@ from winchkit.arrays import Array
 __all__ = ["lost_sign"]
 
 _BITS = range(8, 33)
+"""Widths of counters: a byte to a double word."""
 _FEWEST = 8
 """Least number of different values on each side of the gap."""
 _EXTENT = 0.75

@@ -32,6 +32,7 @@ __all__ = [
 ]
 
 _BUFFER = 1 << 20
+"""Bytes: one write per second or less at the rates of a bench."""
 _PATIENCE = 2.0
 """Longest wait for another process that starts a log in the same folder, s."""
 _FAR = 1 << 62

@@ -15,6 +15,7 @@ __all__ = ["Rotation", "part_path", "parts_beside"]
 _BYTES = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
 _LIMIT = re.compile(r"\s*([0-9.]+)\s*([A-Za-z]+)\s*")
 _SMALLEST, _SHORTEST = 10e3, 1.0
+"""Bytes and s of a part: below, a log would consist of headers."""
 
 
 @dataclass(frozen=True)

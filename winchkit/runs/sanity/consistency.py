@@ -23,13 +23,17 @@ _RANGE = 0.8, 1.25
 _SIGMAS = 3.0
 """Standard deviations by which a slope must be outside the range."""
 _BLOCKS = 40
+"""Blocks of time for the spread of the ratio: each must hold a motion. Rule of thumb."""
 _LEAST_SAMPLES = 50
+"""Fewer samples do not tell a ratio from noise; rule of thumb."""
 _CORRELATION = 0.5
 """Least squared correlation at which a slope is judged: less than half of the integral varies with
 the angle where a filter delays the velocity by more than an eighth of the motion's period."""
 _CLEAR = 4.0
 """Standard deviations of the noise by which both the motion and the velocity are clear."""
 _GAP = 2.5
+"""Steps beyond this many median ones are gaps, over which no velocity is integrated; two lost
+samples."""
 
 
 def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:

@@ -12,8 +12,11 @@ __all__ = ["KNOWN_FACTORS", "Slope", "named_factor", "slope_text"]
 _TOLERANCE = 0.05
 """Relative difference that errors of a profile's values may make on top of the uncertainty."""
 _SIGMAS = 3.0
+"""Standard deviations of the slope within which a known factor explains it."""
 _LARGE = 1e4
+"""From here a factor is written with an exponent."""
 _FEWEST_BITS, _MOST_BITS = 7, 24
+"""Of encoders and converters: 128 counts to 24 bits."""
 
 _UNITS: tuple[tuple[float, str], ...] = (
     *((10.0**n, f"10^{n}, a power of ten (milli, percent, kilo …)") for n in (1, 2, 3, 4, 5, 6, 9)),

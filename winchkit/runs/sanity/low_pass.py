@@ -24,14 +24,20 @@ from winchkit.runs.sanity.quantisation import quantisation_noise
 __all__ = ["low_pass"]
 
 _BINS = 64
+"""Frequencies of the spectrum up to half the sampling rate: blocks of 128 samples."""
 _FALL = 30.0
 """Ratio of power densities an octave apart, 15 dB: steps fall by 6 and jumps of the speed by 12."""
 _ROUNDING = 4.0
+"""In variances of rounding: power below is that of the step of the numbers, not of a filter."""
 _NUMERICAL = 1e-20
+"""Share of the largest power; far above the square of the rounding of floating point (1e-32)."""
 _REPEATED = 0.5
 """Share of samples equal to the one before from which the error of rounding is not white."""
 _LOWEST = 4
+"""Lowest bin of a cut-off: below, the spectrum of the motion itself falls as that of a filter
+does."""
 _LEAST_BLOCKS = 6
+"""Averages below which a spectrum is too uncertain (40 %) to compare two bins; rule of thumb."""
 
 
 def low_pass(run: Run, name: str, step: float) -> Iterator[Finding]:

@@ -27,7 +27,9 @@ _SAME_EVENT = 4.0
 _LEVEL = 0.01
 """Level of the test that spikes coincide with deviations of other channels by chance."""
 _WINDOW = 50
+"""Samples of a local median: the scale follows the motion, and is known to 16 %."""
 _MAD = 0.6745
+"""Median of the absolute value of a standard normal variable."""
 
 
 def outlier_mask(values: Array) -> NDArray[np.bool_]:

@@ -30,6 +30,8 @@ from winchkit.runs.sanity.text import size
 __all__ = ["quantisation_noise", "quantised", "resolution", "resolutions"]
 
 _BINS = 8192
+"""Bins of the histogram of the differences: with `_BINS_PER_STEP` it shows steps down to 1/512 of
+the largest difference."""
 _BINS_PER_STEP = 16
 """Bins of the histogram within the smallest step that is looked for."""
 _PADDED = 4 * _BINS
@@ -39,14 +41,19 @@ _SEARCHED = _PADDED // _BINS_PER_STEP + 2
 """Coefficients up to that step, and those beside them."""
 _ROTATION = np.exp(-1j * np.pi * np.arange(_SEARCHED) / _PADDED)
 _COHERENCE = 0.99
+"""Mean cosine of differences over a step; 0.99 is a jitter of 2 % of the step (rms)."""
 _EXACT = 1 - 2e-5
 """Mean cosine of deviations of a thousandth of a step: multiples, not close to multiples."""
 _SCREENED = 0.8
 _TIE = 0.005
+"""Coherences that differ by less are equal, and the larger step is taken: its divisors fit as
+well."""
 _LEAST_DIFFERENCES = 30
+"""Fewer differences fit some step by chance; rule of thumb."""
 _LEAST_SHARE = 0.2
 """Share of the differences beyond rounding that are at least half a step."""
 _LEAST_LEVELS = 8
+"""Fewer levels occur in a signal at rest, which shows nothing of the step."""
 _FEW_LEVELS = 4
 """Exact levels of a command that changes in steps; with fewer, the values must be dithered."""
 _SHORT = 3.0
@@ -56,11 +63,15 @@ for many."""
 _NEAR = 50
 """Steps up to which a difference is not affected by the uncertainty of the step."""
 _MANY_MULTIPLES = 8
+"""Distinct multiples from which a common divisor of a few is excluded. Rule of thumb."""
 _USUAL = 0.9
+"""Quantile of the multiples that is compared: a few jumps do not count."""
 _SCALES = (0.99, 0.5, 0.2)
 """Quantiles of the differences up to which the three searches take them."""
 _MOST = 50_000
+"""Samples that are searched: more add nothing to a step, and the search takes milliseconds."""
 _REFINEMENTS = 4
+"""Steps of the refinement, which converges in two or three."""
 
 
 def quantisation_noise(step: float) -> float:

@@ -17,10 +17,13 @@ from winchkit.runs.sanity.text import share, size
 __all__ = ["constant", "repeated_values"]
 
 _LEAST_SHARE = 0.2
+"""Share of repeated values that is reported; fewer hardly change a spectrum. Rule of thumb."""
 _LEAST_CHANGES = 20
+"""Fewer changes do not show a period; rule of thumb."""
 _LONG = 3
 """Intervals between changes, in median ones, above which the instrument is at rest and not held."""
 _STEPS = 2.0
+"""A change of fewer steps repeats because of the resolution, not of a held value."""
 
 
 def constant(run: Run, name: str) -> Iterator[Finding]:

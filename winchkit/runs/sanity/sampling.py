@@ -20,6 +20,7 @@ _JITTER = 0.05
 """Standard deviation of the intervals, relative to their mean, that is reported; an interval that
 is a whole number of usual ones to within as much has lost samples."""
 _LEAST_SAMPLES = 20
+"""Fewer samples have no usual step; rule of thumb."""
 
 
 def sampling(run: Run) -> Iterator[Finding]:

@@ -15,19 +15,24 @@ from winchkit.runs.sanity.text import share, size
 __all__ = ["saturated"]
 
 _LEAST_SAMPLES = 5
+"""Fewer equal samples at an end are an extremum that the resolution flattens. Rule of thumb."""
 _TIES = 0.01
 """Share of equal neighbours below which a channel has continuous values."""
 _ALTERNATING = 0.2
 """Share of changes in opposite direction to the one before from which a channel has noise: white
 noise has two thirds, a smooth signal few."""
 _LONGEST = 10
+"""Samples at a level that noise leaves by chance at once; with `_TIMES` usual stretches the least
+of a saturation. Rule of thumb."""
 _TIMES = 3
 _DITHERED = 12
 """Longest repetition elsewhere of a channel whose noise is not small against its resolution."""
 _LEAST_LEVELS = 8
 """Levels below which the extreme of a quantised channel is one of the few values that it has."""
 _OVERSHOOT = 3.0
+"""Steps by which a continued slope would pass the level: below, it could have ended there."""
 _BEFORE = 6
+"""Samples before a level from which its slope is continued: few, since a motion bends."""
 
 
 def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:

@@ -13,7 +13,9 @@ from itertools import islice
 __all__ = ["is_can_trace"]
 
 _SAMPLED = 200
+"""Lines by which a trace is recognised; its header has fewer."""
 _FEWEST = 3
+"""Frames that make a text a trace: one or two may look alike by chance."""
 _SHARE = 0.7
 """Share of the lines from the first frame on that are frames; others are events and comments."""
 _LOGGED = re.compile(r"\(\d+\.\d+\)\s+\S+\s+[0-9A-Fa-f]{3,8}#")

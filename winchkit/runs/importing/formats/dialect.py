@@ -27,6 +27,7 @@ BLANKS = " "
 _DELIMITERS = ("\t", ";", "|", ",", BLANKS)
 _CALLED = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", BLANKS: "blanks"}
 _SAMPLED = 240
+"""Lines by which the separator is found, a third each of the start, middle and end."""
 _CELL_LINES = 8
 """Line ends that a quoted cell may have."""
 _OPENED = re.compile(r'(?:^|[,;\t|])\s*"[^"]*$')

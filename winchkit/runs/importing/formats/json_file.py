@@ -22,6 +22,7 @@ from winchkit.runs.importing.unit_spelling import split_unit
 __all__ = ["is_json", "read_json"]
 
 _DEEPEST = 6
+"""Nesting of objects that is read; recordings have two or three levels."""
 _FEWEST = 2
 """Rows of a table; a list of one element is a field."""
 

@@ -22,6 +22,7 @@ from winchkit.runs.importing.table import Table, refuse_size
 __all__ = ["read_hdf5", "read_mat"]
 
 _DEEPEST = 8
+"""Nesting of structures that is read; those of Simulink have up to five levels."""
 _HEADER, _COMPRESSED = 128, 15
 """Bytes before the first variable of a MAT file of version 5; type of a compressed variable."""
 _CLASSES = "save its arrays, e.g. t = seconds(T.Time); x = T.x; save('file.mat', 't', 'x')"

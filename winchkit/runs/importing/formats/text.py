@@ -28,7 +28,9 @@ from winchkit.runs.importing.table import Column, Table, named_apart
 __all__ = ["read_text_table", "table_of_rows"]
 
 _AHEAD = 3
+"""Rows of numbers after a header that confirm it."""
 _BLOCK = 4096
+"""Rows converted at a time: their texts are released before the next ones are split."""
 _COUNTED = 4
 """Columns from which a row that counts them is no chance."""
 _HEAD = 60
