@@ -262,8 +262,11 @@ def test_a_disk_that_fills_ends_the_log_and_nothing_else(tmp_path: Path, suffix:
     assert "the log has ended, the bench goes on" in done.stderr
     assert 50_000 < path.stat().st_size <= 150_000
     run = read_run(path)
-    assert len(run) > 100
-    assert run["A.motor_angle"] == pytest.approx(run["A.motor_angle"][0] + 3 * run.time, abs=1e-5)
+    angle, whole = run["A.motor_angle"], np.count_nonzero(np.isfinite(run["A.motor_angle"]))
+    assert whole > 100
+    # The sources of a log by channels end at different times: its last rows lack the drive.
+    assert np.isfinite(angle[:whole]).all()
+    assert angle[:whole] == pytest.approx(angle[0] + 3 * run.time[:whole], abs=1e-5)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs a tmpfs of its own")
