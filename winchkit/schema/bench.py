@@ -207,7 +207,7 @@ class BenchSpec(Table):
         if name is None and len(self.winch) == 1:
             return next(iter(self.winch))
         if name is None or name not in self.winch:
-            what = f"no winch '{name}'" if name else "which winch?"
+            what = f"no winch '{name}'" if name else "no winch is given"
             known = list(self.winch)
             raise UsageError(f"{what}; it has {', '.join(known)}" + suggest(name or "", known))
         return name

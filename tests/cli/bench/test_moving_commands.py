@@ -58,7 +58,7 @@ def test_move_all(bench: Served) -> None:
         (("A", "--wind-in", "0.1m/s"), 2, "is a speed here and must be a length"),
         (("A", "--wind-in", "3kg"), 2, "is not a speed or a length"),
         (("A", "--to", "1"), 2, "has no unit"),
-        (("--to", "1 m"), 2, "which winch?"),
+        (("--to", "1 m"), 2, "no winch is given"),
         (("C", "--to", "1 m"), 2, "no winch 'C'"),
         (("A", "--to", "20 m"), 5, "is beyond the limits 0.5 m to 4.7 m"),
         (("A", "--to", "3 m", "--speed", "2 m/s"), 5, "speed 2 m/s is not within"),

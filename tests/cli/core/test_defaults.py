@@ -49,7 +49,7 @@ def test_none_is_chosen_of_two(folder: Path) -> None:
         (folder / name).write_text(BENCH)
     result = stop()
     assert result.exit_code == 2
-    assert "which bench? this folder has left.toml, right.toml" in result.stderr
+    assert "no bench is given: this folder has left.toml, right.toml" in result.stderr
     assert "WINCHKIT_BENCH" in result.stderr
 
 

@@ -45,13 +45,13 @@ def test_scan_by_interface_needs_no_bench(bench: Served) -> None:
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (("scan",), 2, "which bus?"),
-        (("scan", "--interface", "virtual"), 2, "which bus?"),
+        (("scan",), 2, "no bus is given"),
+        (("scan", "--interface", "virtual"), 2, "no bus is given"),
         (("scan", "-b", "none.toml"), 3, "there is no such file"),
         (("scan", "--interface", "nothing", "--channel", "x"), 4, "cannot open nothing"),
         (("scan", "--interface", "virtual", "--channel", "nobody"), 4, "no node answers"),
         (("info", "9", "--interface", "virtual", "--channel", "nobody"), 4, "no answer within"),
-        (("info", "--interface", "virtual", "--channel", "nobody"), 2, "which node?"),
+        (("info", "--interface", "virtual", "--channel", "nobody"), 2, "no node is given"),
     ],
 )
 def test_wrong_input_to_commands_of_the_bus(

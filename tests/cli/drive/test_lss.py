@@ -69,7 +69,7 @@ def test_the_only_device_needs_no_address(device: LssDevice) -> None:
     ("arguments", "code", "words"),
     [
         (("set", "--only"), 2, "nothing to set"),
-        (("set", "--node", "5"), 2, "which device?"),
+        (("set", "--node", "5"), 2, "no device is given"),
         (("set", "--vendor", "1", "--node", "5"), 2, "--product, --revision, --serial"),
         (("set", "--only", "--node", "200"), 2, "200 is no node id"),
         (("set", "--only", "--new-bitrate", "100000"), 2, "is not in the standard's table"),

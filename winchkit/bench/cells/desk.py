@@ -208,7 +208,7 @@ def full_name(spec: BenchSpec, name: str | None) -> str:
         for candidate in (name, f"{name}.cell"):
             if candidate in known:
                 return candidate
-    what = f"no instrument '{name}'" if name else "which instrument?"
+    what = f"no instrument '{name}'" if name else "no instrument is given"
     listed = ", ".join(known) or "none"
     raise UsageError(f"{what}; the bench has {listed}{suggest(name or '', known)}")
 

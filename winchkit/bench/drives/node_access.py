@@ -214,9 +214,9 @@ def _chosen(spec: BenchSpec, who: str | None) -> tuple[str, int, str]:
     if who is not None and who.isdecimal() and 1 <= int(who) <= 127:
         return _by_number(spec, int(who))
     known = list(spec.winch)
-    what = f"no winch '{who}'" if who else "which winch, or which node?"
-    there = f"; there is {', '.join(known)}, or a node number from 1 to 127" if known else ""
-    raise UsageError(what + there + suggest(who or "", known))
+    what = f"no winch '{who}'" if who else "no winch and no node is given"
+    there = f"there is {', '.join(known)}, or give" if known else "give"
+    raise UsageError(f"{what}; {there} a node number from 1 to 127{suggest(who or '', known)}")
 
 
 def _by_number(spec: BenchSpec, node: int) -> tuple[str, int, str]:

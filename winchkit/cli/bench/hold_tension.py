@@ -41,7 +41,7 @@ _NEEDS_CELL = "needs a bench with a load cell"
     "duration",
     metavar="TIME",
     type=Quantity("time", example="5 s"),
-    help="Then stop.  [default: until Ctrl-C]",
+    help="Stop after this time.  [default: until Ctrl-C]",
 )
 @click.option(
     "--travel",
@@ -57,7 +57,7 @@ _NEEDS_CELL = "needs a bench with a load cell"
     type=Quantity("speed", example="20 mm/s"),
     default="20 mm/s",
     show_default=True,
-    help="Fastest; no direction.",
+    help="Largest speed, without a direction.",
 )
 @click.option(
     "--stiffness",

@@ -55,7 +55,7 @@ _POLL = 0.02
     "--speed",
     metavar="SPEED",
     type=Quantity("speed", example="20 mm/s"),
-    help="Of the cable.  [default: a tenth of the winch's limit]",
+    help="Cable speed.  [default: a tenth of the winch's limit]",
 )
 @take_over_option
 @effects_option
@@ -84,7 +84,7 @@ def command(
     from winchkit.cli.core.quantities import optional
 
     if (here is None) == (method is None):
-        raise UsageError("how? give either --here LENGTH or --method NUMBER")
+        raise UsageError("no way of homing is given: give either --here LENGTH or --method NUMBER")
     if at is not None and here is not None:
         raise UsageError("--at belongs to --method; --here names the length already")
     length = optional(here if here is not None else at, "length")

@@ -136,12 +136,14 @@ def _read(
     direction, limit = read_direction(pay_out, wind_in), seconds(duration)
     if limit is not None:
         if direction is None:
-            raise UsageError("which way? --for needs --pay-out SPEED or --wind-in SPEED")
+            raise UsageError(
+                "no direction is given: --for needs --pay-out SPEED or --wind-in SPEED"
+            )
         if speed is not None:
             raise UsageError(f"--speed does not belong to --for: {_HOW}")
         _ = direction.winding_speed
     elif direction is not None and direction.dimension == "speed":
-        raise UsageError(f"for how long? {direction.option} SPEED needs --for TIME: {_HOW}")
+        raise UsageError(f"no time is given: {direction.option} SPEED needs --for TIME: {_HOW}")
     return _Asked(direction, limit, magnitude("--speed", speed or _SPEED, "speed"))
 
 

@@ -37,7 +37,7 @@ __all__ = ["command", "status_table"]
     type=Quantity("time", example="0.2 s"),
     default="0.2 s",
     show_default=True,
-    help="Between two pictures.",
+    help="Time between two pictures.",
 )
 @click.option(
     "--for",

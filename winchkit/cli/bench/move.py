@@ -53,7 +53,7 @@ _POLL = 0.05
     "--speed",
     metavar="SPEED",
     type=Quantity("speed", example="0.1 m/s"),
-    help="How fast; no direction.  [default: limit of winch or robot]",
+    help="Speed, without a direction.  [default: limit of winch or robot]",
 )
 @click.option(
     "--acceleration",
@@ -117,7 +117,8 @@ def command(
         return
     if (to is None) == (direction is None):
         raise UsageError(
-            "where to? give one of --to, --pay-out and --wind-in, each a LENGTH; or --pose"
+            "no destination is given: give one of --to, --pay-out and --wind-in, each a "
+            "LENGTH; or --pose"
         )
     target = optional(to, "length")
     change = None if direction is None else direction.change

@@ -58,7 +58,7 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     help="Bench file; not needed with --points.  [default: the only one of this folder]",
 )
 @click.option("--weights", help='Weights in rising order, e.g. "0 2 5 10 15 20 kg"; or N.')
-@click.option("--series", default=3, show_default=True, help="Times up and down.")
+@click.option("--series", default=3, show_default=True, help="Number of series, up and down.")
 @click.option(
     "--points",
     metavar="CSV",
@@ -73,20 +73,20 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
     type=Quantity("time", example="3 s"),
     default="3 s",
     show_default=True,
-    help="Averaged per weight.",
+    help="Averaging time per weight.",
 )
 @click.option(
     "--settle",
     type=Quantity("time", example="2 s"),
     default="2 s",
     show_default=True,
-    help="Waited after a weight is hung.",
+    help="Waiting time after a weight is hung.",
 )
 @click.option("--serial", help="Serial number of the cell; else what the device says.")
 @click.option(
     "--temperature",
     type=Quantity("temperature", example="21 degC"),
-    help='At the cell, e.g. "21 degC".',
+    help='Temperature at the cell, e.g. "21 degC".',
 )
 @click.option(
     "--direction",

@@ -46,7 +46,7 @@ _MEANINGS = {
     type=Quantity("time", example="10 s"),
     default="10 s",
     show_default=True,
-    help="Watched for this.",
+    help="Duration of the readings.",
 )
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Watch CELL and report rate, noise, drift, frozen or repeated counts, hum and creep.

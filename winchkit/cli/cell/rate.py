@@ -28,7 +28,7 @@ __all__ = ["command"]
     type=Quantity("time", example="3 s"),
     default="3 s",
     show_default=True,
-    help="Measured for this.",
+    help="Duration of the measurement.",
 )
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Measure the rate of CELL and say what limits it: wire, turnaround, conversions, sharing."""

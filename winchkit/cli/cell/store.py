@@ -20,7 +20,13 @@ __all__ = ["command"]
     ),
 )
 @cell_options
-@click.option("--command", "name", default="store", show_default=True, help="Of the device file.")
+@click.option(
+    "--command",
+    "name",
+    default="store",
+    show_default=True,
+    help="Name of the command in the device file.",
+)
 @yes_option
 def command(cell: str | None, bench: str, name: str, *, yes: bool, as_json: bool) -> None:
     """Send CELL a command that writes its EEPROM, such as its own store, or a lasting zero.

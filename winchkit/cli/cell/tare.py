@@ -36,7 +36,7 @@ _TASKS = {
     type=Quantity("time", example="1 s"),
     default="1 s",
     show_default=True,
-    help="Averaged over this.",
+    help="Averaging time.",
 )
 @click.option("--clear", is_flag=True, help="Take the tare away: the host's, or with --device its.")
 @click.option("--device", is_flag=True, help="Send the device its own volatile tare instead.")

@@ -26,7 +26,7 @@ __all__ = ["command"]
     type=Quantity("time", example="1 s"),
     default="1 s",
     show_default=True,
-    help="Averaged over this.",
+    help="Averaging time.",
 )
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
     """Send the device of CELL its zero command: what hangs on it now becomes its gross zero.

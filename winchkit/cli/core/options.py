@@ -86,7 +86,7 @@ def bench_by_default(ctx: click.Context, param: click.Parameter, value: str | No
         return only
     here = [str(path) for path in files_of_kind(Path(), ("bench",))]
     found = f"this folder has {', '.join(here)}" if here else "this folder has no bench file"
-    raise UsageError(f"which bench? {found}; give --bench FILE, or set {BENCH_VARIABLE}")
+    raise UsageError(f"no bench is given: {found}; give --bench FILE, or set {BENCH_VARIABLE}")
 
 
 def _only_bench() -> str | None:
@@ -222,8 +222,8 @@ class BusChoice:
             return replace(self, bench=bench).spec()
         if not self.interface or not self.channel:
             raise UsageError(
-                f"which bus? give --bench FILE, set {BENCH_VARIABLE}, or give --interface and "
-                "--channel"
+                f"no bus is given: give --bench FILE, set {BENCH_VARIABLE}, or give --interface "
+                "and --channel"
             )
         from winchkit.bench.drives.node_access import bus_only
 
@@ -235,8 +235,13 @@ def bus_options(function: Callable[..., Any]) -> Callable[..., Any]:
     options = [
         _bench_option(),
         click.option("--interface", help="Without a bench: python-can's name, e.g. socketcan."),
-        click.option("--channel", help="Without a bench: e.g. can0."),
-        click.option("--bitrate", default=_BITRATE, show_default=True, help="bit/s."),
+        click.option("--channel", help="Without a bench: channel of the interface, e.g. can0."),
+        click.option(
+            "--bitrate",
+            default=_BITRATE,
+            show_default=True,
+            help="Without a bench: bit rate, bit/s.",
+        ),
         click.option("--port", type=int, help="Without a bench: UDP port of udp_multicast."),
     ]
     for option in reversed(options):

@@ -88,7 +88,9 @@ class _Number(click.ParamType):  # type: ignore[type-arg]
 def _identity_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add the four parts of an identity."""
     for part in reversed(_PARTS):
-        function = click.option(f"--{part}", type=_Number(), help="Of object 1018h.")(function)
+        function = click.option(
+            f"--{part}", type=_Number(), help="Number of the identity object, 1018h."
+        )(function)
     only = click.option("--only", is_flag=True, help="The only device on the bus, whichever it is.")
     return only(function)
 
@@ -234,8 +236,8 @@ def _select(line: LssLine, parts: dict[str, int | None], *, only: bool) -> Ident
     if only or len(given) < len(_PARTS):
         missing = ", ".join(f"--{part}" for part in _PARTS if part not in given)
         raise UsageError(
-            f"which device? give all of its identity ({missing or 'without --only'}), or --only "
-            "where there is one device on the bus"
+            f"no device is given: give all of its identity ({missing or 'without --only'}), or "
+            "--only where there is one device on the bus"
         )
     identity = Identity(**given)
     line.select(identity)

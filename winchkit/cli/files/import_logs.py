@@ -73,15 +73,17 @@ _NO_ANGLE = (
     "--torque-constant",
     metavar="CONSTANT",
     type=Quantity("torque constant", example="0.12 N m/A"),
-    help="Of the motor, e.g. '0.12 N m/A'.",
+    help="Torque constant of the motor, e.g. '0.12 N m/A'.",
 )
 @click.option("--counts-per-turn", type=float, metavar="N", help="Counts in a turn of the motor.")
-@click.option("--sensitivity", metavar="RATIO", help="Of the load cell, e.g. '2 mV/V'.")
+@click.option(
+    "--sensitivity", metavar="RATIO", help="Rated output of the load cell, e.g. '2 mV/V'."
+)
 @click.option(
     "--capacity",
     metavar="FORCE",
     type=Quantity("force", example="500 N"),
-    help="Of the load cell, e.g. '500 N'.",
+    help="Rated load of the load cell, e.g. '500 N'.",
 )
 @click.option(
     "--sample-rate",

@@ -76,7 +76,7 @@ _SHOW_PERIOD = 0.5
     type=Quantity("time", example="0.02 s"),
     default="0.02 s",
     show_default=True,
-    help="Between two live pictures.",
+    help="Time between two live pictures.",
 )
 @effects_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")

@@ -79,10 +79,18 @@ _NOISE_DIMENSIONS = {
     help="Let this simulated robot do so, in simulated time.",
 )
 @click.option(
-    "--poses", type=click.IntRange(10), default=60, show_default=True, help="To drive to."
+    "--poses",
+    type=click.IntRange(10),
+    default=60,
+    show_default=True,
+    help="Number of poses to drive to.",
 )
 @click.option(
-    "--held-out", type=click.IntRange(1), default=20, show_default=True, help="Poses never fitted."
+    "--held-out",
+    type=click.IntRange(1),
+    default=20,
+    show_default=True,
+    help="Number of poses for validation only.",
 )
 @click.option(
     "--box",
@@ -90,7 +98,7 @@ _NOISE_DIMENSIONS = {
     type=Quantity("length", example="75 mm"),
     default="75 mm",
     show_default=True,
-    help="Half width about home.",
+    help="Half width of the volume about home.",
 )
 @click.option(
     "--turn",
@@ -98,7 +106,7 @@ _NOISE_DIMENSIONS = {
     type=Quantity("angle", example="7.5 deg"),
     default="7.5 deg",
     show_default=True,
-    help="Half turn about home.",
+    help="Largest rotation from home.",
 )
 @click.option(
     "--accuracy",
@@ -112,7 +120,7 @@ _NOISE_DIMENSIONS = {
     multiple=True,
     metavar="RUN...",
     type=RUN,
-    help="Held out; else every tenth.",
+    help="Run for validation only; without it every tenth pose.",
 )
 @output_option("Profile to write.", "NEW.toml", required=True)
 @click.option(
@@ -134,7 +142,9 @@ _NOISE_DIMENSIONS = {
     type=Quantity("force", example="80 N"),
     help="Cable force kept near, where not measured.",
 )
-@click.option("--next", "following", type=click.IntRange(0), default=0, help="Poses to propose.")
+@click.option(
+    "--next", "following", type=click.IntRange(0), default=0, help="Number of poses to propose."
+)
 @click.option("--fit-report", is_flag=True, help="Print the report of the fit too.")
 @click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
 @html_option

@@ -136,7 +136,13 @@ def _listing(catalogue: Catalogue) -> str:
 )
 @click.argument("file", metavar="FILE.py")
 @click.option(
-    "--fit", "runs", multiple=True, required=True, metavar="RUN...", type=RUN, help="Runs."
+    "--fit",
+    "runs",
+    multiple=True,
+    required=True,
+    metavar="RUN...",
+    type=RUN,
+    help="Runs whose residual gives the initial values.",
 )
 @click.option("--curve", metavar="ID", help="Empirical effect to begin from; else the strongest.")
 @click.option("--id", "effect_id", metavar="ID", help="Of the new effect; else the file's name.")

@@ -267,7 +267,7 @@ def _limits(bench: str, winch: str | None) -> LimitSpec:
 
     wired = read_bench(bench).winch
     if winch is None and len(wired) > 1:
-        raise UsageError(f"which winch? {bench} has {', '.join(wired)}; give --winch")
+        raise UsageError(f"no winch is given: {bench} has {', '.join(wired)}; give --winch")
     name = winch or next(iter(wired))
     if name not in wired:
         known = list(wired)

@@ -40,13 +40,13 @@ __all__ = ["command"]
     type=PROGRAMME,
     help="Another motion programme, as PROGRAMME.",
 )
-@click.option("--seed", default=0, show_default=True, help="Of the noise.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the noise.")
 @click.option(
     "--rate",
     type=Quantity("frequency", example="50 Hz"),
     default="50 Hz",
     show_default=True,
-    help="Of the samples.",
+    help="Sampling rate.",
 )
 @output_option(
     "Folder for the runs.",
@@ -98,7 +98,9 @@ def command(
     write = write_csv if suffix == "csv" else write_mcap
     named = (*programmes, *more)
     if not named:
-        raise UsageError("which programme? name a file, or a shipped one such as programme-demo")
+        raise UsageError(
+            "no motion programme is given: name a file, or a shipped one such as programme-demo"
+        )
     written: list[dict[str, object]] = []
     with progress_bar() as progress:
         for index, name in enumerate(named):

@@ -38,7 +38,7 @@ _DETERMINED = 6
     ),
 )
 @click.argument("bench", shell_complete=complete_sim_bench)
-@click.option("--seed", default=0, show_default=True, help="Of the noise.")
+@click.option("--seed", default=0, show_default=True, help="Seed of the noise.")
 @click.option(
     "-o",
     "--bench-file",

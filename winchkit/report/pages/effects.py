@@ -23,7 +23,7 @@ __all__ = ["effects_html"]
 _INTERVALS = 120
 """Intervals of the drawn signature, each with its lowest and highest value."""
 _SIDE = 480
-"""px: width of a figure, two of which stand beside each other."""
+"""px: width of a figure, of which a row has two."""
 _MOTION = (
     "Along the standard motion: a fast and a slow stroke under 15 kg, then under 45 kg, at rising "
     "temperature. Each curve is the change of the output by the effect, computed by its code."

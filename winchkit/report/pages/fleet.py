@@ -42,7 +42,7 @@ _FOLLOWED = 3
 _CAUSES = 4
 """Effects in the lead of the page; all stand below."""
 _SIDE = 560
-"""px: width of a figure, two of which stand beside each other."""
+"""px: width of a figure, of which a row has two."""
 _ORDER = ("unknown", "partly", "explained", "adequate")
 _SOME = {0: "No effect is", 1: "1 effect is"}
 _BY_CHANCE = 0.01

@@ -21,7 +21,7 @@ __all__ = ["fleet_history_html"]
 _MOST_FIGURES = 24
 """Parameters that are drawn, most significant first; a longer page is not read."""
 _SIDE = 340
-"""px: width of a figure, three of which stand beside each other."""
+"""px: width of a figure, of which a row has three."""
 _HEIGHT = 120.0
 """px of its axes."""
 _DAY = 86400.0

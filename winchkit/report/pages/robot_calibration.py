@@ -28,7 +28,7 @@ _MM = 1e3
 _MOST = 5
 """Parameters in the lead, largest change first; the table has all."""
 _SIDE = 560
-"""px: width of a figure, two of which stand beside each other."""
+"""px: width of a figure, of which a row has two."""
 
 
 def calibration_html(

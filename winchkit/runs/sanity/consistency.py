@@ -25,7 +25,7 @@ _SIGMAS = 3.0
 _BLOCKS = 40
 """Blocks of time for the spread of the ratio: each must hold a motion. Rule of thumb."""
 _LEAST_SAMPLES = 50
-"""Fewer samples do not tell a ratio from noise; rule of thumb."""
+"""The ratio of fewer samples is too uncertain; rule of thumb."""
 _CORRELATION = 0.5
 """Least squared correlation at which a slope is judged: less than half of the integral varies with
 the angle where a filter delays the velocity by more than an eighth of the motion's period."""
