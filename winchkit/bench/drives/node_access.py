@@ -215,7 +215,7 @@ def _chosen(spec: BenchSpec, who: str | None) -> tuple[str, int, str]:
         return _by_number(spec, int(who))
     known = list(spec.winch)
     what = f"no winch '{who}'" if who else "no winch and no node is given"
-    there = f"there is {', '.join(known)}, or give" if known else "give"
+    there = f"there is {', '.join(known)}, or" if known else "give"
     raise UsageError(f"{what}; {there} a node number from 1 to 127{suggest(who or '', known)}")
 
 
