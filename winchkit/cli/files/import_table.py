@@ -34,18 +34,15 @@ def tables_text(guess: Guess) -> str:
     str
         Columns that are not used stand at the end.
     """
+    from winchkit.report.words.columns import aligned
+
     table = guess.table
     rows = max((len(column) for column in table.columns), default=0)
     title = f"{one_line(table.path)}: {table.layout}; {len(table.columns)} columns, {rows} rows"
     columns = {column.source: column for column in table.columns}
     ordered = sorted(guess.assignments, key=lambda item: not item.channel)
     lines = [_HEAD, *(_row(item, columns[item.source]) for item in ordered)]
-    widths = [max(len(line[n]) for line in lines) for n in range(len(_HEAD))]
-    body = [
-        "  "
-        + "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
-        for line in lines
-    ]
+    body = aligned(lines, words=len(_HEAD))
     constants = ", ".join(f"{one_line(k)} = {v:g}" for k, v in table.constants.items())
     notes = [f"  constants: {constants}"] if constants else []
     notes += [f"  note: {note}" for note in (*table.notes, *guess.notes)]

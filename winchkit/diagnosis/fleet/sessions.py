@@ -21,6 +21,7 @@ from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.fleet.meta_analysis import shared_effects
 from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Diagnosis
@@ -147,7 +148,7 @@ def fit_session(
             start = start.with_term(term, regression.n_runs)
     engine = TimeSeriesSelection(regression, start, [term.effect for term in terms])
     fitted, noise = engine.fit_with_noise(start)
-    covariance = inverse_normal(fitted.jacobian * noise.inverse_sigma(regression)[:, None])
+    covariance = inverse_normal(whitened_jacobian(regression, fitted, noise))
     every = _parts(regression, fitted)
     parts = [every[place] for place in places]
     columns = [at for part, _ in parts for at in range(part.start, part.stop)]

@@ -15,6 +15,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
@@ -55,7 +56,7 @@ def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCov
     noise
         Noise variance.
     """
-    whitened = fit.jacobian * noise.inverse_sigma(regression)[:, None]
+    whitened = whitened_jacobian(regression, fit, noise)
     length = np.sqrt(np.sum(whitened**2, axis=0))
     there = np.flatnonzero(length > 0.0)
     scaled = whitened[:, there] / length[there]

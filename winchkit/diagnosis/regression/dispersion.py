@@ -21,6 +21,7 @@ from scipy.special import chdtrc, fdtrc, ndtri, stdtrit
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof, sums_per_band
 from winchkit.diagnosis.regression.projection import orthonormal
 
@@ -108,7 +109,7 @@ def _of_residual(regression: Regression, fit: Fit, noise: Noise) -> tuple[Array,
     squares = fit.residual**2
     total = sums_per_band(squares, bands, count)
     fourth = sums_per_band(squares**2, bands, count)
-    basis = orthonormal(fit.jacobian * noise.inverse_sigma(regression)[:, None])
+    basis = orthonormal(whitened_jacobian(regression, fit, noise))
     rows = sums_per_band(1.0 - np.sum(basis**2, axis=1), bands, count)
     rows = np.maximum(rows, 1.0)
     effective = np.divide(3 * total**2, fourth, out=np.ones_like(total), where=fourth > 0.0)

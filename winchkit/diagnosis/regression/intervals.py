@@ -1,4 +1,4 @@
-"""95 % intervals of fitted values: profile likelihood, widened for what a likelihood leaves out.
+"""95 % intervals of fitted values: profile likelihood, widened for correlated and model errors.
 
 The profile-likelihood interval assumes that model and noise variance are right. It is widened
 

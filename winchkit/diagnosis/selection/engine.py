@@ -129,7 +129,7 @@ class Trial:
 
 
 def _key(hypothesis: Hypothesis, law: Effect, item: Score) -> Hashable:
-    """What a candidate's optimum is kept by: effects beside it, its free unknowns, its shape."""
+    """Key of a candidate's stored optimum: effects beside it, its free unknowns, its shape."""
     return (
         *_effects_of(hypothesis),
         law.id,
