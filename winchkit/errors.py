@@ -54,7 +54,7 @@ _MOST_SUGGESTIONS = 5
 
 
 class WinchkitError(Exception):
-    """The root of the tree. ``exit_code`` is what a command returns for it."""
+    """The root of the tree. ``exit_code`` is the exit code of a command for it."""
 
     exit_code = 1
 

@@ -142,7 +142,7 @@ def _stamp(ancillary: Sequence[tuple[int, int, bytes]]) -> float:
 
 
 def _drop_from(taker: socket.socket, address: str, port: int) -> None:
-    """Let the kernel of Linux drop what comes from an address and UDP port."""
+    """Let the kernel of Linux drop datagrams from an address and UDP port."""
     if sys.platform != "linux":
         return
     rows = (

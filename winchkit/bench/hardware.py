@@ -95,7 +95,7 @@ class Wired:
 def wire(
     spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile, *, separate: bool = False
 ) -> Wired:
-    """Open everything; what is open is closed by ``stack``.
+    """Open all buses and lines; ``stack`` closes them.
 
     ``separate`` has the lines that are not CAN served by a process of their own, where the clock is
     the machine's.
@@ -226,7 +226,7 @@ def _commission(axes: Mapping[str, Cia402Axis]) -> None:
 
 
 def _warn_of_sync(buses: Mapping[str, CanBus], loop: ControlLoop) -> None:
-    """Show that somebody else sends SYNC as a warning until the next reset."""
+    """Show as a warning, until the next reset, that another node sends SYNC."""
     for bus in buses.values():
         bus.on_foreign_sync = lambda words: loop.warn(Trip("sync", "", words, Direction.NONE))
 
@@ -332,7 +332,7 @@ def _at_shaft(cable: CableMap, limits: LimitSpec) -> LimitsAtShaft:
 
 
 def _metadata(spec: BenchSpec, profiles: Mapping[str, WinchProfile]) -> dict[str, str]:
-    """What a log says about where it came from."""
+    """Origin of a log, for its metadata."""
     about = {
         "bench": spec.name,
         "recorded": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -36,7 +36,7 @@ class WinchHost(Protocol):
         """Raise what forbids this motion of a winch; return when it is allowed."""
 
     def raise_trouble(self) -> None:
-        """Raise what has stopped the bench, if anything has."""
+        """Raise the error that has stopped the bench, if there is one."""
 
     def stop_with(self, name: str, *, wait: bool = True) -> None:
         """Ramp a winch to rest, and with it those that stop together with it."""

@@ -198,7 +198,7 @@ class _Execution:
             self._warm = step.temperature
 
     def approach(self) -> None:
-        """Go to where every repeat ends, unlogged, so that the first one begins there too."""
+        """Move to the end of a repeat, unlogged, so that the first one starts there too."""
         if self._approached or self._programme.repeat == 1:
             return
         places = {

@@ -1,4 +1,4 @@
-"""Maintenance report of a fleet: what changed, since when, what it costs, what to do."""
+"""Maintenance report of a fleet: changes, their dates, their costs, and the actions."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ class Step(Table):
 
     @property
     def words(self) -> str:
-        """What it does, in words."""
+        """The step in words."""
         if self.ask is not None:
             return f"ask: {self.ask}"
         if self.hold is not None:

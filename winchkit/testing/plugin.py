@@ -19,7 +19,7 @@ __all__ = ["SimBench", "sim_bench"]
 
 
 class SimBench:
-    """What the fixture ``sim_bench`` gives: call it to open a simulated bench."""
+    """Value of the fixture ``sim_bench``: call it to open a simulated bench."""
 
     def __init__(self, stack: ExitStack, folder: Path) -> None:
         self._stack, self._folder = stack, folder

@@ -86,7 +86,7 @@ class Programmes:
         return target.name
 
     def preview(self, name: str, here: Mapping[str, float]) -> dict[str, Any]:
-        """What a programme would do; compares it with the limits.
+        """Preview of a programme; compares it with the limits.
 
         Parameters
         ----------

@@ -79,7 +79,7 @@ def refit(state: State, effect: str, dataset: Dataset, catalogue: Catalogue, fol
 
 
 def _said(outputs: Mapping[str, OutputFit]) -> str:
-    """Error of the output that fell most, and what it was."""
+    """Error of the output whose error fell most, after and before."""
 
     def fall(name: str) -> float:
         return outputs[name].heldout_rms_before / max(outputs[name].heldout_rms_after, 1e-300)

@@ -1,4 +1,4 @@
-"""What the Diagnose view shows: runs, a profile with its history, and its diagnosis."""
+"""State of the Diagnose view: runs, a profile with its history, and its diagnosis."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ class State:
         return None
 
     def commands(self) -> list[str]:
-        """What was clicked, as commands."""
+        """The user's actions as commands."""
         runs = " ".join(item.name for item in self.used)
         lines = [f"winchkit diagnose {runs} -p {self.source}"]
         profile = self.source

@@ -207,7 +207,7 @@ class Workspace:
         return report_html(self._state.diagnosed, source, profile=source)
 
     def truth(self) -> str:
-        """What the simulated bench hides; raises UsageError for measured runs."""
+        """Hidden effects of the simulated bench; raises UsageError for measured runs."""
         if self._state.truth is None:
             raise UsageError("these runs were not simulated here; their truth is not known")
         return self._state.truth
@@ -254,7 +254,7 @@ class Workspace:
             self.changed()
 
     def progress(self, what: str, share: float) -> None:
-        """Show how far the work is; raises Cancelled where the user ended it."""
+        """Report the progress; raises Cancelled where the user ended it."""
         work = self._work
         if work is None:
             return

@@ -97,7 +97,9 @@ def test_a_drive_that_minds_no_nmt_stopped_is_recorded_as_such(tmp_path: Path) -
         assert not commissioned(bench).winch["A"].stops_on_nmt
 
 
-def test_no_is_no_and_what_was_not_asked_is_a_usage_error(tmp_path: Path) -> None:
+def test_a_negative_answer_is_not_permitted_and_a_missing_one_is_a_usage_error(
+    tmp_path: Path,
+) -> None:
     path = write_bench(tmp_path)
     with served(path) as bench:
         bench.answers.write_text(ANSWERS.replace('direction = "yes"', 'direction = "no"'))

@@ -82,7 +82,7 @@ def test_a_channel_without_any_value_stays_without() -> None:
     assert np.isnan(decimated["temperature"]).all()
 
 
-def test_short_runs_are_left_alone_and_quick_ones_are_not_spoilt() -> None:
+def test_short_runs_are_not_decimated_and_fast_signals_keep_their_band() -> None:
     random = np.random.default_rng(3)
     time = np.arange(300_000) / RATE
     slow = np.sin(2 * np.pi * 0.2 * time) + 1e-3 * random.standard_normal(len(time))

@@ -36,7 +36,9 @@ def test_both_of_two_must_be_found_but_one_name_of_the_same_thing_is_enough() ->
     assert right(BY_NAME["drum radius"], found("explained", {"gear-ratio": ["2"]}))
 
 
-def test_outside_the_catalogue_a_name_is_wrong_and_silence_needs_repeats() -> None:
+def test_outside_the_catalogue_a_named_effect_is_wrong_and_no_finding_needs_missing_repeats() -> (
+    None
+):
     waves, alone = BY_NAME["outside: waves"], BY_NAME["outside: waves, no repeats"]
     assert right(waves, found("unknown"))
     assert not right(waves, found("adequate", notes=[UNSURE]))

@@ -123,7 +123,7 @@ def test_what_no_poses_distinguish_is_said_with_what_does(tmp_path: Path) -> Non
     assert max(map(len, result.stdout.splitlines())) <= 80
 
 
-def test_what_means_nothing_for_a_robot_is_refused_with_what_to_do(
+def test_options_without_meaning_for_a_robot_are_refused_with_the_action(
     flat: tuple[Path, Path], tmp_path: Path
 ) -> None:
     profile, run = flat

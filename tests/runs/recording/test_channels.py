@@ -126,7 +126,7 @@ EMPTY = '{"sources":[],"rule":{"topic":"/x","opened":0,"period":0,"start":null},
         ({"layout": EMPTY}, "'/x'"),
     ],
 )
-def test_a_layout_that_is_none(tmp_path: Path, about: dict[str, str], part: str) -> None:
+def test_a_malformed_layout_is_refused(tmp_path: Path, about: dict[str, str], part: str) -> None:
     path = tmp_path / "a.mcap"
     with path.open("wb") as stream:
         file = McapFile(stream, "winchkit", "test")

@@ -36,7 +36,7 @@ def test_every_file_is_synced_by_another_thread(
 
 
 @pytest.mark.parametrize(("number", "kept"), [(errno.EIO, True), (errno.EINVAL, False)])
-def test_what_the_disk_refuses_is_kept(
+def test_an_input_output_error_is_kept_and_a_missing_fsync_is_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, kept: bool
 ) -> None:
     def fsync(_descriptor: int) -> None:

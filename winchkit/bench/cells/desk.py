@@ -1,4 +1,4 @@
-"""The slow instruments of a bench by name, whoever has opened them: readings and commands."""
+"""The slow instruments of a bench by name: readings and commands."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Steady:
 
 
 class CellDesk:
-    """Instruments by ``WINCH.ROLE``, e.g. ``A.cell``, and what can be done with them."""
+    """Instruments by ``WINCH.ROLE``, e.g. ``A.cell``, with their operations."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""What can be asked of an instrument by name, in this process or in the one that owns the bench."""
+"""Requests to an instrument by name, in this process or in the one that owns the bench."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _identify(desk: CellDesk, name: str) -> dict[str, Any]:
 
 
 def _watch(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
-    """Readings of the next ``duration`` s, and what was counted meanwhile."""
+    """Readings of the next ``duration`` s, and the counts of that time."""
     before = counters_told(desk.sensors[name].counters)
     readings = desk.readings(name, duration)
     after = counters_told(desk.sensors[name].counters)

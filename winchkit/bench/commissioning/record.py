@@ -1,4 +1,4 @@
-"""The commissioning record: what was tried on a bench, what was confirmed, and by whom.
+"""The commissioning record: trials on a bench, confirmations, and the person who gave them.
 
 It is a file beside the bench file (``bench.toml`` -> ``bench.commissioned.json``) and holds the
 identity of each drive, SHA-256 of the files that decide how it moves, and the measured times.
@@ -55,7 +55,7 @@ class DriveRecord:
 
 @dataclass(frozen=True)
 class HostLossRecord:
-    """How the drive notices a dead host, and what it was seen to do; times in s."""
+    """How the drive detects the loss of its host, and its observed reaction; times in s."""
 
     mechanism: str
     limit: float

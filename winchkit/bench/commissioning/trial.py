@@ -320,7 +320,7 @@ def _angle(axis: Cia402Axis) -> float:
 
 @contextmanager
 def _frames_lost() -> Iterator[None]:
-    """Go on where a frame cannot be sent: what comes next must still be done."""
+    """Continue where a frame cannot be sent: the later steps are still necessary."""
     try:
         yield
     except ConnectionLost:

@@ -48,7 +48,7 @@ def is_simulated(spec: BenchSpec) -> bool:
 
 
 def items_of(winch: WinchWiring) -> tuple[str, ...]:
-    """What has to be confirmed of a winch."""
+    """Items of a winch that have to be confirmed."""
     cell = ("cell",) if winch.cell is not None else ()
     return ("brake", "host loss", "direction", "units", *cell, "limits")
 

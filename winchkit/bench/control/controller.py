@@ -260,7 +260,7 @@ class Controller:
         return self.phase in _FOLLOWING and not self.axis.moves_alone
 
     def tracking(self, angle: float, arm: float) -> tuple[float, float]:
-        """What the drive, at a motor angle (rad), is compared with while it :attr:`follows`.
+        """Value that the drive, at a motor angle (rad), is compared with while it :attr:`follows`.
 
         The winding speed of the velocity target sent last (m/s, NaN where the drive has none:
         position targets that are lost leave it at the last of them), and target less measured

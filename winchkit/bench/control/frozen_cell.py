@@ -78,7 +78,7 @@ _KEEPS_COUNTING = Quality.DUPLICATE | Quality.LATE | Quality.UNSTABLE | Quality.
 
 @dataclass(frozen=True, slots=True)
 class Frozen:
-    """A finding: the cell's count cannot have stood still by chance."""
+    """A finding: the cell's count is constant for longer than chance allows."""
 
     count: float
     duration: float

@@ -347,7 +347,7 @@ class ControlLoop:
         self._show_trips()
 
     def _ramping(self) -> bool:
-        """Whether every drive has left operation enabled, as far as it says."""
+        """Whether every drive reports that it has left operation enabled."""
         said = [parts.axis.feedback for parts in self.winches.values()]
         return all(item is not None and item.state is not State.OPERATION_ENABLED for item in said)
 

@@ -179,7 +179,7 @@ class _RemotePort:
 
 
 def _recognised(bus: CanBus, node: int, device: str | None) -> DeviceSpec:
-    """The device file that is named, else the shipped one that fits what a node says of itself."""
+    """The named device file, else the shipped one that fits the identity of a node."""
     from winchkit import catalog
     from winchkit.schema.read import read_device
 

@@ -1,4 +1,4 @@
-"""What a recorder takes from a running bench: cheap to give, in pieces by source."""
+"""Samples of a running bench for its recorder, in pieces by source, at little cost to its loop."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ class Feed:
                 instrument.listeners.remove(listener)
 
     def abandon(self) -> None:
-        """Stop listening and drop what is left."""
+        """Stop listening and drop the remaining samples."""
         self.close()
         self._snapshots.clear()
         for waiting in self._readings.values():

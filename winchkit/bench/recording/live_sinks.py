@@ -87,7 +87,7 @@ def _version_six(found: tuple[Any, ...]) -> bool:
 
 
 def _numbers(winch: Mapping[str, Any]) -> dict[str, float]:
-    """What can be plotted."""
+    """The numbers of a snapshot, which can be plotted."""
     return {
         key: value
         for key, value in winch.items()

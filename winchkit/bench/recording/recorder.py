@@ -129,7 +129,7 @@ class Recorder:
         return {**counters_of(self._sensors), "log": log}
 
     def close(self) -> None:
-        """Write what is pending and finish the file; raises what the writing raised."""
+        """Write pending samples and finish the file; raises the error of the writing."""
         self._detach(self)
         self._feed.close()
         self._stopping.set()
@@ -214,7 +214,7 @@ class Recorder:
 
 
 def counters_of(sensors: Mapping[str, Mapping[str, Sensor]]) -> dict[str, dict[str, Any]]:
-    """What was counted so far, by instrument (``A.cell``)."""
+    """Counts so far, by instrument (``A.cell``)."""
     return {
         f"{name}.{role}": dataclasses.asdict(instrument.counters)
         for name, by_role in sensors.items()

@@ -1,4 +1,4 @@
-"""The control cycles around a trip, kept until its reset: what was measured and what commanded."""
+"""The control cycles around a trip, kept until its reset: measured and commanded values."""
 
 from __future__ import annotations
 

@@ -322,7 +322,7 @@ class RemoteStation:
         return int(self._call("end_log"))
 
     def counters(self) -> dict[str, dict[str, Any]]:
-        """What was counted by instrument, and for the log."""
+        """Counts by instrument, and of the log."""
         return dict(self._call("counters"))
 
     def trip_history(self) -> dict[str, Any] | None:
@@ -380,7 +380,7 @@ class RemoteStation:
         return None if found is None else dict(found)
 
     def answer_programme(self) -> None:
-        """What the programme asks for is done; raises UsageError where it asks nothing."""
+        """Answer the programme's request as done; raises UsageError where there is no request."""
         self._call("answer_programme")
 
     def end_programme(self) -> None:

@@ -120,7 +120,7 @@ class Commanders:
             self._give(winch, actor)
 
     def release(self, winch: str) -> None:
-        """Let a winch be commanded by whoever orders next; only its commander can."""
+        """Release a winch to the next client that commands it; only its commander can do this."""
         with self._lock:
             if self._holders.get(winch) is self.actor:
                 del self._holders[winch]

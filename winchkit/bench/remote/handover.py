@@ -41,7 +41,7 @@ def own(spec: BenchSpec, name: str) -> Ownership:
 
 
 def own_or_find(spec: BenchSpec, name: str) -> Ownership | None:
-    """Own a bench as ``name``; None where somebody else does and takes clients in.
+    """Own a bench as ``name``; None where another process owns it and accepts clients.
 
     Raises NotPermitted, naming the owner, where it accepts no client.
     """

@@ -119,7 +119,7 @@ class ProgrammeRun:
         }
 
     def answer(self) -> None:
-        """What was asked for is done; raises UsageError where nothing is asked."""
+        """Answer the present request as done; raises UsageError where there is none."""
         if not self._asks:
             raise UsageError("the programme asks nothing now")
         self._answered.set()

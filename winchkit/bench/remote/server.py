@@ -145,7 +145,7 @@ class StationServer:
             self._seats.discard(seat)
 
     def _answer(self, seat: _Seat, line: bytes) -> tuple[dict[str, Any], bool]:
-        """Do what a request names, and whether it was the last one."""
+        """Execute a request; returns the reply, and whether the request was the last one."""
         seat.station.client.heard()
         operation, number = "", None
         try:

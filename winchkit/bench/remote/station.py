@@ -97,7 +97,7 @@ class Station(Protocol):
         """Quick-stop every winch; returns at rest."""
 
     def reset(self) -> list[str]:
-        """Clear trips and faults; returns what was cleared, in words."""
+        """Clear trips and faults; returns the cleared ones, in words."""
 
     def tare(self, winch: str | None) -> float:
         """Tare a load cell; returns the tension after it, N."""
@@ -112,7 +112,7 @@ class Station(Protocol):
         """Finish the log; returns its rows."""
 
     def counters(self) -> dict[str, dict[str, Any]]:
-        """What was counted by instrument (``A.cell``), and for the log of this station."""
+        """Counts by instrument (``A.cell``), and for the log of this station."""
 
     def trip_history(self) -> dict[str, Any] | None:
         """The cycles around the trip that is not reset yet, as JSON has them; None without one."""
@@ -281,7 +281,7 @@ class LocalStation:
             self._bench.stop_now()
 
     def reset(self) -> list[str]:
-        """Clear trips and faults; returns what was cleared, in words."""
+        """Clear trips and faults; returns the cleared ones, in words."""
         return self._bench.reset()
 
     def tare(self, winch: str | None) -> float:
@@ -294,7 +294,7 @@ class LocalStation:
         self._recorder = self._bench.log(path, rotate=rotate, replace=replace)
 
     def log_rows(self) -> int:
-        """Rows written so far; raises what has ended the writing."""
+        """Rows written so far; raises the error that has ended the writing."""
         if self._recorder is None:
             return 0
         self._recorder.check()
@@ -319,7 +319,7 @@ class LocalStation:
         return [asdict(item) for item in self._bench.scan()]
 
     def counters(self) -> dict[str, dict[str, Any]]:
-        """What was counted by instrument, and for the log."""
+        """Counts by instrument, and for the log."""
         if self._recorder is not None:
             return self._recorder.counters()
         return counters_of({name: winch.sensors for name, winch in self._bench.winch.items()})

@@ -312,7 +312,7 @@ class _Driver:
         return self._compute(self._look, _fitted, profile, fit, held, options)
 
     def _look(self) -> None:
-        """Raise what has stopped the bench since the beginning."""
+        """Raise the error that has stopped the bench since the beginning."""
         self.bench.raise_stop(self._stops)
 
 

@@ -19,7 +19,7 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 @dataclass(frozen=True)
 class Directed:
-    """A speed or a length with its direction, as somebody typed it."""
+    """A speed or a length with its direction, as typed."""
 
     option: str
     value: float

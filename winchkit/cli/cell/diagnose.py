@@ -1,4 +1,4 @@
-"""``winchkit cell diagnose``: a few seconds of readings, and what they say about the cell."""
+"""``winchkit cell diagnose``: findings on a cell from a few seconds of readings."""
 
 from __future__ import annotations
 

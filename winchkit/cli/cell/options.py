@@ -1,4 +1,4 @@
-"""What the commands of ``winchkit cell`` have in common."""
+"""Options and output that the commands of ``winchkit cell`` have in common."""
 
 from __future__ import annotations
 

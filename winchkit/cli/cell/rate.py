@@ -65,7 +65,7 @@ def _lines(report: dict[str, Any]) -> list[str]:
 
 
 def _cost(cost: dict[str, Any]) -> list[str]:
-    """What a reading keeps the line busy with; nothing for a device that sends by itself."""
+    """Times of a reading on the line; nothing for a device that sends by itself."""
     if not cost:
         return []
     lines = [f"  a reading keeps the line busy for {cost['time'] * 1e3:.2f} ms"]

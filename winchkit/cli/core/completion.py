@@ -1,4 +1,4 @@
-"""What a shell is offered: effects, profiles, benches, programmes, devices, runs, winches.
+"""Completions for a shell: effects, profiles, benches, programmes, devices, runs, winches.
 
 Nothing is imported but the catalogue of shipped files, and no effect is executed: a shell waits for
 the answer.

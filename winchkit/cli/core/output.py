@@ -20,7 +20,7 @@ __all__ = ["echo_each", "echo_json", "plain", "to_json"]
 
 
 def to_json(value: object) -> str:
-    """One line of JSON; NaN and infinity become null, dataclasses and arrays what they hold.
+    """One line of JSON; NaN and infinity become null, dataclasses objects, and arrays lists.
 
     Characters that steer a terminal are escaped, which JSON reads as themselves.
     """

@@ -1,4 +1,4 @@
-"""``winchkit busload``: what a bench file puts on its CAN buses."""
+"""``winchkit busload``: the load of a bench file on its CAN buses."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ _XML = (".xdd", ".xdc", ".xml")
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a file turned out to be."""
+    """Result of the check of one file."""
 
     path: str
     kind: str

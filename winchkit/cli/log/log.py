@@ -230,7 +230,7 @@ class _Log:
 
 
 def _earlier(output: str) -> list[Path]:
-    """What is there of an earlier log of that name, its parts included."""
+    """Existing files of an earlier log of that name, its parts included."""
     from winchkit.runs.recording.rotation import parts_beside
 
     path = Path(output)

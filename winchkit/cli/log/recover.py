@@ -1,4 +1,4 @@
-"""``winchkit log recover``: saves what is whole of a log that was cut off."""
+"""``winchkit log recover``: saves the complete samples of a log that was cut off."""
 
 from __future__ import annotations
 

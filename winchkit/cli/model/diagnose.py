@@ -129,7 +129,7 @@ def _tell_one(
 
 
 def _tell_known(known: WinchAnswer, as_json: bool) -> None:
-    """What is known of a search that Ctrl-C ended: errors and candidates, no verdict."""
+    """Results of a search that Ctrl-C ended: errors and candidates, no verdict."""
     if as_json:
         echo_json(known.diagnosis.to_json())
     else:

@@ -183,7 +183,7 @@ _FEW = 2
 def command(
     runs: Sequence[str], output: str | None, bench: str | None, asked: Asked, as_json: bool
 ) -> None:
-    """Propose motion programmes by what they distinguish and show per minute.
+    """Propose motion programmes, ranked by the effects that they distinguish and show per minute.
 
     Kinds of programmes are tried on the model with the noise of the RUNs: those that separate
     the effects that these runs cannot distinguish come first, else those that show what these

@@ -1,4 +1,4 @@
-"""``winchkit sim list``: the simulated benches there are, and what can be hidden in one."""
+"""``winchkit sim list``: the simulated benches, and the physics that can be hidden in one."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["command"]
 @click.option("--physics", is_flag=True, help="What can be hidden, with its numbers, instead.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON, with everything hidden.")
 def command(physics: bool, as_json: bool) -> None:
-    """List the simulated benches that are there, or the physics that they can hide."""
+    """List the simulated benches, or the physics that can be hidden in one."""
     from winchkit.sim.bench import listed_benches
     from winchkit.sim.physics.table import listed_physics
 

@@ -1,4 +1,4 @@
-"""``winchkit serve``: the page on which one sees where a model fails, and adds what it lacks."""
+"""``winchkit serve``: the page that shows where a model fails, and adds missing effects."""
 
 from __future__ import annotations
 

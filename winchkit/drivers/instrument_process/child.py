@@ -86,7 +86,7 @@ class _Outbox:
 
 
 class _Forwarding(Publisher):
-    """Hands on what a device says before it is judged, which is done in the bench."""
+    """Forwards the raw data of a device; the bench evaluates them."""
 
     def __init__(self, rate: float, forward: Callable[..., None]) -> None:
         super().__init__(rate)
@@ -220,7 +220,7 @@ class _RequestHandler:
         self._slow, self._lines, self._reporter = slow, lines, reporter
 
     def answer(self, number: int, place: tuple[int, int], operation: str, *given: Any) -> None:
-        """Do what a request asks for and send the result; ``place`` are line and instrument."""
+        """Execute a request and send the result; ``place`` are line and instrument."""
         line = self._lines[place[0]]
         try:
             value = self._done(line, line.sensors[place[1]], operation, *given)

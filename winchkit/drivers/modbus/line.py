@@ -93,7 +93,7 @@ class ModbusLine:
             return await identity(self._client, self._own(sensor))
 
     def room_for(self, sensor: Sensor) -> float:
-        """Rate that the line has room for, whatever rate the instrument wants, 1/s."""
+        """Rate that the line allows, independent of the instrument's own rate, 1/s."""
         return self._share.room_for(self._place(sensor))
 
     def time_of(self, sensor: Sensor) -> float:

@@ -1,4 +1,4 @@
-"""Cuts what a serial line brings into frames; what belongs to no frame is counted and dropped.
+"""Cuts the bytes of a serial line into frames; bytes outside a frame are counted and dropped.
 
 The cuts depend on the bytes alone, never on the chunks in which they came.
 """
@@ -53,7 +53,7 @@ class Framing(ABC):
 
 
 class TextFraming(Framing):
-    """Lines up to a terminator. What comes before the first one may be half a line: dropped."""
+    """Lines up to a terminator. Bytes before the first one may be half a line and are dropped."""
 
     def __init__(self, terminator: str, longest: int, *, empty: bool = False) -> None:
         """``longest`` is in characters, without terminator; ``empty`` lines may say something."""

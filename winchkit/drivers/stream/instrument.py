@@ -113,7 +113,7 @@ class StreamInstrument(InstrumentReadings):
         self._flags = decoded.quality
 
     def answered(self, item: Item, t_request: float, t_chunk: float, wire: Wire) -> None:
-        """Publish the answer to a request: what was converted last when it was sent."""
+        """Publish the answer to a request: the last conversion before it was sent."""
         t_receive = max(t_request, t_chunk - item.behind * wire.byte_time)
         earliest = t_request - 1.0 / self.spec.rate
         latest = max(t_request, t_receive - item.size * wire.byte_time)

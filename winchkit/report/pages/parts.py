@@ -43,7 +43,7 @@ def lead(
     rows: Sequence[tuple[str, str]],
     *beside: Markup,
 ) -> Markup:
-    """Result of a page: a word, a headline, and a summary of what was compared and follows.
+    """Result of a page: a word, a headline, and a summary of the comparison and its consequences.
 
     ``tone`` is a verdict whose colour is taken: adequate, explained, partly, unknown.
     ``rows`` are questions and their answers; empty answers are left out.

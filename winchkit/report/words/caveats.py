@@ -1,4 +1,4 @@
-"""Caveats of a diagnosis in words: what a verdict cannot exclude with these data."""
+"""Caveats of a diagnosis in words: causes that these data cannot exclude."""
 
 from __future__ import annotations
 

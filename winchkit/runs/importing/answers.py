@@ -1,4 +1,4 @@
-"""What a file cannot say and its user knows: constants, and the column of a channel."""
+"""Facts that a file lacks and its user supplies: constants, and the column of a channel."""
 
 from __future__ import annotations
 

@@ -137,7 +137,7 @@ class PowerStage:
         self._enter(State.SWITCH_ON_DISABLED)
 
     def control(self, word: int) -> None:
-        """Take a control word that was just written."""
+        """Evaluate a control word that was just written."""
         rising = word & ~self._last_word & FAULT_RESET
         self._last_word = word
         if self.state is State.FAULT:

@@ -15,7 +15,7 @@ advance by itself."""
 
 
 class Coupling:
-    """Advances the platform as far as all winches are.
+    """Advances the platform to the time that all winches have reached.
 
     Each winch integrates its own motor up to the instants of its frames and instruments. Beyond the
     platform's time, at most one tick, its cable continues with the last rate of its length.

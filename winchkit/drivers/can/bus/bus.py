@@ -246,7 +246,7 @@ class CanBus:
         self._handlers.pop(identifier, None)
 
     def pass_on(self, identifier: int, data: bytes, now: float) -> None:
-        """Hand an SDO reply that a handler does not want to the confirmed SDO client."""
+        """Give an SDO reply that no handler claims to the confirmed SDO client."""
         self.network.notify(identifier, bytearray(data), now)
 
     def send(self, identifier: int, data: bytes) -> bool:
@@ -291,7 +291,7 @@ class CanBus:
             waiting[:] = [frame for frame in waiting if frame[0] != identifier]
 
     def send_gathered(self) -> None:
-        """Send what has been gathered, by one call where the interface has one for it.
+        """Send the gathered frames, by one call where the interface has one.
 
         A frame that cannot be sent keeps none of the others from being tried; then it raises
         ConnectionLost. A full queue is dealt with as in :meth:`send`.

@@ -213,7 +213,7 @@ class SdoNode:
         self.verify(index, sub, value)
 
     def verify(self, index: int, sub: int, value: int) -> None:
-        """Read back what was written; raises DeviceRefused when the device kept another value."""
+        """Read a written value back; raises DeviceRefused when the device kept another value."""
         kept = self.read(index, sub)
         if kept != value:
             raise DeviceRefused(

@@ -80,7 +80,7 @@ class AxisFeedback(NamedTuple):
 
     @property
     def target_reached(self) -> bool:
-        """Status bit 10; what it means depends on the mode."""
+        """Status bit 10; its meaning depends on the mode."""
         return bool(self.status & StatusBit.TARGET_REACHED)
 
 

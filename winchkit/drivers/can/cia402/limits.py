@@ -21,7 +21,7 @@ _MS = 1e-3
 
 @dataclass(frozen=True)
 class LimitsAtShaft:
-    """Limits at the motor shaft; what is None leaves the drive's own alone."""
+    """Limits at the motor shaft; None leaves the drive's own limit unchanged."""
 
     angle: tuple[float, float] | None = None
     """Lowest and highest motor angle (607Dh), rad."""

@@ -130,7 +130,7 @@ class Homing(Enum):
 
     @property
     def over(self) -> bool:
-        """Whether it has ended, well or not."""
+        """Whether it has ended, with or without success."""
         return self in (Homing.DONE, Homing.FAILED)
 
 

@@ -119,7 +119,7 @@ def read_units(node: SdoNode) -> Units:
 
 
 def scale_of(units: Units, servo: ServoSpec) -> Scale:
-    """Scale at the motor shaft, the device file standing in for what the drive does not say.
+    """Scale at the motor shaft, with values of the device file where the drive has none.
 
     Positions count ``feed / gear`` units a motor turn (CiA 402-2, position actual value), or
     ``encoder / gear`` without a feed constant, unless 60A8h names a rotary SI unit. Speeds are

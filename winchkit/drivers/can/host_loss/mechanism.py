@@ -91,7 +91,7 @@ class Mechanism:
         """Set time-out of the drive, s."""
 
     def require(self) -> str:
-        """What the drive lacks for it, in words; empty where it lacks nothing."""
+        """Objects and functions for it that the drive lacks, in words; empty where it has all."""
         return ""
 
     def set_up(self) -> None:

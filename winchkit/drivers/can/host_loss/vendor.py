@@ -18,7 +18,7 @@ class VendorWatch(RpdoTimeout):
     declared: VendorWatchdog
 
     def declare(self, name: str, declared: VendorWatchdog) -> Mechanism:
-        """Take what the device file says of it; returns itself."""
+        """Take the declaration of the device file; returns itself."""
         self.name = f"{VENDOR}{name}"
         self.declared = declared
         self.silence = Silence(declared.silence)

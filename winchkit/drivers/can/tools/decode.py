@@ -203,7 +203,7 @@ def _expedited(data: bytes) -> int | None:
 
 
 def _content(index: int, data: bytes) -> str:
-    """What a transfer carries, or how much where that follows in segments."""
+    """Content of a transfer, or its length where the content follows in segments."""
     value = _expedited(data)
     if value is None:
         return f"{int.from_bytes(data[4:8], 'little')} bytes"
