@@ -122,6 +122,36 @@ def test_it_takes_lines_on_its_input(tmp_path: Path, options: list[str], last: s
     assert "did you mean 'load'?" in err
 
 
+def test_it_writes_over_no_file_of_somebody_else(tmp_path: Path) -> None:
+    path = tmp_path / "bench.toml"
+    path.write_text("# the bench in the hall\n")
+    with serving(tmp_path, "-o", path.name) as process:
+        _, words = process.communicate(timeout=60)
+    assert process.returncode == 2
+    assert "no simulation wrote it" in words
+    assert path.read_text() == "# the bench in the hall\n"
+
+
+def test_of_two_onto_one_bench_file_the_second_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "bench.toml"
+    with serving(tmp_path, "-o", path.name) as first:
+        wait_for_file(first, address_file(path))
+        written = path.read_bytes()
+        with serving(tmp_path, "-o", path.name, "--seed", "2") as second:
+            _, words = second.communicate(timeout=60)
+        assert second.returncode == 2
+        assert "a running simulation uses this file" in words
+        assert path.read_bytes() == written
+        assert "10 kg" in send(path, "status")
+    with serving(tmp_path, "-o", path.name) as later:
+        address_file(path).write_text("127.0.0.1:1\n")
+        end_of_wait = time.monotonic() + 60
+        while path.read_bytes() == written and time.monotonic() < end_of_wait:
+            assert later.poll() is None
+            time.sleep(0.02)
+    assert path.read_bytes() != written, "the killed one's file is written anew"
+
+
 def test_an_unknown_bench_is_a_clear_error(tmp_path: Path) -> None:
     found = subprocess.run(
         [*COMMAND, "spirl-bench"], cwd=tmp_path, capture_output=True, text=True, check=False

@@ -83,7 +83,8 @@ def command(
     silence, recover A.cell, status, quit. While it runs, 'winchkit run --yes' with that bench
     file lets it hang the loads that a programme asks for; it finds the simulation by the file
     BENCH-bench.toml.sim beside it. With --json the first line on stdout says that others can
-    connect now: {"schema": 1, "bench": FILE, "ready": true}.
+    connect now: {"schema": 1, "bench": FILE, "ready": true}. Writes over an earlier bench file of
+    its own only, and not while its simulation runs.
     """
     from winchkit.bench.control.realtime import acquire
     from winchkit.catalog import find
@@ -96,6 +97,7 @@ def command(
     sys.setswitchinterval(_TURN)
     declared = read_simbench(find("sim", bench))
     path = bench_file or Path(f"{Path(bench).stem}-bench.toml")
+    _refuse_to_replace(path)
     ended = threading.Event()
     with LiveBench(declared, seed=seed, hidden=hidden, interface=interface) as live:
         live.write_bench_file(path)
@@ -110,6 +112,27 @@ def command(
             while not ended.wait(_CHECK_EVERY):
                 live.check()
     click.echo(f"ended; {path} leads nowhere any more", err=True)
+
+
+def _refuse_to_replace(path: Path) -> None:
+    """Raise UsageError where the bench file is somebody's own, or leads to a running simulation."""
+    from winchkit.errors import ConnectionLost, UsageError
+    from winchkit.sim.live.bench_file import is_written_here
+    from winchkit.sim.live.client import is_simulated, send
+
+    if is_simulated(path):
+        try:
+            send(path, "status")
+        except ConnectionLost:
+            pass  # killed before it could remove the file
+        else:
+            raise UsageError(f"{path}: a running simulation uses this file; name another (-o)")
+    if path.exists() and (
+        not path.is_file() or (path.stat().st_size and not is_written_here(path))
+    ):
+        raise UsageError(
+            f"{path} exists, and no simulation wrote it; name another file (-o), or remove it"
+        )
 
 
 @contextmanager

@@ -14,7 +14,10 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.quantity import Quantity
 from winchkit.units import UNITS
 
-__all__ = ["bench_toml", "write_bench"]
+__all__ = ["bench_toml", "is_written_here", "write_bench"]
+
+_MARK = "# written by winchkit: the bench of a simulation"
+"""First line, by which a later simulation knows that it may write over the file."""
 
 _NOT_IN_FILES = ("path", "latch_file")
 
@@ -22,10 +25,19 @@ _NOT_IN_FILES = ("path", "latch_file")
 def write_bench(bench: BenchSpec, path: Path) -> Path:
     """Write a bench as a file; FileError where that is not possible."""
     try:
-        path.write_text(bench_toml(bench), encoding="utf-8")
+        path.write_text(f"{_MARK}\n{bench_toml(bench)}", encoding="utf-8")
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}") from error
     return path
+
+
+def is_written_here(path: Path) -> bool:
+    """Whether :func:`write_bench` wrote this file; FileError where it cannot be read."""
+    try:
+        with path.open(encoding="utf-8", errors="replace") as lines:
+            return lines.readline(len(_MARK)) == _MARK
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def bench_toml(bench: BenchSpec) -> str:
