@@ -1,4 +1,4 @@
-"""Type checks of the arguments of public functions: what was given, and which call returns it.
+"""Checks of the types of public functions' arguments; an error names the call that returns it.
 
 A path where runs are expected is the usual mistake; without a check it is an ``AttributeError``
 deep in a computation.

@@ -432,7 +432,7 @@ class Bench(BenchConnection):
         self.loop.warn(Trip("client", ", ".join(names), reason, Direction.NONE))
 
     def _come_to_rest(self) -> None:
-        """Ramp down; what does not come to rest gets a quick stop."""
+        """Ramp down; a winch that does not come to rest gets a quick stop."""
         try:
             self.stop()
         except MotionError:

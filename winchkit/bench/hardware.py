@@ -61,7 +61,7 @@ _HEADROOM = 4.0
 
 @dataclass(frozen=True)
 class Wired:
-    """What is behind an open bench."""
+    """Hardware of an open bench."""
 
     loop: ControlLoop
     axes: Mapping[str, Cia402Axis]
@@ -234,7 +234,7 @@ def _warn_of_sync(buses: Mapping[str, CanBus], loop: ControlLoop) -> None:
 def _tell_notes(
     spec: BenchSpec, axes: Mapping[str, Cia402Axis], buses: Mapping[str, CanBus]
 ) -> None:
-    """Say which limits are missing, what was changed in the drives, and who else sends SYNC."""
+    """Report missing limits, changes in the drives, and other senders of SYNC."""
     notes = [f"{'.'.join(key)}: {message} (warning)" for key, message in bench_warnings(spec)]
     notes += [note for axis in axes.values() if axis.drive for note in axis.drive.notes]
     notes += [note for bus in buses.values() if (note := bus.foreign_sync)]
@@ -319,7 +319,7 @@ def _axis(
 
 
 def _at_shaft(cable: CableMap, limits: LimitSpec) -> LimitsAtShaft:
-    """What the drive itself is to keep, where the bench file says so."""
+    """Limits for the drive itself, where the bench file declares them."""
     angle = None
     if limits.in_drive and limits.length is not None:
         low, high = limits.length

@@ -1,4 +1,4 @@
-"""What a winch, and a homing of it, need of the bench to which they belong (interface)."""
+"""Interface of a bench to its winches and their homing."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ A step is the smallest change that was ever seen: of an indicator with a divisio
 
 @dataclass(slots=True)
 class _State:
-    """What is known of the counts in one state, at rest or moving."""
+    """Statistics of the counts in one state, at rest or moving."""
 
     noisy: int = 0
     """Number of blocks, all of them noisy."""

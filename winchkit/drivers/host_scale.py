@@ -27,7 +27,7 @@ class HostScale:
         return value
 
     def indicated(self, calibrated: float) -> float:
-        """What the device shows for a true value; the inverse of :meth:`calibrated`.
+        """Indication of the device for a true value; the inverse of :meth:`calibrated`.
 
         Of the two a parabola has, the one on its rising side is meant.
         """

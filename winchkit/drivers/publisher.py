@@ -104,12 +104,12 @@ class InstrumentReadings:
 
     @property
     def host_tare(self) -> float:
-        """What the host subtracts from the calibrated value, SI."""
+        """Value that the host subtracts from the calibrated one, SI."""
         return self.publisher.scale.tare
 
     @property
     def tally(self) -> Tally:
-        """What was counted, up to date."""
+        """Counts up to now."""
         return self.publisher.tally
 
     @property

@@ -114,4 +114,4 @@ class Sensor(Protocol):
 
     @property
     def host_tare(self) -> float:
-        """What the host subtracts from the calibrated value, SI."""
+        """Value that the host subtracts from the calibrated one, SI."""

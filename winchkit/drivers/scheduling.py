@@ -18,7 +18,7 @@ __all__ = ["Event", "Scheduler", "Thread", "event_loop_of", "event_of", "lock_of
 
 
 class Event(Protocol):
-    """What is used of ``threading.Event``."""
+    """Used part of ``threading.Event``."""
 
     def is_set(self) -> bool:
         """Whether it is set."""
@@ -34,7 +34,7 @@ class Event(Protocol):
 
 
 class Thread(Protocol):
-    """What is used of ``threading.Thread``."""
+    """Used part of ``threading.Thread``."""
 
     def start(self) -> None:
         """Start it."""

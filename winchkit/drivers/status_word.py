@@ -29,7 +29,7 @@ class StatusWord:
         return bool(status & self._masks.get(meaning, 0))
 
     def quality(self, status: int) -> Quality:
-        """What the status alone says of the reading beside it."""
+        """Flags of a reading by its status alone."""
         quality = Quality.GOOD
         for meaning, flag in _FLAGS.items():
             if self.has(meaning, status):

@@ -120,7 +120,7 @@ def _with_retry(task: Task) -> Outcome:
 
 @dataclass
 class _Keeping:
-    """Outcomes on their way into the tables; what is there at an interruption is written."""
+    """Outcomes for the tables; at an interruption those that wait are written."""
 
     tables: Partitions
     due: int

@@ -128,7 +128,7 @@ class OpenedBench:
         self._faulty.add(target)
 
     def recover(self) -> None:
-        """End every fault and disturbance that lasts; what is latched stays so."""
+        """End every lasting fault and disturbance; latched trips stay."""
         for end in self._disturbances:
             end()
         self._disturbances.clear()

@@ -1,4 +1,4 @@
-"""Files of other programs: what their columns may be, and the run that they become."""
+"""Files of other programs: assignments of their columns, and the imported run."""
 
 from __future__ import annotations
 

@@ -160,7 +160,7 @@ def ladder(
 def card(
     answer: WinchAnswer, effect: Effect, values: Mapping[str, Estimate], distinct: Sequence[str]
 ) -> dict[str, Any]:
-    """What the card of a candidate says.
+    """Content of the card of a candidate.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the profiles of a bench say of its newest minute: predictions, residuals, the drums."""
+"""The newest minute of a bench by its profiles: predictions, residuals, the drums."""
 
 from __future__ import annotations
 

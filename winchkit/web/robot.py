@@ -1,4 +1,4 @@
-"""What the Robot view works on: a robot's profile, its poses, and the last calibration.
+"""State of the Robot view: a robot's profile, its poses, and the last calibration.
 
 It calls :func:`winchkit.calibrate`, the force distribution and the feasibility of the public model;
 positions are in m, forces in N, in the base frame.
@@ -125,7 +125,7 @@ class RobotWork:
     # What routes read.
 
     def summary(self) -> dict[str, Any] | None:
-        """What every page gets at every change; None without a robot."""
+        """Data for every page at every change; None without a robot."""
         state = self._state
         if state.profile is None:
             return None

@@ -85,7 +85,7 @@ class Version:
 
 @dataclass(frozen=True)
 class State:
-    """What the page shows; replaced as a whole."""
+    """State of the page; replaced as a whole."""
 
     runs: tuple[LoadedRun, ...] = ()
     source: str = ""

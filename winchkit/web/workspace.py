@@ -1,4 +1,4 @@
-"""What the Diagnose view works on: run files, a profile with its history, and the last diagnosis.
+"""State of the Diagnose view: run files, a profile with its history, and the last diagnosis.
 
 All work runs in one thread, in the order of the requests; a cancelled request leaves the state as
 it was. Files are kept in a folder of the server's own: nothing of the user's is written to.

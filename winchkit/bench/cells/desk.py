@@ -57,7 +57,7 @@ class Noting(Protocol):
 
     @property
     def note(self) -> str:
-        """What is to be said about the port; empty where nothing is."""
+        """Remark on the port; empty where there is none."""
 
 
 @runtime_checkable
@@ -131,7 +131,7 @@ class CellDesk:
         return line.time_of(self.sensors[name]) if isinstance(line, Shared) else None
 
     def line_note(self, name: str) -> str:
-        """What is to be said of its port, e.g. of an adapter that holds bytes back."""
+        """Remark on its port, e.g. on an adapter that holds bytes back."""
         line = self._line_of(name)
         return line.note if isinstance(line, Noting) else ""
 
@@ -161,7 +161,7 @@ class CellDesk:
         return sensor.publisher
 
     def identify(self, name: str) -> dict[str, float]:
-        """What the device says of itself; raises NoReply, DeviceRefused."""
+        """Identity of the device; raises NoReply, DeviceRefused."""
         return self._slow.identify(self.sensors[name])
 
     def first_reading(self, name: str) -> Reading:

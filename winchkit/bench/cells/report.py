@@ -89,7 +89,7 @@ def rate_report(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
 
 
 def _limits(desk: CellDesk, name: str) -> tuple[dict[str, float], dict[str, Any], bool]:
-    """Rates that bound an instrument's, what a reading costs, whether it sends by itself."""
+    """Rates that bound an instrument's, time of a reading, and whether it sends by itself."""
     device, cap = desk.device(name), desk.ref(name).rate
     table = device.modbus or device.stream or device.process
     assert table is not None, "every instrument has one of them"
@@ -136,7 +136,7 @@ def _filter_delay(device: DeviceSpec) -> float:
 
 
 def _link_remarks(desk: CellDesk, name: str, device: DeviceSpec) -> list[str]:
-    """What the line does to its readings, and where it differs from the factory's setting."""
+    """Effects of the line on its readings, and differences from the factory's setting."""
     note = desk.line_note(name)
     told = [note] if note else []
     bus = desk.spec.bus[desk.line(name)]
@@ -154,7 +154,7 @@ def _link_remarks(desk: CellDesk, name: str, device: DeviceSpec) -> list[str]:
 def _doubts(
     device: DeviceSpec, identity: Mapping[str, float], calibration: CellCalibration | None
 ) -> list[str]:
-    """What has no source, and a calibration that is of another device."""
+    """Values without a source, and a calibration that is of another device."""
     told = [
         f"its device file has no source for {what}: compare with the manual"
         for what in device.unconfirmed

@@ -43,7 +43,7 @@ class LocalCells:
 
 
 def do(desk: CellDesk, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-    """Carry out a task; what it returns is plain enough for JSON. Raises UsageError if unknown."""
+    """Carry out a task; its result is plain data for JSON. Raises UsageError if unknown."""
     if task not in TASKS:
         raise UsageError(f"no task '{task}' for an instrument; there are {', '.join(TASKS)}")
     return TASKS[task](desk, full_name(desk.spec, name), *arguments)

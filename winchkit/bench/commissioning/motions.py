@@ -29,7 +29,7 @@ _SIGMAS = 5.0
 
 @dataclass(frozen=True)
 class Moved:
-    """What a motion came to; positive pays out."""
+    """Result of a motion; positive pays out."""
 
     cable: float
     """By the motor's position and the profile, m."""

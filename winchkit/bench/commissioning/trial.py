@@ -62,7 +62,7 @@ _HALF = 1 << 31
 
 @dataclass(frozen=True)
 class Trial:
-    """What one trial showed."""
+    """Result of one trial."""
 
     stopped: bool
     """Whether the drive left operation enabled."""

@@ -66,7 +66,7 @@ def drive_record(axis: Cia402Axis) -> DriveRecord:
 def stale_items(
     spec: BenchSpec, drives: Mapping[str, DriveRecord] | None = None
 ) -> tuple[str, ...]:
-    """What of the record does not hold, in words; with ``drives`` their identities too."""
+    """Items of the record that are not valid, in words; with ``drives`` their identities too."""
     if not spec.path:
         return ("a bench without a file has no commissioning record",)
     try:

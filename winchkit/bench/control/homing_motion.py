@@ -20,7 +20,7 @@ _JUMP = 1.0
 
 @dataclass(frozen=True)
 class HomingRequest:
-    """What is asked for."""
+    """Request for a homing."""
 
     method: int | None = None
     """6098h; None searches nothing."""

@@ -429,7 +429,7 @@ class ControlLoop:
 
 
 def _attempt(action: Callable[..., object], *arguments: object, **options: object) -> None:
-    """Do one part of a stop; what it raises must not keep the others from being done."""
+    """Do one part of a stop; its exception must not prevent the other parts."""
     try:
         action(*arguments, **options)
     except BaseException:

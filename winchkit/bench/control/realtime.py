@@ -55,7 +55,7 @@ _Scheduling = tuple[int, int]
 
 @dataclass(frozen=True)
 class RealTime:
-    """What was granted and what was refused, with the setting that would permit it."""
+    """Granted and refused settings, with the change that would permit the latter."""
 
     items: tuple[Item, ...]
     _before: dict[int, _Scheduling] = field(default_factory=dict, repr=False, compare=False)
@@ -205,7 +205,7 @@ def _scheduling_of(thread: int) -> _Scheduling:
 
 
 def _lock_memory(stack: ExitStack) -> Item:
-    """Lock what is mapped now and, where the limit is no obstacle, what will be."""
+    """Lock the mapped memory and, where the limit permits, future mappings."""
     import resource
 
     libc = ctypes.CDLL(None, use_errno=True)

@@ -116,7 +116,7 @@ class Supervisor:
             self._acknowledged = ()
 
     def withdraw(self) -> None:
-        """Acknowledge nothing any more: what is not cleared stays, the first of its kind."""
+        """End the acknowledgement: trips that are not cleared stay, the first of its kind."""
         with self._latching:
             first = {(trip.kind, trip.winch): trip for trip in reversed(self.tripped)}
             self.tripped = tuple(

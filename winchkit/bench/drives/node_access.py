@@ -143,7 +143,7 @@ class DeclaredDrive:
 
 
 def declared_drive(spec: BenchSpec, who: str | None) -> DeclaredDrive:
-    """What is known of a drive without asking it; raises UsageError, FileError."""
+    """Facts on a drive that need no communication; raises UsageError, FileError."""
     bus, node, winch = _chosen(spec, who)
     if not winch:
         raise UsageError(f"node {node}: which drive this is can only be known by asking it")

@@ -104,7 +104,7 @@ class Feed:
         self._snapshots.append(snapshot)
 
     def take(self) -> tuple[dict[str, Samples], list[BenchSnapshot]]:
-        """What came since the last time: samples by topic, and the snapshots themselves."""
+        """New samples since the last call, by topic, and the snapshots themselves."""
         snapshots = [self._snapshots.popleft() for _ in range(len(self._snapshots))]
         pieces = {}
         for name, topic in self._drives.items():

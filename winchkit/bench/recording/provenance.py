@@ -21,7 +21,7 @@ _ROLES = ("cell", "load", "length", "temperature")
 
 
 def origin(spec: BenchSpec) -> dict[str, str]:
-    """Metadata of a log; what is not known is left out."""
+    """Metadata of a log; unknown items are left out."""
     about = {"versions": json.dumps(_versions())}
     if spec.path:
         about |= git_state(Path(spec.path).resolve().parent)

@@ -124,7 +124,7 @@ class Recorder:
             raise self.failure
 
     def counters(self) -> dict[str, dict[str, Any]]:
-        """What was counted so far, by instrument (``A.cell``) and for the log itself."""
+        """Counts so far, by instrument (``A.cell``) and of the log itself."""
         log = {"rows": self.rows, "parts": len(self.parts), "drops": self._feed.lost}
         return {**counters_of(self._sensors), "log": log}
 

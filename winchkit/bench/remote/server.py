@@ -203,7 +203,7 @@ class StationServer:
 
 
 def _end(station: LocalStation) -> None:
-    """Close a station; what goes wrong there goes to the log as well."""
+    """Close a station; its errors are logged too."""
     try:
         station.close()
     except FileError:

@@ -1,4 +1,4 @@
-"""What an operator can do with a bench, the same in the owner's process and from outside it."""
+"""Operations on a bench, the same in the owner's process and from outside it."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ class Station(Protocol):
         """Where this station's programme is, as JSON has it; None where it started none."""
 
     def answer_programme(self) -> None:
-        """What the programme asks for is done."""
+        """Answer the programme's request as done."""
 
     def end_programme(self) -> None:
         """End this station's programme by a ramp; returns at rest."""
@@ -358,7 +358,7 @@ class LocalStation:
         return None if self._programme is None else self._programme.state()
 
     def answer_programme(self) -> None:
-        """What the programme asks for is done."""
+        """Answer the programme's request as done."""
         if self._programme is None:
             raise UsageError("no programme is under way")
         self._programme.answer()

@@ -27,7 +27,7 @@ __all__ = ["CableTrim", "ForceTrim", "TrimSetting"]
 
 @dataclass(frozen=True)
 class TrimSetting:
-    """What is corrected, of n cables, SI."""
+    """Correction of the tensions of n cables, SI."""
 
     names: Sequence[str]
     force: Array

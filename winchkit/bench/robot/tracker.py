@@ -181,7 +181,7 @@ class Tracker:
         threading.Thread(target=self._run, args=(receiver,), name="tracker", daemon=True).start()
 
     def receive(self, datagram: bytes) -> None:
-        """Take a datagram; what is no pose is counted.
+        """Take a datagram; one without a pose is counted.
 
         Parameters
         ----------

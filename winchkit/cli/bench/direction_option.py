@@ -65,7 +65,7 @@ def direction_options(value: str) -> Decorator:
 
 
 def read_direction(pay_out: str | None, wind_in: str | None) -> Directed | None:
-    """What is given of the two; None for neither. Raises UsageError for both, or a sign."""
+    """The given one of the two options; None for neither. Raises UsageError for both, or a sign."""
     if pay_out is not None and wind_in is not None:
         raise UsageError("--pay-out and --wind-in are opposite directions; give one of them")
     option, text = ("--pay-out", pay_out) if wind_in is None else ("--wind-in", wind_in)

@@ -117,7 +117,7 @@ def command(
 
 @dataclass(frozen=True)
 class _Asked:
-    """What the options ask for."""
+    """Motion that the options request."""
 
     direction: Directed | None
     """None: by keys."""

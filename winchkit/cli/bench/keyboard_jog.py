@@ -143,7 +143,7 @@ _WIND_IN, _PAY_OUT = "up", "down"
 
 
 class KeyboardJog:
-    """What each key does. In inch mode a tap is one step, and so is a key that is held."""
+    """Actions of the keys. In inch mode a tap is one step, and so is a key that is held."""
 
     def __init__(
         self, station: Station, winch: str | None, speed: float, now: Callable[[], float]
@@ -186,7 +186,7 @@ class KeyboardJog:
                 raise Terminated from None
 
     def press(self, key: str) -> None:
-        """Do what a key says; what forbids it is shown, and the operator decides."""
+        """Execute the action of a key; a refusal is shown, and the operator decides."""
         try:
             self._act(key)
         except ConnectionLost:

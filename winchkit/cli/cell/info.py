@@ -1,4 +1,4 @@
-"""``winchkit cell info``: what an instrument is, and what it says now."""
+"""``winchkit cell info``: identity, present reading and status of an instrument."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def command(
 
 
 def _told(task: str, result: dict[str, Any], unit: str) -> str:
-    """What was done, for people."""
+    """The tare in words."""
     if task == "clear tare":
         return (
             f"the host's tare of {shown(result['removed'], unit)} is gone; "

@@ -29,7 +29,7 @@ __all__ = ["command"]
     help="Averaging time.",
 )
 def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
-    """Send the device of CELL its zero command: what hangs on it now becomes its gross zero.
+    """Send the device of CELL its zero command: the present load becomes its gross zero.
 
     Only a volatile zero is sent; a device that keeps it in its EEPROM needs
     `winchkit cell store --command zero`.

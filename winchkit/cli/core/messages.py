@@ -1,4 +1,4 @@
-"""What a command reports beside its result, on standard error: notes, steps, the next command.
+"""Messages of a command beside its result, on standard error: notes, steps, the next command.
 
 ``-q`` leaves all of it out, except warnings and errors. ``-v`` adds a line, with the time since the
 start, for every file that was read, every default that was taken, and every step.

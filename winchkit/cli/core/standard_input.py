@@ -66,7 +66,7 @@ class Readable(click.ParamType):  # type: ignore[type-arg]
     def shell_complete(
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
-        """What the shell offers."""
+        """Completions for the shell."""
         if self._complete is None:
             return [CompletionItem(incomplete, type="file")]
         return self._complete(ctx, param, incomplete)

@@ -1,4 +1,4 @@
-"""``winchkit info``: what a drive says of itself."""
+"""``winchkit info``: identity, state and settings of a drive."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ def about_computer() -> tuple[str, ...]:
 
 
 def refusals(bench: BenchSpec) -> tuple[str, ...]:
-    """What this computer lacks to control the drives of a bench; nothing for simulated buses."""
+    """Missing settings of this computer for the drives of a bench; none for simulated buses."""
     real = [
         bus
         for bus in bench.bus.values()

@@ -17,7 +17,7 @@ __all__ = ["DriveReport", "report_of"]
 
 @dataclass(frozen=True)
 class DriveReport:
-    """What is found wrong, and what is worth knowing, of the drives of a declaration."""
+    """Faults and remarks on the drives of a declaration."""
 
     faults: tuple[Fault, ...] = ()
     warnings: tuple[Fault, ...] = ()
@@ -46,7 +46,7 @@ def report_of(value: object) -> DriveReport:
 
 
 def _not_commissioned(spec: BenchSpec) -> list[Fault]:
-    """What of the commissioning record does not hold, of a bench with real drives."""
+    """Items of the commissioning record that are not valid, of a bench with real drives."""
     from winchkit.bench.commissioning.validity import is_simulated, stale_items
     from winchkit.errors import Fault
 

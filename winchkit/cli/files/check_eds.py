@@ -18,7 +18,7 @@ _SHOWN = 12
 
 
 def describe_eds(path: Path) -> tuple[DriveDescription, tuple[Fault, ...]]:
-    """What an EDS says of its drive, with the warnings of its text; raises FileError."""
+    """Facts in an EDS on its drive, with the warnings of its text; raises FileError."""
     from winchkit.drivers.can.canopen.description import describe
     from winchkit.drivers.can.canopen.eds import read_eds
 

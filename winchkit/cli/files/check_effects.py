@@ -20,7 +20,7 @@ __all__ = ["bench_of", "faults_and_warnings"]
 def faults_and_warnings(
     file: str, value: Declared, effects: Sequence[str]
 ) -> tuple[list[Fault], list[Fault]]:
-    """What is wrong with the effects of a declaration's profiles, and what was not checked.
+    """Faults of the effects of a declaration's profiles, and effects that were not checked.
 
     ``effects`` are the Python files that the user named (``--effects``): they are executed. Those
     that a bench file names (its key ``effects``) are not, unless the user named them as well: an

@@ -1,4 +1,4 @@
-"""``winchkit fleet trend``: what changed in the runs of a library, since when, at what cost."""
+"""``winchkit fleet trend``: changes in the runs of a library, with their dates and costs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``winchkit log info``: what a log holds."""
+"""``winchkit log info``: content of a log."""
 
 from __future__ import annotations
 

@@ -157,7 +157,7 @@ class _Log:
 
     @property
     def result(self) -> dict[str, Any]:
-        """What was logged, as JSON has it."""
+        """Content of the log as JSON."""
         return {
             "schema": 1,
             "output": self._output,

@@ -100,7 +100,7 @@ def _tell_one(
     html: str | None,
     figures: str | None,
 ) -> None:
-    """What one winch lacks, on a page besides where that is asked."""
+    """Diagnosis of one winch, with a page where one is requested."""
     from winchkit.diagnosis.diagnose import diagnose
 
     known: list[WinchAnswer] = []
@@ -145,7 +145,7 @@ def _tell_each(
     html: str | None,
     figures: str | None,
 ) -> None:
-    """What every winch of the runs lacks, each by itself, and what they have in common."""
+    """Diagnosis of every winch of the runs by itself, and their common effects."""
     from winchkit.diagnosis.fleet.diagnose import diagnose_each
     from winchkit.diagnosis.fleet.meta_analysis import alarms, shared_effects
     from winchkit.report.pages.fleet import shared_effects_text
@@ -191,7 +191,7 @@ def _tell_robot(
     html: str | None,
     figures: str | None,
 ) -> None:
-    """What a robot's model lacks, from poses."""
+    """Diagnosis of a robot from poses."""
     from winchkit.diagnosis.robot.diagnose import diagnose_robot
 
     with progress_bar() as progress:
@@ -219,7 +219,7 @@ def _figures(answer: WinchAnswer, asked: Asked) -> Sequence[Figure]:
 
 
 def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
-    """What follows: add the effect that is named alone, else look for what separates or shows."""
+    """Next command: add the effect that is named alone, else plan runs that distinguish or show."""
     if diagnosis.interrupted:
         return
     named = diagnosis.steps[0] if diagnosis.steps else None
@@ -244,7 +244,7 @@ def _page(answer: WinchAnswer, title: str, asked: Asked) -> str:
 
 
 def _said(answer: Answer, as_json: bool) -> Any:
-    """An answer as JSON data or as text: what is printed, without all that is behind it."""
+    """An answer as JSON data or as text, without the data behind it."""
     if as_json:
         from winchkit.report.as_json import report_json
 

@@ -116,7 +116,7 @@ class Asked:
 
     @property
     def options(self) -> tuple[str, ...]:
-        """What was given beside runs and profile, as words to repeat it with."""
+        """Options beside runs and profile, as words of a command that repeats them."""
         out = [word for path in self.effect_files for word in ("--effects", path)]
         out += [] if self.winch is None else ["--winch", self.winch]
         out += [] if self.band is None else ["--band", f"{self.band:g}"]

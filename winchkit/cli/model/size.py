@@ -51,7 +51,7 @@ def command(ctx: click.Context, spec: str, as_json: bool) -> None:
 
 
 def _table(rows: Sequence[Row]) -> str:
-    """Aligned columns; below a requirement that fails, what would do."""
+    """Aligned columns; below a requirement that fails, a value that meets it."""
     cells = [("requirement", "source", "value", "", "limit", "verdict")]
     cells += [_cells(row) for row in rows]
     widths = [max(len(line[k]) for line in cells) for k in range(6)]

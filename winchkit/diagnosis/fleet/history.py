@@ -1,4 +1,4 @@
-"""Parameters of a fleet over time: what changed, since when, at what cost; which winch is odd.
+"""Parameters of a fleet over time: changes, dates and costs; winches that differ from the others.
 
 Estimates of one fixed set of effects (:mod:`winchkit.diagnosis.fleet.sessions`) are grouped by
 effect and parameter. Every winch of a group is tested for a change over its sessions, and against

@@ -1,4 +1,4 @@
-"""Residual analysis: what remains after the fit.
+"""Residual analysis after the fit.
 
 Its power above the low-pass filter's cut-off (``stop_band_leakage``), its attribution to variables
 and orders by the correlation ratio η² (``attribution``), its means over two variables (``maps``),

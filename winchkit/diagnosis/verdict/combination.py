@@ -36,7 +36,7 @@ def combination_of_set(
     parameters: Mapping[str, Mapping[str, Estimate]],
     dataset: Dataset | None,
 ) -> Combination | None:
-    """What the data determine of an equivalence set, whichever member is true.
+    """Combination of parameters that the data determine, whichever member of a set is true.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Null distribution of the specification test: what the best curve gains where the names are right.
+"""Null distribution of the specification test: gain of the best curve where the names are right.
 
 Parametric bootstrap in the linearised model: data are the named effects at their fitted values plus
 noise, whose variance is drawn per band from its own uncertainty (ν/χ²(ν)). In every draw all

@@ -73,7 +73,7 @@ class RawReading(NamedTuple):
 
 
 class State(NamedTuple):
-    """What an instrument shows beside its readings."""
+    """State of an instrument beside its readings."""
 
     problem: tuple[str, str] | None
     """Class and message of the error that keeps readings from coming."""

@@ -107,7 +107,7 @@ class SeparateLine:
 
     @property
     def note(self) -> str:
-        """What is to be said about the port, e.g. of its adapter; empty where nothing is."""
+        """Remark on the port, e.g. on its adapter; empty where there is none."""
         return str(self._ask(self.sensors[0], "note"))
 
     def close(self) -> None:

@@ -121,7 +121,7 @@ class ModbusClient:
                 logging.getLogger(__name__).debug("%s: closing: %s", self.where, error)
 
     def events(self, unit: int) -> list[Event]:
-        """What came from a unit, beside good answers, since the last call."""
+        """Events of a unit, other than good answers, since the last call."""
         self._collect()
         return list(self._events.pop(unit, ()))
 

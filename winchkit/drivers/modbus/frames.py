@@ -38,7 +38,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What was sent, and what its answer must look like from the unit to the end of the PDU."""
+    """A request, and the form of its answer from the unit to the end of the PDU."""
 
     packet: bytes
     unit: int
@@ -65,7 +65,7 @@ class AnswerGate:
         self._events: list[Event] = []
 
     def sent(self, packet: bytes) -> None:
-        """A request goes out; what is left of the time before was no answer to it."""
+        """A request is sent; earlier bytes are no answer to it."""
         self.expire()
         self._request = request_of(packet, "rtu")
         self._unit = self._request.unit
@@ -97,7 +97,7 @@ class AnswerGate:
         return bool(left)
 
     def events(self) -> list[Event]:
-        """What has happened since the last call."""
+        """Events since the last call."""
         if self._request is None:
             self.expire()
         events, self._events = self._events, []
@@ -175,7 +175,7 @@ _TABLE = tuple(_table_entry(byte) for byte in range(256))
 
 
 def request_of(packet: bytes, framing: Framing) -> Request:
-    """What a request asks for, read from the request itself."""
+    """Content of a request, read from the request itself."""
     body = packet[_HEAD[framing] : len(packet) - _TAIL[framing]]
     unit, function = body[0], body[1]
     reads = function in _READS

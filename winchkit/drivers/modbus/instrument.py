@@ -264,7 +264,7 @@ class Instrument(InstrumentReadings):
         self.publisher.publish(decoded.value, decoded.gross, decoded.counts, quality, sampled)
 
     def _before(self, registers: Sequence[int], decoded: Decoded) -> Quality:
-        """What the status that was read before the value says against it."""
+        """Flags of the status that was read before the value."""
         if self._status_before is None or self.decoder.spec.status_read is None:
             return Quality.GOOD
         before = self.decoder.decode(registers, self._status_before)

@@ -88,7 +88,7 @@ class TcpAnswerGate:
         return came
 
     def events(self) -> list[Event]:
-        """What has happened since the last call."""
+        """Events since the last call."""
         events, self._events = self._events, []
         return events
 

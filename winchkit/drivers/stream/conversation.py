@@ -238,7 +238,7 @@ def exchange_time(instrument: StreamInstrument, bus: BusSpec) -> float:
 
 
 def _instead(seen: Counters) -> str:
-    """What came although nothing that could be taken did."""
+    """Bytes that came without an acceptable frame, in words."""
     came = {
         "answers with a wrong check sum": seen.crc,
         "answers of another form": seen.malformed,

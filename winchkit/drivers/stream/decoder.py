@@ -146,7 +146,7 @@ class Decoder:
         return said == f"{check_sum(spec, match.text, len(match.fields['checksum'])):02X}"
 
     def _fields(self, fields: dict[str, str]) -> Decoded | None:
-        """What the fields say, None where one of them says nothing that is known."""
+        """Values of the fields, None where one of them is unknown."""
         address = fields.get("address")
         if address is not None and not self._is_mine(address):
             return None
@@ -203,7 +203,7 @@ class Decoder:
         return self._measured(said, counts, gross, unit)
 
     def _word(self, digits: str, fields: dict[str, str]) -> Says | None:
-        """What a text in place of the digits says; one that a check sum vouches for is a fault."""
+        """Meaning of a text in place of the digits; one with a valid check sum is a fault."""
         text = digits.strip(_PADDING)
         if text in self._words:
             return self._words[text]

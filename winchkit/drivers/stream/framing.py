@@ -26,7 +26,7 @@ class Piece(NamedTuple):
 
 
 class Framing(ABC):
-    """Cuts a sequence of bytes; what its kinds have in common is what is not whole yet."""
+    """Cuts a sequence of bytes; base of all kinds, with the incomplete remainder."""
 
     def __init__(self, terminator: str) -> None:
         self._end = terminator.encode("latin-1")

@@ -28,7 +28,7 @@ _JITTER = 0.8
 
 
 class Wire(Protocol):
-    """What a line says about the times on it, s."""
+    """Times of a line, s."""
 
     @property
     def byte_time(self) -> float:
@@ -90,7 +90,7 @@ class StreamInstrument(InstrumentReadings):
 
     @property
     def tally(self) -> Tally:
-        """What was counted, with what its parsers have counted."""
+        """Counts, with those of its parsers."""
         tally = self.publisher.tally
         parsers = [self.parser, self.talk, *([self.fresh] if self.fresh else [])]
         counts = [parser.counts for parser in parsers]
@@ -105,7 +105,7 @@ class StreamInstrument(InstrumentReadings):
         return self._net
 
     def text(self, template: str) -> bytes:
-        """What to send, the address put in."""
+        """Bytes to send, with the address."""
         return template.format(address=_Address(self.address or 0)).encode("latin-1")
 
     def took(self, decoded: Decoded) -> None:

@@ -72,7 +72,7 @@ class StreamLine:
 
     @property
     def note(self) -> str:
-        """What is to be said about the port, e.g. of its adapter; empty where nothing is."""
+        """Remark on the port, e.g. on its adapter; empty where there is none."""
         return self._talk.port.note if self._talk else ""
 
     def _place(self, sensor: Sensor) -> int:

@@ -113,7 +113,7 @@ class Table:
     """Texts of the first column, whose values are their numbers; empty for a numeric column."""
 
     def to_json(self) -> dict[str, Any]:
-        """What the page embeds."""
+        """Data that the page embeds."""
         return {"head": self.head, "columns": self.columns, "words": self.words}
 
     def csv(self) -> str:

@@ -46,7 +46,7 @@ _PROGRAMMES = 5
 
 
 def screen(text: str, more: str = "") -> str:
-    """Text of at most 24 lines; what is left out is counted.
+    """Text of at most 24 lines; omitted lines are counted.
 
     Parameters
     ----------

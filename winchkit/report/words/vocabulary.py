@@ -168,7 +168,7 @@ def estimate_text(parameter: str, estimate: Estimate) -> str:
 
 
 def combination_text(combination: Combination) -> str:
-    """What the data determine: ``cable per motor turn = 18.7042 ± 0.0014 mm``."""
+    """Combination that the data determine: ``cable per motor turn = 18.7042 ± 0.0014 mm``."""
     unit = "" if combination.unit == "1" else combination.unit
     return f"{combination.name} = {with_std(combination.value, combination.std, unit)}"
 

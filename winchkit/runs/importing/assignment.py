@@ -47,7 +47,7 @@ class Assignment:
 
 @dataclass(frozen=True)
 class Question:
-    """What cannot be known from the file, and the option that answers."""
+    """A fact that the file lacks, and the option that supplies it."""
 
     text: str
     options: tuple[str, ...]

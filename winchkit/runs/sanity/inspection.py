@@ -26,7 +26,7 @@ _INSTRUMENTS = {"tension", "tension_gross", "load", "load_gross", "motor_torque"
 
 @dataclass(frozen=True)
 class Inspection:
-    """What is found on a run without a model of the winch."""
+    """Findings on a run without a model of the winch."""
 
     run: Run
     """The run as it was read."""

@@ -60,7 +60,7 @@ class Fleet:
         self._profile, self._found = profile, found
 
     def view(self) -> dict[str, Any]:
-        """What is known of the fleet."""
+        """Facts on the fleet."""
         tables = self.library.tables
         sessions = [] if tables is None else winch_sessions(tables)
         rows = [] if tables is None else tables.read("diagnoses", ("profile_name",)).to_pylist()

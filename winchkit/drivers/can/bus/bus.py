@@ -452,7 +452,7 @@ class CanBus:
 
 
 class _Network(canopen.Network):
-    """The canopen library's network; what its SDO clients send is shown to the tap."""
+    """The canopen library's network; frames of its SDO clients are shown to the tap."""
 
     def __init__(self, show: Callable[[int, bytes], None]) -> None:
         super().__init__()

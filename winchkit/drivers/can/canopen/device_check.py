@@ -52,7 +52,7 @@ _OBJECTS = {
 
 @dataclass(frozen=True)
 class EdsReport:
-    """What is wrong with a drive's EDS, or with a device file that names it."""
+    """Faults of a drive's EDS, or of a device file that names it."""
 
     faults: tuple[Fault, ...]
     warnings: tuple[Fault, ...]
@@ -139,7 +139,7 @@ def _written_faults(dictionary: Any, text: str) -> Iterator[str]:
 
 
 def _not_watched(dictionary: Any, servo: ServoSpec) -> str:
-    """What the device file leaves out for its way to notice a dead host; empty where nothing."""
+    """Keys that the device file lacks for its detection of a dead host; empty where none."""
     if servo.host_loss == "sync-loss" and not MODES[servo.motion_mode].cyclic:
         return (
             f'host_loss = "sync-loss" needs a cyclic mode; in {servo.motion_mode} no drive minds a '

@@ -78,7 +78,7 @@ class Emergency:
 
 
 def error_text(code: int) -> str:
-    """What a CiA 301/402 error code means; its family when the code itself is not known."""
+    """Meaning of a CiA 301/402 error code; its family when the code itself is not known."""
     known = _TEXT.get(code)
     if known:
         return known

@@ -41,7 +41,7 @@ class LimitsAtShaft:
 
 @dataclass(frozen=True)
 class DriveLimits:
-    """What a drive keeps, SI at the motor shaft; NaN where it has no such object or no limit."""
+    """Limits in a drive, SI at the motor shaft; NaN where it has no such object or no limit."""
 
     angle: tuple[float, float] = (nan, nan)
     following_error: float = nan

@@ -104,7 +104,7 @@ class PositionCounter:
         self._kept = (0, True)
 
     def target(self, counts: int, name: str) -> int:
-        """What the drive is to be sent for an unwrapped target; raises NotPermitted beyond its end.
+        """Counter value for an unwrapped target; raises NotPermitted beyond its end.
 
         No drive is sent across the end of its counter: whether it then takes the short way or the
         long one is proved by nothing that it declares.

@@ -107,7 +107,7 @@ def reaction(
     seen: bool,
     hardware: str = "",
 ) -> HostLoss:
-    """What is known of an enabled drive: by its fault, by 6007h, or because it was seen."""
+    """Known reaction of an enabled drive: by its fault, by 6007h, or by observation."""
     lost = options.get("connection_lost")
     code = None if lost is None else lost.value
     by_option = mechanism.name in BY_6007 and code in _STOPPING
@@ -148,7 +148,7 @@ def _await_reaction(
     *,
     faultless: bool,
 ) -> Proof:
-    """What the drive shows; a fault counts where it was ``faultless`` before the silence."""
+    """Reaction of the drive; a fault counts where it was ``faultless`` before the silence."""
     clock, asked = mechanism.clock, False
     while (delay := clock.now() - start) <= limit + _PATIENCE:
         new = [e for e in tuple(emergencies) if e.time >= start and _fits(mechanism, e)]

@@ -85,7 +85,7 @@ class HostWatch:
     def reaction(
         self, proof: Proof | None, options: Mapping[str, OptionCode], *, seen: bool
     ) -> HostLoss:
-        """What is known of the enabled drive."""
+        """Known reaction of the enabled drive."""
         return reaction(self.mechanism, proof, options, seen=seen, hardware=self.hardware)
 
     def arm(self) -> None:

@@ -1,4 +1,4 @@
-"""CAN frames in words: what is, or would be, on the bus."""
+"""CAN frames in words, of a bus or of a dry run."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ _SEGMENT = 7
 
 @dataclass(frozen=True)
 class KnownNode:
-    """What is known of a node: its name and, where it is a declared drive, its objects."""
+    """Known facts on a node: its name and, where it is a declared drive, its objects."""
 
     name: str
     dictionary: Any = None

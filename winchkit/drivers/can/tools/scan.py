@@ -88,7 +88,7 @@ class RawNode:
             ) from error
 
     def download(self, index: int, sub: int, data: bytes) -> None:
-        """Refuse: what is not known is not written to."""
+        """Refuse: an unknown node is not written to."""
         raise DeviceRefused(f"{self._place} {index:04X}h:{sub}: not written, its type is unknown")
 
 
