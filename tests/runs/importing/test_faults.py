@@ -297,3 +297,20 @@ def test_few_repeated_stamps_are_left_out_with_a_note(tmp_path: Path) -> None:
     found = streams_of(guessed(tmp_path / "log.csv", lines))
     assert found.notes == ("2 of 400 rows have the stamp of the row before them and are left out",)
     assert len(run_of(found, {})) == 398
+
+
+def test_records_of_several_kinds_are_refused_and_no_long_header(tmp_path: Path) -> None:
+    """A set point between the samples; the last samples are at rest, without set points."""
+    lines = []
+    for n in range(400):
+        lines += [f"{0.01 * n:.2f},{n},1.5,2.5", f"Set: {n}, 3.5"]
+        lines += [f"Set: {n}, 4.5"] * 3
+    lines += [f"{4 + 0.01 * n:.2f},400,1.5,2.5" for n in range(100)]
+    with pytest.raises(RunError) as caught:
+        guessed(tmp_path / "log.csv", lines)
+    (fault,) = caught.value.faults
+    assert "400 rows of 4 cells stand between lines of another kind" in fault.message
+    assert fault.line == 2001
+    samples = [line for line in lines if not line.startswith("Set")]
+    found = guessed(tmp_path / "samples.csv", samples)
+    assert len(found.file.columns[0].values) == 500

@@ -720,3 +720,29 @@ def test_components_of_a_pose_are_its_position(name: str, channel: str) -> None:
     meaning = meaning_of(name)
     assert meaning is not None
     assert meaning.channel == channel
+
+
+@pytest.mark.parametrize(
+    ("unit", "asked", "constant", "factor"),
+    [
+        ("%", "is in %: of which torque?", {"rated_torque": 2.4}, 0.024),
+        ("A", "is a current: which torque constant?", {"torque_constant": 0.12}, 0.12),
+        ("V", "is in V: how many N m is 1?", {}, None),
+    ],
+)
+def test_a_unit_that_the_user_names_is_asked_for_its_constant(
+    tmp_path: Path, unit: str, asked: str, constant: dict[str, float], factor: float | None
+) -> None:
+    """The file has no unit; the answer was lost, and the same question came again without end."""
+    time = np.arange(0.0, 2.0, 0.01)
+    columns = {"time": time, "angle [rad]": np.sin(time), "torque": np.cos(5 * time)}
+    (question,) = guess(tmp_path / "log.csv", columns).questions
+    assert "% (of a rated torque), A (a current)" in question.text
+    given = Answers(columns=(read_column(f"motor_torque=torque [{unit}]"),))
+    (question,) = guess(tmp_path / "log.csv", columns, given).questions
+    assert asked in question.text
+    if factor is not None:
+        known = Answers(columns=given.columns, **constant)  # type: ignore[arg-type]
+        found = guess(tmp_path / "log.csv", columns, known)
+        assert not found.questions
+        assert of(found, "motor_torque").factor == pytest.approx(factor)

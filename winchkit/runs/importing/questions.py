@@ -42,6 +42,13 @@ _OPTIONS = {
 }
 
 
+_OTHER_UNITS = {
+    "motor_torque": ("% (of a rated torque)", "A (a current)"),
+    "tension": ("kg", "mV/V", "V"),
+}
+"""Units of a drive and of an amplifier, for which a constant is asked then."""
+
+
 def axis_question(table: Table, by: str) -> Question:
     """Question whether a column names the axis of each row."""
     names = ", ".join(list(axes_of(table, by))[:_SHOWN])
@@ -79,7 +86,7 @@ def _ask_unit(work: Work, item: ChosenColumn) -> None:
     own = f'--column "{channel}={name} [UNIT]"'
     if dimension == "voltage" or (dimension == COUNTS and item.base != "motor_angle"):
         one = next(iter(UNITS[column_dimension(item.base) or "ratio"]))
-        text = f"'{name}' ({channel}) is in {item.column.unit}: how many {one} is 1?"
+        text = f"'{name}' ({channel}) is in {item.unit or item.column.unit}: how many {one} is 1?"
         work.questions.append(Question(text, (f'--column "{channel}={name}*FACTOR [{one}]"',)))
     elif dimension in {COUNTS, COUNT_RATE} or (item.base == "motor_angle" and is_whole(item)):
         is_known = dimension in {COUNTS, COUNT_RATE} or is_counted(item)
@@ -100,7 +107,7 @@ def _ask_unit(work: Work, item: ChosenColumn) -> None:
                 _ask(work, f"'{name}' is in mV/V: which {key} of the load cell?", key, own)
     else:
         si = column_dimension(item.base)
-        units = ", ".join(UNITS[si]) if si else "1"
+        units = ", ".join((*UNITS[si], *_OTHER_UNITS.get(item.base, ()))) if si else "1"
         spelled = item.column.unit
         had = f"has the unknown unit '{spelled}'" if spelled else "has no unit"
         text = f"'{name}' ({channel}) {had}; one of {units}{work.doubts.get(name, '')}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -49,6 +50,8 @@ _COARSE = 0.01
 
 def started(work: Work, candidate: Candidate, answer: ColumnAnswer | None) -> ChosenColumn:
     """A column with the unit that the user or the file gives."""
+    if answer is not None and answer.unit:
+        candidate = replace(candidate, unit=read_unit(answer.unit))
     item = ChosenColumn(candidate, reason=candidate.reason)
     confidence: Confidence = "named" if candidate.rank <= 2 else "derived"
     unit, text = candidate.unit, candidate.column.unit
@@ -60,7 +63,7 @@ def started(work: Work, candidate: Candidate, answer: ColumnAnswer | None) -> Ch
             scale = work.table.constants.get(answer.constant, math.nan)
         scale *= answer.sign
         if answer.unit:
-            unit, text = read_unit(answer.unit), answer.unit
+            text = answer.unit
         elif answer.factor is not None or answer.constant:
             si = column_dimension(item.base) or "ratio"
             item.settle(scale, next(iter(UNITS[si])), "given", "--column")

@@ -206,6 +206,7 @@ def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended:
     first = _first_of_numbers(rows, dialect, is_keyed=is_padded)
     if first is None:
         raise RunError(Fault("has no rows of numbers", path))
+    _check_records(path, rows, first, dialect)
     is_counted = _counts_columns(rows[first][1])
     header = read_header(
         rows[:first], dialect.width, dialect.decimal, is_blank=dialect.delimiter == BLANKS
@@ -261,6 +262,19 @@ def _first_of_numbers(rows: Sequence[Row], dialect: Dialect, *, is_keyed: bool) 
         if sum(_is_numeric(c, dialect) for c in after) * 2 >= len(after):
             return index
     return None
+
+
+def _check_records(path: str, rows: Sequence[Row], first: int, dialect: Dialect) -> None:
+    """Raise where most rows of numbers would be a part of the header: records of several kinds."""
+    above = sum(_is_numeric(rows[n][1], dialect) for n in range(first))
+    below = len(rows) - first
+    if above > below:
+        message = (
+            f"{above} rows of {dialect.width} cells stand between lines of another kind, only the "
+            f"last {below} follow each other: the file has records of several kinds; put those of "
+            "one kind into a file of their own"
+        )
+        raise RunError(Fault(message, path, rows[first][0]))
 
 
 def _kept(
