@@ -265,6 +265,7 @@ def _plausible(effect: Effect) -> list[str]:
             above = p.plausible.high == inf
             ends = "from {:g}" if above else "{:g} to {:g}"
             text = ends.format(p.plausible.low, p.plausible.high) + unit + of
+            text += " on a winch" if p.plausible.of_winch else ""
             lines.append(
                 fill(
                     f"plausible {p.name}: {text} ({p.plausible.reason})",

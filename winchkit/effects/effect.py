@@ -66,6 +66,8 @@ class Plausible:
     """Reason of the range, in words."""
     of: str = ""
     """Number of the profile that the range is relative to, such as ``drum.winding_radius``."""
+    of_winch: bool = False
+    """Whether it is one of winches; that of an axis, which moves its load itself, is not known."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from operator import attrgetter
 from winchkit.diagnosis.results import Estimate
 from winchkit.effects.effect import Parameter
 from winchkit.effects.term import Term
+from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["implausible", "plausible_range"]
@@ -39,7 +40,8 @@ def implausible(
     -----
     A value is beyond its plausible range where its whole 95 % interval is. Where an effect declares
     no range, a value at a bound of the fit other than the null is beyond it. A value that the data
-    do not determine (NaN standard deviation) is not judged.
+    do not determine (NaN standard deviation) is not judged. The inertia of an axis has no range: it
+    includes the arm or carriage that the axis moves.
     """
     return next(_reasons(term, values, profile), None)
 
@@ -72,7 +74,7 @@ def plausible_range(
 ) -> tuple[float, float, str] | None:
     """Plausible range of a parameter in its unit, with its reason; None where none is known."""
     declared = parameter.plausible
-    if declared is None:
+    if declared is None or (declared.of_winch and isinstance(profile, AxisProfile)):
         return None
     size = 1.0
     if declared.of:

@@ -20,12 +20,14 @@ EFFECT = Effect(
             null=0.0,
             typical=1e-4,
             low=0.0,
-            plausible=Plausible(0.0, 1.0, "rotors of motors up to 100 kW are below 1 kg m²"),
+            plausible=Plausible(
+                0.0, 1.0, "rotors of motors up to 100 kW are below 1 kg m²", of_winch=True
+            ),
         ),
     ),
     apply=apply,
     outputs=("motor_torque",),
-    what="Inertia of rotor, brake, coupling and gearbox input.",
+    what="Inertia of rotor, brake, coupling and gearbox input; of an axis, with what it moves.",
     formula="τ + J θ''",
     source="Newton",
     looks_like="Torque in proportion to the motor's acceleration, at any load.",

@@ -116,7 +116,7 @@ _CLAUSES = {
     "pulley-inertia": "the inertia of the pulleys is not negligible",
     "pulley-stribeck": "the pulleys have Coulomb friction with a Stribeck curve",
     "pulley-viscous": "the pulleys have viscous friction",
-    "rotor-inertia": "the inertia of the rotor is not negligible",
+    "rotor-inertia": "the inertia on the motor side is not negligible",
     "spring-balancer": "the torque is linear in the position (a spring or a weight)",
     "torque-constant": "the torque constant of the drive is wrong",
     "torque-lag": "the torque signal of the drive is delayed",
