@@ -1,7 +1,7 @@
 """The inertia of an axis is that of the arm it moves, not of a rotor.
 
-A joint with gravity, friction and the inertia of an arm, in the torque and angle of the joint,
-moves by harmonics whose amplitudes are closed forms, without repeats.
+A joint with gravity, viscous friction and the inertia of an arm, in its torque and angle, moves by
+harmonics whose amplitudes are closed forms, without repeats.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.axis import AxisProfile
 
 JOINT = AxisProfile(name="joint")
-INERTIA, GRAVITY, VISCOUS, COULOMB = 18.0, 100.0, 17.0, 14.0
+INERTIA, GRAVITY, VISCOUS = 18.0, 100.0, 17.0
 RATE, SECONDS = 100.0, 60.0
 HARMONICS = ((0.3, 0.13, 0.0), (0.2, 0.37, 1.0), (0.06, 0.83, 2.0))
 """Amplitude, rad; frequency, Hz; phase, rad."""
@@ -34,7 +34,7 @@ def arm(seed: int) -> Run:
         speed += amplitude * omega * np.cos(at)
         acceleration -= amplitude * omega**2 * np.sin(at)
     torque = INERTIA * acceleration + GRAVITY * np.cos(angle) + VISCOUS * speed
-    torque += COULOMB * np.tanh(speed / 0.005) + random.standard_normal(len(time))
+    torque += random.standard_normal(len(time))
     channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
     return Run("arm", time, channels, {})
 
@@ -59,4 +59,3 @@ def test_an_arm_is_explained_by_gravity_inertia_and_friction(seed: int) -> None:
     assert moved.value == pytest.approx(INERTIA, abs=4 * moved.std)
     assert values["joint-gravity"]["amplitude"].value == pytest.approx(GRAVITY, rel=0.02)
     assert values["motor-viscous"]["viscosity"].value == pytest.approx(VISCOUS, rel=0.05)
-    assert values["motor-coulomb"]["torque"].value == pytest.approx(COULOMB, rel=0.05)
