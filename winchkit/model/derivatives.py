@@ -19,10 +19,10 @@ __all__ = [
     "with_turning_points",
 ]
 
-_LEAVES_BEHIND = 2.0
-"""Highest rate, in creep rates, from which on the sign is smooth over the creep rate."""
 _CREEP_SHARE = 0.02
-"""Width of the smooth sign of a slower machine, as a share of its highest rate."""
+"""Width of the smooth sign as a share of the highest rate: dry friction of a slow joint has its
+size within 5 % (tests/diagnosis/test_slow_joint.py); the creep rates are reached at 25 rad/s and
+50 mm/s."""
 _CREEP_LEAST = 1e-3
 """Least width of that sign, as a share of the creep rate: rounding has no direction."""
 _LOAD_SPAN = 0.02
@@ -49,16 +49,14 @@ def smooth_sign(rate: Array, creep: float, fastest: float) -> Array:
     creep : float
         Rate below which the sign is smooth, in the same unit.
     fastest : float
-        Highest rate of the machine, in the same unit. The smoothing is narrower on a machine that
-        hardly exceeds ``creep``, which would otherwise have no direction at all.
+        Highest rate of the machine, in the same unit. The smoothing is narrower on a slow machine,
+        whose direction it would otherwise turn into a part of its speed.
 
     Returns
     -------
     array
         −1 to 1; zero at standstill, whatever the rounding of the derivative.
     """
-    if fastest >= _LEAVES_BEHIND * creep:
-        return np.asarray(np.tanh(rate / creep))
     width = np.clip(_CREEP_SHARE * fastest, _CREEP_LEAST * creep, creep)
     return np.asarray(np.tanh(rate / width))
 
