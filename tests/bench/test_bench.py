@@ -204,12 +204,12 @@ def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None
     try:
         assert station.names() == ["A"]
         other.start_log(str(tmp_path / "other.csv"))
-        station.jog("A", -0.2, 0.7)
+        station.jog("A", pay_out=0.2, hold=0.7)
         until(lambda: bench.winch["A"].snapshot.cable_speed > 0.1)
         other.stop()
         assert bench.snapshot.at_rest
         with pytest.raises(NotPermitted, match="release it for"):
-            station.jog("A", -0.2, 0.2)
+            station.jog("A", pay_out=0.2)
         assert other.end_log() > 5
         assert abs(station.tare(None)) < 8
         with pytest.raises(UsageError, match="no winch 'Z'"):
@@ -278,7 +278,7 @@ def test_of_two_stations_that_log_onto_one_path_one_is_refused(
 def test_a_station_that_goes_away_releases_its_winches(bench: Bench) -> None:
     station = attach(bench.spec)
     assert station is not None
-    station.step("A", 0.6, 0.1)
+    station.step("A", pay_out=0.6, speed=0.1)
     until(lambda: bench.winch["A"].snapshot.cable_speed > 0.05)
     station.close()
     until(lambda: bench.snapshot.at_rest)

@@ -4,10 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TypedDict
 
 from winchkit.errors import UsageError
 
-__all__ = ["no_positional", "paid_out"]
+__all__ = ["DirectionKeyword", "directed", "no_positional", "paid_out"]
+
+
+class DirectionKeyword(TypedDict, total=False):
+    """The one of the two keywords that a call is given, with its positive number."""
+
+    pay_out: float
+    wind_in: float
+
+
+def directed(change: float) -> DirectionKeyword:
+    """The keyword for a signed number, positive paying out; zero has none and is refused."""
+    return {"wind_in": -change} if change < 0 else {"pay_out": change}
 
 
 def paid_out(what: str, pay_out: float | None, wind_in: float | None) -> float:

@@ -14,7 +14,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from winchkit.bench.control.dead_man import DEAD_MAN
+from winchkit.bench.direction import directed
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.errors import UsageError, WinchkitError
 from winchkit.schema.bench import BenchSpec
@@ -22,8 +22,6 @@ from winchkit.web.programmes import Programmes
 
 __all__ = ["Browser", "Inbox", "counting", "received"]
 
-_RELEASED = 0.05
-"""Hold of a jog at speed 0, which ends the one before, s."""
 _COUNTED = 0.5
 """Period in which the rows of a log are asked for, s."""
 _LARGEST = 4_000
@@ -124,12 +122,15 @@ class Browser:
         if winch is not None and winch != "all" and winch not in self.spec.winch:
             raise UsageError(f"there is no winch '{winch}'")
         actions: dict[str, Callable[[], object]] = {
-            "jog": lambda: station.jog(winch, _number(asked["speed"]), DEAD_MAN),
-            "release": lambda: station.jog(winch, 0.0, _RELEASED),
+            # In a message a jog's speed is positive winding in, a step's change paying out.
+            "jog": lambda: station.jog(winch, **directed(-_number(asked["speed"]))),
+            "release": lambda: station.release(winch),
             "alive": lambda: station.moving(winch),
-            "step": lambda: station.step(winch, _number(asked["change"]), _number(asked["speed"])),
+            "step": lambda: station.step(
+                winch, **directed(_number(asked["change"])), speed=_number(asked["speed"])
+            ),
             "move": lambda: station.move(
-                winch, _number(asked["to"]), None, _number(asked["speed"])
+                winch, to=_number(asked["to"]), speed=_number(asked["speed"])
             ),
             "move_pose": lambda: station.move_pose(
                 {str(asked["axis"]): _number(asked["change"])}, True, _number(asked["speed"])

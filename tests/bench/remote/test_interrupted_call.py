@@ -84,7 +84,7 @@ def test_leaving_waits_for_rest_wherever_the_call_before_was_interrupted() -> No
         station = RemoteStation(ours, patience=5.0)
         with interrupted(points) as interrupts:
             try:
-                station.jog("A", 0.1, 0.2)
+                station.jog("A", wind_in=0.1)
             except KeyboardInterrupt:
                 assert interrupts.came
         station.close()
@@ -102,5 +102,5 @@ def test_the_rest_of_an_answer_whose_beginning_was_lost_is_passed_over(cut: int)
     station = RemoteStation(ours, patience=5.0)
     whole = json.dumps({"id": 17, "ok": {"A": 1.5}}).encode() + b"\n"
     theirs.sendall(whole[cut:])
-    station.jog("A", 0.1, 0.2)
+    station.jog("A", wind_in=0.1)
     station.close()

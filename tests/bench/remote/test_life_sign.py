@@ -63,8 +63,8 @@ def attached(rig: Rig) -> Iterator[Attached]:
 
 
 ORDERS: dict[str, Callable[[LocalStation], None]] = {
-    "move": lambda station: station.move("A", None, 1.0, SPEED),
-    "step": lambda station: station.step("A", 1.0, SPEED),
+    "move": lambda station: station.move("A", pay_out=1.0, speed=SPEED),
+    "step": lambda station: station.step("A", pay_out=1.0, speed=SPEED),
 }
 
 
@@ -106,7 +106,7 @@ def test_the_program_that_owns_the_bench_needs_no_sign(rig: Rig) -> None:
 
 def test_a_jog_keeps_its_own_hold(attached: Attached) -> None:
     """The first press of a key holds for 0.7 s, which is longer."""
-    attached.station.jog("A", -SPEED, 0.7)
+    attached.station.jog("A", pay_out=SPEED, hold=0.7)
     attached.rig.wait(0.6)
     assert abs(attached.rig.slaves[0].motor.velocity) > 1
     attached.rig.wait(0.5)
@@ -114,10 +114,10 @@ def test_a_jog_keeps_its_own_hold(attached: Attached) -> None:
 
 
 def test_silence_at_rest_is_no_silence_in_motion(attached: Attached) -> None:
-    attached.station.move("A", None, 0.02, SPEED)
+    attached.station.move("A", pay_out=0.02, speed=SPEED)
     assert not attached.poll(2.0)
     attached.rig.wait(3.0)
-    attached.station.move("A", None, 1.0, SPEED)
+    attached.station.move("A", pay_out=1.0, speed=SPEED)
     assert attached.poll(1.0)
     attached.station.close()
     assert attached.bench.snapshot.warnings == ()
@@ -137,7 +137,7 @@ def test_a_standstill_of_the_owner_is_not_the_clients() -> None:
 
 
 def test_a_motion_that_is_ended_before_its_first_cycle_has_ended(attached: Attached) -> None:
-    attached.station.move("A", None, 1.0, SPEED)
+    attached.station.move("A", pay_out=1.0, speed=SPEED)
     attached.bench.winch["A"].run_down()
     attached.rig.wait(0.1)
     assert not attached.bench.winch["A"].moving

@@ -427,9 +427,9 @@ def test_a_program_takes_the_bench_from_a_log_which_goes_on(served: Path, tmp_pa
 def test_python_attaches_and_is_refused_while_another_client_may_move(served: Path) -> None:
     with attach(served, name="first") as first, attach(served, name="second") as second:
         assert first.owner == second.owner
-        first.jog("A", -0.05, 0.7)
+        first.jog("A", pay_out=0.05, hold=0.7)
         with pytest.raises(NotPermitted, match="winch A is commanded by first"):
-            second.jog("A", 0.05, 0.7)
+            second.jog("A", wind_in=0.05, hold=0.7)
         with pytest.raises(NotPermitted, match=r"used by (first, second|second, first)"):
             open_bench(served)
         second.stop()

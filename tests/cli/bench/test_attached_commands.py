@@ -33,8 +33,8 @@ def bench(running: Served) -> Served:
 def test_who_attaches_does_the_same_through_the_owner(bench: Served) -> None:
     with open_bench(bench.file) as opened, owned(opened) as station:
         with pytest.raises(UsageError, match="either to a cable length or by a change"):
-            station.move("A", None, None)
-        station.move("all", None, 0.05, 0.3)
+            station.move("A")
+        station.move("all", pay_out=0.05, speed=0.3)
         while station.moving("all"):
             time.sleep(0.02)
         assert [item.winch for item in station.scan()] == ["A", "B"]

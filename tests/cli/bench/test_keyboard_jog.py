@@ -38,13 +38,17 @@ class Station:
         self._refusal = refusal
         self.shown = STATUS
 
-    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
-        self.calls.append(("jog", round(winding_speed, 6), hold))
+    def jog(self, winch: str | None, *, hold: float, **direction: float) -> None:
+        ((name, speed),) = direction.items()
+        self.calls.append(("jog", name, round(speed, 6), hold))
         if self._refusal is not None:
             raise self._refusal
 
-    def step(self, winch: str | None, change: float, speed: float | None) -> None:
-        self.calls.append(("step", change, speed))
+    def release(self, winch: str | None) -> None:
+        self.calls.append(("release",))
+
+    def step(self, winch: str | None, *, speed: float, **direction: float) -> None:
+        self.calls.append(("step", *direction.items()))
 
     def stop(self) -> None:
         self.calls.append(("stop",))
@@ -82,7 +86,7 @@ def press(
 def test_a_first_press_lasts_and_repeats_refresh_shortly(monkeypatch: pytest.MonkeyPatch) -> None:
     station = Station()
     press(monkeypatch, station, [(0.0, ["up"]), (0.5, ["up"]), (0.53, ["up"]), (2.0, ["up"])])
-    holds = [call[2] for call in station.calls if call[0] == "jog"]
+    holds = [call[3] for call in station.calls if call[0] == "jog"]
     assert holds == [0.7, 0.2, 0.2, 0.7]
     assert station.calls[-1] == ("stop",), "q stops"
 
@@ -92,7 +96,8 @@ def test_arrows_give_the_direction_and_plus_and_minus_the_speed(
 ) -> None:
     station = Station()
     press(monkeypatch, station, [(0.0, ["up"]), (0.1, ["+", "down"]), (0.2, ["-", "-", "up"])])
-    assert [call[1] for call in station.calls if call[0] == "jog"] == [0.1, -0.125, 0.08]
+    moved = [call[1:3] for call in station.calls if call[0] == "jog"]
+    assert moved == [("wind_in", 0.1), ("pay_out", 0.125), ("wind_in", 0.08)]
 
 
 def test_space_stops_and_r_resets(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,8 +120,8 @@ def test_a_lost_owner_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
         press(monkeypatch, Station(ConnectionLost("gone")), [(0.0, ["up"])])
 
 
-def steps(station: Station) -> list[float]:
-    """Changes of the cable length that the taps asked for, m."""
+def steps(station: Station) -> list[tuple[str, float]]:
+    """Lengths (m) that the taps asked for, by the keyword of their direction."""
     return [call[1] for call in station.calls if call[0] == "step"]
 
 
@@ -126,9 +131,9 @@ def test_inch_mode_makes_one_step_a_tap_of_the_length_that_is_shown(
     station = Station()
     taps = [(0.0, ["i"]), (1.0, ["up"]), (2.0, ["i", "down"]), (3.0, ["i", "up"]), (4.0, ["i"])]
     press(monkeypatch, station, [*taps, (5.0, ["up"])])
-    assert steps(station) == [-0.001, 0.01, -0.1], "up winds in: the cable gets shorter"
-    moved = [call for call in station.calls if call[0] == "jog" and call[1] != 0.0]
-    assert moved == [("jog", 0.1, 0.7)], "a jog only after the mode went back to hold"
+    assert steps(station) == [("wind_in", 0.001), ("pay_out", 0.01), ("wind_in", 0.1)]
+    moved = [call for call in station.calls if call[0] == "jog"]
+    assert moved == [("jog", "wind_in", 0.1, 0.7)], "a jog only after the mode went back to hold"
     shown = capsys.readouterr().err
     for words in ("1 mm a tap", "10 mm a tap", "100 mm a tap", "hold, 0.100 m/s"):
         assert words in shown
@@ -140,7 +145,7 @@ def test_a_key_that_is_held_is_one_tap_and_the_other_arrow_another(
     station = Station()
     held = [(1.0 + 0.03 * n, ["up"]) for n in (0, 17, 18, 19, 20, 21)]
     press(monkeypatch, station, [(0.0, ["i"]), *held, (1.7, ["down"]), (2.6, ["down"])])
-    assert steps(station) == [-0.001, 0.001, 0.001]
+    assert steps(station) == [("wind_in", 0.001), ("pay_out", 0.001), ("pay_out", 0.001)]
 
 
 @pytest.mark.parametrize("phase", ["enabling", "moving", "running down", "stopping"])

@@ -7,6 +7,7 @@ import statistics
 from dataclasses import dataclass
 
 from winchkit.bench.bench import Bench
+from winchkit.bench.direction import directed
 from winchkit.errors import NotPermitted
 
 __all__ = ["Motions", "Moved"]
@@ -63,10 +64,7 @@ class Motions:
     def go(self, change: float) -> Moved:
         """Pay out, or with a negative length wind in; returns at rest and disabled."""
         before = self._bench.snapshot.winch[self._name]
-        if change > 0:
-            self._winch.move_by(pay_out=change, speed=self._speed)
-        else:
-            self._winch.move_by(wind_in=-change, speed=self._speed)
+        self._winch.move_by(**directed(change), speed=self._speed)
         self._bench.clock.sleep(_LOOK)
         after = self._bench.snapshot.winch[self._name]
         moved = Moved(

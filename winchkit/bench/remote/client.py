@@ -9,6 +9,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any, Self
 
+from winchkit.bench.control.dead_man import DEAD_MAN
+from winchkit.bench.direction import no_positional
 from winchkit.bench.ownership import connect_to_owner
 from winchkit.bench.remote.identity import client_name
 from winchkit.drivers.clock import Clock, MonotonicClock
@@ -117,56 +119,99 @@ class RemoteStation:
         """Newest snapshot as JSON has it."""
         return dict(self._call("status"))
 
-    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
-        """Keep moving for ``hold`` seconds.
+    def jog(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        hold: float = DEAD_MAN,
+    ) -> None:
+        """Move the cable at a speed (m/s, positive), out or in, for ``hold`` seconds.
+
+        Raises TypeError for a speed without a name, UsageError unless exactly one is given.
 
         Parameters
         ----------
         winch : str or None
             Winch; None for the only one.
-        winding_speed : float
-            m/s, positive winds in.
+        pay_out, wind_in : float
+            Cable speed, m/s, positive; exactly one is given.
         hold : float
-            Time of motion without another call, s.
+            Time of motion without another call, s, at most 1.
         """
-        self._call("jog", winch, winding_speed, hold)
+        no_positional("jog", "m/s", unnamed)
+        self._call("jog", winch, pay_out=pay_out, wind_in=wind_in, hold=hold)
 
-    def step(self, winch: str | None, change: float, speed: float | None) -> None:
-        """Start to change the cable length.
+    def release(self, winch: str | None) -> None:
+        """End a jog by a ramp now, instead of when its ``hold`` is over.
 
         Parameters
         ----------
         winch : str or None
             Winch; None for the only one.
-        change : float
-            Change of the cable length, m, positive pays out.
-        speed : float or None
+        """
+        self._call("release", winch)
+
+    def step(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        speed: float | None = None,
+    ) -> None:
+        """Start to pay out or wind in a length (m, positive) of cable.
+
+        Raises TypeError for a length without a name, UsageError unless exactly one is given.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch; None for the only one.
+        pay_out, wind_in : float
+            Length, m, positive; exactly one is given.
+        speed : float, optional
             m/s; by default the limit of the winch.
         """
-        self._call("step", winch, change, speed)
+        no_positional("step", "m", unnamed)
+        self._call("step", winch, pay_out=pay_out, wind_in=wind_in, speed=speed)
 
     def move(
         self,
         winch: str | None,
-        to: float | None,
-        by: float | None,
+        *unnamed: object,
+        to: float | None = None,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> None:
-        """Start a move to a cable length, or by a change of it.
+        """Start a move to a cable length, or by a length (m, positive) paid out or wound in.
+
+        Raises TypeError for a length without a name, UsageError unless exactly one is given.
 
         Parameters
         ----------
         winch : str or None
             Winch, "all", or None for the only one.
-        to : float or None
+        to : float, optional
             Cable length, m.
-        by : float or None
-            Change of the cable length, m, positive pays out; one of the two is given.
+        pay_out, wind_in : float
+            Length, m, positive; exactly one of the three is given.
         speed, acceleration : float, optional
             m/s and m/s²; by default the limits of the winch.
         """
-        self._call("move", winch, to, by, speed, acceleration)
+        no_positional("move", "m", unnamed)
+        self._call(
+            "move",
+            winch,
+            to=to,
+            pay_out=pay_out,
+            wind_in=wind_in,
+            speed=speed,
+            acceleration=acceleration,
+        )
 
     def move_pose(
         self,
@@ -431,16 +476,18 @@ class RemoteStation:
                 self._stream.close()
             self._connection.close()
 
-    def _call(self, operation: str, *arguments: Any) -> Any:
+    def _call(self, operation: str, *arguments: Any, **named: Any) -> Any:
         with self._lock:
             if self._gone:
                 raise OwnerGone("this station at the bench was left; attach again")
-            answer = self._exchange(operation, arguments)
+            answer = self._exchange(operation, arguments, named)
         if "error" in answer:
             raise error_of(answer["error"], answer["message"])
         return answer["ok"]
 
-    def _exchange(self, operation: str, arguments: Sequence[Any]) -> dict[str, Any]:
+    def _exchange(
+        self, operation: str, arguments: Sequence[Any], named: Mapping[str, Any]
+    ) -> dict[str, Any]:
         """Send a request, and wait for the answer with its number; raises OwnerGone.
 
         Ctrl-C may interrupt it at any instruction. The answers to requests that were interrupted,
@@ -448,7 +495,7 @@ class RemoteStation:
         """
         self._requests += 1
         number = self._requests
-        request = {"id": number, "op": operation, "args": arguments}
+        request = {"id": number, "op": operation, "args": arguments, "named": named}
         try:
             self._stream.write(json.dumps(request).encode() + b"\n")
             self._stream.flush()

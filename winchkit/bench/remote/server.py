@@ -6,7 +6,7 @@ import json
 import logging
 import socket
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +32,7 @@ OPERATIONS = (
     "names",
     "status",
     "jog",
+    "release",
     "step",
     "move",
     "move_pose",
@@ -151,7 +152,7 @@ class StationServer:
         try:
             request = json.loads(line)
             operation, number = request["op"], request["id"]
-            answer = {"ok": self._do(seat, operation, request["args"])}
+            answer = {"ok": self._do(seat, operation, request["args"], request.get("named", {}))}
         except WinchkitError as error:
             answer = {"error": class_name(error), "message": str(error)}
         except (ValueError, KeyError, TypeError) as error:
@@ -159,7 +160,9 @@ class StationServer:
             answer = {"error": "UsageError", "message": words}
         return {"id": number, **answer}, operation == "leave"
 
-    def _do(self, seat: _Seat, operation: str, arguments: Sequence[Any]) -> Any:
+    def _do(
+        self, seat: _Seat, operation: str, arguments: Sequence[Any], named: Mapping[str, Any]
+    ) -> Any:
         """Do an operation of a station, or one of those of the server; returns its result."""
         if operation == "introduce":
             return self._introduce(seat, *arguments)
@@ -170,7 +173,7 @@ class StationServer:
             return None
         if operation not in OPERATIONS:
             raise UsageError(f"no operation '{operation}'")
-        return getattr(seat.station, operation)(*arguments)
+        return getattr(seat.station, operation)(*arguments, **named)
 
     def _introduce(self, seat: _Seat, name: str, observer: bool) -> dict[str, Any]:
         """Take a client's name; returns who owns the bench, and whether it is handed over."""

@@ -9,8 +9,10 @@ from typing import Any, Protocol
 
 from winchkit.bench.bench import Bench
 from winchkit.bench.cells.tasks import do
+from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.snapshot import to_dict
+from winchkit.bench.direction import no_positional, paid_out
 from winchkit.bench.recording.recorder import Recorder, counters_of
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.programme_run import ProgrammeRun
@@ -36,21 +38,43 @@ class Station(Protocol):
     def status(self) -> dict[str, Any]:
         """Newest snapshot and the health of the CAN buses, as JSON has them."""
 
-    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
-        """Keep moving for ``hold`` seconds at a winding speed (m/s, positive winds in)."""
+    def jog(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        hold: float = DEAD_MAN,
+    ) -> None:
+        """Keep moving for ``hold`` seconds at a cable speed (m/s, positive), out or in.
 
-    def step(self, winch: str | None, change: float, speed: float | None) -> None:
-        """Start to change the cable length by ``change`` (m, positive pays out)."""
+        This, ``step`` and ``move`` raise TypeError for a number without a name.
+        """
+
+    def release(self, winch: str | None) -> None:
+        """End a jog by a ramp now, as the hand that releases the key does."""
+
+    def step(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        speed: float | None = None,
+    ) -> None:
+        """Start to pay out or wind in a length (m, positive) of cable."""
 
     def move(
         self,
         winch: str | None,
-        to: float | None,
-        by: float | None,
+        *unnamed: object,
+        to: float | None = None,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> None:
-        """Start a move to a cable length, or by a change of it (m, positive pays out).
+        """Start a move to a cable length (m), or by a length (m, positive) paid out or wound in.
 
         "all" moves all as one.
         """
@@ -185,13 +209,36 @@ class LocalStation:
             "clients": [client.name for client in self._bench.stations.clients],
         }
 
-    def jog(self, winch: str | None, winding_speed: float, hold: float) -> None:
+    def jog(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        hold: float = DEAD_MAN,
+    ) -> None:
         """Keep moving for ``hold`` seconds."""
+        no_positional("jog", "m/s", unnamed)
+        winding_speed = -paid_out("jog", pay_out, wind_in)
         with self._acting():
             self._bench.named(winch).keep_jogging(winding_speed, hold)
 
-    def step(self, winch: str | None, change: float, speed: float | None) -> None:
-        """Start to change the cable length."""
+    def release(self, winch: str | None) -> None:
+        """End a jog by a ramp now."""
+        with self._acting():
+            self._bench.named(winch).keep_jogging(0.0, REFRESH)
+
+    def step(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        speed: float | None = None,
+    ) -> None:
+        """Start to pay out or wind in a length of cable."""
+        no_positional("step", "m", unnamed)
+        change = paid_out("step", pay_out, wind_in)
         chosen = self._bench.named(winch)
         with self._acting():
             chosen.move_to(chosen.cable_length + change, speed, wait=False)
@@ -199,16 +246,23 @@ class LocalStation:
     def move(
         self,
         winch: str | None,
-        to: float | None,
-        by: float | None,
+        *unnamed: object,
+        to: float | None = None,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> None:
-        """Start a move to a cable length, or by a change of it."""
-        if (to is None) == (by is None):
-            raise UsageError("a move goes either to a cable length or by a change of it")
+        """Start a move to a cable length, or by a length paid out or wound in."""
+        no_positional("move", "m", unnamed)
+        if (to is None) == (pay_out is None and wind_in is None):
+            raise UsageError(
+                "a move goes either to a cable length or by a change of it; give to=, pay_out= or "
+                "wind_in="
+            )
+        change = paid_out("move", pay_out, wind_in) if to is None else 0.0
         lengths = {
-            item.name: item.cable_length + by if by is not None else float(to or 0.0)
+            item.name: item.cable_length + change if to is None else float(to)
             for item in self._chosen(winch)
         }
         with self._acting():

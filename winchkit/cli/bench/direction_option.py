@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from winchkit.cli.core.quantities import dimension, quantity
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.bench.direction import DirectionKeyword
 
 __all__ = ["Directed", "direction_options", "magnitude", "read_direction"]
 
@@ -28,24 +31,22 @@ class Directed:
     dimension: str
 
     @property
-    def change(self) -> float:
-        """Change of the cable length, m; raises UsageError for a speed."""
-        length = self._magnitude("length", "50mm")
-        return length if self.pays_out else -length
+    def length(self) -> DirectionKeyword:
+        """The length (m) by the keyword of its direction; raises UsageError for a speed."""
+        return self._keyword("length", "50mm")
 
     @property
-    def winding_speed(self) -> float:
-        """Speed (m/s), positive winding in; raises UsageError for a length."""
-        speed = self._magnitude("speed", "0.1m/s")
-        return -speed if self.pays_out else speed
+    def speed(self) -> DirectionKeyword:
+        """The speed (m/s) by the keyword of its direction; raises UsageError for a length."""
+        return self._keyword("speed", "0.1m/s")
 
-    def _magnitude(self, wanted: str, example: str) -> float:
+    def _keyword(self, wanted: str, example: str) -> DirectionKeyword:
         if self.dimension != wanted:
             raise UsageError(
                 f"{self.option} is a {self.dimension} here and must be a {wanted}, such as "
                 f"{self.option} {example}"
             )
-        return self.value
+        return {"pay_out": self.value} if self.pays_out else {"wind_in": self.value}
 
 
 def direction_options(value: str) -> Decorator:

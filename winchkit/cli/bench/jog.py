@@ -30,6 +30,7 @@ from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
+    from winchkit.bench.direction import DirectionKeyword
     from winchkit.bench.remote.station import Station
 
 __all__ = ["command"]
@@ -105,10 +106,10 @@ def command(
             _jog_by_keys(station, winch, asked.speed)
             return
         if asked.duration is None:
-            station.step(winch, asked.direction.change, asked.speed)
+            station.step(winch, **asked.direction.length, speed=asked.speed)
             _wait(station, winch)
         else:
-            _jog_for(station, winch, asked.direction.winding_speed, asked.duration)
+            _jog_for(station, winch, asked.direction.speed, asked.duration)
         if as_json and not dry_run:
             echo_json(station.status())
         elif not dry_run:
@@ -141,22 +142,22 @@ def _read(
             )
         if speed is not None:
             raise UsageError(f"--speed does not belong to --for: {_HOW}")
-        _ = direction.winding_speed
+        _ = direction.speed
     elif direction is not None and direction.dimension == "speed":
         raise UsageError(f"no time is given: {direction.option} SPEED needs --for TIME: {_HOW}")
     return _Asked(direction, limit, magnitude("--speed", speed or _SPEED, "speed"))
 
 
-def _jog_for(station: Station, winch: str | None, winding_speed: float, duration: float) -> None:
+def _jog_for(station: Station, winch: str | None, speed: DirectionKeyword, duration: float) -> None:
     """Keep a dead-man alive from here for a time."""
     from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
 
     clock = station.clock
     end = clock.now() + duration
     while (left := end - clock.now()) > 0:
-        station.jog(winch, winding_speed, min(DEAD_MAN, left + REFRESH))
+        station.jog(winch, **speed, hold=min(DEAD_MAN, left + REFRESH))
         clock.sleep(min(REFRESH, left))
-    station.jog(winch, 0.0, REFRESH)
+    station.release(winch)
     _wait(station, winch)
 
 

@@ -18,6 +18,7 @@ from winchkit.cli.core.terminal import screen, status_line
 from winchkit.errors import ConnectionLost, MotionError, WinchkitError, printable
 
 if TYPE_CHECKING:
+    from winchkit.bench.direction import DirectionKeyword
     from winchkit.bench.remote.station import Station
 
 __all__ = [
@@ -198,13 +199,12 @@ class KeyboardJog:
         if key in (_WIND_IN, _PAY_OUT):
             hold = self._held.hold(key, self._now())
             if self.inch is None:
-                speed = self._speed if key == _WIND_IN else -self._speed
-                self._station.jog(self._winch, speed, hold)
+                self._station.jog(self._winch, **_directed(key, self._speed), hold=hold)
             elif hold == FIRST_PRESS:
-                self._step(-self.inch if key == _WIND_IN else self.inch)
+                self._step(_directed(key, self.inch))
         elif key == "i":
             self._modes = (*self._modes[1:], self._modes[0])
-            self._station.jog(self._winch, 0.0, _PICTURE)
+            self._station.release(self._winch)
         elif key in "+-":
             self._speed *= _FASTER if key == "+" else 1 / _FASTER
         elif key == " ":
@@ -212,11 +212,16 @@ class KeyboardJog:
         elif key == "r":
             self._station.reset()
 
-    def _step(self, change: float) -> None:
+    def _step(self, change: DirectionKeyword) -> None:
         """Change the cable length from rest, so that a tap is exactly one step."""
         winches = self._station.status()["winch"]
         name = next(iter(winches)) if self._winch is None else self._winch
         phase = winches.get(name, {}).get("phase", Phase.DISABLED.value)
         if phase != Phase.DISABLED.value:
             raise MotionError(f"winch {name} is still {phase}; this tap was ignored")
-        self._station.step(self._winch, change, self._speed)
+        self._station.step(self._winch, **change, speed=self._speed)
+
+
+def _directed(key: str, value: float) -> DirectionKeyword:
+    """A speed or a length in the direction of an arrow."""
+    return {"wind_in": value} if key == _WIND_IN else {"pay_out": value}

@@ -24,6 +24,7 @@ from winchkit.errors import UsageError
 from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
+    from winchkit.bench.direction import DirectionKeyword
     from winchkit.bench.remote.station import Station
 
 __all__ = ["command"]
@@ -95,7 +96,7 @@ def command(
     from winchkit.cli.core.quantities import optional
 
     direction = read_direction(pay_out, wind_in)
-    speeds = optional(speed, "speed"), optional(acceleration, "acceleration")
+    limit, gentle = optional(speed, "speed"), optional(acceleration, "acceleration")
     if pose is not None or pose_by is not None:
         if winch is not None or to is not None or direction is not None:
             raise UsageError("a pose is of the platform: give neither WINCH nor a LENGTH with it")
@@ -107,7 +108,7 @@ def command(
         ) as station:
             if take_over:
                 station.take_over(ALL)
-            station.move_pose(goal, pose is None, *speeds)
+            station.move_pose(goal, pose is None, limit, gentle)
             _wait(station, ALL)
             status, there = station.status(), station.pose()
         if as_json and not dry_run:
@@ -121,13 +122,13 @@ def command(
             "LENGTH; or --pose"
         )
     target = optional(to, "length")
-    change = None if direction is None else direction.change
+    change: DirectionKeyword = {} if direction is None else direction.length
     with station_for(
         bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
     ) as station:
         if take_over:
             station.take_over(winch)
-        station.move(winch, target, change, *speeds)
+        station.move(winch, to=target, **change, speed=limit, acceleration=gentle)
         _wait(station, winch)
         status = station.status()
     if dry_run:

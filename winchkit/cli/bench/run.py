@@ -24,6 +24,7 @@ from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
+    from winchkit.bench.direction import DirectionKeyword
     from winchkit.schema.programme import Programme, Step
 
 __all__ = ["command"]
@@ -167,15 +168,23 @@ def _refuse_to_lose(programme: Programme, out: Path, suffix: str) -> None:
 
 def _rehearse(bench: str, programme: Programme, effects: Sequence[str], *, as_json: bool) -> None:
     """Make the moves of one repeat on simulated drives, leaving out holds and questions."""
+    from winchkit.bench.direction import directed
     from winchkit.cli.core.dry_run import station_for
 
     with station_for(
         bench, client="run", dry_run=True, as_json=as_json, effects=effects
     ) as station:
         for step in programme.step:
-            if step.to is None and step.by is None:
+            if step.to is None and not step.by:
                 continue
-            station.move(step.winch, step.to, step.by, step.speed, step.acceleration)
+            change: DirectionKeyword = {} if step.by is None else directed(step.by)
+            station.move(
+                step.winch,
+                to=step.to,
+                **change,
+                speed=step.speed,
+                acceleration=step.acceleration,
+            )
             while station.moving(step.winch):
                 station.clock.sleep(_POLL)
 
