@@ -26,7 +26,7 @@ from winchkit.schema.programme import Programme, Step, write_programme
 from winchkit.schema.read import read_simbench
 from winchkit.web.application import _refused
 from winchkit.web.bench import BenchView
-from winchkit.web.browser import Inbox
+from winchkit.web.browser import Browser, Inbox
 from winchkit.web.drive_objects import drive_objects, drive_settings, write_setting
 from winchkit.web.frames import FrameWords
 from winchkit.web.live_model import CHANNELS, LiveModel
@@ -58,6 +58,37 @@ def test_of_jogs_that_wait_only_the_newest_is_left_and_every_other_message_ends_
     assert [item["number"] for item in left if item["do"] != "jog"] == others
     jogs = [item["number"] for item in left if item["do"] == "jog"]
     assert jogs == ([len(names) - 1] if names and names[-1] == "jog" else [])
+
+
+@pytest.mark.parametrize(
+    ("message", "call"),
+    [
+        ({"do": "jog", "speed": 0.1}, ("jog", {"wind_in": 0.1})),
+        ({"do": "jog", "speed": -0.1}, ("jog", {"pay_out": 0.1})),
+        ({"do": "release"}, ("release", {})),
+        ({"do": "step", "change": 0.01, "speed": 0.1}, ("step", {"pay_out": 0.01, "speed": 0.1})),
+        ({"do": "step", "change": -0.01, "speed": 0.1}, ("step", {"wind_in": 0.01, "speed": 0.1})),
+        ({"do": "move", "to": 3.0, "speed": 0.1}, ("move", {"to": 3.0, "speed": 0.1})),
+    ],
+)
+def test_a_message_of_the_page_names_the_direction(
+    tmp_path: Path, message: dict[str, Any], call: tuple[str, dict[str, float]]
+) -> None:
+    """A jog's speed is positive for the button Wind in, a step's change for a longer cable."""
+    seen: list[tuple[str, Any, dict[str, float]]] = []
+
+    class Station:
+        def __getattr__(self, name: str) -> Any:
+            return lambda winch, **named: seen.append((name, winch, named))
+
+        def close(self) -> None:
+            pass
+
+    spec = read_simbench(find("sim", "spiral-bench")).bench
+    browser = Browser("page", spec, Programmes(spec, tmp_path, tmp_path))
+    browser.take(Station())  # type: ignore[arg-type]
+    browser.do(message["do"], {**message, "winch": "A"})
+    assert seen == [(call[0], "A", call[1])]
 
 
 @pytest.mark.parametrize("phase", ["moving", "running down", "enabling", None])
