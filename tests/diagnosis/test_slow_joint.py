@@ -1,4 +1,4 @@
-"""Dry and viscous friction of a joint that turns slowly are told apart, with their sizes.
+"""Dry and viscous friction of a joint that turns slowly are distinguished, with their sizes.
 
 The torque is made by formula with a sign that is sharp: gravity, inertia, viscous and dry friction.
 """
