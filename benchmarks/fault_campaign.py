@@ -5,8 +5,8 @@ faults at random moments of jogs, moves and programmes, on one winch and on eigh
 judged from the truth: the speed, tension and drive state of the simulation, never from what
 winchkit says. With ``--realtime-share`` that share of the cases runs in real time. ``--case 1/17``
 plays one case again and prints it. ``--jobs 2`` plays them in as many processes, with the same
-result. One JSON object on stdout, failures on stderr; exit 1 where a case failed, 130 after Ctrl-C.
-See benchmarks/README.md.
+result. One JSON object on stdout, failures on stderr; exit 1 where a case failed, 130 after Ctrl-C,
+which keeps what was played. See benchmarks/README.md.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ def main() -> int:
     arguments = parser.parse_args()
     begin = time.perf_counter()
     played: list[tuple[Case, Verdict]] = []
-    coming = each(chosen(arguments), arguments.jobs)
+    coming, ended = each(chosen(arguments), arguments.jobs), False
     try:
         for case, verdict, told in coming:
             played.append((case, verdict))
@@ -153,14 +153,18 @@ def main() -> int:
                 break
     except KeyboardInterrupt:
         print(f"interrupted after {len(played)} cases", file=sys.stderr)
-        return 130
+        ended = True
     finally:
         coming.close()
+    if not played:
+        return 130
     found = summary(played, time.perf_counter() - begin)
     if arguments.json:
         print(json.dumps(found))
     else:
         print({key: value for key, value in found.items() if key not in ("failed", "faults")})
+    if ended:
+        return 130
     return 0 if found["passed"] == found["cases"] else 1
 
 

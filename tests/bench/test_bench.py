@@ -74,15 +74,17 @@ def test_jog_move_log_and_the_instruments_agree(bench: Bench, tmp_path: Path) ->
     winch.jog(wind_in=0.2, duration=0.6)
     assert winch.snapshot.phase is Phase.DISABLED
     assert 0.05 < start - winch.cable_length < 0.16
-    path = tmp_path / "lift.csv"
+    path, missed_before = tmp_path / "lift.csv", bench.loop.overruns
     with bench.log(path, {"programme": "up"}):
         winch.move_to(3.6, 0.4)
+    missed = bench.loop.overruns - missed_before
     assert winch.cable_length == pytest.approx(3.6, abs=2e-3)
     assert winch.tension == pytest.approx(10 * 9.80665, abs=6)
     run = read_run(path)
     assert run.metadata["programme"] == "up"
     assert run.load_mass == 10.0
-    assert 0.008 < run.interval < 0.012
+    # A computer that missed cycles, which the loop counts, has fewer rows.
+    assert 0.008 < run.interval < 0.012 or missed > len(run) // 20
     assert np.isfinite(run["motor_angle"]).mean() > 0.98
     measured, turned = run["cable_length"], run["motor_angle"]
     expected = np.array([bench.loop.winches["A"].cable.cable_length(a) for a in turned])
