@@ -23,6 +23,8 @@ Hidden = Mapping[str, Values]
 OUTPUTS = ("cable_length", "tension", "motor_torque")
 G = 9.80665
 TURN = 2 * np.pi
+CREEP_RATE, CREEP_SPEED = 0.05, 5e-5
+"""rad/s of the motor (0.5 rpm) and m/s of the cable, up to which friction rises linearly."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,11 @@ def show(winch: Winch, run: Situation, hidden: Hidden) -> Shown:
     return _Line(winch, run, hidden).shown()
 
 
+def _way(rate: Array, creep: float) -> Array:
+    """Direction of a motion without noise."""
+    return np.clip(rate / creep, -1.0, 1.0)
+
+
 class _Line:
     def __init__(self, winch: Winch, run: Situation, hidden: Hidden) -> None:
         self.winch, self.run, self.hidden = winch, run, hidden
@@ -62,7 +69,7 @@ class _Line:
         self.drum_angle = winch.direction * (run.motor_angle - winch.motor_reference) / winch.ratio
         total = TURN * winch.wound_turns + self.drum_angle
         self.speed = np.gradient(_wound(winch, total, 0.0, 0.0), run.time)
-        self.s = np.tanh(self.speed / 1e-3)
+        self.s = _way(self.speed, CREEP_SPEED)
 
     def get(self, effect: str) -> Values | None:
         return self.hidden.get(effect)
@@ -240,7 +247,7 @@ class _Line:
         if p := self.get("gear-efficiency"):
             torque = torque * p["efficiency"] ** (-self.s)
         torque = torque * (1 + (self.get("torque-constant") or {}).get("gain_error", 0.0))
-        way = np.tanh(rate / 0.5)
+        way = _way(rate, CREEP_RATE)
         torque = torque + self._presliding()
         torque = torque + (self.get("motor-coulomb") or {}).get("torque", 0.0) * way
         torque = torque + (self.get("motor-coulomb-asymmetry") or {}).get("offset", 0.0)

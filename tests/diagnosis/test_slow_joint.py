@@ -16,13 +16,14 @@ JOINT = AxisProfile(name="joint")
 RATE, SECONDS = 250.0, 40.0
 GRAVITY, INERTIA, VISCOSITY, DRY = 100.0, 18.0, 17.0, 14.0
 """N m, kg m^2, N m s and N m: a shoulder of an arm."""
+HIDDEN = "joint-gravity", "rotor-inertia", "motor-viscous", "motor-coulomb"
 ENCODER_NOISE, TORQUE_NOISE = 1e-5, 2.0
 FREQUENCIES = 2 * np.pi * np.array([0.05, 0.1, 0.15, 0.2, 0.25])
 """rad/s, of the sines of the motion."""
 
 
-def slow_joint(seed: int, fastest: float) -> Run:
-    """A multisine whose highest speed is ``fastest``, rad/s."""
+def slow_joint(seed: int, fastest: float, encoder_noise: float = ENCODER_NOISE) -> Run:
+    """A multisine whose highest speed is ``fastest``, rad/s; ``encoder_noise`` in rad."""
     random = np.random.default_rng(seed)
     size, phase = random.normal(size=5), random.uniform(0, 2 * np.pi, 5)
     time = np.arange(0.0, SECONDS, 1 / RATE)
@@ -32,14 +33,17 @@ def slow_joint(seed: int, fastest: float) -> Run:
     acceleration = -np.sin(turn) @ (size * FREQUENCIES)
     torque = GRAVITY * np.cos(angle) + INERTIA * acceleration + VISCOSITY * speed
     torque += DRY * np.sign(speed) + TORQUE_NOISE * random.normal(size=len(time))
-    angle = angle + ENCODER_NOISE * random.normal(size=len(time))
+    angle = angle + encoder_noise * random.normal(size=len(time))
     channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
     return Run(f"joint-{seed}", time, channels, {})
 
 
-@pytest.mark.parametrize("fastest", [0.8, 1.5, 2.5])
-def test_dry_friction_of_a_slow_joint_has_its_size(fastest: float) -> None:
-    found = diagnose([slow_joint(0, fastest)], JOINT).diagnosis
+@pytest.mark.parametrize(
+    ("fastest", "encoder_noise"), [(0.8, 1e-5), (1.5, 1e-5), (4.0, 1e-5), (1.5, 1e-4), (4.0, 1e-3)]
+)
+def test_dry_friction_of_a_slow_joint_has_its_size(fastest: float, encoder_noise: float) -> None:
+    """By differences an encoder of 0.1 mrad adds an acceleration of 3.8 rad/s^2, 69 N m here."""
+    found = diagnose([slow_joint(0, fastest, encoder_noise)], JOINT).diagnosis
     assert found.verdict == "explained"
     values = {
         (effect, name): parameter.value
@@ -47,7 +51,8 @@ def test_dry_friction_of_a_slow_joint_has_its_size(fastest: float) -> None:
         for effect in step.effects[:1]
         for name, parameter in step.parameters[effect].items()
     }
-    assert values["motor-coulomb", "torque"] == pytest.approx(DRY, rel=0.05)
-    assert values["motor-viscous", "viscosity"] == pytest.approx(VISCOSITY, rel=0.06)
-    assert values["rotor-inertia", "inertia"] == pytest.approx(INERTIA, rel=0.03)
-    assert values["joint-gravity", "amplitude"] == pytest.approx(GRAVITY, rel=0.01)
+    assert {effect for effect, _ in values} == set(HIDDEN)
+    assert values["motor-coulomb", "torque"] == pytest.approx(DRY, rel=0.01)
+    assert values["motor-viscous", "viscosity"] == pytest.approx(VISCOSITY, rel=0.015)
+    assert values["rotor-inertia", "inertia"] == pytest.approx(INERTIA, rel=0.015)
+    assert values["joint-gravity", "amplitude"] == pytest.approx(GRAVITY, rel=0.002)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from model_lines import line_with, profile_with, swing
-from winchkit.model.derivatives import Clock
+from winchkit.model.derivatives import Clock, direction
 from winchkit.model.line import Line
 from winchkit.model.stages import ROBOT_STAGES, Modifier, Signals, Stage
 from winchkit.schema.profiles.winch import (
@@ -77,12 +77,11 @@ def test_a_hanging_mass_follows_the_cable_as_it_is_really_paid_out() -> None:
     assert np.ptp(predicted["motor_torque"]) > 0.02 * arm
 
 
-def test_a_slow_machine_has_directions_too() -> None:
-    """Where nothing turns faster than the smoothing, the smoothing narrows."""
+def test_a_slow_motion_has_directions_and_none_at_standstill() -> None:
     line = Line(profile_with("grooved"))
     time = np.linspace(0, 20, 2001)
     at = line.motion(Signals(time, 0.02 * np.sin(time))).at
-    moving = np.abs(at.motor_rate) > 0.3 * np.max(np.abs(at.motor_rate))
+    moving = np.abs(at.motor_rate) > 0.15 * np.max(np.abs(at.motor_rate))
     assert np.allclose(at.motor_direction[moving], np.sign(at.motor_rate[moving]), atol=0.01)
     assert np.allclose(at.direction[moving], np.sign(at.speed[moving]), atol=0.01)
     still = line.motion(Signals(time, np.full_like(time, 1234.567))).at
@@ -90,12 +89,24 @@ def test_a_slow_machine_has_directions_too() -> None:
     assert np.allclose(still.direction, 0.0, atol=1e-6)
 
 
-def test_a_creeping_run_of_a_fast_machine_has_the_directions_of_its_fast_runs() -> None:
-    line = Line(profile_with("grooved"))
-    time = np.linspace(0, 20, 2001)
-    at = line.motion(Signals(time, 0.02 * np.sin(time), fastest=30.0)).at
-    assert np.allclose(at.motor_direction, np.tanh(at.motor_rate / 0.5))
-    assert np.allclose(at.direction, np.tanh(at.speed / 1e-3))
+def test_the_expected_direction_is_the_mean_of_the_true_one() -> None:
+    """By simulation: half of the samples stand, the others have any rate, and both have noise."""
+    random = np.random.default_rng(0)
+    true = np.where(random.random(400_000) < 0.5, 0.0, random.uniform(-1, 1, 400_000))
+    rate = true + 0.02 * random.standard_normal(len(true))
+    expected = direction(rate, 0.02, 0.5)
+    for low in np.arange(-0.15, 0.15, 0.01):
+        own = (rate >= low) & (rate < low + 0.01)
+        assert np.mean(expected[own]) == pytest.approx(np.mean(np.sign(true[own])), abs=0.05)
+    threshold = np.where(np.abs(rate) > 0.06, np.sign(rate), 0.0)
+    assert np.mean((expected - np.sign(true)) ** 2) < np.mean((threshold - np.sign(true)) ** 2)
+
+
+def test_a_rate_above_the_creep_rate_has_a_direction_whatever_its_noise() -> None:
+    rate = np.linspace(-2, 2, 401)
+    assert direction(rate, 100.0, 0.5)[np.abs(rate) > 0.5] == pytest.approx(
+        np.sign(rate[np.abs(rate) > 0.5]), abs=0.01
+    )
 
 
 def test_a_measured_load_comes_before_a_known_mass() -> None:

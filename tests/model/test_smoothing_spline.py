@@ -80,12 +80,40 @@ def test_a_rounded_angle_has_at_least_the_noise_of_its_rounding() -> None:
 
 def test_even_samples_keep_their_differences() -> None:
     time = np.arange(200) / 50
-    angle = np.sin(time) + 1e-3 * np.cos(100 * time)
+    angle = np.sin(time) + 1e-3 * np.cos(20 * time)
     clock = Clock(time, angle)
     assert clock.spline is None
+    assert clock.smoother is None
     assert clock.acceleration_std is None
     assert np.array_equal(clock.rate, np.gradient(angle, time))
     assert np.array_equal(clock.acceleration, np.gradient(np.gradient(angle, time), time))
+
+
+def test_noise_of_even_samples_does_not_reach_the_acceleration() -> None:
+    """By differences it would have 120 times the acceleration of the motion."""
+    time = np.arange(5000) / 250
+    angle = np.sin(time) + 1e-3 * np.random.default_rng(3).standard_normal(len(time))
+    clock = Clock(time, angle)
+    assert clock.spline is None
+    inner = slice(250, -250)
+    by_differences = np.gradient(np.gradient(angle, time), time)
+    assert np.std((by_differences + np.sin(time))[inner]) > 20
+    assert np.std((clock.acceleration + np.sin(time))[inner]) < 0.05
+    assert np.std((clock.rate - np.cos(time))[inner]) < 0.01
+    ripple = 1e-3 * np.sin(30 * time)
+    assert np.std((clock.gradient(ripple) - 0.03 * np.cos(30 * time))[inner]) < 1e-4
+
+
+@pytest.mark.parametrize("derivative", [0, 1, 2])
+def test_the_typical_uncertainty_is_that_of_the_recursion_far_from_the_ends(
+    derivative: int,
+) -> None:
+    time = np.arange(2000) / 100
+    noise = 1e-2 * np.random.default_rng(4).standard_normal(len(time))
+    spline = SmoothingSpline.fit(time, np.sin(0.3 * time) + noise)
+    assert spline.reach > 10
+    middle = float(np.median(spline.std(derivative)))
+    assert spline.typical_std(derivative) == pytest.approx(middle, rel=0.03)
 
 
 def test_a_reported_velocity_takes_the_place_of_the_angle() -> None:

@@ -13,18 +13,18 @@ from winchkit.model.smoothing_spline import SmoothingSpline
 
 __all__ = [
     "Clock",
+    "direction",
     "is_smoother",
     "shifted",
-    "smooth_sign",
     "with_turning_points",
 ]
 
-_CREEP_SHARE = 0.02
-"""Width of the smooth sign as a share of the highest rate: dry friction of a slow joint has its
-size within 5 % (tests/diagnosis/test_slow_joint.py); the creep rates are reached at 25 rad/s and
-50 mm/s."""
+_SIGNIFICANT = 3.0
+"""Standard deviations of its noise that a rate at standstill does not exceed: one in 370 does."""
 _CREEP_LEAST = 1e-3
-"""Least width of that sign, as a share of the creep rate: rounding has no direction."""
+"""Least noise of a rate, as a share of the creep rate: rounding has no direction."""
+_FOURTH_DIFFERENCE = 70.0
+"""Variance of the fourth difference of white noise of variance one: 1 + 16 + 36 + 16 + 1."""
 _LOAD_SPAN = 0.02
 """Span of a difference to either side for an acceleration, s: an encoder's noise stays small."""
 _AGREES = 0.1
@@ -34,31 +34,51 @@ _CALMER = 0.5
 """Noise of a reported rate, in that of the differences, below which it replaces them."""
 _EVEN = 1e-3
 """Deviation of a step from the median step up to which samples count as even."""
+_NOISY = 0.15
+"""Noise of an acceleration by differences, as a share of its standard deviation, above which a
+spline replaces them. The share of its variance is up to twice the square of this, for neighbouring
+differences share samples: an inertia would be 5 % too small."""
 _LEAST_SAMPLES = 8
 """Rule of thumb: the spline has six coefficients more than intervals, and its two variances are
 estimated from what remains; with fewer samples differences are taken."""
 
 
-def smooth_sign(rate: Array, creep: float, fastest: float) -> Array:
-    """Sign of a rate, smooth at standstill.
+def direction(rate: Array, noise: float, creep: float) -> Array:
+    """Expected direction of a motion whose rate is known with noise.
 
     Parameters
     ----------
-    rate : array
-        Rate, any shape and unit.
+    rate : (n,) array
+        Rates of one run, in any unit.
+    noise : float
+        Their standard deviation, in the same unit.
     creep : float
-        Rate below which the sign is smooth, in the same unit.
-    fastest : float
-        Highest rate of the machine, in the same unit. The smoothing is narrower on a slow machine,
-        whose direction it would otherwise turn into a part of its speed.
+        Rate that has a direction whatever its noise, in the same unit.
 
     Returns
     -------
-    array
-        −1 to 1; zero at standstill, whatever the rounding of the derivative.
+    (n,) array
+        Mean of the sign of the true rate, −1 to 1.
+
+    Notes
+    -----
+    The true rate is zero with the probability p, else of a density f that is constant about zero.
+    The rate r = 0 ± σ is then that of a standstill with the probability p φ / (p φ + f), with
+    φ the normal density of r, and of a motion of the expected sign 2 Φ(r/σ) − 1 otherwise. f is
+    the density between three and six σ, and p the share of rates within three beyond what f
+    has there.
     """
-    width = np.clip(_CREEP_SHARE * fastest, _CREEP_LEAST * creep, creep)
-    return np.asarray(np.tanh(rate / width))
+    from scipy.special import erf
+
+    spread = creep * float(np.clip(noise / creep, _CREEP_LEAST, 1 / _SIGNIFICANT))
+    near = np.abs(rate) <= _SIGNIFICANT * spread
+    beside = (np.abs(rate) <= 2 * _SIGNIFICANT * spread) & ~near
+    moving = max(int(beside.sum()), 1)
+    at_rest = max(int(near.sum()) - moving, 0)
+    ratio = rate / spread
+    standing = at_rest * np.exp(-(ratio**2) / 2) / np.sqrt(2 * np.pi)
+    share = standing / (standing + moving / (2 * _SIGNIFICANT))
+    return np.asarray((1 - share) * erf(ratio / np.sqrt(2)))
 
 
 def is_smoother(measured: Array, differences: Array) -> bool:
@@ -117,13 +137,37 @@ class Clock:
         smoother = is_smoother(self.velocity, np.gradient(self.angle, self.time))
         return self.velocity if smoother else None
 
+    @property
+    def _moved(self) -> Array | None:
+        """What is differentiated: the measured angle or rate."""
+        return self.angle if self.measured_rate is None else self.measured_rate
+
     @cached_property
     def spline(self) -> SmoothingSpline | None:
-        """Smoothing spline of uneven samples; None where differences are taken."""
-        moved = self.angle if self.measured_rate is None else self.measured_rate
+        """Smoothing spline of uneven samples; None where derivatives are differences."""
+        moved = self._moved
         if moved is None or len(self.time) < _LEAST_SAMPLES or self.even or not np.ptp(moved):
             return None
         return SmoothingSpline.fit(self.time, moved)
+
+    @cached_property
+    def smoother(self) -> SmoothingSpline | None:
+        """Spline of the motor's rate and acceleration; None where these are differences.
+
+        That of uneven samples, or of even ones whose noise is a part of the acceleration that
+        biases an inertia. Other signals of even samples keep their differences: they may have
+        periods that the smoother of a steady motion would remove.
+        """
+        moved = self._moved
+        if self.spline is not None or moved is None or len(self.time) < _LEAST_SAMPLES:
+            return self.spline
+        if not np.ptp(moved):
+            return None
+        acceleration = self.differences(moved)
+        if self.measured_rate is None:
+            acceleration = self.differences(acceleration)
+        biased = _noise(acceleration) > _NOISY * float(np.std(acceleration))
+        return SmoothingSpline.fit(self.time, moved) if biased else None
 
     @cached_property
     def acceleration_std(self) -> Array | None:
@@ -136,15 +180,34 @@ class Clock:
     def rate(self) -> Array:
         """First derivative of the angle, (n,): as reported where that has less noise."""
         assert self.angle is not None
+        if self.smoother is not None:
+            return self._smoothed(self.smoother, 1)
         return self.gradient(self.angle) if self.measured_rate is None else self.measured_rate
+
+    @cached_property
+    def rate_noise(self) -> float:
+        """Standard deviation of the rate's noise.
+
+        That of its smoother, or from its fourth differences: a motion that is smooth over five
+        samples has none, and differences of a noisy angle have a quarter more.
+        """
+        if self.smoother is None:
+            return _noise(self.rate)
+        return self.smoother.typical_std(1 if self.measured_rate is None else 0)
 
     @cached_property
     def acceleration(self) -> Array:
         """Second derivative of the angle, (n,)."""
-        if self.spline is not None and self.measured_rate is None:
-            assert self.angle is not None
-            return self.spline.smoothed(self.angle, 2)
-        return self.gradient(self.rate)
+        if self.smoother is None:
+            return self.gradient(self.rate)
+        return self._smoothed(self.smoother, 2)
+
+    def _smoothed(self, smoother: SmoothingSpline, derivative: int) -> Array:
+        """Derivative of the angle by the spline of the angle or of the measured rate."""
+        if self.measured_rate is not None:
+            return smoother.smoothed(self.measured_rate, derivative - 1)
+        assert self.angle is not None
+        return smoother.smoothed(self.angle, derivative)
 
     @cached_property
     def reach(self) -> int:
@@ -228,6 +291,13 @@ class Clock:
         if self.spline is not None:
             return 12 * (self.spline.smoothed(x) - x)
         return self.span**2 * self.second_derivative(x)
+
+
+def _noise(signal: Array) -> float:
+    """Standard deviation of white noise from the fourth differences of a signal, in its unit."""
+    if len(signal) < _LEAST_SAMPLES:
+        return 0.0
+    return float(np.sqrt(np.mean(np.diff(signal, 4) ** 2) / _FOURTH_DIFFERENCE))
 
 
 def _by_number(x: Array) -> Array:

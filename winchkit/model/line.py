@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.derivatives import Clock, smooth_sign
+from winchkit.model.derivatives import Clock, direction
 from winchkit.model.drum import Drum, drum_of
 from winchkit.model.stages import At, Modifier, Path, Signals, Stage, WinchKinematics
 from winchkit.schema.profiles.winch import WinchProfile
@@ -25,9 +25,8 @@ from winchkit.units import GRAVITY
 __all__ = ["Line", "Motion"]
 
 _CREEP_SPEED = 1e-3
-"""m/s, and with `_CREEP_RATE`, rad/s at the motor, the rates over which a direction of motion is
-smooth. Rule of thumb: above the noise of differentiated encoders, below the slowest programmed
-speed; tenfold, friction at 10 mm/s would be smoothed too."""
+"""m/s, and with `_CREEP_RATE`, rad/s at the motor, the rates that always have a direction, whatever
+their noise. Rule of thumb: below the slowest programmed speed."""
 _CREEP_RATE = 0.5
 """rad/s: 5 turns a minute of the motor; see `_CREEP_SPEED`."""
 _NEWTON_STEPS = 4
@@ -116,9 +115,8 @@ class Line:
         time, angle = signals.time, signals.motor_angle
         drum_angle, length = self._nominal_length(angle)
         clock = signals.clock or Clock(time - time[0], angle, signals.motor_velocity)
-        arm, speed, rate = self._nominal_arm(angle), -clock.gradient(length), clock.rate
-        if clock.measured_rate is not None:
-            speed = speed + arm * (rate - clock.gradient(angle))
+        arm, rate = self._nominal_arm(angle), clock.rate
+        speed = arm * (rate - clock.gradient(angle)) - clock.gradient(length)
         load, mass, discretization, load_std = signals.load, None, None, None
         if load is None and signals.load_mass is not None:
             mass = signals.load_mass
@@ -132,19 +130,19 @@ class Line:
                 load_std = mass * np.abs(arm) * clock.acceleration_std
         tension = load if load is not None else signals.tension
         missing, zero = np.full_like(time, np.nan), np.zeros_like(time)
-        fastest = signals.fastest or float(np.max(np.abs(rate), initial=0.0))
-        fastest_cable = fastest * float(np.max(np.abs(arm), initial=0.0))
+        noise = clock.rate_noise if signals.rate_noise is None else signals.rate_noise
+        cable_noise = noise * float(np.max(np.abs(arm), initial=0.0))
         at = At(
             profile=self.profile,
             time=clock.time,
             motor_angle=angle,
             motor_rate=rate,
             motor_acceleration=clock.acceleration,
-            motor_direction=smooth_sign(rate, _CREEP_RATE, fastest),
+            motor_direction=direction(rate, noise, _CREEP_RATE),
             drum_angle=drum_angle,
             wound_angle=self._reference_wound + drum_angle,
             speed=speed,
-            direction=smooth_sign(speed, _CREEP_SPEED, fastest_cable),
+            direction=direction(speed, cable_noise, _CREEP_SPEED),
             free_length=length,
             tension=zero if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
@@ -266,7 +264,8 @@ class Line:
         Returns
         -------
         At
-            With accelerations of zero, and with the smoothing of directions of a fast machine.
+            With accelerations of zero, and with directions that are smooth below the creep rates,
+            so that a controller's friction has no step at standstill.
         """
         drum_angle, length = self._nominal_length(motor_angle)
         speed = self._nominal_arm(motor_angle) * motor_rate

@@ -224,6 +224,33 @@ class SmoothingSpline:
                 )
         return np.asarray(self.noise * np.sqrt(np.maximum(total, 0.0)))
 
+    def typical_std(self, derivative: int) -> float:
+        """Standard deviation of a derivative far from the ends of even samples.
+
+        Parameters
+        ----------
+        derivative : int
+            Order, 0 to 2.
+
+        Returns
+        -------
+        float
+            As :meth:`std`, without its recursion.
+
+        Notes
+        -----
+        σ² times the integral of ω²ʳ / (1 + λ ω⁶) over ω/2π, ω in radians per knot, for the order r:
+        the posterior variance by the equivalent kernel, for kernels of more than one sample.
+
+        References
+        ----------
+        Silverman, B. W. (1984). Spline smoothing: the equivalent variable kernel method. Annals of
+        Statistics 12, 898-916.
+        """
+        order = (2 * derivative + 1) / 6
+        variance = max(1.0, self.weight) ** -order / (6 * np.sin(np.pi * order))
+        return float(self.noise / self.design.spacing**derivative * np.sqrt(variance))
+
     @cached_property
     def _factor(self) -> Array:
         """Lower band of the Cholesky factor of B'B + λ D'D, (6, count)."""

@@ -115,8 +115,8 @@ class Signals:
     temperature: Array | None = None
     motor_velocity: Array | None = None
     motor_torque: Array | None = None
-    fastest: float | None = None
-    """Highest motor speed in all runs of this machine, rad/s; None: that of this run."""
+    rate_noise: float | None = None
+    """Standard deviation of the noise of the motor's rate, rad/s; None: that of its derivatives."""
     clock: Clock | None = None
     """Derivatives of the motor angle, where they were computed before; None to compute them."""
 
@@ -132,13 +132,13 @@ class At:
     motor_rate: Array
     motor_acceleration: Array
     motor_direction: Array
-    """Tanh(θ'/0.5 rad/s): smooth at standstill; see ``winchkit.model.derivatives``."""
+    """Expected sign of the rate, −1 to 1; see ``winchkit.model.derivatives``."""
     drum_angle: Array
     wound_angle: Array
     speed: Array
     """Winding-in speed of the cable, m/s."""
     direction: Array
-    """Tanh(v/1 mm/s)."""
+    """The same of the cable."""
     free_length: Array
     """Unstrained, from exit point to attachment, m."""
     tension: Array

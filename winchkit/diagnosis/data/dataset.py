@@ -331,16 +331,13 @@ def assemble(
     """
     line, filtering = Line(profile), filtering or Filtering()
     clocks = [_clock(run) for run in runs]
-    fastest = max((_fastest(clock) for clock in clocks), default=0.0)
-    signals = [
-        _signals(run, profile, fastest, clock) for run, clock in zip(runs, clocks, strict=True)
-    ]
+    signals = [_signals(run, profile, clock) for run, clock in zip(runs, clocks, strict=True)]
     raw = [line.motion(own) for own in signals]
     decimation = filtering.decimation
     if decimation is not None:
         raw = [decimation.motion(motion) for motion in raw]
         runs = [decimation.run(run) for run in runs]
-        signals = [_signals(run, profile, fastest) for run in runs]
+        signals = [_signals(run, profile) for run in runs]
     repeats = find_repeats(signals)
     smooth = denoised_motions(line, signals, raw, repeats)
     nominal = [line.predict(motion) for motion in raw]
@@ -413,15 +410,7 @@ def _clock(run: Run) -> Clock:
     )
 
 
-def _fastest(clock: Clock) -> float:
-    """Fastest motor rate of a run by its angle, rad/s."""
-    assert clock.angle is not None
-    return float(np.max(np.abs(clock.gradient(clock.angle))))
-
-
-def _signals(
-    run: Run, profile: WinchProfile, fastest: float, clock: Clock | None = None
-) -> Signals:
+def _signals(run: Run, profile: WinchProfile, clock: Clock | None = None) -> Signals:
     has_cable = not isinstance(profile, AxisProfile)
     return Signals(
         time=run.time,
@@ -432,7 +421,6 @@ def _signals(
         temperature=bridged_channel(run, "temperature"),
         motor_velocity=bridged_channel(run, "motor_velocity"),
         motor_torque=bridged_channel(run, "motor_torque"),
-        fastest=fastest,
         clock=clock,
     )
 

@@ -118,7 +118,7 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     those of a smoothing spline.
     """
     signals, smooth, clock = recording.signals, recording.smooth, recording.raw.clock
-    if recording.decimated or clock.measured_rate is not None or clock.spline is not None:
+    if recording.decimated or clock.measured_rate is not None or clock.smoother is not None:
         return None
     count = len(signals.time)
     if count < _LEAST_SAMPLES:
@@ -127,7 +127,7 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
     there = np.arange(_FINER * (count - 1) + 1) / _FINER
     between = interpolated
     time, angle = np.interp(there, here, signals.time), between(signals.motor_angle)
-    finer = line.motion(Signals(time, angle, fastest=signals.fastest))
+    finer = line.motion(Signals(time, angle, rate_noise=clock.rate_noise))
     at = replace(
         finer.at,
         tension=between(smooth.at.tension + _force_correction(recording, line)),

@@ -30,20 +30,21 @@ Expansion = Annotated[float, Quantity("expansion")]
 ForceDrift = Annotated[float, Quantity("force per time")]
 ThermalForce = Annotated[float, Quantity("force per temperature")]
 
-_CABLE_STANDSTILL = 1e-3
-"""m/s: friction changes its direction smoothly within it, so that steps of 1 ms are stable."""
-_MOTOR_STANDSTILL = 0.5
-"""rad/s: the same for friction of the motor, about the same speed of the cable by a gearbox of 20
-and a radius of 60 mm (1.5 mm/s)."""
+_CABLE_STANDSTILL = 2e-5
+"""m/s: friction changes its direction within it, a twentieth of the slowest speed of a programme;
+the drum follows the servo whatever the friction, so that its direction may be as sharp."""
+_MOTOR_STANDSTILL = 0.01
+"""rad/s: the same for friction of the motor, by a gearbox of 20 and a radius of 60 mm (0.03 mm/s).
+"""
 
 
 def winding_direction(state: State) -> float:
-    """Direction of the cable, +1 winding in, smooth within about 1 mm/s of standstill."""
+    """Direction of the cable, +1 winding in, sharp to about 0.02 mm/s of standstill."""
     return tanh(state.winding_speed / _CABLE_STANDSTILL)
 
 
 def motor_direction(state: State) -> float:
-    """Direction of the motor, smooth within about 0.5 rad/s of standstill."""
+    """Direction of the motor, sharp to about 0.01 rad/s of standstill."""
     return tanh(state.motor_speed / _MOTOR_STANDSTILL)
 
 

@@ -22,8 +22,7 @@ from winchkit.sim.plant.servo import DriveCommand, Servo
 __all__ = ["Measurement", "WinchPlant"]
 
 MAX_STEP = 1e-3
-"""s: a quarter of the servo's lag, and within `_CABLE_STANDSTILL` for accelerations up to 1 m/s²
-(rule of thumb)."""
+"""s: a quarter of the servo's lag (rule of thumb)."""
 _SMALLEST_INERTIA_SHARE = 0.05
 """Share of the load's mass that an elastic cable passes to the motor within a step; some remains,
 so that a motor without inertia of its own stays stable (rule of thumb)."""
