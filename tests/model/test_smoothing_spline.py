@@ -104,6 +104,17 @@ def test_noise_of_even_samples_does_not_reach_the_acceleration() -> None:
     assert np.std((clock.gradient(ripple) - 0.03 * np.cos(30 * time))[inner]) < 1e-4
 
 
+def test_a_staircase_of_many_samples_a_step_is_no_motion() -> None:
+    """Thirty samples a step: the rounding errors of neighbours are alike."""
+    time = np.arange(10_000) / 1000
+    step = 0.03
+    spline = SmoothingSpline.fit(time, step * np.round(np.sin(time) / step))
+    inner = slice(1000, -1000)
+    angle = step * np.round(np.sin(time) / step)
+    assert np.std((spline.smoothed(angle, 1) - np.cos(time))[inner]) < 0.02
+    assert np.std((spline.smoothed(angle, 2) + np.sin(time))[inner]) < 0.1
+
+
 @pytest.mark.parametrize("derivative", [0, 1, 2])
 def test_the_typical_uncertainty_is_that_of_the_recursion_far_from_the_ends(
     derivative: int,

@@ -35,6 +35,9 @@ _PENALTY = np.array([-1.0, 3.0, -3.0, 1.0])
 """Third difference of the coefficients: the jerk of the motion."""
 _LOG_WEIGHTS = np.linspace(-18.0, 24.0, 8)
 """Natural logarithms of the weights from which the search begins; 1.5·10⁻⁸ to 2.6·10¹⁰."""
+_LEAST_SAMPLES = 50
+"""Least number of samples that determine the weight where rounding makes neighbours alike (rule of
+thumb)."""
 _MOST_KNOTS = 200_000
 """Bounds time and memory, both linear in it: each band of six rows is 10 MB."""
 _LONG_GAP, _SPAN = 300, 200
@@ -146,13 +149,23 @@ class SmoothingSpline:
         Notes
         -----
         The noise is at least that of the signal's rounding, q/√12 for a step q: a staircase is no
-        motion.
+        motion. Where the signal changes by less than q between samples, the rounding errors of
+        neighbours are alike; every k-th sample, between which it changes by q, then determines the
+        weight, and each of all samples counts as a k-th of one: noise k σ², weight k⁶ times
+        (k⁵ by the spacing, in whose fifth power the variance of third differences grows).
         """
         from scipy.optimize import minimize_scalar
 
         spacing = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST_KNOTS)
         levels = np.unique(signal)
         step = float(np.min(np.diff(levels))) if len(levels) > 1 else 0.0
+        alike = round(step / float(np.mean(np.abs(np.diff(signal))))) if step else 1
+        every = max(1, min(alike, len(signal) // _LEAST_SAMPLES))
+        if every > 1:
+            sparse = cls.fit(time[::every], signal[::every])
+            weight = sparse.weight * (sparse.design.spacing / spacing) ** 5 * every
+            noise = sparse.noise * float(np.sqrt(every))
+            return cls(Design(time, spacing), weight, noise, sparse.deviance)
         least = max(step**2 / 12, (1e-12 * float(np.ptp(signal))) ** 2, 1e-300)
 
         design = Design(time, spacing)
