@@ -378,6 +378,8 @@ def _saved(mapping: ImportMapping, path: str) -> str:
 
 def _targets(files: Sequence[str], folder: Path, *, overwrite: bool, is_joined: bool) -> list[Path]:
     """File of each run; raises UsageError rather than write over a recording."""
+    from winchkit.runs.overwriting import refuse_existing
+
     stems: list[str] = []
     for file in files:
         stem, number = Path(file).stem, 1
@@ -391,8 +393,7 @@ def _targets(files: Sequence[str], folder: Path, *, overwrite: bool, is_joined: 
             raise UsageError(
                 f"{target}: would replace the imported file; name another folder by -o"
             )
-        if target.exists() and not overwrite:
-            raise UsageError(f"{target} exists; --replace writes over it")
+        refuse_existing(target, overwrite)
     return targets
 
 

@@ -76,7 +76,7 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     if not added and not result.noise.from_repeats and _error_ratio(outputs) < 1 / RELEVANT_RATIO:
         return Judgement("adequate", 0.0, outputs, result, (_irrelevant(result),))
     share = _unexplained(engine, result)
-    verdict = _verdict(result, outputs, share)
+    verdict = _verdict(result, outputs, share) if added else "unknown"
     # Only the effect itself explains nearly all of a residual far above the noise floor.
     explained_but_detectable = share < _EXPLAINED_SHARE and result.noise.from_repeats
     if verdict == "explained" or explained_but_detectable or not added:
@@ -173,8 +173,7 @@ def _error_ratio(outputs: Mapping[str, OutputFit]) -> float:
 
 
 def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
-    has_additions = len(result.final.hypothesis.terms) > len(result.initial_model.hypothesis.terms)
-    if not has_additions or share > _UNKNOWN_SHARE:
+    if share > _UNKNOWN_SHARE:
         return "unknown"
     if not result.lack_of_fit or not result.noise.from_repeats:
         return "explained" if share < _HELD_OUT_SHARE else "partly"
