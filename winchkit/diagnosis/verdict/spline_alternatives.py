@@ -118,7 +118,7 @@ def curves(
 def _products(names: Sequence[str]) -> list[tuple[str, str]]:
     """Products of a factor and a curve: friction by length or load, compliant cables.
 
-    The direction is the smooth sign of the model: how steep it is, is not tested.
+    The direction is the expected one of the model: how steep it is, is not tested.
     """
     force = "load" if "load" in names else "tension"
     pairs = (
