@@ -64,10 +64,14 @@ def hidden_values(run: Run) -> dict[tuple[str, str], float]:
     ("fastest", "encoder_noise"), [(0.8, 1e-5), (1.5, 1e-5), (4.0, 1e-5), (1.5, 1e-4), (4.0, 1e-3)]
 )
 def test_dry_friction_of_a_slow_joint_has_its_size(fastest: float, encoder_noise: float) -> None:
-    """By differences an encoder of 0.1 mrad adds an acceleration of 3.8 rad/s^2, 69 N m here."""
+    """By differences an encoder of 0.1 mrad adds an acceleration of 3.8 rad/s^2, 69 N m here.
+
+    The model's reversals are rounded over 0.005 rad/s, these are sharp: less than 1 % of the dry
+    friction at 0.8 rad/s, and what that is of the viscous torque there.
+    """
     values = hidden_values(slow_joint(0, fastest, encoder_noise))
     assert values["motor-coulomb", "torque"] == pytest.approx(DRY, rel=0.01)
-    assert values["motor-viscous", "viscosity"] == pytest.approx(VISCOSITY, rel=0.015)
+    assert values["motor-viscous", "viscosity"] == pytest.approx(VISCOSITY, rel=0.022)
     assert values["rotor-inertia", "inertia"] == pytest.approx(INERTIA, rel=0.015)
     assert values["joint-gravity", "amplitude"] == pytest.approx(GRAVITY, rel=0.002)
 
