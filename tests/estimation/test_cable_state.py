@@ -104,9 +104,13 @@ def test_the_tension_is_the_load_that_the_whole_run_had(effect: Effect) -> None:
     states = followed(term, signals, cell=cell)
     tension = cell + np.array([s.correction for s in states])
     missed = np.abs(tension - signals.load)
-    # Friction lets the reading jump where the cable starts and stops, and it is smoothed.
     assert np.quantile(missed[steady(signals)], 0.95) < 0.02 * size
-    assert np.max(missed) < 0.15 * size
+    # Friction lets the reading jump where the cable starts and stops: the run's direction is as
+    # sharp as its noise permits, the estimator's is smooth below 1 mm/s.
+    speed = np.abs(line.motion(signals).at.speed)
+    known = (speed > 3e-3) | (speed < 1e-9)
+    assert np.mean(known) > 0.9
+    assert np.max(missed[known]) < 0.15 * size
 
 
 def test_effects_of_one_chain_are_undone_together() -> None:

@@ -85,6 +85,14 @@ PAIRS = [
 ]
 
 
+def has_known_direction(rate: np.ndarray) -> np.ndarray:
+    """Samples at rest or above 1 rad/s of the motor.
+
+    Between them the plant knows the direction, and a run of finite rate only about when it changes.
+    """
+    return (np.abs(rate) > 1.0) | (np.abs(rate) < 1e-6)
+
+
 def misses(pair: Pair) -> tuple[dict[str, float], dict[str, float]]:
     """Rms of the error in units of the noise, of the nominal model and with the effect."""
     bench = read_simbench(find("sim", pair.bench))
@@ -110,9 +118,11 @@ def misses(pair: Pair) -> tuple[dict[str, float], dict[str, float]]:
                 temperature=run["temperature"],
                 motor_torque=run["motor_torque"],
             )
-            predicted = line.predict(line.motion(signals))
+            motion = line.motion(signals)
+            predicted = line.predict(motion)
+            sure = has_known_direction(motion.at.motor_rate)
             for name in OUTPUTS:
-                errors[name].append(run[name] - predicted[name])
+                errors[name].append((run[name] - predicted[name])[sure])
         found.append(
             {
                 name: float(np.std(np.concatenate(error)) / getattr(noise, name))
