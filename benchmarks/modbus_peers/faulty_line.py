@@ -30,6 +30,8 @@ FAULTS = (
 ONLY_TCP = ("retag",)
 ONLY_RTU = ("damaged",)
 GAP = 0.003
+COPY_REQUESTS = 2
+"""Three requests in a row differ in length; a later copy cannot be distinguished from an answer."""
 HELD = 0.3
 """So long a reply that waits for the next one is held at most, s."""
 
@@ -82,6 +84,8 @@ class FaultyLine:
         self.stale: deque[bytes] = deque()
         """PDUs that are handed over as answers to later requests."""
         self.jammed_until = 0.0
+        self.requests = 0
+        """Requests that were passed on."""
 
     def reply(self, frame: bytes) -> None:
         """Pass a reply of the server on, or not."""
@@ -97,13 +101,20 @@ class FaultyLine:
         self.done[fault] += 1
         getattr(self, "_" + fault.replace(" ", "_"))(frame)
 
-    def _at(self, delay: float, data: bytes) -> None:
+    def _at(
+        self, delay: float, data: bytes, hand_over: Callable[[bytes], None] | None = None
+    ) -> None:
         loop = asyncio.get_running_loop()
         when = max(loop.time() + delay, self.jammed_until)
+
+        def send() -> None:
+            # The client may have changed since.
+            (hand_over or self.to_client)(data)
+
         if when <= loop.time():
-            self.to_client(data)
+            send()
         else:
-            loop.call_at(when, lambda: self.to_client(data))
+            loop.call_at(when, send)
 
     def _delay(self) -> float:
         if self.random.random() < 0.7:
@@ -167,8 +178,17 @@ class FaultyLine:
             self._at(GAP, frame)
 
     def _copy(self, frame: bytes) -> None:
+        """Twice; at most ``COPY_REQUESTS`` later where a reply does not name its request."""
+        asked = self.requests
+
+        def hand_over(copy: bytes) -> None:
+            if self.rtu and self.requests > asked + COPY_REQUESTS:
+                self.done["copy left out"] += 1
+            else:
+                self.to_client(copy)
+
         self._at(0.0, frame)
-        self._at(self.random.uniform(0.0, self.copy_within), frame)
+        self._at(self.random.uniform(0.0, self.copy_within), frame, hand_over)
 
     def _split(self, frame: bytes) -> None:
         part = self._part(frame)
@@ -237,6 +257,7 @@ async def over_serial(line: FaultyLine) -> None:
         while (size := request_size(pending[client], rtu=True)) and len(pending[client]) >= size:
             frame, pending[client] = pending[client][:size], pending[client][size:]
             assert frame[-2:] == crc(frame[:-2]), "the client sends whole requests"
+            line.requests += 1
             os.write(server, frame)
 
     def from_server() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import asyncio
 import os
 import shutil
 from pathlib import Path
@@ -11,6 +13,7 @@ import pytest
 
 import modbus_campaign
 from modbus_campaign import CASES, Judge, play
+from modbus_peers.faulty_line import COPY_REQUESTS, FaultyLine
 from winchkit.drivers.modbus.late_replies import LateReplies
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.drivers.reading import Quality, Reading
@@ -27,7 +30,7 @@ pytestmark = [
 
 @pytest.mark.realtime
 def test_lines_that_fail_publish_no_wrong_number() -> None:
-    """In real time: a line process that is late delays a copy beyond what the test declares."""
+    """In real time, beside other tests: the line counts requests, so its lateness is no fault."""
     found: dict[str, Any] = play(3000, seed=11, share=0.1, seconds=10.0)
     assert found["wrong"] == []
     assert found["numbers"] > 200
@@ -58,3 +61,25 @@ def test_the_judge_knows_a_number_by_its_age(late: float, wrong: int) -> None:
     judge = Judge(CASES[0])
     judge(Reading(value, value, 0.0, Quality.GOOD, 100.0, 100.002, 99.9995, 0.0035))
     assert len(judge.wrong) == wrong
+
+
+@pytest.mark.parametrize(("later", "copies"), [(0, 2), (COPY_REQUESTS, 2), (COPY_REQUESTS + 1, 1)])
+def test_a_line_that_is_late_leaves_out_a_copy(later: int, copies: int) -> None:
+    """So many requests were passed on meanwhile; no client can distinguish it."""
+    options = argparse.Namespace(
+        kind="rtu", share=1.0, timeout=0.03, latest=0.3, copy_within=1e-4, seed=1, without=()
+    )
+    sent: list[bytes] = []
+
+    async def one_reply() -> FaultyLine:
+        line = FaultyLine(options)
+        line.faults = ["copy"]
+        line.to_client = sent.append
+        line.reply(b"reply")
+        line.requests += later
+        await asyncio.sleep(0.02)
+        return line
+
+    line = asyncio.run(one_reply())
+    assert sent == [b"reply"] * copies
+    assert line.done["copy left out"] == 2 - copies

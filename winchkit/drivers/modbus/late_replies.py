@@ -12,8 +12,10 @@ remembered until no reply to it can come any more, and until then
   the horizon, and the first exchange after it is discarded: its reading is NaN and ``ambiguous``.
 
 Over TCP the transaction identifies a reply. There the same is done against a gateway that takes
-the late reply of its serial line for the answer to its next query, except for a device of one
-length: that one is left alone for the longest reply time only.
+the late reply of its serial line for the answer to its next query. Replies that came while nothing
+was asked wait in such a gateway, one for each later query: after the horizon as many exchanges are
+discarded as replies were outstanding. A device of one length is left alone for the longest reply
+time only.
 """
 
 from __future__ import annotations
@@ -43,8 +45,8 @@ class LateReplies:
     """Whether a reply names its request (TCP)."""
     until: float = 0.0
     """Until then the unit is not asked."""
-    ambiguous: bool = False
-    """Whether the next reading is discarded: its answer may belong to an earlier request."""
+    ambiguous: int = 0
+    """Readings to be discarded: their answers may belong to earlier requests."""
     _missing: list[tuple[int, float]] = field(default_factory=list)
     """Registers of each reply that is outstanding, and when it cannot come any more."""
     _longest: dict[int, int] = field(default_factory=dict)
@@ -56,7 +58,7 @@ class LateReplies:
 
     def clear(self) -> None:
         """Nothing old can come any more."""
-        self.until, self.ambiguous = 0.0, False
+        self.until, self.ambiguous = 0.0, 0
         self._missing.clear()
 
     def count(self, block: ReadBlock, now: float) -> int:
@@ -77,7 +79,8 @@ class LateReplies:
                     return 0
                 free = list(lengths)
             else:
-                self.until, self.ambiguous = min(ends), True
+                self.until = min(ends)
+                self.ambiguous = len(ends) if self.tagged else 1
                 return 0
         last = self._last.get(block.start, ())
         # The length that was used longest ago, if ever.
@@ -128,8 +131,9 @@ class LateReplies:
         return now < self.until
 
     def discards(self) -> bool:
-        """Whether the reading that was just taken is discarded, once."""
-        discarded, self.ambiguous = self.ambiguous, False
+        """Whether the reading that was just taken is discarded."""
+        discarded = self.ambiguous > 0
+        self.ambiguous -= discarded
         return discarded
 
     def _lengths(self, block: ReadBlock) -> range:
