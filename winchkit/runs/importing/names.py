@@ -164,7 +164,7 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         r"\b(velocity|velocities|velocite|velo?|speeds?|drehzahl\w*|\w+drehzahl|geschwindigkeit\w*|"
         r"\w+geschwindigkeit|winkelgeschwindigkeit|omega|vitesse|velocidad|velocita|dq|qd|qdot|"
         r"dtheta|thetadot|(theta|phi|q) dot|phidot|dphi|"
-        r"rpm|n ist|nist|v ist|vist|vx|angular rate|rotational speed|w)\b",
+        r"rpm|n ist|nist|v ist|vist|vx|angular rate|rotational speed)\b",
         1,
         "motor_velocity",
     ),
@@ -210,6 +210,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         "cable_length",
     ),
     (r"\bswivel\b|\bschwenkwinkel\b", 1, "swivel"),
+    # Beside the word of another quantity it is a winch: W1 position.
+    (r"\bw\b", 1, "motor_velocity"),
 )
 _COMPILED = tuple((re.compile(pattern), rank, channel) for pattern, rank, channel in _RULES)
 _LONGEST = 300

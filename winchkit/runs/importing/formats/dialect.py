@@ -28,6 +28,8 @@ _DELIMITERS = ("\t", ";", "|", ",", BLANKS)
 _CALLED = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", BLANKS: "blanks"}
 _SAMPLED = 240
 """Lines by which the separator is found, a third each of the start, middle and end."""
+_FEWEST = 2
+"""Numbers and stamps of a mixed row."""
 _CELL_LINES = 8
 """Line ends that a quoted cell may have."""
 _OPENED = re.compile(r'(?:^|[,;\t|])\s*"[^"]*$')
@@ -45,6 +47,8 @@ class Dialect:
     """Most frequent number of cells in a row of numbers."""
     has_units: bool = False
     """Whether cells are numbers with their units."""
+    is_mixed: bool = False
+    """Whether rows of numbers have as many texts as numbers, or more."""
 
     @property
     def text(self) -> str:
@@ -168,17 +172,22 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
     Returns
     -------
     Dialect, optional
-        Of equal candidates the one with more cells in a row.
+        Of equal candidates the one with more cells in a row. Rows with fewer numbers than texts
+        count where no rows have more.
     """
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "%"))]
     sample = _blocks(filled)
+    return _best(sample, is_mixed=False) or _best(sample, is_mixed=True)
+
+
+def _best(sample: Sequence[str], *, is_mixed: bool) -> Dialect | None:
     best: tuple[float, Dialect] | None = None
     for delimiter in _DELIMITERS:
         split = [split_line(line, delimiter) for line in sample]
         for decimal in ".,":
             if decimal == delimiter and not any('"' in line for line in sample):
                 continue
-            candidate = _rated(split, delimiter, decimal)
+            candidate = _rated(split, delimiter, decimal, is_mixed=is_mixed)
             if candidate is not None and (best is None or candidate[0] > best[0]):
                 best = candidate
     return None if best is None else best[1]
@@ -197,19 +206,26 @@ def _blocks(lines: Sequence[str]) -> list[str]:
 
 
 def _rated(
-    split: Sequence[list[str]], delimiter: str, decimal: str
+    split: Sequence[list[str]], delimiter: str, decimal: str, *, is_mixed: bool
 ) -> tuple[float, Dialect] | None:
-    """Cells with a value less cells with a text, in rows of the most frequent width."""
+    """Cells with a value less cells with a text, in rows of the most frequent width.
+
+    Mixed rows have a stamp and a number at least, and count by these.
+    """
     widths: dict[int, int] = {}
     for cells in split:
         values, given = _values(cells, decimal)
-        if 2 * values > given:
-            widths[len(cells)] = widths.get(len(cells), 0) + 2 * values - given
+        gain = values if is_mixed else 2 * values - given
+        if gain > 0 and (not is_mixed or values >= _FEWEST):
+            widths[len(cells)] = widths.get(len(cells), 0) + gain
     if not widths:
         return None
     width = max(widths, key=lambda item: (widths[item], item))
     rows = [cells for cells in split if len(cells) == width]
-    return widths[width], Dialect(delimiter, decimal, width, has_cell_units(rows, decimal))
+    if is_mixed and 2 * len(rows) < len(split):
+        return None
+    has_units = has_cell_units(rows, decimal)
+    return widths[width], Dialect(delimiter, decimal, width, has_units, is_mixed)
 
 
 def has_cell_units(rows: Sequence[Sequence[str]], decimal: str) -> bool:

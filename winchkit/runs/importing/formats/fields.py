@@ -69,7 +69,7 @@ def _of_mapping(
     joints = fields.get("name")
     is_joints = isinstance(joints, Sequence) and not isinstance(joints, str) and bool(joints)
     for key, item in fields.items():
-        if key in {"header", "name"} and depth <= 1:
+        if depth <= 1 and (key == "header" or (key == "name" and is_joints)):
             continue
         path = f"{name}.{key}" if name else str(key)
         lists = isinstance(item, Sequence) and not isinstance(item, str | bytes)

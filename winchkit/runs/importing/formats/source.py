@@ -10,6 +10,7 @@ from pathlib import Path
 from winchkit.errors import Fault, RunError
 from winchkit.regular_file import regular
 from winchkit.runs.importing.formats.cell_units import with_cell_units
+from winchkit.runs.importing.formats.channel_table import by_channel
 from winchkit.runs.importing.table import LARGEST, Table
 
 __all__ = ["read_table"]
@@ -45,7 +46,8 @@ def read_table(path: str | Path) -> Table:
         Without the library of the format, with the name of the extra that installs it.
     """
     table = _read(path)
-    return replace(table, columns=tuple(with_cell_units(item) for item in table.columns))
+    units = replace(table, columns=tuple(with_cell_units(item) for item in table.columns))
+    return by_channel(units)
 
 
 def _read(path: str | Path) -> Table:

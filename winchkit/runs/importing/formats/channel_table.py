@@ -1,0 +1,175 @@
+"""Tables in which each row is one value of one channel, which a column names.
+
+Databases of time series (InfluxDB, EPICS archives), monitors of process variables and statistics
+programs write recordings so; each channel has stamps of its own.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.runs.importing.formats.stamps import is_stamp
+from winchkit.runs.importing.names import meaning_of
+from winchkit.runs.importing.table import Column, Table, named_apart
+from winchkit.runs.importing.unit_spelling import read_unit, split_unit
+
+__all__ = ["by_channel"]
+
+_VALUE = re.compile(
+    r"[_ ]*(value|val|reading|data|double|float|wert|valeur|valor|valore)s?[_ ]*", re.I
+)
+"""Name of a column of values that says nothing of their quantity."""
+_UNIT = re.compile(r"[_ ]*(units?|einheit|egu|unité|unidad|unità)[_ ]*", re.I)
+"""Name of a column of units; EGU is the field of EPICS."""
+_DEVICE = re.compile(r".*[:./|]")
+"""Names of process variables and of topics: device before quantity."""
+_MOST = 64
+"""Channels of one table."""
+_ROWS = 10
+"""Rows of each channel on average below which a repetition of names may be chance."""
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """Columns of a table by their role."""
+
+    key: Column
+    value: Column
+    clocks: tuple[Column, ...]
+    unit: Column | None
+
+
+def by_channel(table: Table) -> Table:
+    """A table with one column for each channel, where each row is one value of one channel.
+
+    Parameters
+    ----------
+    table : Table
+        Any table.
+
+    Returns
+    -------
+    Table
+        Values and stamps of each channel in a group of its own, in the order of the file; the
+        table itself where it has another form.
+    """
+    parts = _parts(table)
+    if parts is None:
+        return table
+    names = np.array([text.strip() for text in parts.key.texts or ()], dtype=np.str_)
+    found = list(dict.fromkeys(names.tolist()))
+    start = _common_start(found)
+    columns = [item for name in found for item in _columns(parts, name, names == name, start)]
+    note = f"each row is one value of one channel, by column '{parts.key.source}': " + ", ".join(
+        found
+    )
+    return replace(
+        table,
+        columns=named_apart(columns),
+        line_of=lambda _row: None,
+        interval=None,
+        notes=(*table.notes, note),
+    )
+
+
+def _common_start(names: Sequence[str]) -> int:
+    """Characters of the device, up to a separator, that all names begin with."""
+    first, last = min(names), max(names)
+    same = next((n for n, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), 0)
+    device = _DEVICE.match(first[:same])
+    return device.end() if device else 0
+
+
+def _parts(table: Table) -> _Parts | None:
+    """Roles of the columns; None for a table of another form."""
+    if len({item.group for item in table.columns}) > 1:
+        return None
+    stamps = [item for item in table.columns if _is_stamped(item)]
+    texts = [item for item in table.columns if item.texts is not None and item not in stamps]
+    unit = next((item for item in texts if _UNIT.fullmatch(item.name)), None)
+    for key in texts:
+        names = np.array([text.strip() for text in key.texts or ()], dtype=np.str_)
+        found, codes = np.unique(names, return_inverse=True)
+        if not 1 < len(found) <= _MOST or len(names) < _ROWS * len(found) or key is unit:
+            continue
+        if not all(re.search("[A-Za-z]", name) for name in found):
+            continue
+        numbers = [item for item in table.columns if item.texts is None]
+        changing = [item for item in numbers if not _is_constant(item, codes)]
+        clocks = [item for item in changing if _is_increasing(item, codes)]
+        values = [item for item in changing if item not in clocks]
+        clocks += _without_limits(stamps)
+        if clocks and len(values) == 1 and _is_of_any_quantity(values[0], found.tolist()):
+            return _Parts(key, values[0], tuple(clocks), unit)
+    return None
+
+
+def _is_stamped(column: Column) -> bool:
+    return is_stamp(next((text for text in column.texts or () if text.strip()), ""))
+
+
+def _without_limits(stamps: Sequence[Column]) -> list[Column]:
+    """Columns of stamps without those of a moment that all rows have, as a query's start."""
+    found = [set(item.texts or ()) for item in stamps]
+    kept = [
+        item
+        for item, moments in zip(stamps, found, strict=True)
+        if len(moments) > 1 or not any(":" in moment for moment in moments)
+    ]
+    return kept or list(stamps)
+
+
+def _is_increasing(column: Column, codes: NDArray[np.intp]) -> bool:
+    """Whether numbers never decrease within any channel, as only times do."""
+    channels = [column.values[codes == code] for code in np.unique(codes)]
+    return all(bool(np.all(np.diff(values) >= 0)) for values in channels)
+
+
+def _is_constant(column: Column, codes: NDArray[np.intp]) -> bool:
+    """Whether numbers do not change within any channel: a table's number, a quality code."""
+    for code in np.unique(codes):
+        known = column.values[codes == code]
+        known = known[np.isfinite(known)]
+        if len(known) and np.any(known != known[0]):
+            return False
+    return True
+
+
+def _is_of_any_quantity(value: Column, names: Sequence[str]) -> bool:
+    """Whether the channels, and not the column of the values, have the names of quantities.
+
+    A file without names needs a channel whose name is known.
+    """
+    if _VALUE.fullmatch(value.name):
+        return True
+    is_unnamed = value.name == str(value.number)
+    return is_unnamed and any(meaning_of(split_unit(name)[0]) is not None for name in names)
+
+
+def _columns(parts: _Parts, channel: str, rows: NDArray[np.bool_], start: int) -> Iterator[Column]:
+    """Stamps and values of one channel, whose name begins with what all have in common."""
+    name, unit = split_unit(channel[start:])
+    if parts.unit is not None and parts.unit.texts is not None:
+        given = {parts.unit.texts[int(row)].strip() for row in np.flatnonzero(rows)}
+        own = given.pop() if len(given) == 1 else ""
+        unit = unit or (own if read_unit(own) else "")
+    for clock in parts.clocks:
+        yield replace(_of_rows(clock, rows), labels=(name,), group=channel)
+    value = _of_rows(parts.value, rows)
+    yield replace(value, name=name, unit=unit or parts.value.unit, group=channel)
+
+
+def _of_rows(column: Column, rows: NDArray[np.bool_]) -> Column:
+    place = {int(row): number for number, row in enumerate(np.flatnonzero(rows))}
+    texts = column.texts
+    return replace(
+        column,
+        values=column.values[rows],
+        texts=None if texts is None else [texts[row] for row in place],
+        wrong=tuple((place[row], text) for row, text in column.wrong if row in place),
+    )
