@@ -15,6 +15,7 @@ from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.mapping import guess_by, mapping_of
+from winchkit.runs.importing.names import meaning_of
 from winchkit.runs.importing.runs import run_of
 from winchkit.runs.importing.streams import streams_of
 
@@ -99,6 +100,34 @@ def test_units_of_a_column_and_of_the_names_are_taken(tmp_path: Path) -> None:
     assert {c.name: c.unit for c in read_table(path).columns if c.name in UNITS} == UNITS
     path.write_text(tidy(rows()).replace("tension,", "tension [kN],"))
     assert {c.name: c.unit for c in read_table(path).columns}["tension"] == "kN"
+
+
+def test_rows_with_an_alarm_behind_the_value_are_read(tmp_path: Path) -> None:
+    """Every fifth row, then most rows: the alarm is no reason to lose a value."""
+    found = []
+    for share in (0.2, 0.8):
+        lines = monitor(rows()).splitlines()
+        texts = [f"{x} LOLO MAJOR" if n % 10 < 10 * share else x for n, x in enumerate(lines)]
+        path = tmp_path / f"alarms-{share}.txt"
+        path.write_text("\n".join(texts) + "\n")
+        table = read_table(path)
+        assert table.faults == ()
+        found.append({c.name: c.values.tolist() for c in table.columns if c.name in UNITS})
+    path.write_text(monitor(rows()))
+    assert found[0] == found[1]
+    assert found[0] == {
+        c.name: c.values.tolist() for c in read_table(path).columns if c.name in UNITS
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "channel"),
+    [("TARGET_DU:Rotation-PosAct", "motor_angle"), ("W1:TORQUE:ACT", "motor_torque")],
+)
+def test_the_device_of_a_process_variable_is_no_quantity(name: str, channel: str) -> None:
+    found = meaning_of(name)
+    assert found is not None
+    assert found.channel == channel
 
 
 def test_two_winches_keep_their_names(tmp_path: Path) -> None:

@@ -269,7 +269,9 @@ def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
     whole = words_of(" ".join((*labels, name)))
     # The last part of a name with dots or slashes (MAT, HDF5, ROS), where the whole says nothing.
     last = words_of(re.split(r"[./]", name)[-1])
-    for text in dict.fromkeys((_axis_of(labels, words), words, whole, last)):
+    # The device of a process variable is before its quantity: TARGET:PosAct is no set point.
+    variable = words_of(name.rpartition(":")[2])
+    for text in dict.fromkeys((_axis_of(labels, words), variable, words, whole, last)):
         for pattern, rank, channel in _COMPILED:
             if text and (found := pattern.search(text)):
                 return Meaning(channel, rank, found[0])

@@ -240,9 +240,14 @@ def _counts_columns(cells: Sequence[str]) -> bool:
 
 
 def _is_numeric(cells: Sequence[str], dialect: Dialect) -> bool:
-    """Whether a row has the width of the rows of numbers, and mostly values."""
-    if len(cells) != dialect.width:
+    """Whether a row has the width of the rows of numbers, and mostly values.
+
+    Further words behind them are a remark where blanks separate the cells.
+    """
+    behind = len(cells) - dialect.width
+    if behind and not (dialect.delimiter == BLANKS and 0 < behind <= _remark(cells, dialect)):
         return False
+    cells = cells[: dialect.width]
     given = [cell for cell in cells if cell]
     values = [c for c in given if number(c, dialect.decimal) is not None or is_stamp(c)]
     if dialect.has_units:
@@ -281,6 +286,16 @@ def _check_records(path: str, rows: Sequence[Row], first: int, dialect: Dialect)
         raise RunError(Fault(message, path, rows[first][0]))
 
 
+def _remark(cells: Sequence[str], dialect: Dialect) -> int:
+    """Number of words behind the last number of a row, such as the alarm of a process variable."""
+    places = [
+        n
+        for n, cell in enumerate(cells)
+        if number(cell, dialect.decimal) is not None or is_stamp(cell)
+    ]
+    return len(cells) - 1 - places[-1] if places else 0
+
+
 def _kept(
     path: str,
     rows: Sequence[Row],
@@ -294,7 +309,8 @@ def _kept(
     """Rows of numbers without blank lines, comments and repeated headers."""
     width = dialect.width
     found = _Rows([_Cells(dialect.decimal) for _ in range(width)])
-    repeated, comments = 0, 0
+    repeated, comments, remarks = 0, 0, 0
+    is_blank, least = dialect.delimiter == BLANKS, width - _remark(rows[first][1][:width], dialect)
     last = next((n for n, cells in reversed(rows) if any(cells)), 0)
     titles = {row[0] for row in header.rows}
     for line, given in islice(rows, first, None):
@@ -303,6 +319,8 @@ def _kept(
         cells = given[:-1] if len(given) == width + 1 and not given[-1] else given
         if is_padded and len(cells) < width and cells[0].upper() != "EOF":
             cells = [*cells, *[""] * (width - len(cells))]
+        if is_blank and len(cells) != width and len(cells) - _remark(cells, dialect) == least:
+            cells, remarks = [*cells, *[""] * width][:width], remarks + 1
         is_title = cells[0] in titles and tuple(cells) in header.rows
         if len(cells) == width and not is_title:
             found.add(line, cells)
@@ -322,6 +340,8 @@ def _kept(
     found.finish()
     if repeated:
         found.notes.append(f"{repeated} repeated lines of the header are left out")
+    if remarks:
+        found.notes.append(f"{remarks} rows have more or fewer words behind their numbers")
     if comments:
         found.notes.append(f"{comments} comments between the rows are left out")
     return found
