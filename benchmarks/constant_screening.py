@@ -1,0 +1,190 @@
+"""Group screening of the constants whose reason in docs/methods.md is a rule of thumb.
+
+``python benchmarks/constant_screening.py --draws 8 --cases 16 --seed 1 --json``: in each draw every
+such constant of the time-series diagnosis is made larger or smaller by a factor, at random and all
+at once, and the same cases are diagnosed again. A two-level screening design with random columns
+(Satterthwaite, Technometrics 1 (1959) 111-137): where no answer changes, none of the constants
+decides at that size, alone or beside others; where one does, the association of its changes with
+the levels of each constant says where to look. Cases as in diagnosis_campaign.py, small.
+See benchmarks/README.md.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import pkgutil
+import re
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+sys.path.insert(0, str(Path(__file__).parent))
+
+import numpy as np
+
+from campaign.case import Plan
+from campaign.run import run_case
+from diagnosis_campaign import SNRS, plans
+from summaries import print_summary
+
+Name = tuple[str, str]
+"""File below winchkit/diagnosis, and constant."""
+PAGE = Path(__file__).parents[1] / "docs" / "methods.md"
+KINDS = ("none", "single", "pair", "outside")
+ROOMS = ("data", "regression", "selection", "verdict")
+"""Folders whose constants can change the answer for a winch."""
+SETS = {"_DEGREES", "_POWERS"}
+"""Sets of laws, which have no size."""
+
+
+def rules_of_thumb(page: str) -> list[Name]:
+    """Constants of these folders that were chosen by judgement, and not by the computing cost."""
+    found, place = [], ""
+    for line in page.splitlines():
+        if heading := re.fullmatch(r"### `([\w/]+\.py)`", line):
+            place = heading[1]
+        row = re.match(r"\| `(\w+)` \| `[^`]+` \| .* \| ([^|]+) \|$", line)
+        if not row or row[1] in SETS:
+            continue
+        if place.split("/")[0] in ROOMS and row[2].startswith(("rule of thumb", "screened")):
+            found.append((place, row[1]))
+    return found
+
+
+def value_of(name: Name) -> Any:
+    """Value of a constant."""
+    return getattr(_module(name[0]), name[1])
+
+
+def scaled(value: Any, factor: float) -> Any:
+    """A constant at another level.
+
+    Counts stay whole and at least 1; of a share or a ratio between 0.5 and 2 the distance from 1
+    is scaled, so that it stays on its side of 1.
+    """
+    if isinstance(value, tuple):
+        return tuple(scaled(one, factor) for one in value)
+    if isinstance(value, int):
+        moved = round(value * factor)
+        return max(1, moved if moved != value else value + (1 if factor > 1 else -1))
+    if 0.5 < value < 2 and value != 1:
+        return 1 + (value - 1) * factor
+    return value * factor
+
+
+def set_constants(values: Mapping[Name, Any]) -> None:
+    """Set constants where they are defined, and where another module has imported them."""
+    for (place, name), value in values.items():
+        home = _module(place)
+        before = getattr(home, name)
+        for module in [home, *_importers(name, before)]:
+            setattr(module, name, value)
+
+
+def _importers(name: str, before: Any) -> list[Any]:
+    if name.startswith("_"):
+        return []
+    loaded = [m for key, m in sys.modules.items() if key.startswith("winchkit.") and m is not None]
+    return [module for module in loaded if getattr(module, name, None) is before]
+
+
+def _module(place: str) -> Any:
+    return importlib.import_module("winchkit.diagnosis." + place[:-3].replace("/", "."))
+
+
+def _answer(job: tuple[int, Plan, Mapping[Name, Any]]) -> tuple[Any, ...] | None:
+    """Verdict and sets of names of a case."""
+    seed, plan, values = job
+    set_constants(values)
+    with tempfile.TemporaryDirectory() as folder:
+        found = run_case(seed, plan, Path(folder))
+    return None if found is None else (found.verdict, *(tuple(sorted(s)) for s in found.steps))
+
+
+def associations(
+    names: Sequence[Name], levels: Sequence[Sequence[bool]], changed: Sequence[float]
+) -> list[dict[str, Any]]:
+    """Share of changed answers at the upper less that at the lower level, the largest first."""
+    upper = np.asarray(levels, dtype=bool)
+    share = np.asarray(changed)
+    out = []
+    for column, (place, name) in enumerate(names):
+        high, low = share[upper[:, column]], share[~upper[:, column]]
+        if len(high) and len(low):
+            difference = float(high.mean() - low.mean())
+            out.append({"constant": f"{place} {name}", "difference": round(difference, 3)})
+    return sorted(out, key=lambda row: -abs(row["difference"]))
+
+
+def main() -> None:
+    """Run and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--draws", type=int, default=8)
+    parser.add_argument("--cases", type=int, default=16)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--factor", type=float, default=1.5, help="between a value and its levels")
+    parser.add_argument("--only", default="", help="constants whose file and name match")
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    import winchkit.diagnosis
+
+    for module in pkgutil.walk_packages(winchkit.diagnosis.__path__, "winchkit.diagnosis."):
+        importlib.import_module(module.name)
+    names = [
+        name
+        for name in rules_of_thumb(PAGE.read_text(encoding="utf-8"))
+        if re.search(args.only, " ".join(name))
+    ]
+    usual = {name: value_of(name) for name in names}
+    chance = np.random.default_rng(args.seed)
+    levels = [chance.random(len(names)) < 0.5 for _ in range(args.draws)]
+    draws = [usual] + [
+        {
+            name: scaled(usual[name], args.factor if up else 1 / args.factor)
+            for name, up in zip(names, upper, strict=True)
+        }
+        for upper in levels
+    ]
+    cases = list(enumerate(plans(args.cases, list(KINDS), list(SNRS), (), small=True)))
+    jobs = [
+        (args.seed * 100_000 + index, plan, values) for values in draws for index, plan in cases
+    ]
+    answers: list[tuple[Any, ...] | None] = []
+    with ProcessPoolExecutor(args.jobs) as pool:
+        for job, found in zip(jobs, pool.map(_answer, jobs), strict=True):
+            answers.append(found)
+            print(job[0], len(answers) // len(cases), found, file=sys.stderr, flush=True)
+    table = [answers[n * len(cases) : (n + 1) * len(cases)] for n in range(len(draws))]
+    known = [n for n, found in enumerate(table[0]) if found is not None]
+    changed = [[own[n] != table[0][n] for n in known] for own in table[1:]]
+    summary = {
+        "schema": 1,
+        "constants": len(names),
+        "factor": args.factor,
+        "answers": sum(len(own) for own in changed),
+        "changed": sum(sum(own) for own in changed),
+        "changes": [
+            {
+                "draw": draw + 1,
+                "case": args.seed * 100_000 + n,
+                "before": table[0][n],
+                "after": table[draw + 1][n],
+            }
+            for draw, own in enumerate(changed)
+            for n, is_changed in zip(known, own, strict=True)
+            if is_changed
+        ],
+        "associations": associations(names, levels, [float(np.mean(own)) for own in changed])[:12],
+    }
+    print_summary(summary, as_json=args.json)
+
+
+if __name__ == "__main__":
+    main()
