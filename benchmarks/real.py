@@ -34,7 +34,7 @@ from winchkit.effects.catalogue import load_catalogue
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.read import read_axis
+from winchkit.schema.read import read_profile
 
 OURS = "winchkit"
 OUTPUT = "motor_torque"
@@ -123,7 +123,7 @@ def profile_of(recording: Recording) -> WinchProfile:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "axis.toml"
         path.write_text(AXIS.format(name=recording.name, effects=recording.effects))
-        return read_axis(path)
+        return read_profile(path)
 
 
 @dataclass(frozen=True)

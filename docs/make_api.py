@@ -25,7 +25,7 @@ SECTIONS = {
     ),
     "A simulated bench": ("LiveBench", "SimulatedClock", "simulate", "listed_benches"),
     "Files": (
-        *("find", "check", "read_profile", "read_axis", "read_robot", "read_size"),
+        *("find", "check", "read_profile", "read_robot", "read_size"),
         *("read_bench", "read_programme", "write_programme", "read_simbench", "read_mapping"),
     ),
     "Runs": (

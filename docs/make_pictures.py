@@ -21,7 +21,6 @@ from winchkit import (
     diagnose,
     find,
     load_catalogue,
-    read_axis,
     read_profile,
     read_programme,
     read_run,
@@ -93,7 +92,7 @@ def emps(folder: Path) -> Axes:
     """Force of EMPS: measured, and predicted with and without Coulomb friction."""
     run = read_run(folder / "train.csv")
     (block,) = re.findall(r'title="emps.toml"\n(.*?)```', _page("emps"), re.DOTALL)
-    profile = read_axis(_saved(block))
+    profile = read_profile(_saved(block))
     terms = [term for term, _ in add("motor-coulomb", [run], profile).terms]
     axes = _axes()
     part = slice(0, 6000, 10)
@@ -113,7 +112,7 @@ def cogging(folder: Path) -> Axes:
     (source,) = re.findall(r'title="cogging.py"\n(.*?)```', _page("cogging"), re.DOTALL)
     (block,) = re.findall(r'title="motor.toml"\n(.*?)```', _page("cogging"), re.DOTALL)
     maps = {name: read_run(folder / "odrive-cogging" / f"map-{name}_16.csv") for name in "abd"}
-    profile = read_axis(_saved(block))
+    profile = read_profile(_saved(block))
     catalogue = load_catalogue([_saved(source, "cogging.py")])
     addition = add("cogging-table", [maps["a"], maps["b"]], profile, catalogue)
     line = Line(profile, modifiers_of([term for term, _ in addition.terms]))

@@ -107,7 +107,6 @@ if TYPE_CHECKING:
     from winchkit.runs.writer import open_writer, write_run
     from winchkit.schema.programme import write_programme
     from winchkit.schema.read import (
-        read_axis,
         read_bench,
         read_mapping,
         read_profile,
@@ -204,7 +203,6 @@ __all__ = [
     "plan",
     "plan_poses",
     "query_library",
-    "read_axis",
     "read_bench",
     "read_log",
     "read_mapping",
@@ -356,7 +354,6 @@ _NAMES = {
     ),
     "winchkit.schema.programme": ("write_programme",),
     "winchkit.schema.read": (
-        "read_axis",
         "read_bench",
         "read_mapping",
         "read_profile",

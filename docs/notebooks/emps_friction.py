@@ -14,7 +14,7 @@ from pathlib import Path
 import pandas as pd
 from scipy.io import loadmat
 
-from winchkit import add, compare, diagnose, read_axis, read_run, run_of, write_addition
+from winchkit import add, compare, diagnose, read_profile, read_run, run_of, write_addition
 
 folder = Path(os.environ["WINCHKIT_EMPS"])
 
@@ -75,7 +75,7 @@ id = "motor-viscous"
 viscosity = "203.5 N m s"
 """
 )
-profile = read_axis(source)
+profile = read_profile(source)
 profile
 
 # %%
@@ -110,7 +110,7 @@ addition
 # %%
 better = work / "better.toml"
 write_addition(source, addition, [run.name], better)
-after = compare([run], read_axis(better))
+after = compare([run], read_profile(better))
 after
 
 # %%

@@ -19,7 +19,7 @@ from winchkit.diagnosis.write import write_addition
 from winchkit.runs import read_run
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.axis import AxisProfile
-from winchkit.schema.read import read_axis
+from winchkit.schema.read import read_profile
 
 VARIABLE = "WINCHKIT_REAL"
 AXIS = AxisProfile(name="axis")
@@ -69,9 +69,9 @@ def test_cogging_of_a_motor_is_one_effect_with_its_orders() -> None:
 def test_the_orders_are_written_as_one_effect_each(tmp_path: Path) -> None:
     source, better = tmp_path / "axis.toml", tmp_path / "better.toml"
     source.write_text('schema = 1\nkind = "axis"\n')
-    addition = add("motor-cogging", runs_of("odrive-cogging", *MAPS), read_axis(source))
+    addition = add("motor-cogging", runs_of("odrive-cogging", *MAPS), read_profile(source))
     write_addition(source, addition, ["map.csv"], better)
-    orders = [table.values["order"] for table in read_axis(better).effect]
+    orders = [table.values["order"] for table in read_profile(better).effect]
     assert set(COGGING) <= set(orders)
     assert len(orders) == len(set(orders))
 

@@ -11,7 +11,7 @@ from winchkit.catalog import find
 from winchkit.cli.files.check import command
 from winchkit.effects.bind import line_of, terms_of
 from winchkit.errors import FileError
-from winchkit.schema.read import read_any, read_axis, read_profile, read_robot
+from winchkit.schema.read import read_any, read_profile, read_robot, read_winch
 
 AXIS = """\
 schema = 1
@@ -36,7 +36,7 @@ def written(folder: Path, text: str = AXIS, name: str = "elbow.toml") -> Path:
 
 
 def test_an_axis_has_motor_gearbox_and_effects(tmp_path: Path) -> None:
-    axis = read_axis(written(tmp_path))
+    axis = read_profile(written(tmp_path))
     assert axis.gearbox.ratio == 50
     assert axis.motor.torque_constant == pytest.approx(0.09)
     values = {term.effect.id: dict(term.values) for term in terms_of(axis)}
@@ -46,7 +46,7 @@ def test_an_axis_has_motor_gearbox_and_effects(tmp_path: Path) -> None:
 
 
 def test_an_axis_needs_nothing_but_its_kind(tmp_path: Path) -> None:
-    axis = read_axis(written(tmp_path, 'schema = 1\nkind = "axis"\n'))
+    axis = read_profile(written(tmp_path, 'schema = 1\nkind = "axis"\n'))
     assert (axis.name, axis.gearbox.ratio, axis.reference.motor_angle) == ("elbow", 1.0, 0.0)
     assert line_of(axis).modifiers == ()
 
@@ -65,14 +65,14 @@ def test_an_axis_needs_nothing_but_its_kind(tmp_path: Path) -> None:
 def test_parts_of_a_winch_are_refused(tmp_path: Path, added: str, message: str) -> None:
     text = 'schema = 1\nkind = "axis"\n' + added + "\n"
     with pytest.raises(FileError) as error:
-        read_axis(written(tmp_path, text))
+        read_profile(written(tmp_path, text))
     assert message in str(error.value)
 
 
 def test_a_winch_is_asked_for_in_words(tmp_path: Path) -> None:
     path = written(tmp_path)
     with pytest.raises(FileError, match="'axis', which has no drum and no cable; a 'winch' is"):
-        read_profile(path)
+        read_winch(path)
     with pytest.raises(FileError, match="a 'robot' is needed here"):
         read_robot(path)
 

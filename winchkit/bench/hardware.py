@@ -271,9 +271,9 @@ def _moving(axis: Cia402Axis, cable: CableMap) -> Callable[[], bool]:
 
 
 def _profile(spec: BenchSpec, winch: WinchWiring) -> WinchProfile:
-    from winchkit.schema.read import read_profile
+    from winchkit.schema.read import read_winch
 
-    return read_profile(catalog.find("profiles", winch.profile, spec.path or None))
+    return read_winch(catalog.find("profiles", winch.profile, spec.path or None))
 
 
 def _open_buses(spec: BenchSpec, clock: Clock, stack: ExitStack) -> dict[str, CanBus]:

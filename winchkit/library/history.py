@@ -142,13 +142,13 @@ def _profiles(
     profile: str | Path, winches: Iterable[str]
 ) -> tuple[dict[str, WinchProfile], dict[str, FileError]]:
     """Profile of every winch, and the faults of the others; raises FileError where none is left."""
-    from winchkit.schema.read import read_winch_or_axis
+    from winchkit.schema.read import read_profile
 
     profiles: dict[str, WinchProfile] = {}
     faults: dict[str, FileError] = {}
     for winch in winches:
         try:
-            profiles[winch] = read_winch_or_axis(profile_path(profile, winch))
+            profiles[winch] = read_profile(profile_path(profile, winch))
         except FileError as error:
             faults[winch] = error
     if faults and not profiles:

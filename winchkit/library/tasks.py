@@ -107,14 +107,14 @@ def outcome_of(task: Task) -> Outcome:
     """Diagnose the runs of a task; a failure becomes a row with its reason."""
     from winchkit.diagnosis.diagnose import diagnose
     from winchkit.effects.catalogue import load_catalogue
-    from winchkit.schema.read import read_winch_or_axis
+    from winchkit.schema.read import read_profile
 
     library = Path(task.library)
     try:
         with tempfile.TemporaryDirectory() as place:
             source = Path(place) / f"{task.profile_name}.toml"
             source.write_text(task.profile, encoding="utf-8")
-            profile = read_winch_or_axis(source)
+            profile = read_profile(source)
             files = [Path(place) / name for name, _ in task.effects]
             for file, (_, text) in zip(files, task.effects, strict=True):
                 file.write_text(text, encoding="utf-8")

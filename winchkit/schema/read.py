@@ -35,7 +35,6 @@ __all__ = [
     "Declared",
     "load",
     "read_any",
-    "read_axis",
     "read_bench",
     "read_calibration",
     "read_device",
@@ -47,7 +46,7 @@ __all__ = [
     "read_simbench",
     "read_size",
     "read_tares",
-    "read_winch_or_axis",
+    "read_winch",
 ]
 
 Declared = (
@@ -78,49 +77,7 @@ class Declaration:
 
 
 def read_profile(path: PathLike) -> WinchProfile:
-    """Read the profile of a winch.
-
-    Parameters
-    ----------
-    path : str or Path
-        File in TOML of the kind ``winch``.
-
-    Returns
-    -------
-    WinchProfile
-        Drum, gearbox, guide, cable, pulleys, reference and effects, in SI.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file, each with its line.
-    """
-    return _read(path, "winch", WinchProfile)
-
-
-def read_axis(path: PathLike) -> AxisProfile:
-    """Read the profile of an axis: a joint or a motor without drum and cable.
-
-    Parameters
-    ----------
-    path : str or Path
-        File in TOML of the kind ``axis``.
-
-    Returns
-    -------
-    AxisProfile
-        Motor, gearbox, reference and effects, in SI.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file, each with its line.
-    """
-    return _read(path, "axis", AxisProfile)
-
-
-def read_winch_or_axis(path: PathLike) -> WinchProfile:
-    """Read the profile of a winch or of an axis.
+    """Read the profile of a winch or of an axis (a joint or a motor without drum and cable).
 
     Parameters
     ----------
@@ -130,15 +87,38 @@ def read_winch_or_axis(path: PathLike) -> WinchProfile:
     Returns
     -------
     WinchProfile
-        In SI; an AxisProfile of the kind ``axis``.
+        Drum, gearbox, guide, cable, pulleys, reference and effects, in SI; an AxisProfile of the
+        kind ``axis``.
 
     Raises
     ------
     FileError
-        With every fault of the file; for another kind, in the words of the reader of winches.
+        With every fault of the file, each with its line.
     """
     value = read_any(path)
-    return value if isinstance(value, WinchProfile) else read_profile(path)
+    # The reader of winches refuses every other kind in its own words.
+    return value if isinstance(value, WinchProfile) else read_winch(path)
+
+
+def read_winch(path: PathLike) -> WinchProfile:
+    """Read the profile of a winch for what needs its drum.
+
+    Parameters
+    ----------
+    path : str or Path
+        File in TOML of the kind ``winch``.
+
+    Returns
+    -------
+    WinchProfile
+        In SI.
+
+    Raises
+    ------
+    FileError
+        With every fault of the file, and for an axis.
+    """
+    return _read(path, "winch", WinchProfile)
 
 
 def read_robot(path: PathLike) -> RobotProfile:

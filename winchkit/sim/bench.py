@@ -45,14 +45,14 @@ def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
     dict
         By winch.
     """
-    from winchkit.schema.read import read_profile
+    from winchkit.schema.read import read_winch
 
     if bench.platform is not None:
         from winchkit.sim.robot.build import build_robot
 
         return build_robot(bench, bench.platform).profiles
     return {
-        name: read_profile(find("profiles", wiring.profile, beside=bench.bench.path or None))
+        name: read_winch(find("profiles", wiring.profile, beside=bench.bench.path or None))
         for name, wiring in bench.bench.winch.items()
     }
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from winchkit.catalog import find
 from winchkit.errors import UsageError
 from winchkit.runs.run import Run
-from winchkit.schema.read import read_profile, read_programme, read_simbench
+from winchkit.schema.read import read_programme, read_simbench, read_winch
 from winchkit.schema.simbench import SimBench
 from winchkit.sim import choose_bench
 from winchkit.sim.record import simulate
@@ -41,7 +41,7 @@ class Simulated:
         """Two programmes under two loads, each twice."""
         wiring = self.bench.bench.winch
         profiles = {
-            name: read_profile(find("profiles", winch.profile)) for name, winch in wiring.items()
+            name: read_winch(find("profiles", winch.profile)) for name, winch in wiring.items()
         }
         for name in _PROGRAMMES:
             programme = read_programme(find("sim", name))

@@ -22,7 +22,7 @@ from winchkit.model.stages import Signals
 from winchkit.plain_json import finite_or_none
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.read import read_profile
+from winchkit.schema.read import read_winch
 
 __all__ = ["CHANNELS", "LiveModel"]
 
@@ -57,7 +57,7 @@ class LiveModel:
     def __init__(self, spec: BenchSpec, file: str, effects: Sequence[str]) -> None:
         self.spec = spec
         self.profiles = {
-            name: read_profile(find("profiles", winch.profile, beside=file))
+            name: read_winch(find("profiles", winch.profile, beside=file))
             for name, winch in spec.winch.items()
         }
         self._lines = {name: _line(profile, effects) for name, profile in self.profiles.items()}

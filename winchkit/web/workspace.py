@@ -26,7 +26,7 @@ from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.schema.read import read_winch_or_axis
+from winchkit.schema.read import read_profile
 from winchkit.web.candidate import candidate_card
 from winchkit.web.curves import OutputCurves, curves_of
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
@@ -306,7 +306,7 @@ class Workspace:
 
     def _open_profile(self, profile: str) -> None:
         path = find("profiles", profile)
-        read_winch_or_axis(path)
+        read_profile(path)
         copy = self.keep(path.name, path.read_bytes())
         self._set(source=profile, versions=(Version(copy),), rungs=(), answer=None, curves={})
 
@@ -334,7 +334,7 @@ class Workspace:
         self._diagnose()
 
     def _diagnose(self, faults: Sequence[str] = ()) -> None:
-        profile = read_winch_or_axis(self._state.profile)
+        profile = read_profile(self._state.profile)
         self.progress("reading the signals", 0.0)
         regression = TimeSeriesRegression(self._dataset(profile))
         residual = initial_residual(self.catalogue, regression)
@@ -366,12 +366,12 @@ class Workspace:
 
     def _add(self, effect: str) -> None:
         state = self._state
-        dataset = self._dataset(read_winch_or_axis(state.profile))
+        dataset = self._dataset(read_profile(state.profile))
         extended = refit(state, effect, dataset, self.catalogue, self.folder)
         self._cards, self._state = {}, extended
         self.changed()
         try:
-            answer, curves = self._diagnosed(read_winch_or_axis(extended.profile))
+            answer, curves = self._diagnosed(read_profile(extended.profile))
         except BaseException:
             self._cards, self._state = {}, state
             raise
@@ -387,7 +387,7 @@ class Workspace:
         if len(state.versions) < 2:
             raise UsageError("there is nothing to undo")
         earlier = state.versions[-2].path
-        answer, curves = state.before or self._diagnosed(read_winch_or_axis(earlier))
+        answer, curves = state.before or self._diagnosed(read_profile(earlier))
         versions, rungs = state.versions[:-1], state.rungs[:-1]
         self._set(
             versions=versions, rungs=rungs, said="", answer=answer, curves=curves, before=None
@@ -399,7 +399,7 @@ class Workspace:
         side = State(runs, state.source, state.versions, winch=state.winch)
         if isinstance(profile, str):
             path = find("profiles", profile)
-            read_winch_or_axis(path)
+            read_profile(path)
             version = Version(self.keep(path.name, path.read_bytes()))
             side = replace(side, source=profile, versions=(version,))
         elif 0 <= profile < len(state.versions):
@@ -413,7 +413,7 @@ class Workspace:
             self.progress("diagnosing beside", 0.0)
             winch, used = side.winch_runs()
             side = replace(side, winch=winch)
-            known = self._diagnosed_on(self._prepare(used, read_winch_or_axis(side.profile)))
+            known = self._diagnosed_on(self._prepare(used, read_profile(side.profile)))
         self._set(beside=replace(side, answer=known[0], curves=known[1]))
 
     @staticmethod

@@ -9,7 +9,7 @@ import pytest
 
 from winchkit import compare, read_run
 from winchkit.errors import RunError
-from winchkit.schema.read import read_axis
+from winchkit.schema.read import read_profile
 
 CONSTANT = 0.125
 AXIS = """schema = 1
@@ -41,7 +41,7 @@ def recorded(folder: Path, column: str, factor: float) -> Path:
 
 
 def test_a_current_is_compared_as_its_torque(tmp_path: Path) -> None:
-    profile = read_axis(axis(tmp_path, f'torque_constant = "{CONSTANT} N m/A"'))
+    profile = read_profile(axis(tmp_path, f'torque_constant = "{CONSTANT} N m/A"'))
     torque = compare([read_run(recorded(tmp_path, "motor_torque [N m]", 1.0))], profile)
     current = compare([read_run(recorded(tmp_path, "motor_current [mA]", 1e3 / CONSTANT))], profile)
     assert list(current.outputs) == ["motor_torque"]
@@ -51,14 +51,14 @@ def test_a_current_is_compared_as_its_torque(tmp_path: Path) -> None:
 
 
 def test_without_a_torque_constant_the_message_names_the_key(tmp_path: Path) -> None:
-    profile = read_axis(axis(tmp_path, ""))
+    profile = read_profile(axis(tmp_path, ""))
     run = read_run(recorded(tmp_path, "motor_current [A]", 1 / CONSTANT))
     with pytest.raises(RunError, match=r"give motor\.torque_constant in the profile"):
         compare([run], profile)
 
 
 def test_a_recorded_torque_comes_first(tmp_path: Path) -> None:
-    profile = read_axis(axis(tmp_path, f'torque_constant = "{CONSTANT} N m/A"'))
+    profile = read_profile(axis(tmp_path, f'torque_constant = "{CONSTANT} N m/A"'))
     path = recorded(tmp_path, "motor_torque [N m]", 1.0)
     lines = path.read_text().splitlines()
     both = [

@@ -36,14 +36,14 @@ def _bench_warnings(file: str, bench: BenchSpec) -> tuple[Fault, ...]:
     from winchkit.catalog import find
     from winchkit.model.capacity import drum_warnings
     from winchkit.model.guide import guide_warnings
-    from winchkit.schema.read import read_profile
+    from winchkit.schema.read import read_winch
     from winchkit.schema.reading.source import open_source
 
     faults = []
     for name, wiring in bench.winch.items():
         if wiring.limits.length is None:
             continue
-        profile = read_profile(find("profiles", wiring.profile, beside=bench.path))
+        profile = read_winch(find("profiles", wiring.profile, beside=bench.path))
         faults += [
             open_source(file).fault(("winch", name, "limits", "length"), message)
             for _, message in (

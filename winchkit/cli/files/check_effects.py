@@ -68,7 +68,7 @@ def _profiles(value: Declared) -> list[WinchProfile]:
     from winchkit.catalog import find
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
-    from winchkit.schema.read import read_profile
+    from winchkit.schema.read import read_winch
 
     if isinstance(value, WinchProfile):
         return [value]
@@ -78,7 +78,7 @@ def _profiles(value: Declared) -> list[WinchProfile]:
     if bench is None:
         return []
     named = dict.fromkeys(wiring.profile for wiring in bench.winch.values())
-    return [read_profile(find("profiles", name, beside=bench.path)) for name in named]
+    return [read_winch(find("profiles", name, beside=bench.path)) for name in named]
 
 
 def bench_of(value: Declared) -> BenchSpec | None:

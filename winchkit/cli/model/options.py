@@ -94,9 +94,9 @@ class Asked:
     @property
     def declared(self) -> WinchProfile:
         """The profile of a winch or an axis. Raises FileError with its faults."""
-        from winchkit.schema.read import read_winch_or_axis
+        from winchkit.schema.read import read_profile
 
-        return read_winch_or_axis(self.source)
+        return read_profile(self.source)
 
     @property
     def catalogue(self) -> Catalogue:
