@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosis_runs import Ride, engine_for, term
-from winchkit.diagnosis.selection.engine import best_of_each
+from winchkit.diagnosis.selection.admissible import best_of_each
 from winchkit.diagnosis.selection.pairs import screened_pairs
 from winchkit.diagnosis.selection.stepwise import _best_pair, _exchanged_terms
 from winchkit.effects.term import Term

@@ -23,70 +23,22 @@ from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.projection import inverse_normal
+from winchkit.diagnosis.selection.admissible import admissible, best_of_each
 from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
 from winchkit.diagnosis.selection.pairs import Pair, screened_pairs
-from winchkit.diagnosis.selection.scores import Projected, Score, score, zero_score
+from winchkit.diagnosis.selection.scores import Projected, Score, score
 from winchkit.diagnosis.selection.signatures import Signatures, signatures, updated_signatures
 from winchkit.diagnosis.selection.starting_values import (
     shape_at_bound,
     starting_points,
-    starting_values,
     truncated_series,
 )
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
-from winchkit.effects.series import harmonic_series, orders_of, single_orders
+from winchkit.effects.series import harmonic_series, single_orders
 from winchkit.effects.term import Term
 
-__all__ = [
-    "LastValue",
-    "SelectionEngine",
-    "Trial",
-    "admissible",
-    "best_of_each",
-]
-
-
-def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[Score]:
-    """Scores of the candidates that the model does not contain yet, best first.
-
-    A candidate whose best amplitudes are all outside their bounds, such as a negative inertia, gets
-    the score zero.
-    """
-    signed = [item if _is_feasible(item) else zero_score(item, rows) for item in ranked]
-    signed.sort(key=lambda item: -item.net_gain)
-    return [item for item in signed if not _is_present(item.candidate.effect, item, present)]
-
-
-def best_of_each(scores: Sequence[Score]) -> list[Score]:
-    """Best point of each effect's shape grid, in the order of the scores."""
-    first: dict[str, Score] = {}
-    for item in scores:
-        first.setdefault(item.candidate.effect.id, item)
-    return list(first.values())
-
-
-def _is_present(effect: Effect, item: Score, hypothesis: Hypothesis) -> bool:
-    """Whether the hypothesis contains the effect or one that contains it."""
-    for term in hypothesis.terms:
-        if effect.id in term.effect.contains:
-            return True
-        if term.effect.id == effect.id and (
-            not effect.repeatable or item.candidate.shape.get("order") in orders_of(term)
-        ):
-            return True
-    return False
-
-
-def _is_feasible(item: Score) -> bool:
-    """Whether the best amplitudes of an effect are within its bounds, at least in part."""
-    coordinates = Coordinates(item.candidate.effect)
-    if item.candidate.effect.probes:
-        return True
-    base = {**item.candidate.effect.null, **item.candidate.shape}
-    amplitudes = slice(len(coordinates.amplitudes))
-    start_values = coordinates.vector(starting_values(item)[0])[amplitudes]
-    return bool(np.any(start_values != coordinates.vector(base)[amplitudes]))
+__all__ = ["LastValue", "SelectionEngine", "Trial"]
 
 
 Kept = TypeVar("Kept")
