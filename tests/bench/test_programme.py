@@ -57,6 +57,25 @@ def test_a_stop_during_a_hold_ends_the_programme_and_keeps_its_log(
     assert len(read_run(tmp_path / "held-10kg-1.csv")) > 5
 
 
+def test_a_programme_that_is_refused_writes_no_file(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An empty run would have to be removed before the next attempt."""
+    monkeypatch.setattr(bench, "not_commissioned", "there is no commissioning record")
+    steps = (Step(by=-0.1, speed=0.4),)
+    begun = []
+    with pytest.raises(NotPermitted, match="no commissioning record"):
+        run_programme(
+            bench,
+            Programme("refused", steps),
+            tmp_path / "runs",
+            lambda _step: None,
+            progress=lambda *place: begun.append(place),
+        )
+    assert begun == []
+    assert not (tmp_path / "runs").exists()
+
+
 def test_a_quick_stop_ends_a_held_tension(live: LiveBench, bench: Bench) -> None:
     """And whoever goes on refreshing it is refused: nothing moves before it was released."""
     winch, plant = bench.winch["A"], live.winches["A"].plant

@@ -306,6 +306,14 @@ class Bench(BenchConnection):
             if trip.blocks is Direction.BOTH or (trip.winch == winch and trip.blocks & direction):
                 raise NotPermitted(str(trip))
 
+    def require_motion(self) -> None:
+        """Raise what forbids every motion: no valid commissioning record, a trip, an ended loop.
+
+        A programme calls it before it writes a file.
+        """
+        self._require_commissioned()
+        self.raise_trouble()
+
     def _look_at_record(self) -> None:
         """Compare the commissioning record with the files, and with the drives as they are now."""
         trust_record(self.spec, self.axes)

@@ -65,6 +65,8 @@ def run_programme(
     ------
     UsageError
         Before any motion, where runs of this name exist and are not to be replaced.
+    NotPermitted, LimitTripped, DriveFault
+        Before any motion and any file, for what forbids every motion.
     MotionError
         Whatever stops a motion; rows logged until then are kept. A reset and a new command are the
         caller's.
@@ -80,6 +82,7 @@ def run_programme(
     if not replace and (held := earlier_runs(programme, folder, suffix)):
         earlier = f"{held[0]} holds an earlier run of '{programme.name}'"
         raise UsageError(f"{earlier}; name another folder, or replace=True")
+    bench.require_motion()
     execution = _Execution(
         bench, programme, Path(folder), ask, suffix, check=check, replace=replace
     )

@@ -146,6 +146,7 @@ def run_robot_programme(
         raise UsageError(
             f"{held[0]} holds an earlier run of '{programme.name}'; name another folder, or replace"
         )
+    bench.require_motion()
     platform = bench.robot
     start = platform.pose
     planner = platform.planner
