@@ -130,6 +130,14 @@ def test_the_device_of_a_process_variable_is_no_quantity(name: str, channel: str
     assert found.channel == channel
 
 
+def test_a_quality_beside_the_values_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "quality.csv"
+    head = "timestamp,tag,value,quality\n"
+    lines = [f"{t:.3f},{name},{x:.6g},{192 + n % 2}" for n, (t, name, x) in enumerate(rows())]
+    path.write_text(head + "\n".join(lines) + "\n")
+    assert {c.name for c in read_table(path).columns} == {"timestamp", *UNITS}
+
+
 def test_two_winches_keep_their_names(tmp_path: Path) -> None:
     path = tmp_path / "two.txt"
     text = monitor(rows())

@@ -103,6 +103,8 @@ def _parts(table: Table) -> _Parts | None:
         changing = [item for item in numbers if not _is_constant(item, codes)]
         clocks = [item for item in changing if _is_increasing(item, codes)]
         values = [item for item in changing if item not in clocks]
+        # Beside a quality that varies the column of the values has the name of one.
+        values = [item for item in values if _VALUE.fullmatch(item.name)] or values
         clocks += _without_limits(stamps)
         if clocks and len(values) == 1 and _is_of_any_quantity(values[0], found.tolist()):
             return _Parts(key, values[0], tuple(clocks), unit)
