@@ -16,6 +16,7 @@ from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.results import series_orders
 from winchkit.diagnosis.write import write_addition
+from winchkit.report.words.sentence import sentence
 from winchkit.runs import read_run
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.axis import AxisProfile
@@ -96,6 +97,18 @@ def test_a_joint_at_three_speeds_has_offsets_presliding_and_gravity() -> None:
         assert offsets["case3_middle"] - offsets[other] == pytest.approx(0.4, abs=0.15)
     assert diagnosis.unexplained_share < 0.25
     assert {"drum_angle", "motor_angle", "directed_length"} & {w.variable for w in diagnosis.where}
+
+
+def test_gravity_that_is_not_named_is_offered_with_its_size() -> None:
+    """As a winch, the joint has free curves over a cable length; one of them explains more."""
+    assert DATA is not None
+    runs = runs_of("franka-q2", "case3_slow", "case3_middle", "case3_high")
+    found = diagnose(runs, read_profile(DATA / "franka-q2" / "profile.toml")).diagnosis
+    assert [step.effects for step in found.steps] == [("motor-dahl",)]
+    (gravity,) = found.closest
+    assert gravity.effect == "joint-gravity"
+    assert 1.0 < gravity.parameters["amplitude"].value < 5.0
+    assert "an eccentric weight (amplitude = " in sentence(found)
 
 
 @pytest.mark.campaign

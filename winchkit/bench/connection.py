@@ -25,6 +25,7 @@ from winchkit.drivers.can.bus.health import BusHealth
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.tools.scan import Found, named_after, scan
 from winchkit.drivers.clock import Clock
+from winchkit.drivers.scheduling import Scheduler
 from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
 
@@ -83,7 +84,9 @@ class BenchConnection(ABC):
 
     def _start(self, realtime: Request) -> None:
         """Start the control loop; return when every drive and instrument has answered."""
-        self.realtime: RealTime = acquire(realtime, self._urgent_threads())
+        self.realtime: RealTime = acquire(
+            realtime, self._urgent_threads(), simulated=isinstance(self.clock, Scheduler)
+        )
         """What the control loop was granted of real-time settings, and what was refused."""
         self._stack.callback(self.realtime.close)
         if realtime:

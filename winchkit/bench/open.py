@@ -43,7 +43,8 @@ def open_bench(
     realtime
         ``"try"`` takes what this computer permits of real-time settings for the whole process
         until the bench is closed, ``True`` demands them; ``bench.realtime`` says what was granted.
-        By default nothing of the process is changed.
+        By default the garbage collector leaves out the objects that exist at the opening, and
+        nothing else of the process is changed.
 
     Returns
     -------

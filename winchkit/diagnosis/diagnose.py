@@ -343,6 +343,8 @@ def _answer(
         reported, pairs = judgement.reported, []
     elif withheld_sets:
         closest = _imitations(engine, result, withheld_sets)
+    elif judgement.verdict == "partly":
+        closest = _beside_the_named(engine, result, reported)
     spread = spread if reported is found else _spread(engine, reported)
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
@@ -451,6 +453,17 @@ def _imitations(
     return tuple(
         Closest(step.effects[0], step.parameters[step.effects[0]], _IMITATES) for step in steps
     )
+
+
+def _beside_the_named(
+    engine: TimeSeriesSelection, result: SelectionResult, reported: SelectionResult
+) -> tuple[Closest, ...]:
+    """Additions of the search that are not named beside others, with their values."""
+    named = [term.label for term in reported.final.hypothesis.terms]
+    added = result.final.hypothesis.terms[engine.n_initial_terms :]
+    alone = [EquivalenceSet(t, (t.effect.id,), (t,), (result.final,), {}) for t in added]
+    found = _imitations(engine, result, alone)
+    return tuple(each for each, term in zip(found, added, strict=True) if term.label not in named)
 
 
 def _closest(

@@ -110,12 +110,24 @@ def test_collector_and_interpreter_lock_are_given_back() -> None:
     assert locked() == before
 
 
-def test_nothing_changes_unless_requested() -> None:
+@pytest.mark.usefixtures("unfrozen")
+def test_without_a_request_the_objects_are_frozen_and_nothing_else_changes() -> None:
     before = gc.get_threshold(), sys.getswitchinterval(), locked()
     nothing = acquire(False, [threading.get_native_id()])
-    assert (gc.get_threshold(), sys.getswitchinterval(), locked()) == before
-    assert not nothing.granted
-    assert "realtime=" in str(nothing.refused[0])
+    try:
+        assert gc.get_freeze_count() > 0
+        assert (gc.get_threshold(), sys.getswitchinterval(), locked()) == before
+        assert not nothing.granted
+        assert "realtime=" in str(nothing.refused[0])
+    finally:
+        nothing.close()
+    assert gc.get_freeze_count() == 0
+
+
+@pytest.mark.usefixtures("unfrozen")
+def test_in_simulated_time_nothing_changes() -> None:
+    acquire(False, [], simulated=True).close()
+    assert gc.get_freeze_count() == 0
 
 
 @pytest.mark.realtime

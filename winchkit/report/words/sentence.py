@@ -103,7 +103,7 @@ def cause_and_error(diagnosis: Diagnosis) -> tuple[str, str]:
         gain = gain_text(outputs, _opening(steps)) or _NO_GAIN
         parts = [gain, still_text(outputs)]
         if diagnosis.verdict == "partly":
-            parts.append(_unexplained(diagnosis, "Partly unexplained"))
+            parts += [_unexplained(diagnosis, "Partly unexplained"), _nearest(diagnosis)]
         return _named(steps, diagnosis.data), " ".join(part for part in parts if part)
     if diagnosis.verdict == "partly":
         opening = "Partly explained by known effects, none of which is named"
@@ -353,7 +353,8 @@ def _nearest(diagnosis: Diagnosis) -> str:
     for each in diagnosis.closest:
         values = values_text(each.parameters)
         parts.append(clause(each.effect) + (f" ({values})" if values else ""))
-    return f"A part is explained by these effects, or they imitate its cause: {'; '.join(parts)}."
+    which = "A further part is" if diagnosis.steps else "A part is"
+    return f"{which} explained by these effects, or they imitate its cause: {'; '.join(parts)}."
 
 
 def _unexplained(diagnosis: Diagnosis, opening: str) -> str:
