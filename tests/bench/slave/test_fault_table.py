@@ -9,6 +9,7 @@ expiry.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -402,6 +403,11 @@ def test_an_exception_in_the_control_loop_stops_the_drive_and_is_named(
         assert seen.left <= 0.02
         assert seen.rest <= 0.02 + seen.speed / _RAMP + _LAG
         assert re.search("OverflowError|ZeroDivisionError|KeyError", seen.cause), seen.cause
+        # What was measured before the failure is shown no longer; the power state is that of now.
+        winch = bench.snapshot.winch["A"]
+        assert math.isnan(winch.cable_speed)
+        assert math.isnan(winch.cable_length)
+        assert winch.state not in {"", "operation enabled"}
         key.release()
         rig.wait(0.5)
     with rig.opened() as again, pytest.raises(LimitTripped, match="control loop failed"):

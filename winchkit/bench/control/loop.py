@@ -352,12 +352,13 @@ class ControlLoop:
         return all(item is not None and item.state is not State.OPERATION_ENABLED for item in said)
 
     def _show_trips(self) -> None:
-        """The newest picture with the trips of now, and the phases."""
+        """Trips, phases and power states of now; what was measured before is not valid any more."""
         if self.snapshot is not None:
-            winches = {
-                name: item._replace(phase=self.winches[name].controller.phase)
-                for name, item in self.snapshot.winch.items()
-            }
+            winches = {}
+            for name, item in self.snapshot.winch.items():
+                parts = self.winches[name]
+                state = "" if (said := parts.axis.feedback) is None else str(said.state)
+                winches[name] = item.without_values(parts.controller.phase, state)
             self.snapshot = replace(
                 self.snapshot, tripped=self.supervisor.tripped, winch=winches, cycle=self._count
             )

@@ -86,6 +86,22 @@ class WinchSnapshot(NamedTuple):
     commanded_speed: float = math.nan
     """Commanded derivative of the cable length (positive pays out), m/s."""
 
+    def without_values(self, phase: Phase, state: str) -> WinchSnapshot:
+        """The winch once nothing measured is valid any more, e.g. after the loop has failed."""
+        nan = math.nan
+        return WinchSnapshot(
+            phase,
+            state,
+            self.time,
+            motor_angle=nan,
+            motor_velocity=nan,
+            motor_torque=nan,
+            cable_length=nan,
+            cable_speed=nan,
+            turns_known=self.turns_known,
+            commander=self.commander,
+        )
+
 
 class WinchSnapshots(Mapping[str, WinchSnapshot]):
     """The winches of a cycle by name, made at the first access: most cycles have none.
