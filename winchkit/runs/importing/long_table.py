@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -122,25 +121,10 @@ def _is_closer(values: Array, codes: NDArray[np.intp]) -> bool:
 
 
 def _of_rows(table: Table, key: Column, rows: NDArray[np.intp]) -> Table:
-    place = {int(row): number for number, row in enumerate(rows)}
-
     def line_of(row: int) -> int | None:
         return table.line_of(int(rows[row]))
 
+    others = [item for item in table.columns if item is not key and len(item) == len(key)]
     return replace(
-        table, columns=tuple(_columns(table, key, rows, place)), line_of=line_of, interval=None
+        table, columns=tuple(item.at(rows) for item in others), line_of=line_of, interval=None
     )
-
-
-def _columns(
-    table: Table, key: Column, rows: NDArray[np.intp], place: dict[int, int]
-) -> Iterator[Column]:
-    for column in table.columns:
-        if column is not key and len(column) == len(key):
-            texts = column.texts
-            yield replace(
-                column,
-                values=column.values[rows],
-                texts=None if texts is None else [texts[row] for row in rows],
-                wrong=tuple((place[row], text) for row, text in column.wrong if row in place),
-            )

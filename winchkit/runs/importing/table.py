@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
@@ -40,6 +43,17 @@ class Column:
 
     def __len__(self) -> int:
         return len(self.values)
+
+    def at(self, rows: NDArray[np.intp]) -> Column:
+        """The same column at some of its rows, shape (m,)."""
+        place = {int(row): number for number, row in enumerate(rows)}
+        texts = self.texts
+        return replace(
+            self,
+            values=self.values[rows],
+            texts=None if texts is None else [texts[row] for row in place],
+            wrong=tuple((place[row], text) for row, text in self.wrong if row in place),
+        )
 
 
 @dataclass(frozen=True)

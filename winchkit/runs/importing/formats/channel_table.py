@@ -64,7 +64,11 @@ def by_channel(table: Table) -> Table:
     names = np.array([text.strip() for text in parts.key.texts or ()], dtype=np.str_)
     found = list(dict.fromkeys(names.tolist()))
     start = _common_start(found)
-    columns = [item for name in found for item in _columns(parts, name, names == name, start)]
+    columns = [
+        item
+        for name in found
+        for item in _columns(parts, name, np.flatnonzero(names == name), start)
+    ]
     note = f"each row is one value of one channel, by column '{parts.key.source}': " + ", ".join(
         found
     )
@@ -153,25 +157,14 @@ def _is_of_any_quantity(value: Column, names: Sequence[str]) -> bool:
     return is_unnamed and any(meaning_of(split_unit(name)[0]) is not None for name in names)
 
 
-def _columns(parts: _Parts, channel: str, rows: NDArray[np.bool_], start: int) -> Iterator[Column]:
+def _columns(parts: _Parts, channel: str, rows: NDArray[np.intp], start: int) -> Iterator[Column]:
     """Stamps and values of one channel, whose name begins with what all have in common."""
     name, unit = split_unit(channel[start:])
     if parts.unit is not None and parts.unit.texts is not None:
-        given = {parts.unit.texts[int(row)].strip() for row in np.flatnonzero(rows)}
+        given = {parts.unit.texts[int(row)].strip() for row in rows}
         own = given.pop() if len(given) == 1 else ""
         unit = unit or (own if read_unit(own) else "")
     for clock in parts.clocks:
-        yield replace(_of_rows(clock, rows), labels=(name,), group=channel)
-    value = _of_rows(parts.value, rows)
+        yield replace(clock.at(rows), labels=(name,), group=channel)
+    value = parts.value.at(rows)
     yield replace(value, name=name, unit=unit or parts.value.unit, group=channel)
-
-
-def _of_rows(column: Column, rows: NDArray[np.bool_]) -> Column:
-    place = {int(row): number for number, row in enumerate(np.flatnonzero(rows))}
-    texts = column.texts
-    return replace(
-        column,
-        values=column.values[rows],
-        texts=None if texts is None else [texts[row] for row in place],
-        wrong=tuple((place[row], text) for row, text in column.wrong if row in place),
-    )

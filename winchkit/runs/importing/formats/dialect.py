@@ -15,6 +15,7 @@ from winchkit.runs.importing.formats.stamps import is_stamp
 
 __all__ = [
     "BLANKS",
+    "FEWEST",
     "Dialect",
     "decode",
     "find_dialect",
@@ -28,7 +29,7 @@ _DELIMITERS = ("\t", ";", "|", ",", BLANKS)
 _CALLED = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", BLANKS: "blanks"}
 _SAMPLED = 240
 """Lines by which the separator is found, a third each of the start, middle and end."""
-_FEWEST = 2
+FEWEST = 2
 """Numbers and stamps of a mixed row."""
 _CELL_LINES = 8
 """Line ends that a quoted cell may have."""
@@ -216,7 +217,7 @@ def _rated(
     for cells in split:
         values, given = _values(cells, decimal)
         gain = values if is_mixed else 2 * values - given
-        if gain > 0 and (not is_mixed or values >= _FEWEST):
+        if gain > 0 and (not is_mixed or values >= FEWEST):
             widths[len(cells)] = widths.get(len(cells), 0) + gain
     if not widths:
         return None

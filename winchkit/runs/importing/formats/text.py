@@ -15,6 +15,7 @@ from winchkit.runs.importing.formats.cell_units import has_unit
 from winchkit.runs.importing.formats.cells import is_missing, number, numbers
 from winchkit.runs.importing.formats.dialect import (
     BLANKS,
+    FEWEST,
     Dialect,
     decode,
     find_dialect,
@@ -33,8 +34,6 @@ _BLOCK = 4096
 """Rows converted at a time: their texts are released before the next ones are split."""
 _COUNTED = 4
 """Columns from which a row that counts them is no chance."""
-_FEWEST = 2
-"""Numbers and stamps of a row with more texts than numbers."""
 _HEAD = 60
 """Lines in which a header ends."""
 _END_OF_HEADER = "***End_of_Header***"
@@ -254,7 +253,7 @@ def _is_numeric(cells: Sequence[str], dialect: Dialect) -> bool:
         values += [c for c in given if c not in values and has_unit(c, dialect.decimal)]
     certain = [c for c in values if not is_missing(c)]
     if dialect.is_mixed:
-        return len(certain) >= _FEWEST
+        return len(certain) >= FEWEST
     return bool(certain) and 2 * len(values) > len(given)
 
 
