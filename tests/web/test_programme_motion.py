@@ -107,7 +107,8 @@ def test_a_button_that_is_not_held_long_enough_starts_nothing(
 
 @pytest.mark.parametrize("way", ["Space", "button", "End programme"])
 def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way: str) -> None:
-    choose(page, tmp_path, "0.3 m" if way == "button" else "-0.3 m", "0.1 m/s")
+    # Half a minute: a busy browser clicks seconds later.
+    choose(page, tmp_path, "0.6 m" if way == "button" else "-0.6 m", "0.02 m/s")
     before = length(page)
     press(page, 1.0)
     until(page, lambda: state(page) in MOVING, 10.0)
@@ -122,7 +123,7 @@ def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way
     stopped = length(page)
     page.wait_for_timeout(800)
     assert length(page) == pytest.approx(stopped, abs=0.02), "the ramp at the most"
-    assert abs(length(page) - before) < 0.25
+    assert abs(length(page) - before) < 0.55
     if page.locator("#reset").count():
         page.once("dialog", lambda shown: shown.accept())
         page.click("#reset")

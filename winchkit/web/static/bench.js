@@ -10,7 +10,7 @@ import { consequences, together, trip } from "./trip.js";
 import { card, picture as drawn, words as said } from "./winch.js";
 
 const PERIOD = 50, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
-let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, cardsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
+let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, cardsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
 
 // A request that fails is repeated: without it there is no Stop.
 export async function station(state) {
@@ -209,6 +209,7 @@ const tabs = () => [...(lastTrip ? ["Trip"] : []), "Charts", "Bus frames", "Driv
 
 function hold(sign) {
   if (!commands() || tripped().length) { alarm(tripped().length ? "Tripped: reset first." : "This page only watches; request command first."); return; }
+  alarm("");
   held = sign;
   clearInterval(timer);
   beat();
@@ -319,8 +320,15 @@ function refresh() {
   fill(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));
   const host = document.getElementById("cycles");
   if (host && picture.status.cycle_time) cycles(host, picture.status.cycle_time, picture.status.overruns);
-  strips.refresh();
+  charts(at);
   cards(at);
+}
+
+// The strip charts, five times a second: one pixel of 60 s is 0.08 s, and they cost most of a picture.
+function charts(at) {
+  if (at - stripsAt < 190) return;
+  stripsAt = at;
+  strips.refresh();
 }
 
 // Every winch of the bench as a card; four times a second.
