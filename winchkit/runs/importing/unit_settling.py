@@ -37,7 +37,7 @@ _AXES = (
 )
 _TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
 _SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
-_SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "effort", "thetadot", "dtheta"}
+_SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "thetadot", "dtheta"}
 _GAINS = {"gtau", "ktau", "kt", "km", "torqueconstant", "torquegain", "gf", "forcegain"}
 
 _LARGEST_OF_JOINT = 1.02 * 2 * math.pi
@@ -227,8 +227,7 @@ def by_convention(work: Work) -> None:
 
 def _doubt(work: Work, item: ChosenColumn) -> str:
     """Why an angle may not be in rad; messages of ROS are in rad."""
-    is_ros = work.table.layout == "MCAP" or item.column.name.startswith("/")
-    if item.base != "motor_angle" or is_ros:
+    if item.base != "motor_angle" or _is_of_ros(work.table):
         return ""
     return _doubt_of_radians(
         item.column.values,
@@ -277,9 +276,19 @@ def _declared(table: Table, dimension: str | None) -> SpelledUnit | None:
 
 
 def _is_si(table: Table, name: str) -> bool:
-    """Whether a name or a format has SI units by convention; names with slashes are of ROS."""
+    """Whether a name or a format has SI units by convention."""
     words = words_of(name).split()
-    return table.layout in _SI_LAYOUTS or name.startswith("/") or bool(set(words) & _SI_WORDS)
+    return table.layout in _SI_LAYOUTS or bool(set(words) & _SI_WORDS) or _is_of_ros(table)
+
+
+def _is_of_ros(table: Table) -> bool:
+    """Whether a table is of messages of ROS, which are in SI units (REP 103).
+
+    Their topics have slashes, and the torques of its JointState are efforts.
+    """
+    names = [item.name for item in table.columns]
+    is_named = any(name.startswith("/") or "effort" in words_of(name).split() for name in names)
+    return table.layout == "MCAP" or is_named
 
 
 def _is_in_seconds(values: Array) -> bool:

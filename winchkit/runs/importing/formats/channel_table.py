@@ -99,13 +99,19 @@ def _parts(table: Table) -> _Parts | None:
     for key in texts:
         names = np.array([text.strip() for text in key.texts or ()], dtype=np.str_)
         found, codes = np.unique(names, return_inverse=True)
-        if not 1 < len(found) <= _MOST or len(names) < _ROWS * len(found) or key is unit:
+        if not len(found) <= _MOST or len(names) < _ROWS * len(found) or key is unit:
             continue
         if not all(re.search("[A-Za-z]", name) for name in found):
             continue
+        if len(found) == 1 and meaning_of(split_unit(str(found[0]))[0]) is None:
+            continue
         numbers = [item for item in table.columns if item.texts is None]
         changing = [item for item in numbers if not _is_constant(item, codes)]
-        clocks = [item for item in changing if _is_increasing(item, codes)]
+        clocks = [
+            item
+            for item in changing
+            if _is_increasing(item, codes) and not _VALUE.fullmatch(item.name)
+        ]
         values = [item for item in changing if item not in clocks]
         # Beside a quality that varies the column of the values has the name of one.
         values = [item for item in values if _VALUE.fullmatch(item.name)] or values

@@ -5,6 +5,7 @@ Elements of an array are named by their index, joints of a JointState by their n
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -12,12 +13,13 @@ __all__ = ["fields_of", "numbers_of"]
 
 _LONGEST = 64
 """Most elements of an array in a message; longer ones are images and point clouds."""
+_HEADER = re.compile(r"(\w+\.)?header\.")
 _DEEPEST = 6
 """Nesting of tables in tables that is read; recordings have two or three levels."""
 
 
 def numbers_of(value: Any) -> Iterator[tuple[str, float]]:
-    """Paths and values of the numbers of a message.
+    """Paths and values of the numbers of a message, without its header.
 
     Parameters
     ----------
@@ -30,7 +32,7 @@ def numbers_of(value: Any) -> Iterator[tuple[str, float]]:
         Path such as ``pose.x`` or ``joint1.position``; ``data`` for a single number.
     """
     for name, item in fields_of(value):
-        if not isinstance(item, str):
+        if not isinstance(item, str) and not _HEADER.match(name):
             yield name, item
 
 
@@ -69,7 +71,7 @@ def _of_mapping(
     joints = fields.get("name")
     is_joints = isinstance(joints, Sequence) and not isinstance(joints, str) and bool(joints)
     for key, item in fields.items():
-        if depth <= 1 and (key == "header" or (key == "name" and is_joints)):
+        if depth <= 1 and key == "name" and is_joints:
             continue
         path = f"{name}.{key}" if name else str(key)
         lists = isinstance(item, Sequence) and not isinstance(item, str | bytes)

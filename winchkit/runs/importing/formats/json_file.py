@@ -1,7 +1,8 @@
 """Reader of JSON files: records, lists of rows, lists by name, and one record per line.
 
-A table is a list of mappings (a row each), a list of lists of numbers (a row each) or a list of
-numbers (a column). Single numbers beside it are constants, single texts are metadata.
+A table is a list of mappings (a row each), a list of lists of numbers (a row each), a list of
+numbers (a column), or a list of channels with a list of records each. Single numbers beside it
+are constants, single texts are metadata.
 """
 
 from __future__ import annotations
@@ -117,27 +118,72 @@ def _tables(name: str, value: Any, depth: int) -> Iterator[tuple[str, dict[str, 
     """Columns of every table of a value, by the path of the table."""
     if depth > _DEEPEST:
         return
-    if isinstance(value, Mapping):
+    if isinstance(value, Mapping) and (rows := _of_named_rows(value)):
+        yield name, _of_records(rows)
+    elif isinstance(value, Mapping):
         for key, item in value.items():
             yield from _tables(f"{name}.{key}" if name else str(key), item, depth + 1)
-    elif isinstance(value, Sequence) and not isinstance(value, str) and len(value) >= _FEWEST:
-        if all(isinstance(item, Mapping) for item in value):
-            yield name, _of_records(value)
-        elif all(isinstance(item, list) for item in value):
-            width = min(map(len, value))
-            if width and all(_is_number(cell) for row in value for cell in row[:width]):
-                columns = np.array([[_float(cell) for cell in row[:width]] for row in value]).T
-                yield name, {f"{name or 'column'}[{n}]": c for n, c in enumerate(columns)}
-            else:
-                for n, item in enumerate(value):
-                    yield from _tables(f"{name}[{n}]", item, depth + 1)
-        elif all(_is_number(item) for item in value):
-            array = np.array([_float(item) for item in value])
-            parent, _, last = name.rpartition(".")
-            yield parent, {last or "data": array}
-        elif all(isinstance(item, str) for item in value):
-            parent, _, last = name.rpartition(".")
-            yield parent, {last or "data": np.array(value)}
+    elif isinstance(value, list):
+        records = _of_channels(value)
+        if records or (len(value) >= _FEWEST and all(isinstance(row, Mapping) for row in value)):
+            yield name, _of_records(records or value)
+        else:
+            yield from _tables_of_list(name, value, depth)
+
+
+def _tables_of_list(
+    name: str, value: list[Any], depth: int
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Columns of a list of rows, of numbers, of texts, or of tables."""
+    if len(value) < _FEWEST:
+        for item in value:
+            yield from _tables(name, item, depth + 1)
+    elif all(isinstance(item, list) for item in value):
+        width = min(map(len, value))
+        if width and all(_is_number(cell) for row in value for cell in row[:width]):
+            columns = np.array([[_float(cell) for cell in row[:width]] for row in value]).T
+            yield name, {f"{name or 'column'}[{n}]": c for n, c in enumerate(columns)}
+        else:
+            for n, item in enumerate(value):
+                yield from _tables(f"{name}[{n}]", item, depth + 1)
+    elif all(_is_number(item) for item in value) or all(isinstance(item, str) for item in value):
+        is_text = isinstance(value[0], str)
+        parent, _, last = name.rpartition(".")
+        yield parent, {last or "data": np.array(value if is_text else [*map(_float, value)])}
+
+
+def _of_named_rows(value: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Records of rows beside a list of the names of their cells (InfluxDB, pandas' ``split``)."""
+    names = value.get("columns")
+    if not isinstance(names, list) or not names or not all(isinstance(n, str) for n in names):
+        return []
+    lists = [item for key, item in value.items() if isinstance(item, list) and key != "columns"]
+    for rows in lists:
+        if rows and all(isinstance(row, list) and len(row) == len(names) for row in rows):
+            return [dict(zip(names, row, strict=True)) for row in rows]
+    return []
+
+
+def _of_channels(items: list[Any]) -> list[dict[str, Any]]:
+    """Records of channels that each have a list of them, with the channel's other fields.
+
+    An archive has few channels with many records each (EPICS: ``meta`` and ``data``); a record
+    with a list has fewer elements in it than there are records. Empty for other lists.
+    """
+    found: list[dict[str, Any]] = []
+    for item in items:
+        lists = {
+            key: rows
+            for key, rows in (item.items() if isinstance(item, Mapping) else ())
+            if isinstance(rows, list) and len(rows) > max(len(items), _FEWEST)
+        }
+        rows = next(iter(lists.values()), [])
+        if len(lists) != 1 or not all(isinstance(row, Mapping) for row in rows):
+            return []
+        shared = dict(fields_of({key: one for key, one in item.items() if key not in lists}))
+        own = {name.rpartition(".")[2]: one for name, one in shared.items()}
+        found += [own | row for row in rows]
+    return found
 
 
 def _of_records(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
