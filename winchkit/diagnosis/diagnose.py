@@ -6,6 +6,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
+from winchkit.diagnosis.closest import (
+    beside_the_named,
+    imitations,
+    plausible_sets,
+    unnamed_sets,
+)
 from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.data.sanity import caveats
@@ -20,9 +26,7 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, attributions, harmonics
 from winchkit.diagnosis.residuals.traces import Trace, trace_columns, traces_of
 from winchkit.diagnosis.results import (
-    Closest,
     Diagnosis,
-    Step,
 )
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
@@ -33,16 +37,14 @@ from winchkit.diagnosis.selection.stepwise import (
     without_term,
 )
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.steps import candidates_of, steps_of
+from winchkit.diagnosis.steps import candidates_of
 from winchkit.diagnosis.verdict.decision import (
-    Judgement,
     output_fits,
     reweighted_judgement,
     withheld,
 )
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
-from winchkit.diagnosis.verdict.plausibility import implausible
 from winchkit.diagnosis.verdict.significance import insignificant_additions
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -70,7 +72,6 @@ _UNSEARCHED = (
     "with --as-recorded"
 )
 _LOCATED = ("unknown", "partly")
-_IMITATES = "a part of the residual is unexplained: it may imitate the cause"
 
 
 ProgressCallback = Callable[[str, float], None]
@@ -325,7 +326,7 @@ def _answer(
     reported, reasons = judgement.reported, judgement.notes
     added = range(engine.n_initial_terms, len(reported.final.hypothesis.terms))
     sets = [equivalence_set(engine, reported.final, reported.noise, index) for index in added]
-    withheld_sets = () if sets else _closest(engine, result, judgement)
+    withheld_sets = () if sets else unnamed_sets(engine, result, judgement)
     pairs = pairs_of(sets or withheld_sets)
     if sets:
         judgement = reweighted_judgement(engine, judgement)
@@ -336,15 +337,15 @@ def _answer(
         if judge_with_specification_test(engine, fewer).reported is fewer:
             note = _insignificant_note(sets[index - added.start])
             return _answer(engine, fewer, tuple(dict.fromkeys((*notes, *reasons, note))))
-    sets, steps, closest = _plausible(engine, reported, sets, spread)
+    sets, steps, closest = plausible_sets(engine, reported, sets, spread)
     if closest:
         names = ", ".join(dict.fromkeys(f"{each.effect}: {each.reason}" for each in closest))
         judgement = withheld(engine, result, 1.0, f"closest, but not named: {names}")
         reported, pairs = judgement.reported, []
     elif withheld_sets:
-        closest = _imitations(engine, result, withheld_sets)
+        closest = imitations(engine, result, withheld_sets)
     elif judgement.verdict == "partly":
-        closest = _beside_the_named(engine, result, reported)
+        closest = beside_the_named(engine, result, reported)
     spread = spread if reported is found else _spread(engine, reported)
     diagnosis = Diagnosis(
         verdict=judgement.verdict,
@@ -407,77 +408,6 @@ def _beside_notes(equivalence: EquivalenceSet) -> Iterator[str]:
 def _insignificant_note(equivalence: EquivalenceSet) -> str:
     names = ", ".join(equivalence.effects)
     return f"not named: {names}; beside the other effects it is not significant"
-
-
-def _plausible(
-    engine: TimeSeriesSelection,
-    result: SelectionResult,
-    sets: Sequence[EquivalenceSet],
-    spread: Spread,
-) -> tuple[list[EquivalenceSet], tuple[Step, ...], tuple[Closest, ...]]:
-    """Sets without members of implausible values, their steps, and the effects of empty sets.
-
-    Where a set has no other member, nothing is named: the other effects were fitted beside it.
-    """
-    dataset, found = engine.regression.dataset, list(sets)
-    if not found:
-        return [], (), ()
-    steps = steps_of(engine, result, found, dataset, spread)
-    kept, closest = [], []
-    for equivalence, step in zip(found, steps, strict=True):
-        reasons = {
-            term.effect.id: implausible(term, step.parameters[term.effect.id], dataset.profile)
-            for term in equivalence.terms
-        }
-        possible = [effect for effect, reason in reasons.items() if reason is None]
-        if possible:
-            kept.append(equivalence.only(possible))
-        else:
-            closest += [
-                Closest(effect, step.parameters[effect], reason)
-                for effect, reason in reasons.items()
-                if reason is not None
-            ]
-    if closest:
-        return [], (), tuple(closest)
-    if all(a.effects == b.effects for a, b in zip(found, kept, strict=True)):
-        return found, steps, ()
-    return kept, steps_of(engine, result, kept, dataset, spread), ()
-
-
-def _imitations(
-    engine: TimeSeriesSelection, result: SelectionResult, sets: Sequence[EquivalenceSet]
-) -> tuple[Closest, ...]:
-    """First effects of the sets that explain a part, with their values."""
-    steps = steps_of(engine, result, sets, engine.regression.dataset)
-    return tuple(
-        Closest(step.effects[0], step.parameters[step.effects[0]], _IMITATES) for step in steps
-    )
-
-
-def _beside_the_named(
-    engine: TimeSeriesSelection, result: SelectionResult, reported: SelectionResult
-) -> tuple[Closest, ...]:
-    """Additions of the search that are not named beside others, with their values."""
-    named = [term.label for term in reported.final.hypothesis.terms]
-    added = result.final.hypothesis.terms[engine.n_initial_terms :]
-    alone = [EquivalenceSet(t, (t.effect.id,), (t,), (result.final,), {}) for t in added]
-    found = _imitations(engine, result, alone)
-    return tuple(each for each, term in zip(found, added, strict=True) if term.label not in named)
-
-
-def _closest(
-    engine: TimeSeriesSelection, result: SelectionResult, judgement: Judgement
-) -> list[EquivalenceSet]:
-    """Equivalence sets of additions that are not named, where a part of the residual is explained.
-
-    None for an unknown effect: additions that imitate an effect outside the catalogue would lead to
-    a wrong programme.
-    """
-    if judgement.verdict != "partly":
-        return []
-    added = range(engine.n_initial_terms, len(result.final.hypothesis.terms))
-    return [equivalence_set(engine, result.final, result.noise, index) for index in added]
 
 
 def selection_engine(

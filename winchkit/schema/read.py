@@ -24,6 +24,7 @@ from winchkit.schema.profiles.sizing import SizeSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme
 from winchkit.schema.reading import bench as benches
+from winchkit.schema.reading import robot as robots
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.parts import Reading
 from winchkit.schema.reading.source import open_source
@@ -399,44 +400,7 @@ def _axis(reading: Reading, tree: dict[str, Any]) -> AxisProfile | None:
 
 
 def _robot(reading: Reading, tree: dict[str, Any]) -> RobotProfile | None:
-    tree = {"name": reading.stem, **tree}
-    if "effect" in tree:
-        tree["effect"] = reading.effects(tree["effect"])
-    if isinstance(prior := tree.get("prior"), dict):
-        tree["prior"] = {
-            name: {"std": value} if isinstance(value, str) else value
-            for name, value in prior.items()
-        }
-    if isinstance(lines := tree.get("line"), list):
-        tree["line"] = [_line(reading, raw, ("line", n)) for n, raw in enumerate(lines)]
-    return reading.table(RobotProfile, tree)
-
-
-def _line(reading: Reading, raw: object, at: Key) -> object:
-    """A line with its winch's profile in place of a name or a table."""
-    if not isinstance(raw, dict) or "winch" not in raw:
-        return raw
-    winch, place = raw["winch"], (*at, "winch")
-    if isinstance(winch, dict):
-        profile = reading.winch(winch, str(raw.get("name", "")), place)
-    elif isinstance(winch, str):
-        profile = _named_winch(reading, winch, place)
-    else:
-        profile = None
-        reading.fault(place, f"expected the name of a winch or its tables, not {winch!r}")
-    # The faults of a winch are noted above and not reported a second time.
-    return {**raw, "winch": profile or str(winch)}
-
-
-def _named_winch(reading: Reading, name: str, at: Key) -> WinchProfile | None:
-    path = reading.shipped("profiles", name, at)
-    if path is None:
-        return None
-    try:
-        return read_profile(path)
-    except FileError as error:
-        reading.faults += error.faults
-        return None
+    return robots.robot(reading, tree, read_winch)
 
 
 def _bench(reading: Reading, tree: dict[str, Any]) -> BenchSpec | None:

@@ -142,7 +142,7 @@ def test_the_owner_refuses_the_form_of_an_earlier_client(rig: Rig) -> None:
             ("move", (None, 0.02)),
         ):
             with pytest.raises(UsageError, match="a number without a name"):
-                station._call(operation, "A", *sent)
+                station._requests.call(operation, "A", *sent)
         assert not bench.winch["A"].moving
 
 

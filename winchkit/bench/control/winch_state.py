@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
+from winchkit.bench.control.axis_port import AxisPort
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.controller import AxisPort, Controller
+from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
 from winchkit.bench.control.observation import Instrumented, WinchInput
 from winchkit.bench.control.snapshot import Phase, WinchSnapshot

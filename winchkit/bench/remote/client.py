@@ -2,34 +2,27 @@
 
 from __future__ import annotations
 
-import json
 import socket
-import threading
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Self
 
 from winchkit.bench.control.dead_man import DEAD_MAN
 from winchkit.bench.direction import no_positional
 from winchkit.bench.ownership import connect_to_owner
 from winchkit.bench.remote.identity import client_name
+from winchkit.bench.remote.requests import OwnerGone, Requests
 from winchkit.drivers.clock import Clock, MonotonicClock
-from winchkit.errors import ConnectionLost, error_of
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
     from winchkit.drivers.can.tools.scan import Found
 
-__all__ = ["OwnerGone", "RemoteCells", "RemoteStation", "attach"]
+__all__ = ["RemoteCells", "RemoteStation", "attach"]
 
 _ANSWER_TIME = 10.0
 """s: longer than the longest answer without a motion, a reset of several drives (some seconds)."""
 _CELL_TIME = 20.0
 """Longer than any command to an instrument with the readings before and after it, s."""
-
-
-class OwnerGone(ConnectionLost):
-    """The process that owned the bench has ended, or does not answer any more."""
 
 
 def attach(
@@ -67,17 +60,11 @@ class RemoteStation:
         observer: bool = False,
     ) -> None:
         """Take a place at the owner; raises ConnectionLost where it accepts no client."""
-        connection.settimeout(patience)
-        self._patience = patience
-        self._connection = connection
-        self._stream = connection.makefile("rwb")
-        self._lock = threading.Lock()
-        self._gone = False
-        self._requests = 0
+        self._requests = Requests(connection, patience)
         try:
-            reply = self._call("introduce", name or client_name(), observer)
+            reply = self._requests.call("introduce", name or client_name(), observer)
         except BaseException:
-            self._hang_up()
+            self._requests.hang_up()
             raise
         self.owner = str(reply["owner"])
         """Name of the process that owns the bench."""
@@ -94,7 +81,7 @@ class RemoteStation:
 
     def hand_over(self) -> str:
         """Ask the owner to end for this client's sake; raises NotPermitted where it does not."""
-        return str(self._call("hand_over"))
+        return str(self._requests.call("hand_over"))
 
     def take_over(self, winch: str | None) -> None:
         """Command a winch that another client commands.
@@ -104,7 +91,7 @@ class RemoteStation:
         winch : str or None
             Winch, "all", or None for the only one.
         """
-        self._call("take_over", winch)
+        self._requests.call("take_over", winch)
 
     @property
     def clock(self) -> Clock:
@@ -113,11 +100,11 @@ class RemoteStation:
 
     def names(self) -> list[str]:
         """Winches there are."""
-        return [str(name) for name in self._call("names")]
+        return [str(name) for name in self._requests.call("names")]
 
     def status(self) -> dict[str, Any]:
         """Newest snapshot as JSON has it."""
-        return dict(self._call("status"))
+        return dict(self._requests.call("status"))
 
     def jog(
         self,
@@ -141,7 +128,7 @@ class RemoteStation:
             Time of motion without another call, s, at most 1.
         """
         no_positional("jog", "m/s", unnamed)
-        self._call("jog", winch, pay_out=pay_out, wind_in=wind_in, hold=hold)
+        self._requests.call("jog", winch, pay_out=pay_out, wind_in=wind_in, hold=hold)
 
     def release(self, winch: str | None) -> None:
         """End a jog by a ramp now, instead of when its ``hold`` is over.
@@ -151,7 +138,7 @@ class RemoteStation:
         winch : str or None
             Winch; None for the only one.
         """
-        self._call("release", winch)
+        self._requests.call("release", winch)
 
     def step(
         self,
@@ -175,7 +162,7 @@ class RemoteStation:
             m/s; by default the limit of the winch.
         """
         no_positional("step", "m", unnamed)
-        self._call("step", winch, pay_out=pay_out, wind_in=wind_in, speed=speed)
+        self._requests.call("step", winch, pay_out=pay_out, wind_in=wind_in, speed=speed)
 
     def move(
         self,
@@ -203,7 +190,7 @@ class RemoteStation:
             m/s and m/s²; by default the limits of the winch.
         """
         no_positional("move", "m", unnamed)
-        self._call(
+        self._requests.call(
             "move",
             winch,
             to=to,
@@ -231,11 +218,11 @@ class RemoteStation:
         speed, acceleration : float, optional
             m/s and m/s²; by default the limits of the bench's ``[robot]``.
         """
-        self._call("move_pose", dict(change), relative, speed, acceleration)
+        self._requests.call("move_pose", dict(change), relative, speed, acceleration)
 
     def pose(self) -> dict[str, float]:
         """Pose of the platform by the motor angles: x, y, z (m), roll, pitch, yaw (rad)."""
-        return dict(self._call("pose"))
+        return dict(self._requests.call("pose"))
 
     def hold_tension(
         self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
@@ -254,7 +241,7 @@ class RemoteStation:
             ``travel`` of cable either way, m, largest ``speed``, m/s, and upper bound of the
             ``stiffness``, N/m, as of ``Winch.hold_tension``; each may be left out.
         """
-        self._call("hold_tension", winch, tension, hold, dict(bounds))
+        self._requests.call("hold_tension", winch, tension, hold, dict(bounds))
 
     def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
         """Bytes of an object of a drive.
@@ -271,7 +258,7 @@ class RemoteStation:
         bytes or None
             Its value, little-endian; None for an object that the drive lacks.
         """
-        found = self._call("read_object", winch, index, sub)
+        found = self._requests.call("read_object", winch, index, sub)
         return None if found is None else bytes.fromhex(found)
 
     def scan(self) -> list[Found]:
@@ -281,7 +268,7 @@ class RemoteStation:
 
         return [
             Found(**{**item, "identity": Identity(**item["identity"])})
-            for item in self._call("scanned")
+            for item in self._requests.call("scanned")
         ]
 
     def moving(self, winch: str | None) -> bool:
@@ -297,7 +284,7 @@ class RemoteStation:
         bool
             Whether a motion is under way; raises what stopped it.
         """
-        return bool(self._call("moving", winch))
+        return bool(self._requests.call("moving", winch))
 
     def home(
         self, winch: str | None, method: int | None, at: float | None, speed: float | None
@@ -315,19 +302,19 @@ class RemoteStation:
         speed : float or None
             Speed of the search, m/s.
         """
-        self._call("home", winch, method, at, speed)
+        self._requests.call("home", winch, method, at, speed)
 
     def homing(self) -> bool:
         """Whether the homing is under way."""
-        return bool(self._call("homing"))
+        return bool(self._requests.call("homing"))
 
     def stop(self) -> None:
         """Quick-stop every winch."""
-        self._call("stop")
+        self._requests.call("stop")
 
     def reset(self) -> list[str]:
         """Clear trips and faults; returns what was cleared, in words."""
-        return [str(item) for item in self._call("reset")]
+        return [str(item) for item in self._requests.call("reset")]
 
     def tare(self, winch: str | None) -> float:
         """Tare a load cell.
@@ -342,7 +329,7 @@ class RemoteStation:
         float
             Tension after it, N.
         """
-        return float(self._call("tare", winch))
+        return float(self._requests.call("tare", winch))
 
     def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
         """Log to a file in the owner's process.
@@ -356,19 +343,19 @@ class RemoteStation:
         replace : bool
             Remove an earlier log of that name.
         """
-        self._call("start_log", path, rotate, replace)
+        self._requests.call("start_log", path, rotate, replace)
 
     def log_rows(self) -> int:
         """Rows written so far."""
-        return int(self._call("log_rows"))
+        return int(self._requests.call("log_rows"))
 
     def end_log(self) -> int:
         """Finish the log."""
-        return int(self._call("end_log"))
+        return int(self._requests.call("end_log"))
 
     def counters(self) -> dict[str, dict[str, Any]]:
         """Counts by instrument, and of the log."""
-        return dict(self._call("counters"))
+        return dict(self._requests.call("counters"))
 
     def trip_history(self) -> dict[str, Any] | None:
         """The cycles around the trip that is not reset yet; None without one.
@@ -381,7 +368,7 @@ class RemoteStation:
             angle, velocity and torque, tension, load, length of its instrument, cable length and
             speed of the drive, and commanded speed by winch, SI; ``events``: time and words.
         """
-        found = self._call("trip_history")
+        found = self._requests.call("trip_history")
         return None if found is None else dict(found)
 
     def frames(self) -> dict[str, dict[str, Any]]:
@@ -393,7 +380,7 @@ class RemoteStation:
             ``newest``: number, time (s), identifier and bytes in hexadecimal of each identifier's
             newest frame; ``last``: time, identifier and bytes of the last 200 frames.
         """
-        return dict(self._call("frames"))
+        return dict(self._requests.call("frames"))
 
     def start_programme(
         self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
@@ -411,7 +398,7 @@ class RemoteStation:
         replace : bool
             Write over earlier runs of a programme of this name.
         """
-        self._call("start_programme", path, folder, suffix, replace)
+        self._requests.call("start_programme", path, folder, suffix, replace)
 
     def programme(self) -> dict[str, Any] | None:
         """Where this station's programme is; None where it started none.
@@ -421,16 +408,16 @@ class RemoteStation:
         dict or None
             As of ``winchkit.bench.remote.programme_run.ProgrammeRun.state``.
         """
-        found = self._call("programme")
+        found = self._requests.call("programme")
         return None if found is None else dict(found)
 
     def answer_programme(self) -> None:
         """Answer the programme's request as done; raises UsageError where there is no request."""
-        self._call("answer_programme")
+        self._requests.call("answer_programme")
 
     def end_programme(self) -> None:
         """End this station's programme by a ramp; returns at rest."""
-        self._call("end_programme")
+        self._requests.call("end_programme")
 
     def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
         """Something with an instrument, e.g. "zero"; ``arguments`` are times (s), or words.
@@ -450,11 +437,8 @@ class RemoteStation:
             Result of the task, as JSON has it.
         """
         watched = sum(item for item in arguments if isinstance(item, float))
-        self._connection.settimeout(_CELL_TIME + 3 * watched)
-        try:
-            return dict(self._call("cell", task, name, *arguments))
-        finally:
-            self._connection.settimeout(self._patience)
+        patience = _CELL_TIME + 3 * watched
+        return dict(self._requests.call("cell", task, name, *arguments, patience=patience))
 
     def close(self) -> None:
         """Leave; returns when what was started here has ended and stands still.
@@ -462,63 +446,12 @@ class RemoteStation:
         Raises MotionError where it does not come to rest. Twice does no harm.
         """
         try:
-            if not self._gone:
-                self._call("leave")
+            if not self._requests.gone:
+                self._requests.call("leave")
         except OwnerGone:
             pass  # it stops everything when it ends
         finally:
-            self._hang_up()
-
-    def _hang_up(self) -> None:
-        with self._lock:
-            self._gone = True
-            with suppress(OSError):
-                self._stream.close()
-            self._connection.close()
-
-    def _call(self, operation: str, *arguments: Any, **named: Any) -> Any:
-        with self._lock:
-            if self._gone:
-                raise OwnerGone("this station at the bench was left; attach again")
-            answer = self._exchange(operation, arguments, named)
-        if "error" in answer:
-            raise error_of(answer["error"], answer["message"])
-        return answer["ok"]
-
-    def _exchange(
-        self, operation: str, arguments: Sequence[Any], named: Mapping[str, Any]
-    ) -> dict[str, Any]:
-        """Send a request, and wait for the answer with its number; raises OwnerGone.
-
-        Ctrl-C may interrupt it at any instruction. The answers to requests that were interrupted,
-        whole or the rest of one, come before the one with the number, and are passed over.
-        """
-        self._requests += 1
-        number = self._requests
-        request = {"id": number, "op": operation, "args": arguments, "named": named}
-        try:
-            self._stream.write(json.dumps(request).encode() + b"\n")
-            self._stream.flush()
-            while line := self._stream.readline():
-                answer = _answer(line)
-                if answer.get("id") == number:
-                    return answer
-        except ConnectionError:
-            pass
-        except (OSError, ValueError) as error:
-            self._gone = True
-            raise OwnerGone(f"the bench's owner does not answer: {error}") from error
-        self._gone = True
-        raise OwnerGone("the process that owned the bench has ended; its drives stop") from None
-
-
-def _answer(line: bytes) -> dict[str, Any]:
-    """An answer of the owner; empty for the rest of one whose beginning was lost."""
-    try:
-        answer = json.loads(line)
-    except ValueError:
-        return {}
-    return answer if isinstance(answer, dict) else {}
+            self._requests.hang_up()
 
 
 class RemoteCells:

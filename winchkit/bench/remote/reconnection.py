@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from winchkit.bench.remote.client import OwnerGone
+from winchkit.bench.remote.requests import OwnerGone
 from winchkit.bench.remote.session import at_station
 
 if TYPE_CHECKING:

@@ -1,0 +1,99 @@
+"""Requests of a station to the process that owns the bench, and their answers."""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+from winchkit.errors import ConnectionLost, error_of
+
+__all__ = ["OwnerGone", "Requests"]
+
+
+class OwnerGone(ConnectionLost):
+    """The process that owned the bench has ended, or does not answer any more."""
+
+
+class Requests:
+    """One request after another over a socket, each with the answer of its number.
+
+    Parameters
+    ----------
+    connection : socket
+        To the owner.
+    patience : float
+        Time to wait for an answer, s.
+    """
+
+    def __init__(self, connection: socket.socket, patience: float) -> None:
+        connection.settimeout(patience)
+        self._patience = patience
+        self._connection = connection
+        self._stream = connection.makefile("rwb")
+        self._lock = threading.Lock()
+        self._number = 0
+        self.gone = False
+        """Whether the owner has ended or the station was left."""
+
+    def call(
+        self, operation: str, *arguments: Any, patience: float | None = None, **named: Any
+    ) -> Any:
+        """The owner's answer to an operation.
+
+        Raises the owner's error, or OwnerGone; another ``patience`` (s) holds for this call.
+        """
+        with self._lock:
+            if self.gone:
+                raise OwnerGone("this station at the bench was left; attach again")
+            self._connection.settimeout(self._patience if patience is None else patience)
+            answer = self._exchange(operation, arguments, named)
+        if "error" in answer:
+            raise error_of(answer["error"], answer["message"])
+        return answer["ok"]
+
+    def hang_up(self) -> None:
+        """Close the connection; twice does no harm."""
+        with self._lock:
+            self.gone = True
+            with suppress(OSError):
+                self._stream.close()
+            self._connection.close()
+
+    def _exchange(
+        self, operation: str, arguments: Sequence[Any], named: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Send a request, and wait for the answer with its number; raises OwnerGone.
+
+        Ctrl-C may interrupt it at any instruction. The answers to requests that were interrupted,
+        whole or the rest of one, come before the one with the number, and are passed over.
+        """
+        self._number += 1
+        number = self._number
+        request = {"id": number, "op": operation, "args": arguments, "named": named}
+        try:
+            self._stream.write(json.dumps(request).encode() + b"\n")
+            self._stream.flush()
+            while line := self._stream.readline():
+                answer = _answer(line)
+                if answer.get("id") == number:
+                    return answer
+        except ConnectionError:
+            pass
+        except (OSError, ValueError) as error:
+            self.gone = True
+            raise OwnerGone(f"the bench's owner does not answer: {error}") from error
+        self.gone = True
+        raise OwnerGone("the process that owned the bench has ended; its drives stop") from None
+
+
+def _answer(line: bytes) -> dict[str, Any]:
+    """An answer of the owner; empty for the rest of one whose beginning was lost."""
+    try:
+        answer = json.loads(line)
+    except ValueError:
+        return {}
+    return answer if isinstance(answer, dict) else {}
