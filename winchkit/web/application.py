@@ -1,47 +1,37 @@
-"""Routes of the page, and what they refuse.
-
-Everything but the page's own files needs the token of the URL. Requests of other origins, under
-other host names, too large or malformed are refused; the content security policy forbids
-everything that does not come from this server.
-
-References
-----------
-W3C (2024). Content Security Policy Level 3. OWASP: Cross-Site WebSocket Hijacking.
-"""
+"""Routes of the page. Requests that are too large or malformed are refused."""
 
 from __future__ import annotations
 
 import asyncio
 import json
-import secrets
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import parse_qsl, unquote, urlsplit
+from urllib.parse import unquote
 
 from starlette.applications import Starlette
 from starlette.middleware import Middleware
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from winchkit.catalog import names
 from winchkit.errors import UsageError, WinchkitError
 from winchkit.version import __version__
 from winchkit.web.foreign import is_run, preview
+from winchkit.web.guard import Guard
 from winchkit.web.library.fleet import Fleet
 from winchkit.web.library.runs import Library
 from winchkit.web.robot import RobotWork, is_robot
 from winchkit.web.workspace import Workspace
 
 if TYPE_CHECKING:
-    from winchkit.web.bench import BenchView
+    from winchkit.web.bench.view import BenchView
 
-__all__ = ["Guard", "application", "open_robot"]
+__all__ = ["application", "open_robot"]
 
 _STATIC = Path(__file__).parent / "static"
 _LARGEST_FILE = 400_000_000
@@ -50,75 +40,6 @@ _MOST_POINTS = 8000
 """Points of a curve: two per pixel of a screen of 4000."""
 _LARGEST_MESSAGE = 64_000
 """Bytes of a message that orders something."""
-_POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
-    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-)
-_HEADERS = {
-    "content-security-policy": _POLICY,
-    "x-content-type-options": "nosniff",
-    "referrer-policy": "no-referrer",
-    "cache-control": "no-store",
-    "cross-origin-opener-policy": "same-origin",
-    "cross-origin-resource-policy": "same-origin",
-}
-_HOSTS = {"127.0.0.1", "localhost", "[::1]"}
-
-
-class Guard:
-    """Refuses foreign hosts, foreign origins and missing tokens, and sets the headers.
-
-    Parameters
-    ----------
-    app : ASGI application
-        What answers the permitted requests.
-    token : str
-        Token of the URL.
-    """
-
-    def __init__(self, app: ASGIApp, token: str) -> None:
-        self.app = app
-        self.token = token
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, or refuse it with 403."""
-        if scope["type"] not in {"http", "websocket"}:
-            await self.app(scope, receive, send)
-            return
-        refusal = self._refusal(scope)
-        if refusal and scope["type"] == "websocket":
-            await send({"type": "websocket.close", "code": 1008, "reason": refusal})
-            return
-
-        async def with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                present = list(message.get("headers", []))
-                present += [(k.encode(), v.encode()) for k, v in _HEADERS.items()]
-                message = {**message, "headers": present}
-            await send(message)
-
-        if refusal:
-            await PlainTextResponse(refusal, 403)(scope, receive, with_headers)
-            return
-        await self.app(scope, receive, with_headers)
-
-    def _refusal(self, scope: Scope) -> str:
-        headers = {
-            key.decode("latin-1"): value.decode("latin-1") for key, value in scope["headers"]
-        }
-        host = headers.get("host", "")
-        if _without_port(host) not in _HOSTS:
-            return "this page answers on the loopback address only"
-        origin = headers.get("origin")
-        if origin is not None and urlsplit(origin).netloc != host:
-            return "the request comes from another page"
-        if not scope["path"].startswith(("/api/", "/live")):
-            return ""
-        query = dict(parse_qsl(scope.get("query_string", b"").decode("latin-1")))
-        given = headers.get("x-winchkit-token") or query.get("token") or ""
-        if not secrets.compare_digest(given.encode(), self.token.encode()):
-            return "the token is missing or wrong; open the URL that 'winchkit serve' printed"
-        return ""
 
 
 def application(
@@ -506,7 +427,3 @@ async def _until_closed(socket: WebSocket) -> None:
 def _attachment(text: str, name: str, media: str) -> Response:
     headers = {"content-disposition": f'attachment; filename="{name}"'}
     return Response(text, media_type=media, headers=headers)
-
-
-def _without_port(host: str) -> str:
-    return host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host

@@ -91,7 +91,7 @@ def serve(
         stack.callback(workspace.close)
         view = None
         if bench is not None or sim is not None:
-            from winchkit.web.bench import BenchView
+            from winchkit.web.bench.view import BenchView
             from winchkit.web.simulated import simulated_bench
 
             if sim is not None:

@@ -14,8 +14,10 @@ from typing import Any
 
 import pytest
 
-from winchkit.bench.remote import client
+from winchkit.bench.remote import client, requests
 from winchkit.bench.remote.client import RemoteStation
+
+CLIENT = {client.__file__, requests.__file__}
 
 
 class Owner(threading.Thread):
@@ -46,7 +48,7 @@ class Owner(threading.Thread):
 class Interrupts:
     """Raises Ctrl-C at one of the points at which the interpreter looks for signals.
 
-    These are the beginnings and ends of calls; those of the client's module count.
+    These are the beginnings and ends of calls; those of the client's modules count.
     """
 
     def __init__(self, point: int) -> None:
@@ -54,7 +56,7 @@ class Interrupts:
         self.came = False
 
     def __call__(self, frame: FrameType, event: str, _argument: object) -> None:
-        if frame.f_code.co_filename != client.__file__ or event == "c_call":
+        if frame.f_code.co_filename not in CLIENT or event == "c_call":
             return
         self.left -= 1
         if self.left < 0 and not self.came:

@@ -212,7 +212,7 @@ def _answers(options: Mapping[str, Any]) -> Answers:
     """Answers of the command line in SI; raises UsageError."""
     from winchkit.runs.importing.answers import CONSTANTS, Answers, read_column, read_constant
 
-    constants = {
+    constants: dict[str, Any] = {
         key: read_constant(key, str(options[key])) for key in CONSTANTS if options[key] is not None
     }
     try:
@@ -225,11 +225,7 @@ def _answers(options: Mapping[str, Any]) -> Answers:
         axis=options["axis"],
         unsigned=tuple(options["unsigned"]),
     )
-    return _with(own, **constants)
-
-
-def _with(answers: Answers, **constants: Any) -> Answers:
-    return replace(answers, **constants)
+    return replace(own, **constants)
 
 
 def _masses(texts: Sequence[str], count: int) -> list[str | None]:

@@ -19,12 +19,11 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Coarse, Folds, Regression
 from winchkit.diagnosis.regression.gls import CoarseProblem, Fit, Target, fit, fit_from
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.diagnosis.selection.admissible import admissible, best_of_each
 from winchkit.diagnosis.selection.initial_states import explained_by_initial_states
+from winchkit.diagnosis.selection.minor_orders import significant_orders
 from winchkit.diagnosis.selection.pairs import Pair, screened_pairs
 from winchkit.diagnosis.selection.scores import Projected, Score, score
 from winchkit.diagnosis.selection.signatures import Signatures, signatures, updated_signatures
@@ -35,7 +34,7 @@ from winchkit.diagnosis.selection.starting_values import (
 )
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
-from winchkit.effects.series import harmonic_series, single_orders
+from winchkit.effects.series import harmonic_series
 from winchkit.effects.term import Term
 
 __all__ = ["LastValue", "SelectionEngine", "Trial"]
@@ -412,37 +411,9 @@ class SelectionEngine(ABC):
         return starts + [one for start in starts for one in self._without_discretization(start)]
 
     def without_minor_orders(self, fitted: Fit, noise: Noise) -> Fit:
-        """A fit without the orders of its series that decrease χ² by less than their penalty.
-
-        Notes
-        -----
-        Wald statistic of the cosine and sine amplitudes of each order. Orders that were added
-        before another effect may have explained a part of it.
-        """
-        hypothesis = fitted.hypothesis
-        series = [i for i, term in enumerate(hypothesis.terms) if term.effect.single is not None]
-        if not series:
-            return fitted
-        covariance = inverse_normal(whitened_jacobian(self.regression, fitted, noise))
-        dropped = False
-        for index in series:
-            term = hypothesis.terms[index]
-            own = np.flatnonzero(self.regression.unknowns_of(index, fitted.hypothesis))
-            singles = [single for single, _ in single_orders(term)]
-            pairs = own.reshape(len(singles), -1)
-            least = self.penalty_per_parameter * Coordinates(singles[0].effect).n_parameters
-            kept = [
-                single
-                for single, pair in zip(singles, pairs, strict=True)
-                if fitted.vector[pair]
-                @ np.linalg.pinv(covariance[np.ix_(pair, pair)], hermitian=True)
-                @ fitted.vector[pair]
-                >= least
-            ]
-            if kept and len(kept) < len(singles):
-                hypothesis = hypothesis.with_term_at(index, harmonic_series(kept))
-                dropped = True
-        return self.refit(hypothesis, noise) if dropped else fitted
+        """A fit without the orders of its series that decrease χ² by less than their penalty."""
+        kept = significant_orders(self.regression, fitted, noise, self.penalty_per_parameter)
+        return fitted if kept is fitted.hypothesis else self.refit(kept, noise)
 
     def _without_discretization(self, start: Hypothesis) -> list[Hypothesis]:
         """The same start with a zero discretisation correction, where hysteresis is added.

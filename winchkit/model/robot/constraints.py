@@ -46,7 +46,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.drum import Archimedean, Grooved, Spiral, Squared, drum_of
@@ -335,7 +334,7 @@ def rotation_residual(turned: Array, angles: Array) -> Array:
     (p, 3) array
         rad.
     """
-    whole = _whole(angles)
+    whole = np.all(np.isfinite(angles), axis=1)
     out = wrapped(angles_of(turned) - angles)
     seen = np.swapaxes(rotation_of(*angles[whole].T), 1, 2)
     out[whole] = rotation_vector(turned[whole] @ seen)
@@ -359,7 +358,7 @@ def rotation_by_pose(turned: Array, angles: Array) -> Array:
     """
     out = np.zeros((len(turned), 3, 6))
     out[..., 3:] = angle_rates(turned)
-    out[_whole(angles), :, 3:] = np.eye(3)
+    out[np.all(np.isfinite(angles), axis=1), :, 3:] = np.eye(3)
     return out
 
 
@@ -497,7 +496,3 @@ def by_geometry(by: Sensitivities) -> dict[str, Array]:
         "anchor_point": by.anchor_point,
         "swivel_radius": by.swivel_radius,
     }
-
-
-def _whole(angles: Array) -> NDArray[np.bool_]:
-    return np.asarray(np.all(np.isfinite(angles), axis=1))

@@ -25,13 +25,13 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.programme import Programme, Step, write_programme
 from winchkit.schema.read import read_simbench
 from winchkit.web.application import _refused
-from winchkit.web.bench import BenchView
-from winchkit.web.browser import Browser, Inbox
-from winchkit.web.drive_objects import drive_objects, drive_settings, write_setting
-from winchkit.web.frames import FrameWords
-from winchkit.web.live_model import CHANNELS, LiveModel
-from winchkit.web.programmes import Programmes
-from winchkit.web.trip_file import trip_file
+from winchkit.web.bench.browser import Browser, Inbox
+from winchkit.web.bench.drive_objects import drive_objects, drive_settings, write_setting
+from winchkit.web.bench.frames import FrameWords
+from winchkit.web.bench.live_model import CHANNELS, LiveModel
+from winchkit.web.bench.programmes import Programmes
+from winchkit.web.bench.trip_file import trip_file
+from winchkit.web.bench.view import BenchView
 
 
 def taken(inbox: Inbox) -> list[dict[str, Any]]:

@@ -18,7 +18,7 @@ from winchkit.bench.direction import directed
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.errors import UsageError, WinchkitError
 from winchkit.schema.bench import BenchSpec
-from winchkit.web.programmes import Programmes
+from winchkit.web.bench.programmes import Programmes
 
 __all__ = ["Browser", "Inbox", "counting", "received"]
 

@@ -30,13 +30,18 @@ from winchkit.bench.remote.session import attach
 from winchkit.catalog import find
 from winchkit.errors import ConnectionLost, UsageError, WinchkitError
 from winchkit.schema.read import read_bench
-from winchkit.web.browser import Browser, counting, received
-from winchkit.web.drive_objects import drive_objects, drive_settings, read_setting, write_setting
-from winchkit.web.frames import FrameWords
-from winchkit.web.live_model import CHANNELS, LiveModel
-from winchkit.web.live_robot import LiveRobot
-from winchkit.web.programmes import Programmes
-from winchkit.web.trip_file import trip_file
+from winchkit.web.bench.browser import Browser, counting, received
+from winchkit.web.bench.drive_objects import (
+    drive_objects,
+    drive_settings,
+    read_setting,
+    write_setting,
+)
+from winchkit.web.bench.frames import FrameWords
+from winchkit.web.bench.live_model import CHANNELS, LiveModel
+from winchkit.web.bench.live_robot import LiveRobot
+from winchkit.web.bench.programmes import Programmes
+from winchkit.web.bench.trip_file import trip_file
 
 __all__ = ["BenchView"]
 
