@@ -15,7 +15,7 @@ from campaign.answers import keep, kept
 from campaign.bench import Bench, draw_bench
 from campaign.identifiable import RATIO, identity
 from campaign.likelihood import gram, least_along, without
-from campaign.logger_case import LoggerPlan, make_logger_case, run_logger_cases
+from campaign.logger_case import LoggerPlan, answer, make_logger_case, run_logger_cases
 from campaign.logger_score import LoggerScore, clopper_pearson, logger_summary
 from campaign.loggers import FAULTS, MISREAD, Fault, fault_of
 from campaign.record import AR, Recording, recordings
@@ -284,3 +284,13 @@ def test_scores_of_every_campaign_are_read_from_their_log(tmp_path: Path) -> Non
     path.unlink()
     keep(several, path)
     assert kept(path, SeveralScore.read) == {4: several}
+
+
+@pytest.mark.slow
+def test_a_ripple_that_is_sampled_a_few_times_per_period_keeps_its_name(tmp_path: Path) -> None:
+    """Two fast runs: the derivatives of the effect are too small there, which is known."""
+    case = make_logger_case(26112700321, LoggerPlan(1.0), tmp_path)
+    assert case is not None
+    assert list(case.hidden) == ["gear-transmission-error"]
+    found = answer(case)
+    assert (found.verdict, found.steps) == ("explained", (("gear-transmission-error",),))

@@ -101,7 +101,8 @@ class Dataset:
     sanity: tuple[Finding, ...] = ()
     """Findings on the runs as recorded."""
     resolution: Mapping[str, float] = field(default_factory=dict)
-    """Resolution (quantisation step) of every output at the full rate, rms over the runs, SI."""
+    """Resolution (quantisation step) of every output and of the load at the full rate, rms over the
+    runs, SI."""
     zeroed_anew: frozenset[str] = frozenset()
     """Outputs whose instrument has another offset in every run."""
     decimation_factor: int = 1

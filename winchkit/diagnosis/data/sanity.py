@@ -39,12 +39,12 @@ def caveats(found: Sequence[Finding]) -> tuple[str, ...]:
 
 
 def resolutions(inspected: Sequence[Inspection]) -> dict[str, float]:
-    """Resolution of every output, rms over the runs that have it, SI."""
+    """Resolution of every output and of the load, rms over the runs that have it, SI."""
     out = {}
-    for output in OUTPUTS:
-        squares = [one.resolutions[output] ** 2 for one in inspected if output in one.run]
+    for name in (*OUTPUTS, "load"):
+        squares = [one.resolutions[name] ** 2 for one in inspected if name in one.run]
         if squares:
-            out[output] = float(np.sqrt(np.mean(squares)))
+            out[name] = float(np.sqrt(np.mean(squares)))
     return out
 
 

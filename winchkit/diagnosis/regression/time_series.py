@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.data.instrument_rounding import RoundingError, rounding_errors
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.requirements import excites, missing_needs
-from winchkit.diagnosis.data.rounding import mean_error, noise_before_rounding
 from winchkit.diagnosis.data.spectrum import (
     WHOLE_TRANSITION,
     band_edges,
@@ -36,7 +36,6 @@ from winchkit.diagnosis.regression.prediction_cache import Predictor, masked
 from winchkit.effects.effect import Effect
 from winchkit.model.line import Line
 from winchkit.model.stages import At, Stage
-from winchkit.runs.sanity.local_noise import local_noise
 
 __all__ = ["TimeSeriesRegression"]
 
@@ -108,36 +107,30 @@ class TimeSeriesRegression(Regression):
         for segment in self.segments:
             bands = self.band_of_row[segment.rows]
             np.add.at(count, bands, 1.0)
-            found = self.rounding_error(segment)
-            if found is None:
-                continue
-            shared, white = found
             valid = self.dataset.recordings[segment.run].valid[segment.output]
-            own = white * float(np.mean(valid)) * segment.band.gain**2
-            own = own + repeats.get(segment.run, 1) * np.sum(shared**2, axis=0)
+            measured = float(np.mean(valid)) * segment.band.gain**2
+            own = np.zeros(len(bands))
+            for error in self.rounding_errors(segment):
+                shared = np.sum(error.components**2, axis=0)
+                own += error.white * measured + repeats.get(segment.run, 1) * shared
             np.add.at(power, bands, own / self.dataset.decimation_factor)
         return power / np.maximum(count, 1.0)
 
-    def rounding_error(self, segment: Segment) -> tuple[Array, float] | None:
-        """Rounding error of a segment; None where its instrument has no known resolution.
+    def rounding_errors(self, segment: Segment) -> list[RoundingError]:
+        """Rounding errors in a segment, of its instrument and of a measured input, at its rows.
 
-        Returns
-        -------
-        components : ndarray of shape (2 × harmonics, n_rows of the segment)
-            Cosine, then sine components of the harmonics of its mean, see
-            :func:`~winchkit.diagnosis.data.rounding.mean_error`.
-        white : float
-            Variance of the rest in time.
+        The variance ``white`` is that in time.
         """
-        step = self.dataset.resolution.get(segment.output, 0.0)
-        if not step:
-            return None
         recording = self.dataset.recordings[segment.run]
-        measured = recording.measured[segment.output]
-        predicted = recording.nominal_smooth[segment.output]
-        after = min(local_noise(measured), local_noise(measured - predicted))
-        shared, white = mean_error(predicted, step, noise_before_rounding(after, step))
-        return np.array([self._masked(segment, component) for component in shared]), white
+        found = rounding_errors(
+            self.dataset.profile, recording, segment.output, self.dataset.resolution
+        )
+        return [
+            replace(
+                one, components=np.array([self._masked(segment, each) for each in one.components])
+            )
+            for one in found
+        ]
 
     @property
     def n_observations(self) -> int:

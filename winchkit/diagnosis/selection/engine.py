@@ -164,6 +164,10 @@ class SelectionEngine(ABC):
     def _test_lack_of_fit(self, present: Fit, noise: Noise) -> LackOfFitTest:
         """F test of the residual against the noise, band by band."""
 
+    def discretization_power(self, fitted: Fit, noise: Noise) -> dict[str, float]:
+        """Mean square of what the discretisation error explains of each output; zero by default."""
+        return dict.fromkeys(noise.rms, 0.0)
+
     @property
     def coarse(self) -> Coarse | None:
         """Coarse regression; None where there is none."""

@@ -99,6 +99,24 @@ class TimeSeriesSelection(SelectionEngine):
         )
         return lack_of_fit_test(self.regression, left, present.jacobian, noise)
 
+    def discretization_power(self, fitted: Fit, noise: Noise) -> dict[str, float]:
+        """Decrease of each output's mean square without the discretisation error."""
+        regression = self.regression
+        left = without_discretization_error(regression, fitted, noise.inverse_sigma(regression))
+        explained = fitted.residual**2 - left**2
+        return {
+            output: max(
+                0.0,
+                sum(
+                    float(np.sum(explained[s.rows]))
+                    for s in regression.segments
+                    if s.output == output
+                )
+                / regression.n_samples(output),
+            )
+            for output in regression.outputs
+        }
+
     def _new_orders(self, present: Hypothesis) -> bool:
         """Extend the grids of effects with an order by the significant orders of the residual.
 

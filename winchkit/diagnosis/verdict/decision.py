@@ -145,6 +145,11 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
         for rms in held_out_errors
     ]
     share = excess[1] / excess[0] if excess[0] > 0 else 0.0
+    if share > _HELD_OUT_SHARE:
+        # The lack-of-fit test leaves the discretisation error out, and so does this share.
+        discretized = engine.discretization_power(result.final, result.noise)
+        known = sum(discretized[o] / noise**2 for o, noise in result.noise.rms.items())
+        share = max(0.0, excess[1] - known) / excess[0]
     if result.noise.from_repeats:
         # Both in units of the final noise, so that a re-estimated noise does not shift the share.
         scale = result.initial_noise.power / result.noise.power

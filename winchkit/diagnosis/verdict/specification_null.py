@@ -161,12 +161,11 @@ class _Design:
         return np.asarray(out)
 
     def _add_rounding(self, products: dict[str, Array], segment: Segment, columns: Array) -> None:
-        """Add a segment's inner products of columns and mean rounding error to its output's."""
-        found = self._regression.rounding_error(segment)
-        if found is not None:
-            components = found[0] * self._partial.inverse_sigma[segment.rows]
+        """Add a segment's inner products of columns and mean rounding errors by instrument."""
+        for error in self._regression.rounding_errors(segment):
+            components = error.components * self._partial.inverse_sigma[segment.rows]
             own = columns.T @ components.T
-            products[segment.output] = products.get(segment.output, 0.0) + own
+            products[error.instrument] = products.get(error.instrument, 0.0) + own
 
     def _columns(self, segment: Segment) -> Array:
         """Whitened columns of one segment, (rows, columns)."""
