@@ -146,7 +146,7 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     ]
     share = excess[1] / excess[0] if excess[0] > 0 else 0.0
     if share > _HELD_OUT_SHARE:
-        # The lack-of-fit test leaves the discretisation error out, and so does this share.
+        # Without the discretisation error, as in the lack-of-fit test.
         discretized = engine.discretization_power(result.final, result.noise)
         known = sum(discretized[o] / noise**2 for o, noise in result.noise.rms.items())
         share = max(0.0, excess[1] - known) / excess[0]
