@@ -63,9 +63,8 @@ def rounding_errors(
     if step := resolution.get(output, 0.0):
         yield RoundingError(output, *_mean_error(recording.measured[output], predicted, step))
     motion, signals = recording.smooth, recording.signals
-    name, measured = ("tension", signals.tension)
-    if motion.load is not None:
-        name, measured = ("load", signals.load)
+    is_known = motion.load is not None
+    name, measured = ("load", signals.load) if is_known else ("tension", signals.tension)
     step = resolution.get(name, 0.0)
     if measured is None or not step or output == "cable_length":
         return

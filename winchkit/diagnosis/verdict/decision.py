@@ -137,26 +137,27 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     ]
     # Without a lack of fit, an error above the noise floor may be chance.
     expected_excess = {} if result.lack_of_fit else result.noise.uncertainty(engine.regression)
-    excess = [
-        sum(
-            max(0.0, (rms[o] / noise) ** 2 - 1 - expected_excess.get(o, 0.0))
+
+    def excess(rms: Mapping[str, float], known: Mapping[str, float]) -> float:
+        """Mean squares beyond the noise and beyond what is known, in units of the noise."""
+        return sum(
+            max(0.0, (rms[o] ** 2 - known.get(o, 0.0)) / noise**2 - 1 - expected_excess.get(o, 0.0))
             for o, noise in result.noise.rms.items()
         )
-        for rms in held_out_errors
-    ]
-    share = excess[1] / excess[0] if excess[0] > 0 else 0.0
+
+    before, after = held_out_errors
+    initial = excess(before, {})
+    share = excess(after, {}) / initial if initial > 0 else 0.0
     if share > _HELD_OUT_SHARE:
         # Without the discretisation error, as in the lack-of-fit test.
-        discretized = engine.discretization_power(result.final, result.noise)
-        known = sum(discretized[o] / noise**2 for o, noise in result.noise.rms.items())
-        share = max(0.0, excess[1] - known) / excess[0]
+        share = excess(after, engine.discretization_power(result.final, result.noise)) / initial
     if result.noise.from_repeats:
         # Both in units of the final noise, so that a re-estimated noise does not shift the share.
         scale = result.initial_noise.power / result.noise.power
-        before = float(
+        lacking = float(
             np.sum(np.maximum(result.initial_lack_of_fit_test.excess_power * scale, 0.0))
         )
-        after = float(
+        left = float(
             np.sum(
                 np.maximum(result.lack_of_fit_test.excess_power, 0.0)[
                     result.lack_of_fit_test.rejected
@@ -164,7 +165,7 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
             )
         )
         share = max(
-            share if share > _HELD_OUT_SHARE else 0.0, after / before if before > 0 else 0.0
+            share if share > _HELD_OUT_SHARE else 0.0, left / lacking if lacking > 0 else 0.0
         )
     return min(1.0, share)
 

@@ -99,7 +99,7 @@ def _parts(table: Table) -> _Parts | None:
     for key in texts:
         names = np.array([text.strip() for text in key.texts or ()], dtype=np.str_)
         found, codes = np.unique(names, return_inverse=True)
-        if not len(found) <= _MOST or len(names) < _ROWS * len(found) or key is unit:
+        if len(found) > _MOST or len(names) < _ROWS * len(found) or key is unit:
             continue
         if not all(re.search("[A-Za-z]", name) for name in found):
             continue
