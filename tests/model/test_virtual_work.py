@@ -23,8 +23,8 @@ def test_work_at_the_motor_is_work_on_the_cable(
     """∫ τ dθ = −F Δℓ, with τ by the line and ℓ by the line: one cannot lie without the other."""
     chosen = {None: {}, "all": KINEMATIC}.get(effect, {effect: KINEMATIC.get(effect or "", {})})
     line = line_with(profile_with(drum, direction), chosen)
-    angle = direction * np.linspace(-40, 240, 70001)
-    time = np.linspace(0, 100, 70001)
+    angle = direction * np.linspace(-40, 240, 14001)
+    time = np.linspace(0, 100, 14001)
     force = 150.0
     predicted = line.predict(line.motion(Signals(time, angle, load=np.full_like(time, force))))
     torque, length = predicted["motor_torque"], predicted["cable_length"]
