@@ -25,6 +25,9 @@ from hypothesis import settings
 from stalls import LATE_CYCLES, StallWatch
 from winchkit.python_can import import_python_can
 
+# Threads of small matrices only spin, and take the processors of the other tests.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 # Before a test imports it: with all that it imports of MF4, each process starts seconds later.
 import_python_can()
 # No test is judged by the clock: machines are shared and noisy. A change is judged by the same 100
@@ -42,36 +45,49 @@ SLOW = frozenset(
         Path,
         (
             "bench/control/test_fault_campaign.py",
+            "bench/robot/test_computation.py",
+            "bench/robot/test_platform.py",
+            "bench/slave",
             "calibration/robot/test_benchmark.py",
+            "calibration/robot/test_hanging_robot.py",
+            "calibration/robot/test_tracker.py",
             "cli/core/test_examples.py",
+            "cli/model/test_html_option.py",
             "cli/model/test_plan.py",
             "cli/model/test_promises.py",
             "cli/model/test_unknown_effect.py",
             "cli/model/test_whole_procedure.py",
+            "devices/test_makers_drives.py",
             "diagnosis/design",
             "diagnosis/fleet",
+            "diagnosis/regression/test_dispersion.py",
+            "diagnosis/residuals/test_orders.py",
             "diagnosis/robot",
             "diagnosis/selection",
             "diagnosis/test_campaign.py",
             "diagnosis/test_hidden_effects.py",
             "diagnosis/test_real_emps.py",
+            "diagnosis/test_slow_joint.py",
             "diagnosis/verdict",
             "drivers/modbus/test_cell_fault_campaign.py",
             "drivers/modbus/test_modbus_campaign.py",
             "drivers/stream/test_faults.py",
+            "model/robot/test_forces.py",
             "papers/test_ipanema3.py",
             "report/notebook",
             "report/pages/test_diagnosis.py",
             "report/pages/test_robot.py",
+            "report/test_text.py",
             "repository/test_examples.py",
             "repository/test_pages.py",
             "repository/test_wheel.py",
+            "repository/test_words.py",
             "testing/test_sessions.py",
         ),
     )
 )
-"""Files and folders whose tests the default run leaves out: diagnoses of many runs, campaigns, and
-sessions of the pages."""
+"""Files and folders whose tests the default run leaves out: diagnoses of many runs, campaigns,
+tables of faults, sessions of the pages, and the words of all texts."""
 _WATCH = pytest.StashKey[StallWatch]()
 _EARLIER = pytest.StashKey[dict[str, float]]()
 """Of the session: by fixture of a module, the largest stall (s) in the tests that used it."""
@@ -98,9 +114,17 @@ def pytest_configure() -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """``-n auto``: all processors for the whole suite without real time, else this process."""
+    """``-n auto``: more processes than processors for the whole suite, else this process.
+
+    Half as many more, since some tests wait for peers. Those that move a bench in real time
+    (``realtime``) want a processor to themselves.
+    """
     whole = config.args == config.getini("testpaths")
-    return os.cpu_count() or 1 if whole and "not realtime" in config.option.markexpr else 0
+    if not whole or "not realtime" not in config.option.markexpr:
+        return 0
+    here = hasattr(os, "sched_getaffinity")
+    processors = len(os.sched_getaffinity(0)) if here else os.cpu_count() or 1
+    return processors + max(1, processors // 2)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -120,9 +144,16 @@ def pytest_collection() -> Generator[None, object, object]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests of ``SLOW``, and leave campaigns to those who ask for them."""
+    """Mark the tests of ``SLOW``, and leave campaigns to those who ask for them.
+
+    A file or a folder of ``SLOW`` that the command line names is run.
+    """
     tests = Path(__file__).parent
-    slow = {place for part in SLOW for place in (tests / part, *(tests / part).rglob("test_*.py"))}
+    named = {Path(each.partition("::")[0]).resolve() for each in config.args}
+    parts = {tests / part for part in SLOW}
+    if config.option.markexpr == DEFAULT:
+        parts -= {part for part in parts for each in named if each.is_relative_to(part)}
+    slow = {place for part in parts for place in (part, *part.rglob("test_*.py"))}
     left = []
     for item in items:
         if item.path in slow:

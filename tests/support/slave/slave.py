@@ -292,6 +292,8 @@ class Slave:
         )
 
     def _loses(self, which: str, kind: str, number: int) -> bool:
+        if not self.faults:
+            return False
         acting = (self._numbers(n) for n in self.faults if kind in getattr(FAULTS[n], which))
         return any(not numbers or number in numbers for numbers in acting)
 
