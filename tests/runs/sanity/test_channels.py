@@ -135,6 +135,20 @@ def test_spikes_are_outliers_and_nothing_else_is(seed: int, count: int, size: fl
     assert np.count_nonzero(mask[places]) >= 0.6 * count - 1
 
 
+@given(SEEDS, st.integers(1, 30), st.floats(12.0, 1e4), st.floats(-1e5, 1e5))
+@settings(max_examples=40, deadline=None)
+def test_spikes_in_a_fast_motion_are_those_at_rest(
+    seed: int, count: int, size: float, speed: float
+) -> None:
+    """A motion at constant speed has a step of any size per sample."""
+    random = np.random.default_rng(seed)
+    values = random.normal(0, 0.8, COUNT)
+    values[random.choice(np.arange(10, COUNT - 10, 5), count, replace=False)] += 2.5 * size
+    moving = values + speed * np.arange(COUNT)
+    assert np.array_equal(outlier_mask(moving), outlier_mask(values))
+    assert np.count_nonzero(outlier_mask(moving)) >= (count if size > 20 else 0)
+
+
 @given(SEEDS, st.integers(0, 2**31), st.floats(200.0, 1e4), st.sampled_from([-1.0, 1.0]))
 @settings(max_examples=40, deadline=None)
 def test_two_spikes_with_one_sample_between_them_are_outliers(

@@ -20,6 +20,8 @@ _LIMIT = 12.0
 """Local standard deviations: beyond 8 in none of 10¹⁵ Gaussian samples, and room for tails."""
 _AGREEMENT = 0.25
 """Largest range of the four neighbours, in deviations of the sample."""
+_STEPS = 8
+"""Steps of a local slope, four on each side: the sample itself and one more spike take four."""
 _END = 3.0
 """Largest other steps of a run in the step from its first sample, or to its last one."""
 _SAME_EVENT = 4.0
@@ -46,9 +48,9 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
 
     Notes
     -----
-    The deviation from the median of two neighbours on each side exceeds twelve local standard
-    deviations (of the deviations, by their median over 50 samples), and the neighbours agree within
-    a quarter of it. Where one of the two at a distance of two samples deviates as much, it is left
+    The deviation from the median of two neighbours on each side, less the local slope (the median
+    of the eight nearest steps), exceeds twelve local standard deviations (of the deviations, by
+    their median over 50 samples), and the neighbours agree within a quarter of it. Where one of the two at a distance of two samples deviates as much, it is left
     out: of two spikes with one sample between them, neither hides the other. A peak that lasts two
     samples, a step, or an oscillation is none. The first and the last sample have neighbours on
     one side: they are spikes where the step to the next sample exceeds twelve standard deviations
@@ -128,7 +130,9 @@ def _spikes(
     known = values[rows]
     if len(known) < _WINDOW:
         return out, event, ends
+    slope = _slope(known)[2:-2]
     around = np.stack([known[:-4], known[1:-3], known[3:-1], known[4:]])
+    around += np.array([[2.0], [1.0], [-1.0], [-2.0]]) * slope
     deviation = np.abs(known[2:-2] - _median_of_four(*around))
     # Neighbours that are equal in a quantised or held channel have a local deviation of zero.
     usual = np.minimum(deviation, sorted_quantile(np.sort(deviation), 0.95))
@@ -151,6 +155,13 @@ def _is_apart(values: Array, scale: float) -> bool:
     steps = np.abs(np.diff(values))
     limit = max(_LIMIT * scale, _END * float(np.max(steps[1:])))
     return bool(steps[0] > limit and np.ptp(values[1:5]) < _AGREEMENT * steps[0])
+
+
+def _slope(values: Array) -> Array:
+    """Change per sample: median of the nearest steps, of which a spike has one up and one down."""
+    steps = np.diff(values)
+    median = np.median(np.lib.stride_tricks.sliding_window_view(steps, _STEPS), axis=1)
+    return np.pad(median, _STEPS // 2, mode="edge")
 
 
 def _median_of_four(a: Array, b: Array, c: Array, d: Array) -> Array:
