@@ -134,6 +134,19 @@ def test_factors_that_differ_from_run_to_run_are_no_unit() -> None:
     assert codes([same[0], scaled(runs[1], "tension", 0.45359)]) == []
 
 
+@pytest.mark.parametrize("ripple", [0.0, 0.05, 0.2])
+def test_a_unit_beside_an_effect_that_scatters_the_slopes_is_named(ripple: float) -> None:
+    """A ripple of the torque (N m) with another phase in every run: slopes of 9.2 to 10.7."""
+    runs = []
+    for seed in range(6):
+        run = scaled(made(seed, load_mass=10.0 + 3 * seed), "tension", 1 / 9.80665)
+        torque = run["motor_torque"] + ripple * np.sin(run["motor_angle"] / 5 + seed)
+        runs.append(replace(with_channel(run, "motor_torque", torque), metadata={}))
+    found = sign_and_scale(runs, GROOVED)
+    assert [f.code for f in found] == ["wrong-factor"] * 2 * len(runs)
+    assert all("kilograms" in f.text for f in found)
+
+
 def joint(seed: int, sign: float) -> tuple[Run, WinchProfile]:
     """A joint without a load: inertia, friction, gravity over its angle, an offset."""
     random = np.random.default_rng(seed)

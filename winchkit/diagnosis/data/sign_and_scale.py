@@ -66,18 +66,19 @@ def sign_and_scale(
         Value: slope of measured over predicted. Where tension and torque of a run are wrong by the
         same factor, the load is.
     """
-    wrong: dict[tuple[str, str, str, str], list[tuple[str, Slope]]] = {}
+    wrong: dict[tuple[str, str, str], list[tuple[str, Slope]]] = {}
     every = _slopes(runs, profile, catalogue)
     scattered = {name for name in OUTPUTS if _differ([own[name] for own in every if name in own])}
     for run, own in zip(runs, every, strict=True):
         slopes = {name: slope for name, slope in own.items() if name not in scattered}
         for (channel, other), slope in _suspects(run, slopes).items():
             code = "inverted-sign" if slope.value < 0 else "wrong-factor"
-            known = named_factor(slope) if _outside(abs(slope.value)) else ""
-            wrong.setdefault((channel, other, code, known), []).append((run.name, slope))
+            wrong.setdefault((channel, other, code), []).append((run.name, slope))
     out = []
-    for (channel, other, code, known), found in wrong.items():
-        text = _text(channel, code, known, _mean([slope for _, slope in found]), other)
+    for (channel, other, code), found in wrong.items():
+        mean = _mean([slope for _, slope in found])
+        known = named_factor(mean) if _outside(abs(mean.value)) else ""
+        text = _text(channel, code, known, mean, other)
         out += [Finding(code, name, channel, slope.value, text) for name, slope in found]
     for run in runs:
         out += _passivity(run, profile)
@@ -208,13 +209,16 @@ def _is_wrong(slope: Slope) -> bool:
 def _differ(slopes: Sequence[Slope]) -> bool:
     """Whether the slopes that are not wrong differ from run to run, or the units of the others.
 
-    A channel has one unit in all runs: two units are none, but an effect that is missing.
+    A channel has one unit in all runs: two units are none, but an effect that is missing. They
+    are two where the slopes differ beyond their uncertainty.
     """
-    wrong = [slope for slope in slopes if _is_wrong(slope)]
-    sizes = [abs(slope.value) for slope in wrong]
+    wrong = sorted((s for s in slopes if _is_wrong(s)), key=lambda slope: abs(slope.value))
     units = {known for slope in wrong if (known := named_factor(slope))}
-    if len(units) > 1 and max(sizes) > _EQUAL * min(sizes):
-        return True
+    if len(units) > 1:
+        low, high = wrong[0], wrong[-1]
+        excess = abs(high.value) - _EQUAL * abs(low.value)
+        if excess > _SIGMAS * float(np.hypot(high.std, low.std)):
+            return True
     sizes = [slope.value for slope in slopes if not _is_wrong(slope)]
     return len(sizes) > 1 and max(sizes) > _EQUAL * min(sizes)
 
@@ -302,9 +306,12 @@ def _signals(run: Run, profile: WinchProfile) -> Signals:
 
 
 def _mean(slopes: Sequence[Slope]) -> Slope:
+    """Mean over the runs; its standard deviation by theirs, or by the scatter if that is larger."""
     values = np.array([slope.value for slope in slopes])
-    stds = np.array([slope.std for slope in slopes])
-    return Slope(float(values.mean()), float(np.sqrt(np.mean(stds**2) / len(stds))))
+    variance = float(np.mean([slope.std**2 for slope in slopes]))
+    if len(values) > 1:
+        variance = max(variance, float(np.var(values, ddof=1)))
+    return Slope(float(values.mean()), float(np.sqrt(variance / len(values))))
 
 
 def _text(channel: str, code: str, known: str, slope: Slope, other: str) -> str:

@@ -74,16 +74,20 @@ def named_factor(slope: Slope, *, is_angle: bool = False) -> str:
     Returns
     -------
     str
-        The nearest constant within three standard deviations and 5 %; empty without one.
+        The nearest constant within three standard deviations and 5 %, and those that three standard
+        deviations do not exclude either; empty without one.
     """
     size = abs(slope.value)
     if size == 0:
         return ""
-    tolerance = _SIGMAS * slope.std / size + _TOLERANCE
+    uncertainty = _SIGMAS * slope.std / size
     known = _UNITS if is_angle else (*_UNITS, *_OF_LOADS)
-    distances = [(abs(abs(log(size)) - abs(log(value))), text) for value, text in known]
-    nearest, text = min(distances)
-    return text if nearest < tolerance else ""
+    distances = sorted((abs(abs(log(size)) - abs(log(value))), text) for value, text in known)
+    nearest = distances[0][0]
+    if nearest >= uncertainty + _TOLERANCE:
+        return ""
+    limit = max(nearest, uncertainty)
+    return ", or ".join(text for distance, text in distances if distance <= limit)
 
 
 def slope_text(slope: Slope) -> str:

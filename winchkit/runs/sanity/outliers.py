@@ -50,11 +50,12 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
     -----
     The deviation from the median of two neighbours on each side, less the local slope (the median
     of the eight nearest steps), exceeds twelve local standard deviations (of the deviations, by
-    their median over 50 samples), and the neighbours agree within a quarter of it. Where one of the two at a distance of two samples deviates as much, it is left
-    out: of two spikes with one sample between them, neither hides the other. A peak that lasts two
-    samples, a step, or an oscillation is none. The first and the last sample have neighbours on
-    one side: they are spikes where the step to the next sample exceeds twelve standard deviations
-    and three times the largest other step, and the next four samples agree.
+    their median over 50 samples), and the neighbours agree within a quarter of it. Where one of the
+    two at a distance of two samples deviates as much, it is left out: of two spikes with one sample
+    between them, neither hides the other. A peak that lasts two samples, a step, or an oscillation
+    is none. The first and the last sample have neighbours on one side: they are spikes where the
+    step to the next sample exceeds twelve standard deviations and three times the largest other
+    step, and the next four samples agree.
     """
     spikes, _, ends = _spikes(values, resolution(values))
     return spikes | ends
