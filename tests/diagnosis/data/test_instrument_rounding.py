@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis_runs import GROOVED, Array
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.data.instrument_rounding import rounding_errors
+from winchkit.diagnosis.data.instrument_rounding import instrument_noise, rounding_errors
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.run import Channel, Run
 
@@ -51,8 +51,9 @@ def test_error_of_the_torque_by_a_rounded_tension(noise: float) -> None:
     shared = np.mean([each["tension"] for each in runs], axis=0) - force
     dataset = prepare(runs[:2], GROOVED)
     assert dataset.resolution["tension"] == pytest.approx(STEP)
-    recording = dataset.recordings[0]
-    found = list(rounding_errors(GROOVED, recording, "motor_torque", dataset.resolution))
+    before = instrument_noise(dataset.recordings, dataset.resolution)
+    assert before["tension"] == pytest.approx(noise, rel=0.2, abs=0.1 * STEP)
+    found = list(rounding_errors(dataset, 0, "motor_torque", before))
     by_tension = next(each for each in found if each.instrument == "tension")
     assert by_tension.white == 0.0
     # Cosines and sines are both there, since the zero is not known: twice the mean square.
@@ -70,3 +71,25 @@ def test_no_effect_is_named_for_the_rounding_of_the_load_cell() -> None:
     found = diagnose(runs, GROOVED).diagnosis
     assert found.verdict == "adequate"
     assert found.steps == ()
+
+
+@pytest.mark.parametrize("step", [0.06, 0.08])
+def test_a_rounded_torque_does_not_take_the_name_of_an_effect_away(step: float) -> None:
+    """Losses of a fifth of a step: each load and direction has a rounding error of its own."""
+    runs = []
+    for seed, load in enumerate((395.1, 395.1, 138.3, 138.3, 237.1, 237.1)):
+        random = np.random.default_rng(seed)
+        time = np.arange(COUNT) / RATE
+        angle = 40 * np.sin(0.5 * time)
+        torque = GROOVED.gearbox.direction * load * ARM * np.ones(COUNT)
+        torque *= np.where(torque * np.gradient(angle) > 0, 1 / 0.986, 0.986)
+        torque += random.normal(0, 0.2 * step, COUNT)
+        channels = {
+            "motor_angle": Channel(angle, "rad"),
+            "load": Channel(load + random.normal(0, 1.0, COUNT), "N"),
+            "motor_torque": Channel(np.round(torque / step) * step, "N m"),
+        }
+        runs.append(Run(f"run-{seed}", time, channels, {"programme": f"{load:.0f}"}))
+    found = diagnose(runs, GROOVED).diagnosis
+    assert found.verdict == "explained"
+    assert "gear-efficiency" in found.steps[0].effects

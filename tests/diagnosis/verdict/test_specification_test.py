@@ -258,10 +258,11 @@ def test_the_null_distribution_is_that_of_fits_to_drawn_data() -> None:
     columns = own * partial.inverse_sigma[:, None]
     columns = columns / np.sqrt(np.sum(columns**2, axis=0))
     columns -= partial.explained @ (partial.explained.T @ columns)
-    change = partial.projected(regression.change(result.final.hypothesis))
+    whole = regression.change(result.final.hypothesis)
+    change = partial.projected(whole)
     places = [("motor_torque", "speed"), ("cable_force", "cable_length")]
     families = list(curves(regression, ["motor_torque"], places))
-    drawn = null_excess(regression, noise, partial, Named(change, columns, 1), families)
+    drawn = null_excess(regression, noise, partial, Named(change, columns, 1, whole), families)
     random, redrawn = np.random.default_rng(3), []
     basis = np.linalg.qr(columns)[0]
     for _ in range(80):

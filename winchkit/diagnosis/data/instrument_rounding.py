@@ -7,19 +7,22 @@ it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.data.dataset import Dataset, Recording
 from winchkit.diagnosis.data.rounding import mean_error, noise_before_rounding
 from winchkit.model.line import Line, Motion
 from winchkit.runs.sanity.local_noise import local_noise
-from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["RoundingError", "rounding_errors"]
+__all__ = ["RoundingError", "instrument_noise", "rounding_errors"]
+
+_WINDOW = 25
+"""Samples of a moving mean: it leaves a fifth of the noise and follows a motion."""
 
 
 @dataclass(frozen=True)
@@ -43,40 +46,82 @@ class RoundingError:
     white: float
 
 
+def instrument_noise(
+    recordings: Sequence[Recording], resolution: Mapping[str, float]
+) -> dict[str, float]:
+    """Standard deviation of the noise of instruments before their rounding.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        All runs of a winch.
+    resolution : mapping of str to float
+        Resolution by channel, SI.
+
+    Returns
+    -------
+    dict of str to float
+        One value per rounded channel, SI, by the mean over the runs of the variance after the
+        rounding. That of one run depends on where its signal lies between two steps: under a
+        constant load in the middle of a step no noise is visible at all.
+    """
+    out = {}
+    for name, step in resolution.items():
+        found = [both for each in recordings if (both := _measured_and_signal(each, name))]
+        after = [min(local_noise(shown), local_noise(shown - signal)) for shown, signal in found]
+        if step and after:
+            out[name] = noise_before_rounding(float(np.sqrt(np.mean(np.square(after)))), step)
+    return out
+
+
 def rounding_errors(
-    profile: WinchProfile, recording: Recording, output: str, resolution: Mapping[str, float]
+    dataset: Dataset,
+    run: int,
+    output: str,
+    noise: Mapping[str, float],
+    change: Array | None = None,
 ) -> Iterator[RoundingError]:
     """Rounding errors in an output of a run.
 
     Parameters
     ----------
-    profile : WinchProfile
-        Of the winch.
-    recording : Recording
-        The run.
+    dataset : Dataset
+        Data with the resolution of their channels.
+    run : int
+        Index of the run.
     output : str
         Measured and predicted output.
-    resolution : mapping of str to float
-        Resolution by channel, SI; none is known of a channel that is missing or zero.
+    noise : mapping of str to float
+        Noise of the rounded channels before their rounding, SI (:func:`instrument_noise`).
+    change : (n,) array, optional
+        Change of the output by effects, SI: the rounding error is a function of the whole signal.
     """
+    recording, resolution = dataset.recordings[run], dataset.resolution
     predicted = recording.nominal_smooth[output]
-    if step := resolution.get(output, 0.0):
-        yield RoundingError(output, *_mean_error(recording.measured[output], predicted, step))
-    motion, signals = recording.smooth, recording.signals
-    is_known = motion.load is not None
-    name, measured = ("load", signals.load) if is_known else ("tension", signals.tension)
-    step = resolution.get(name, 0.0)
-    if measured is None or not step or output == "cable_length":
+    if output in noise:
+        if change is None:
+            rest = np.nan_to_num(recording.measured[output] - predicted)
+            change = uniform_filter1d(rest, _WINDOW, mode="nearest")
+        signal = predicted + change
+        yield RoundingError(output, *mean_error(signal, resolution[output], noise[output]))
+    motion = recording.smooth
+    name = "tension" if motion.load is None else "load"
+    if name not in noise or output == "cable_length":
         return
-    changed = Line(profile).predict(_with_force(motion, step))[output]
+    step = resolution[name]
+    changed = Line(dataset.profile).predict(_with_force(motion, step))[output]
     by_force = (changed - predicted) / step
-    components, _ = _mean_error(measured, _force(motion), step)
+    components, _ = mean_error(_force(motion), step, noise[name])
     yield RoundingError(name, by_force * components, 0.0)
 
 
-def _mean_error(measured: Array, signal: Array, step: float) -> tuple[Array, float]:
-    after = min(local_noise(measured), local_noise(measured - signal))
-    return mean_error(signal, step, noise_before_rounding(after, step))
+def _measured_and_signal(recording: Recording, name: str) -> tuple[Array, Array] | None:
+    """Samples of an output or of a measured force, and their prediction without noise."""
+    if name in recording.measured:
+        return recording.measured[name], recording.nominal_smooth[name]
+    signals = recording.signals
+    force = {"load": signals.load, "tension": signals.tension}.get(name)
+    return None if force is None else (force, _force(recording.smooth))
 
 
 def _force(motion: Motion) -> Array:

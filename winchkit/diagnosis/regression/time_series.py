@@ -18,7 +18,11 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.data.instrument_rounding import RoundingError, rounding_errors
+from winchkit.diagnosis.data.instrument_rounding import (
+    RoundingError,
+    instrument_noise,
+    rounding_errors,
+)
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.requirements import excites, missing_needs
 from winchkit.diagnosis.data.spectrum import (
@@ -116,15 +120,19 @@ class TimeSeriesRegression(Regression):
             np.add.at(power, bands, own / self.dataset.decimation_factor)
         return power / np.maximum(count, 1.0)
 
-    def rounding_errors(self, segment: Segment) -> list[RoundingError]:
+    @cached_property
+    def _noise_before_rounding(self) -> dict[str, float]:
+        return instrument_noise(self.dataset.recordings, self.dataset.resolution)
+
+    def rounding_errors(self, segment: Segment, change: Array | None = None) -> list[RoundingError]:
         """Rounding errors in a segment, of its instrument and of a measured input, at its rows.
 
-        The variance ``white`` is that in time.
+        The signal is the prediction with the ``change`` by effects, (n_rows,), if it is given. The
+        variance ``white`` is that in time.
         """
-        recording = self.dataset.recordings[segment.run]
-        found = rounding_errors(
-            self.dataset.profile, recording, segment.output, self.dataset.resolution
-        )
+        noise = self._noise_before_rounding
+        added = None if change is None else to_time(change[segment.rows], segment.band)
+        found = rounding_errors(self.dataset, segment.run, segment.output, noise, added)
         return [
             replace(
                 one, components=np.array([self._masked(segment, each) for each in one.components])

@@ -44,6 +44,8 @@ class Named:
     columns: Array
     """Derivatives by their unknowns, whitened to unit length, then projected, (rows, k)."""
     n_parameters: int
+    whole: Array
+    """Change of the outputs by all effects of the model, SI, (rows,): rounded with them."""
 
 
 def null_excess(
@@ -97,6 +99,7 @@ class _Design:
         families: Sequence[CurveFamily],
     ) -> None:
         self._regression, self._partial, self._families = regression, partial, families
+        self._whole = named.whole
         self._own = np.column_stack(
             [named.change, orthonormal_of_projected(named.columns, UNIDENTIFIABLE)]
         )
@@ -162,7 +165,7 @@ class _Design:
 
     def _add_rounding(self, products: dict[str, Array], segment: Segment, columns: Array) -> None:
         """Add a segment's inner products of columns and mean rounding errors by instrument."""
-        for error in self._regression.rounding_errors(segment):
+        for error in self._regression.rounding_errors(segment, self._whole):
             components = error.components * self._partial.inverse_sigma[segment.rows]
             own = columns.T @ components.T
             products[error.instrument] = products.get(error.instrument, 0.0) + own

@@ -209,9 +209,8 @@ class SpecificationTest:
         columns = columns[:, np.any(columns, axis=0)]
         columns = columns / np.sqrt(np.sum(columns**2, axis=0))
         columns -= partial.explained @ (partial.explained.T @ columns)
-        change = partial.projected(
-            np.asarray(_change(regression, self.result.final.hypothesis, indices))
-        )
+        final = self.result.final.hypothesis
+        change = partial.projected(np.asarray(_change(regression, final, indices)))
         outputs = self._outputs(indices)
         ranked = ranked_curves(regression, partial, outputs, penalty)[:_COMPARED]
         places = {(curve.place, curve.variable) for curve in ranked}
@@ -219,7 +218,7 @@ class SpecificationTest:
             regression,
             noise,
             partial,
-            Named(change, columns, self._n_parameters(indices)),
+            Named(change, columns, self._n_parameters(indices), regression.change(final)),
             list(curves(regression, outputs, places)),
         )
         tests = 1 + (len(self.added) if len(self.added) > 1 else 0)
