@@ -67,9 +67,11 @@ def instrument_noise(
     """
     out = {}
     for name, step in resolution.items():
+        if not step:
+            continue
         found = [both for each in recordings if (both := _measured_and_signal(each, name))]
         after = [min(local_noise(shown), local_noise(shown - signal)) for shown, signal in found]
-        if step and after:
+        if after:
             out[name] = noise_before_rounding(float(np.sqrt(np.mean(np.square(after)))), step)
     return out
 
