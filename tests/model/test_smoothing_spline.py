@@ -113,6 +113,21 @@ def test_a_staircase_of_many_samples_a_step_is_no_motion() -> None:
     angle = step * np.round(np.sin(time) / step)
     assert np.std((spline.smoothed(angle, 1) - np.cos(time))[inner]) < 0.02
     assert np.std((spline.smoothed(angle, 2) + np.sin(time))[inner]) < 0.1
+    assert 30 <= spline.reach < 1000
+    # A kernel of three knots leaves out the highest frequencies of an acceleration.
+    for derivative, accuracy in enumerate((0.03, 0.03, 0.15)):
+        middle = float(np.median(spline.std(derivative)))
+        assert spline.typical_std(derivative) == pytest.approx(middle, rel=accuracy)
+
+
+def test_a_polynomial_that_the_penalty_leaves_free_is_exact_whatever_the_weight() -> None:
+    """Third differences of a parabola vanish: the smoother returns it and its derivatives."""
+    time = np.arange(10_000) / 1000
+    staircase = 0.03 * np.round(np.sin(time) / 0.03)
+    spline = SmoothingSpline.fit(time, staircase)
+    parabola = 1 + 2 * time - 3 * time**2
+    for derivative, exact in enumerate((parabola, 2 - 6 * time, np.full_like(time, -6.0))):
+        assert spline.smoothed(parabola, derivative) == pytest.approx(exact, rel=1e-6, abs=1e-6)
 
 
 @pytest.mark.parametrize("derivative", [0, 1, 2])

@@ -211,9 +211,12 @@ class Line:
             return load
         at, clock = motion.at, motion.clock
         longer = kinematics.free_length - at.free_length
-        paid_out = (self._nominal_arm(at.motor_angle) - kinematics.arm) * at.motor_rate
-        rest = clock.sharp_gradient(longer) - paid_out
-        added = clock.sharp_gradient(paid_out) + clock.wide_gradient(rest)
+        speed = clock.sharp_gradient(longer)
+        if clock.spline is not None:
+            added = clock.sharp_gradient(speed)  # Linear: what is paid out would cancel.
+        else:
+            paid_out = (self._nominal_arm(at.motor_angle) - kinematics.arm) * at.motor_rate
+            added = clock.sharp_gradient(paid_out) + clock.wide_gradient(speed - paid_out)
         if motion.smoothed_share:
             twice = clock.differences(clock.differences(longer))
             added = added + motion.smoothed_share * (twice - added)

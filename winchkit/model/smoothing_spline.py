@@ -18,13 +18,17 @@ PICA Conference, 63-69.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 __all__ = ["Design", "SmoothingSpline"]
 
@@ -57,11 +61,17 @@ class Design:
     """(n,), s, increasing."""
     spacing: float
     """Of the knots, s."""
+    _matrices: dict[int, csr_array] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
     def count(self) -> int:
         """Number of coefficients."""
         return int((self.time[-1] - self.time[0]) / self.spacing) + 1 + _DEGREE
+
+    @cached_property
+    def samples_per_knot(self) -> float:
+        """Of the usual interval; at least one."""
+        return max(1.0, self.spacing / float(np.median(np.diff(self.time))))
 
     @cached_property
     def _position(self) -> tuple[NDArray[np.intp], Array]:
@@ -84,15 +94,22 @@ class Design:
             values = (padded[:, :-1] - padded[:, 1:]) / self.spacing
         return first, values
 
-    @cached_property
-    def values(self) -> tuple[NDArray[np.intp], Array]:
-        """First coefficient and weights of the signal itself."""
-        return self.basis(0)
+    def matrix(self, derivative: int) -> csr_array:
+        """Signal, or a derivative of it, at the samples by the coefficients, sparse (n, count)."""
+        from scipy.sparse import csr_array
+
+        if derivative not in self._matrices:
+            first, weights = self.basis(derivative)
+            columns = first[:, None] + np.arange(_DEGREE + 1)
+            starts = np.arange(0, weights.size + 1, _DEGREE + 1)
+            parts = weights.ravel(), columns.ravel(), starts
+            self._matrices[derivative] = csr_array(parts, shape=(len(first), self.count))
+        return self._matrices[derivative]
 
     @cached_property
     def gram(self) -> Array:
         """Lower band of B'B, (6, count)."""
-        first, weights = self.values
+        first, weights = self.basis(0)
         band = np.zeros((_DEGREE + 1, self.count))
         for row in range(_DEGREE + 1):
             for column in range(row + 1):
@@ -151,8 +168,8 @@ class SmoothingSpline:
         The noise is at least that of the signal's rounding, q/√12 for a step q: a staircase is no
         motion. Where the signal changes by less than q between samples, the rounding errors of
         neighbours are alike; every k-th sample, between which it changes by q, then determines the
-        weight, and each of all samples counts as a k-th of one: noise k σ², weight k⁶ times
-        (k⁵ by the spacing, in whose fifth power the variance of third differences grows).
+        weight and the knots, and each of all samples counts as a k-th of one: noise k σ², weight
+        k times.
         """
         from scipy.optimize import minimize_scalar
 
@@ -163,9 +180,9 @@ class SmoothingSpline:
         every = max(1, min(alike, len(signal) // _LEAST_SAMPLES))
         if every > 1:
             sparse = cls.fit(time[::every], signal[::every])
-            weight = sparse.weight * (sparse.design.spacing / spacing) ** 5 * every
+            design = Design(time, sparse.design.spacing)
             noise = sparse.noise * float(np.sqrt(every))
-            return cls(Design(time, spacing), weight, noise, sparse.deviance)
+            return cls(design, sparse.weight * every, noise, sparse.deviance)
         least = max(step**2 / 12, (1e-12 * float(np.ptp(signal))) ** 2, 1e-300)
 
         design = Design(time, spacing)
@@ -203,8 +220,12 @@ class SmoothingSpline:
 
     @property
     def reach(self) -> float:
-        """Half width of the smoother's kernel in knots, λ to the power of a sixth, at least one."""
-        return float(max(1.0, self.weight ** (1 / (2 * (len(_PENALTY) - 1)))))
+        """Half width of the smoother's kernel in samples, at least a knot's.
+
+        With m samples per knot it is (λ/m) to the power of a sixth, in knots.
+        """
+        density = self.design.samples_per_knot
+        return density * float(max(1.0, (self.weight / density) ** (1 / (2 * (len(_PENALTY) - 1)))))
 
     def std(self, derivative: int) -> Array:
         """Standard deviation of a derivative of the signal to which the weight was fitted.
@@ -252,8 +273,9 @@ class SmoothingSpline:
 
         Notes
         -----
-        σ² times the integral of ω²ʳ / (1 + λ ω⁶) over ω/2π, ω in radians per knot, for the order r:
-        the posterior variance by the equivalent kernel, for kernels of more than one sample.
+        σ² times the integral of ω²ʳ / (m + λ ω⁶) over ω/2π, ω in radians per knot, for the order r
+        and m samples per knot: the posterior variance by the equivalent kernel, for kernels of more
+        than one sample.
 
         References
         ----------
@@ -261,7 +283,9 @@ class SmoothingSpline:
         Statistics 12, 898-916.
         """
         order = (2 * derivative + 1) / 6
-        variance = max(1.0, self.weight) ** -order / (6 * np.sin(np.pi * order))
+        density = self.design.samples_per_knot
+        size = max(1.0, self.weight / density) ** -order / density
+        variance = size / (6 * np.sin(np.pi * order))
         return float(self.noise / self.design.spacing**derivative * np.sqrt(variance))
 
     @cached_property
@@ -286,19 +310,15 @@ class SmoothingSpline:
     def _coefficients(self, signal: Array) -> Array:
         from scipy.linalg import cho_solve_banded
 
-        first, weights = self.design.values
-        right = np.zeros(self.design.count)
-        for k in range(_DEGREE + 1):
-            right += np.bincount(first + k, weights[:, k] * signal, self.design.count)
+        right = self.design.matrix(0).T @ signal
         held = self.design.held
         if held.any():
             line = np.interp(self.design.centres[held], self.design.time, signal)
             right[held] += self._hold * line
-        return np.asarray(cho_solve_banded((self._factor, True), right))
+        return np.asarray(cho_solve_banded((self._factor, True), right, check_finite=False))
 
     def _at_samples(self, coefficients: Array, derivative: int) -> Array:
-        first, weights = self.design.values if derivative == 0 else self.design.basis(derivative)
-        return np.asarray(sum(weights[:, k] * coefficients[first + k] for k in range(_DEGREE + 1)))
+        return np.asarray(self.design.matrix(derivative) @ coefficients)
 
     def _reml(self, signal: Array, least: float) -> tuple[float, float]:
         """Minus twice the restricted log-likelihood at the best noise variance, and that."""
