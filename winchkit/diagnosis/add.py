@@ -13,13 +13,15 @@ from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.run_offsets import with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.diagnosis.results import Estimate, OutputFit
+from winchkit.diagnosis.selection.acceptance import predicts_better
 from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Score, score
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.selection.weighting import reweighted
+from winchkit.diagnosis.selection.weighting import Reweighted, reweighted
 from winchkit.diagnosis.verdict.decision import output_fits
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -183,18 +185,23 @@ def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -
         raise UsageError(
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
-    (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
-    reduced = without_impacts(dataset, final.hypothesis)
+    before, after = _fitted(engine, effect_id)
+    offset = with_run_offsets(dataset, engine.regression, after[0])
+    if offset is not None:
+        other = _engine(offset, candidates, effect)
+        beside = _fitted(other, effect_id)
+        if predicts_better((other, *beside[1]), (engine, *after)):
+            dataset, engine, (before, after) = offset, other, beside
+    reduced = without_impacts(dataset, after[0].hypothesis)
     if reduced is not None:
         engine = _engine(reduced, candidates, effect)
-        (initial_model, noise), (final, final_noise) = _fitted(engine, effect_id)
-    best = reweighted(engine, final, final_noise)
+        before, after = _fitted(engine, effect_id)
+    best = reweighted(engine, *after)
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
-    outputs = output_fits(engine, (initial_model, noise), (best.fit, best.noise))
+    outputs = output_fits(engine, before, (best.fit, best.noise))
     terms = tuple(estimates(engine.regression, best.fit, spread))
-    notes = (*engine.regression.dataset.notes, *best.notes)
     return FittedAddition(
-        engine.regression, initial_model, best.fit, Addition(outputs, terms, notes)
+        engine.regression, before[0], best.fit, Addition(outputs, terms, _notes(engine, best))
     )
 
 
@@ -303,6 +310,12 @@ def remove(
     dataset = prepare(runs, profile, band, decimate=True, catalogue=catalogue)
     engine = selection_engine(dataset, catalogue)
     initial_model, noise = engine.fit_with_noise(engine.initial_model)
+    offset = with_run_offsets(dataset, engine.regression, initial_model)
+    if offset is not None:
+        other = selection_engine(offset, catalogue)
+        beside = other.fit_with_noise(other.initial_model)
+        if predicts_better((other, *beside), (engine, initial_model, noise)):
+            engine, (initial_model, noise) = other, beside
     terms = initial_model.hypothesis.terms
     there = [index for index, term in enumerate(terms) if term.effect.id == effect_id]
     if not there:
@@ -313,5 +326,11 @@ def remove(
     outputs = output_fits(engine, (initial_model, noise), (best.fit, noise))
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     left = tuple(estimates(engine.regression, best.fit, spread))
-    notes = (*engine.regression.dataset.notes, *best.notes)
-    return Removal(effect_id, outputs, left, notes)
+    return Removal(effect_id, outputs, left, _notes(engine, best))
+
+
+def _notes(engine: TimeSeriesSelection, best: Reweighted) -> tuple[str, ...]:
+    """Notes on the data and the weights, and every instrument with an offset per run."""
+    dataset = engine.regression.dataset
+    offsets = [finding.text for finding in dataset.sanity if finding.code == "zeroed-anew"]
+    return (*dataset.notes, *offsets, *best.notes)

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.spectrum import WHOLE_TRANSITION
+from winchkit.diagnosis.regression.gls import evaluated
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import replicate_rms
+from winchkit.diagnosis.regression.run_offsets import offset_between_runs
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, attributions, harmonics
 from winchkit.diagnosis.residuals.maps import residual_maps
@@ -22,6 +24,7 @@ from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.runs.run import Run
+from winchkit.runs.sanity.text import size
 from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Compared", "compare", "compared", "initial_hypothesis", "initial_residual"]
@@ -91,6 +94,7 @@ def compared(
     residual, offset = _without_offsets(profile, catalogue, regression)
     shares, orders = attributions(regression, residual), harmonics(regression, residual)
     noise = replicate_rms(regression, residual)
+    offsets = _offsets_between_runs(profile, catalogue, regression)
     outputs = {}
     for output in regression.dataset.outputs:
         error = regression.compared_samples(residual, output)
@@ -106,13 +110,16 @@ def compared(
             noise_rms=noise.get(output),
             follows=tuple((f.variable, f.share) for f in shares if f.output == output),
             orders=tuple((f.variable, _order(f), f.share) for f in orders if f.output == output),
+            rms_with_run_offsets=_rms_within_runs(regression, residual, output)
+            if output in offsets
+            else None,
         )
     maps = tuple(residual_maps(regression, residual))
     dataset = regression.dataset
     comparison = Comparison(
         outputs,
         offset,
-        dataset.notes,
+        (*dataset.notes, *(_offset_note(o, outputs[o], offsets[o]) for o in offsets)),
         maps,
         sanity=dataset.sanity,
         used_share=dataset.used_share,
@@ -139,6 +146,41 @@ def _without_offsets(
     fitted = np.linalg.lstsq(columns, residual, rcond=None)[0]
     lengths = _of_length(regression, columns)
     return residual - columns @ fitted, float(np.mean(fitted[lengths])) if lengths.any() else None
+
+
+def _offsets_between_runs(
+    profile: WinchProfile, catalogue: Catalogue | None, regression: TimeSeriesRegression
+) -> dict[str, float]:
+    """Standard deviation of an offset between runs without repeats, SI, of outputs that have one.
+
+    It is told beside the errors and not taken out: that a model is wrong in every run by another
+    constant is the same.
+    """
+    if regression.dataset.repeated:
+        return {}
+    even = np.ones(regression.n_rows)
+    at = evaluated(regression, initial_hypothesis(profile, catalogue, regression), even)
+    found = {output: offset_between_runs(regression, at, output) for output in regression.outputs}
+    return {output: one.value for output, one in found.items() if one is not None}
+
+
+def _rms_within_runs(regression: TimeSeriesRegression, residual: Array, output: str) -> float:
+    """Error of an output less its mean in every run, rms, SI."""
+    squares, count = 0.0, 0
+    for segment, error in zip(regression.segments, regression.in_time(residual), strict=True):
+        if segment.output == output:
+            own = error[regression.dataset.recordings[segment.run].valid[output]]
+            squares, count = squares + len(own) * float(np.var(own)), count + len(own)
+    return float(np.sqrt(squares / count))
+
+
+def _offset_note(output: str, error: OutputError, spread: float) -> str:
+    return (
+        f"{output.replace('_', ' ')}: the mean error differs between the runs by "
+        f"{size(spread, error.unit)} (standard deviation): another zero of the instrument in every "
+        "run, or an effect of what differs between them; with an offset per run the error is "
+        f"{size(error.rms_with_run_offsets or 0.0, error.unit)} rms"
+    )
 
 
 def initial_hypothesis(

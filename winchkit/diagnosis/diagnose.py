@@ -18,7 +18,6 @@ from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
-from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
@@ -28,7 +27,7 @@ from winchkit.diagnosis.residuals.traces import Trace, trace_columns, traces_of
 from winchkit.diagnosis.results import (
     Diagnosis,
 )
-from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
+from winchkit.diagnosis.selection.acceptance import predicts_better
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import (
     SelectionResult,
@@ -229,7 +228,9 @@ def diagnose_prepared(
             other = selection_engine(offset, catalogue)
             other.on_trial = _Trials(progress, "with an offset per run, fitting", _SEARCH)
             searched = stepwise_selection(other)
-            if _predicts_better((other, searched), (engine, result)):
+            if predicts_better(
+                (other, searched.final, searched.noise), (engine, result.final, result.noise)
+            ):
                 dataset, engine, result = offset, other, searched
         reduced = without_impacts(dataset, result.last_model)
         if reduced is not None:
@@ -242,18 +243,6 @@ def diagnose_prepared(
         if interrupted is not None and known:
             interrupted(_known_at_interrupt(engine, known[0]))
         raise
-
-
-def _predicts_better(
-    new: tuple[TimeSeriesSelection, SelectionResult],
-    old: tuple[TimeSeriesSelection, SelectionResult],
-) -> bool:
-    """Whether a search's result predicts blocks of time better than another's on the same runs."""
-    was, now = (
-        held_out_rms(engine.regression, result.final, result.noise, engine.regression.blocks)
-        for engine, result in (old, new)
-    )
-    return min(now[output] / was[output] for output in was) < RELEVANT_RATIO
 
 
 class _Trials:

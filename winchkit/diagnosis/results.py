@@ -57,6 +57,8 @@ class OutputError:
     """Variables and the share of the error variance (η²) that each explains."""
     orders: tuple[tuple[str, int, float], ...] = ()
     """Angles, periods per turn, and the share of the error variance that this sine explains."""
+    rms_with_run_offsets: float | None = None
+    """With a fitted offset in every run, where the means of runs without repeats differ."""
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""

@@ -10,6 +10,8 @@ import pytest
 from scipy.stats import binomtest
 
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
+from winchkit.diagnosis.add import add, remove
+from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression import run_offsets
@@ -19,6 +21,7 @@ from winchkit.diagnosis.regression.run_offsets import offset_between_runs, with_
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.report.text import report_text
 from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import EffectTable
 
 FRICTION = term("motor-coulomb", torque=0.03)
 SHIFTS = (0.04, -0.05, 0.02)
@@ -112,3 +115,31 @@ def test_friction_is_named_beside_offsets_that_the_report_lists() -> None:
     text = report_text(answer)
     assert "offset of each run" in text
     assert "is estimated from every run itself" in " ".join(text.split())
+
+
+def test_add_and_remove_estimate_an_offset_of_every_run_as_a_diagnosis_does() -> None:
+    shifted = moved(ridden(), SHIFTS)
+    added = add("motor-coulomb", shifted, GROOVED)
+    torque = added.added[1]["torque"]
+    assert abs(torque.value - 0.03) < 4 * torque.std
+    fitted = added.outputs["motor_torque"]
+    assert fitted.heldout_rms_after < 1.1 * NOISE
+    assert any("the offset differs between runs" in note for note in added.notes)
+    sticky = replace(GROOVED, effect=(EffectTable("motor-coulomb", {"torque": "0.03 N m"}),))
+    removed = remove("motor-coulomb", shifted, sticky)
+    left = removed.outputs["motor_torque"]
+    assert left.heldout_rms_before < 1.1 * NOISE
+    assert left.heldout_rms_after > 4 * NOISE
+
+
+def test_compare_tells_the_error_with_an_offset_per_run_beside_the_whole_error() -> None:
+    sticky = replace(GROOVED, effect=(EffectTable("motor-coulomb", {"torque": "0.03 N m"}),))
+    found = compare(moved(ridden(), SHIFTS), sticky)
+    error = found.outputs["motor_torque"]
+    whole = float(np.sqrt(np.mean(np.square(SHIFTS))))
+    assert error.rms == pytest.approx(whole, rel=0.05)
+    assert error.rms_with_run_offsets is not None
+    assert error.rms_with_run_offsets < 1.1 * NOISE < error.rms
+    assert error.rms_with_run_offsets == error.to_json()["rms_with_run_offsets"]
+    assert any("with an offset per run the error is" in note for note in found.notes)
+    assert compare(ridden(), sticky).outputs["motor_torque"].rms_with_run_offsets is None

@@ -28,7 +28,15 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Coarse, Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 
-__all__ = ["CoarseProblem", "Fit", "Target", "fit", "fit_from", "starts_from_coarse_fits"]
+__all__ = [
+    "CoarseProblem",
+    "Fit",
+    "Target",
+    "evaluated",
+    "fit",
+    "fit_from",
+    "starts_from_coarse_fits",
+]
 
 _ITERATIONS = 15
 _ITERATIONS_OF_PRODUCTS = 40
@@ -291,7 +299,7 @@ def fit_from(
     if problem is not None:
         found = starts_from_coarse_fits(regression, starts, inverse_sigma, problem)
     if found is not None and target is not None:
-        first = _at(regression, found[0], inverse_sigma)
+        first = evaluated(regression, found[0], inverse_sigma)
         if target.is_out_of_reach(first.chi_square, first.n_unknowns):
             return first
     if aim is None:
@@ -305,8 +313,8 @@ def fit_from(
     return replace(best, abandoned=True)
 
 
-def _at(regression: Regression, hypothesis: Hypothesis, inverse_sigma: Array) -> Fit:
-    """A hypothesis at its values."""
+def evaluated(regression: Regression, hypothesis: Hypothesis, inverse_sigma: Array) -> Fit:
+    """A hypothesis at its values, not fitted."""
     residual, vector = regression.residual(hypothesis), regression.vector(hypothesis)
     derivative = _derivative(regression, vector, hypothesis)
     chi_square = _chi_square(residual, inverse_sigma)

@@ -19,7 +19,7 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["MIN_GAIN", "RELEVANT_RATIO", "best_accepted", "is_accepted"]
+__all__ = ["MIN_GAIN", "RELEVANT_RATIO", "best_accepted", "is_accepted", "predicts_better"]
 
 _LEVEL = 0.02
 MIN_GAIN = 2.0
@@ -98,3 +98,17 @@ def _added(present: Fit, larger: Fit) -> int:
         for fitted in (larger, present)
     )
     return max(1, after - before)
+
+
+def predicts_better(
+    new: tuple[SelectionEngine, Fit, Noise], old: tuple[SelectionEngine, Fit, Noise]
+) -> bool:
+    """Whether a fit predicts held-out blocks of time of some output relevantly better.
+
+    Both fits are of the same runs, with other nuisance parameters or excluded samples.
+    """
+    was, now = (
+        held_out_rms(engine.regression, fitted, noise, engine.regression.blocks)
+        for engine, fitted, noise in (old, new)
+    )
+    return min(now[output] / was[output] for output in was) < RELEVANT_RATIO
