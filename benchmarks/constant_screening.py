@@ -5,8 +5,9 @@ such constant of the time-series diagnosis is made larger or smaller by a factor
 at once, and the same cases are diagnosed again. A two-level screening design with random columns
 (Satterthwaite, Technometrics 1 (1959) 111-137): where no answer changes, none of the constants
 decides at that size, alone or beside others; where one does, the association of its changes with
-the levels of each constant says where to look. Cases as in diagnosis_campaign.py, small.
-See benchmarks/README.md.
+the levels of each constant says where to look. Cases as in diagnosis_campaign.py, small; with
+``--robots`` half of them as in robot_diagnosis.py and half as in robot_metrology.py, for the
+constants of robots. See benchmarks/README.md.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import pkgutil
 import re
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,10 @@ import numpy as np
 from campaign.case import Plan
 from campaign.run import run_case
 from diagnosis_campaign import SNRS, plans
+from robot_diagnosis import answer, named
+from robot_metrology import Hidden, diagnosed, drawn
+from robot_poses.cases import CASES
+from robot_poses.hidden import Case
 from summaries import print_summary
 
 Name = tuple[str, str]
@@ -39,12 +44,14 @@ PAGE = Path(__file__).parents[1] / "docs" / "methods.md"
 KINDS = ("none", "single", "pair", "outside")
 ROOMS = ("data", "regression", "selection", "verdict")
 """Folders whose constants can change the answer for a winch."""
+ROBOT_ROOMS = ("robot",)
+"""Folders whose constants change the answer for a robot only."""
 SETS = {"_DEGREES", "_POWERS"}
 """Sets of laws, which have no size."""
 
 
-def rules_of_thumb(page: str) -> list[Name]:
-    """Constants of these folders that were chosen by judgement, and not by the computing cost."""
+def rules_of_thumb(page: str, rooms: Sequence[str] = ROOMS) -> list[Name]:
+    """Constants of folders that were chosen by judgement, and not by the computing cost."""
     found, place = [], ""
     for line in page.splitlines():
         if heading := re.fullmatch(r"### `([\w/]+\.py)`", line):
@@ -52,7 +59,7 @@ def rules_of_thumb(page: str) -> list[Name]:
         row = re.match(r"\| `(\w+)` \| `[^`]+` \| .* \| ([^|]+) \|$", line)
         if not row or row[1] in SETS:
             continue
-        if place.split("/")[0] in ROOMS and row[2].startswith(("rule of thumb", "screened")):
+        if place.split("/")[0] in rooms and row[2].startswith(("rule of thumb", "screened")):
             found.append((place, row[1]))
     return found
 
@@ -107,6 +114,16 @@ def _answer(job: tuple[int, Plan, Mapping[Name, Any]]) -> tuple[Any, ...] | None
     return None if found is None else (found.verdict, *(tuple(sorted(s)) for s in found.steps))
 
 
+def _robot_answer(job: tuple[int, Case | Hidden, Mapping[Name, Any]]) -> tuple[Any, ...]:
+    """Verdict and sets of names of a case of a robot, or of a tracker that was set up anew."""
+    seed, case, values = job
+    set_constants(values)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        found = diagnosed(case, folder) if isinstance(case, Hidden) else answer(case, seed, folder)
+    return (found["verdict"], *(tuple(own.split("|")) for own in named(found)))
+
+
 def associations(
     names: Sequence[Name], levels: Sequence[Sequence[bool]], changed: Sequence[float]
 ) -> list[dict[str, Any]]:
@@ -129,6 +146,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=16)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--factor", type=float, default=1.5, help="between a value and its levels")
+    parser.add_argument("--robots", action="store_true", help="constants and cases of robots")
     parser.add_argument("--only", default="", help="constants whose file and name match")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--json", action="store_true")
@@ -139,7 +157,9 @@ def main() -> None:
         importlib.import_module(module.name)
     names = [
         name
-        for name in rules_of_thumb(PAGE.read_text(encoding="utf-8"))
+        for name in rules_of_thumb(
+            PAGE.read_text(encoding="utf-8"), ROBOT_ROOMS if args.robots else ROOMS
+        )
         if re.search(args.only, " ".join(name))
     ]
     usual = {name: value_of(name) for name in names}
@@ -152,13 +172,21 @@ def main() -> None:
         }
         for upper in levels
     ]
-    cases = list(enumerate(plans(args.cases, list(KINDS), list(SNRS), (), small=True)))
+    run: Callable[[Any], tuple[Any, ...] | None]
+    cases: Sequence[Plan | Case | Hidden]
+    if args.robots:
+        trackers = drawn(args.cases // 2, args.seed * 100_000)
+        run, cases = _robot_answer, [*CASES[: args.cases - args.cases // 2], *trackers]
+    else:
+        run, cases = _answer, plans(args.cases, list(KINDS), list(SNRS), (), small=True)
     jobs = [
-        (args.seed * 100_000 + index, plan, values) for values in draws for index, plan in cases
+        (args.seed * 100_000 + index, case, values)
+        for values in draws
+        for index, case in enumerate(cases)
     ]
     answers: list[tuple[Any, ...] | None] = []
     with ProcessPoolExecutor(args.jobs) as pool:
-        for job, found in zip(jobs, pool.map(_answer, jobs), strict=True):
+        for job, found in zip(jobs, pool.map(run, jobs), strict=True):
             answers.append(found)
             print(job[0], len(answers) // len(cases), found, file=sys.stderr, flush=True)
     table = [answers[n * len(cases) : (n + 1) * len(cases)] for n in range(len(draws))]

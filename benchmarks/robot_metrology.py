@@ -33,7 +33,7 @@ from robot_poses.truth import Noise, Vector, csv, poses
 from summaries import print_cases
 from winchkit.cli import main
 
-__all__ = ["Hidden", "drawn", "judged"]
+__all__ = ["Hidden", "diagnosed", "drawn", "judged"]
 
 _REAL = ("none", "home length", "exit point", "drum radius")
 _BY_NAME = {case.name: case for case in CASES}
@@ -75,13 +75,18 @@ def _vector(values: Any) -> Vector:
     return x, y, z
 
 
+def diagnosed(hidden: Hidden, folder: Path) -> dict[str, Any]:
+    """Answer of ``diagnose`` to one case, as the command prints it."""
+    run, profile = folder / "poses.csv", folder / "robot.toml"
+    run.write_text(observed(hidden.case, hidden.station, seed=hidden.seed, angles=hidden.angles))
+    profile.write_text(profile_text())
+    answer = _called("diagnose", run, "--profile", profile, "--json").stdout
+    return json.loads(answer)  # type: ignore[no-any-return]
+
+
 def judged(hidden: Hidden, folder: Path) -> dict[str, Any]:
     """Answers of ``diagnose`` and ``calibrate`` to one case."""
-    run, profile = folder / "poses.csv", folder / "robot.toml"
-    text = observed(hidden.case, hidden.station, seed=hidden.seed, angles=hidden.angles)
-    run.write_text(text)
-    profile.write_text(profile_text())
-    found = json.loads(_called("diagnose", run, "--profile", profile, "--json").stdout)
+    found = diagnosed(hidden, folder)
     sets = [_members(step) for step in found["steps"]]
     first = {name for own in sets for name in own}
     true = {_EFFECT[hidden.instrument], *hidden.case.answers}
