@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
+from winchkit.diagnosis.add import add
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.input_denoising import (
     contrasts,
@@ -102,3 +103,30 @@ def test_a_noisy_load_is_quietened_and_its_real_acceleration_kept() -> None:
         inner = slice(25, -25)  # accelerations at the ends of a run are not known
         assert rms((recording.raw.load - true)[inner]) == pytest.approx(noise, rel=0.1)
         assert rms((recording.smooth.load - true)[inner]) < noise / 3
+
+
+def test_crosstalk_is_that_of_the_torque_and_not_of_the_noise_of_its_measurement() -> None:
+    """Least squares on a torque whose noise is as large as its changes halves the share."""
+    share, noise = 40.0, 0.3
+    random, runs, torques = np.random.default_rng(8), [], []
+    for seed in range(4):
+        ride = Ride(samples=4000)
+        quiet = made(seed, noise={"tension": 0.5, "motor_torque": 0.0}, ride=ride)
+        torque = quiet["motor_torque"] + 0.3 * np.sin(quiet["motor_angle"] / 60)
+        coupled = with_channel(quiet, "tension", quiet["tension"] + share * torque, "N")
+        read = torque + noise * random.standard_normal(len(torque))
+        runs.append(with_channel(coupled, "motor_torque", read, "N m"))
+        torques.append(torque)
+    for recording, torque in zip(prepare(runs, GROOVED).recordings, torques, strict=True):
+        assert rms(recording.smooth.at.motor_torque - torque) < noise / 3
+    error = np.concatenate(
+        [
+            r["tension"] - made(n, noise={"tension": 0.0}, ride=ride)["tension"]
+            for n, r in enumerate(runs)
+        ]
+    )
+    measured = np.concatenate([run["motor_torque"] for run in runs])
+    attenuated = np.polyfit(measured, error, 1)[0]
+    (found,) = add("cell-crosstalk", runs, GROOVED).added[1].values()
+    assert attenuated < 0.6 * share
+    assert found.value == pytest.approx(share, rel=0.02)

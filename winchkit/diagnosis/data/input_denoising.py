@@ -1,6 +1,6 @@
 """Denoising of measured inputs (errors in variables), on which changes by effects are evaluated.
 
-A measured load or temperature carries noise of its own. What an effect changes is evaluated on the
+A measured load, torque or temperature carries noise of its own. What an effect changes is evaluated on the
 part of it that repeats share, by a Wiener filter per frequency band; without repeats on the part
 that another instrument shares (the tension with the torque, the load with the tension), or, where
 there is none, above the white noise floor. Otherwise that noise acts like a lag or a hysteresis.
@@ -149,7 +149,7 @@ def _band_filtered(full: Array, power: Array, noise: Array, other: Array | None 
 def denoised_motions(
     line: Line, signals: Sequence[Signals], motions: Sequence[Motion], repeats: Sequence[Repeats]
 ) -> list[Motion]:
-    """Motions with denoised cable force and temperature, one per run.
+    """Motions with denoised cable force, motor torque and temperature, one per run.
 
     Parameters
     ----------
@@ -165,7 +165,8 @@ def denoised_motions(
     The acceleration of the cable is the part that repeats share. A measured force is its regression
     on that acceleration plus the part of the remainder that repeats, or two instruments, share; the
     force of a known weight follows the acceleration alone; known weights on a winch at rest are
-    used as they are, since a filter would smooth their steps. The error of finite differences in
+    used as they are, since a filter would smooth their steps. Of a measured torque it is the part
+    that repeats share. The error of finite differences in
     the acceleration is estimated from a measured force; with a known weight it is a nuisance
     parameter of the fit.
     """
@@ -186,6 +187,10 @@ def denoised_motions(
             group.runs, _forces(line, own, regressors, group), discretization, strict=True
         ):
             out[index] = _with(out[index], force, r, signals[index].temperature)
+        torques = [s.motor_torque for s in own if s.motor_torque is not None]
+        if len(torques) == len(own):
+            for index, torque in zip(group.runs, _denoised(torques, group), strict=True):
+                out[index] = replace(out[index], at=replace(out[index].at, motor_torque=torque))
     return out
 
 
