@@ -77,6 +77,22 @@ def test_unknown() -> None:
     assert any(abs(frequency - 1 / 1.03) < 0.5 for frequency in told)
 
 
+def test_a_significant_wave_of_a_fifth_of_the_noise_is_told_and_leaves_the_model_adequate() -> None:
+    """Long repeats show what no error shows: significance is no relevance."""
+    ride = replace(RIDE, samples=6000)
+    wave = 6e-5 * np.sin(2 * np.pi * ride.time / 1.03)
+    long = [
+        with_channel(run, "cable_length", run["cable_length"] + wave, "m")
+        for mass in (10.0, 25.0)
+        for run in (made(int(mass) + seed, load_mass=mass, ride=ride) for seed in range(3))
+    ]
+    found = verdict_of(diagnose(long, GROOVED).diagnosis, "adequate")
+    length = found.outputs["cable_length"]
+    assert length.noise_rms is not None
+    assert length.heldout_rms_after < 1.02 * length.noise_rms
+    assert any("a lack of fit is significant" in note for note in found.notes)
+
+
 def test_partly() -> None:
     """A large drag keeps its name beside a wobble of another output that no effect explains."""
     strange = {"cable_length": strange_length(1e-3)}

@@ -73,7 +73,7 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     added = result.final.labels[engine.n_initial_terms :]
     if not result.lack_of_fit_at_start:
         return Judgement("adequate", 0.0, outputs, result, ())
-    if not added and not result.noise.from_repeats and _error_ratio(outputs) < 1 / RELEVANT_RATIO:
+    if not added and _error_ratio(outputs) < 1 / RELEVANT_RATIO:
         return Judgement("adequate", 0.0, outputs, result, (_irrelevant(result),))
     share = _unexplained(engine, result)
     verdict = _verdict(result, outputs, share) if added else "unknown"
@@ -86,11 +86,12 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
 
 
 def _irrelevant(result: SelectionResult) -> str:
-    """Note on the most evident candidate where no error is above the noise by a relevant ratio."""
+    """Note on what is significant where no error is above the noise by a relevant ratio."""
     significant = (item for item in result.scores if item.is_significant(result.threshold))
-    best = next(significant, result.scores[0]).candidate.effect.id
+    best = next(significant, None)
+    what = "a lack of fit" if best is None else f"the evidence for {best.candidate.effect.id}"
     return (
-        f"the evidence for {best} is significant, but no held-out error is above the noise by "
+        f"{what} is significant, but no held-out error is above the noise by "
         f"{100 * (1 / RELEVANT_RATIO - 1):.0f} %: what it would change is not named"
     )
 
