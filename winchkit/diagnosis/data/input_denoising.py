@@ -1,9 +1,10 @@
 """Denoising of measured inputs (errors in variables), on which changes by effects are evaluated.
 
-A measured load, torque or temperature carries noise of its own. What an effect changes is evaluated on the
-part of it that repeats share, by a Wiener filter per frequency band; without repeats on the part
-that another instrument shares (the tension with the torque, the load with the tension), or, where
-there is none, above the white noise floor. Otherwise that noise acts like a lag or a hysteresis.
+A measured load, torque or temperature carries noise of its own. What an effect changes is evaluated
+on the part of it that repeats share, by a Wiener filter per frequency band; without repeats on the
+part that another instrument shares (the tension with the torque, the load with the tension), or,
+where there is none, above the white noise floor. Otherwise that noise acts like a lag or a
+hysteresis.
 
 References
 ----------
