@@ -132,7 +132,7 @@ def test_add_and_remove_estimate_an_offset_of_every_run_as_a_diagnosis_does() ->
     assert left.heldout_rms_after > 4 * NOISE
 
 
-def test_compare_tells_the_error_with_an_offset_per_run_beside_the_whole_error() -> None:
+def test_compare_states_the_error_with_an_offset_per_run_beside_the_whole_error() -> None:
     sticky = replace(GROOVED, effect=(EffectTable("motor-coulomb", {"torque": "0.03 N m"}),))
     found = compare(moved(ridden(), SHIFTS), sticky)
     error = found.outputs["motor_torque"]

@@ -77,7 +77,7 @@ def test_unknown() -> None:
     assert any(abs(frequency - 1 / 1.03) < 0.5 for frequency in told)
 
 
-def test_a_significant_wave_of_a_fifth_of_the_noise_is_told_and_leaves_the_model_adequate() -> None:
+def test_a_significant_wave_of_a_fifth_of_the_noise_is_a_note_and_the_model_adequate() -> None:
     """Long repeats show what no error shows: significance is no relevance."""
     ride = replace(RIDE, samples=6000)
     wave = 6e-5 * np.sin(2 * np.pi * ride.time / 1.03)
