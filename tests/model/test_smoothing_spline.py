@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from winchkit.arrays import Array
 from winchkit.model.derivatives import Clock
-from winchkit.model.smoothing_spline import SmoothingSpline
+from winchkit.model.smoothing_spline import Design, SmoothingSpline
 
 RATE = 2 * np.pi / 5
 
@@ -128,6 +128,27 @@ def test_a_polynomial_that_the_penalty_leaves_free_is_exact_whatever_the_weight(
     parabola = 1 + 2 * time - 3 * time**2
     for derivative, exact in enumerate((parabola, 2 - 6 * time, np.full_like(time, -6.0))):
         assert spline.smoothed(parabola, derivative) == pytest.approx(exact, rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("weight", [1e5, 1e7, 1e9, 2.6e10])
+def test_large_weights_leave_the_derivatives_of_a_parabola(weight: float) -> None:
+    """Their equations have a condition of 64 times the weight, 2·10¹² for the last one."""
+    time = np.arange(100) * 0.02
+    spline = SmoothingSpline(Design(time, 0.02), weight, 1e-6)
+    assert spline.smoothed(0.1 * time, 1) == pytest.approx(np.full(100, 0.1), abs=1e-7)
+    assert spline.smoothed(0.05 * time**2, 2) == pytest.approx(np.full(100, 0.1), abs=1e-6)
+
+
+@pytest.mark.parametrize("weight", [1e-8, 1e-2, 1.0, 1e2, 1e4])
+def test_beyond_its_support_a_sample_changes_the_second_derivative_by_two_percent(
+    weight: float,
+) -> None:
+    time = np.arange(401.0)
+    spline = SmoothingSpline(Design(time, 1.0), weight, 1.0)
+    kernel = np.abs(spline.smoothed((time == 200.0).astype(float), 2))
+    acting = np.flatnonzero(kernel > 0.02 * kernel.max())
+    width = int(acting[-1]) - 200
+    assert 0.75 * spline.support - 1 <= width <= 1.25 * spline.support
 
 
 @pytest.mark.parametrize("derivative", [0, 1, 2])

@@ -8,16 +8,14 @@ from typing import Any
 
 from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.diagnose import selection_engine
+from winchkit.diagnosis.diagnose import selection_engine, with_offsets_where_better
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.run_offsets import with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.diagnosis.results import Estimate, OutputFit
-from winchkit.diagnosis.selection.acceptance import predicts_better
 from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Score, score
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
@@ -44,6 +42,8 @@ __all__ = [
 ]
 
 _STARTS = 4
+_Addition = tuple[TimeSeriesSelection, tuple[Fit, Noise], tuple[Fit, Noise]]
+"""Engine, and the fits before and after the addition, each with its noise."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -185,17 +185,20 @@ def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -
         raise UsageError(
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
-    before, after = _fitted(engine, effect_id)
-    offset = with_run_offsets(dataset, engine.regression, after[0])
-    if offset is not None:
-        other = _engine(offset, candidates, effect)
-        beside = _fitted(other, effect_id)
-        if predicts_better((other, *beside[1]), (engine, *after)):
-            dataset, engine, (before, after) = offset, other, beside
+
+    def fitted_on(runs: Dataset) -> _Addition:
+        other = _engine(runs, candidates, effect)
+        return other, *_fitted(other, effect_id)
+
+    dataset, (engine, before, after) = with_offsets_where_better(
+        dataset,
+        (engine, *_fitted(engine, effect_id)),
+        fitted_on,
+        lambda found: (found[0], *found[2]),
+    )
     reduced = without_impacts(dataset, after[0].hypothesis)
     if reduced is not None:
-        engine = _engine(reduced, candidates, effect)
-        before, after = _fitted(engine, effect_id)
+        engine, before, after = fitted_on(reduced)
     best = reweighted(engine, *after)
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     outputs = output_fits(engine, before, (best.fit, best.noise))
@@ -308,14 +311,14 @@ def remove(
     """
     catalogue = catalogue or load_catalogue()
     dataset = prepare(runs, profile, band, decimate=True, catalogue=catalogue)
-    engine = selection_engine(dataset, catalogue)
-    initial_model, noise = engine.fit_with_noise(engine.initial_model)
-    offset = with_run_offsets(dataset, engine.regression, initial_model)
-    if offset is not None:
-        other = selection_engine(offset, catalogue)
-        beside = other.fit_with_noise(other.initial_model)
-        if predicts_better((other, *beside), (engine, initial_model, noise)):
-            engine, (initial_model, noise) = other, beside
+
+    def fitted_on(runs: Dataset) -> tuple[TimeSeriesSelection, Fit, Noise]:
+        engine = selection_engine(runs, catalogue)
+        return engine, *engine.fit_with_noise(engine.initial_model)
+
+    _, (engine, initial_model, noise) = with_offsets_where_better(
+        dataset, fitted_on(dataset), fitted_on, lambda found: found
+    )
     terms = initial_model.hypothesis.terms
     there = [index for index, term in enumerate(terms) if term.effect.id == effect_id]
     if not there:

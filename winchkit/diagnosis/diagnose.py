@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from winchkit.diagnosis.design.detectability import DetectionThreshold, detectab
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.exclusion import without_impacts
+from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
+from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, attributions, harmonics
@@ -44,7 +47,7 @@ from winchkit.diagnosis.verdict.decision import (
 )
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
-from winchkit.diagnosis.verdict.significance import insignificant_additions
+from winchkit.diagnosis.verdict.significance import negligible_additions
 from winchkit.diagnosis.verdict.specification_test import judge_with_specification_test
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
@@ -63,6 +66,7 @@ __all__ = [
     "diagnose_prepared",
     "no_progress",
     "selection_engine",
+    "with_offsets_where_better",
 ]
 
 _WHERE = 6
@@ -73,6 +77,7 @@ _UNSEARCHED = (
 _LOCATED = ("unknown", "partly")
 
 
+Found = TypeVar("Found")
 ProgressCallback = Callable[[str, float], None]
 """Called with the present step and the share of the work done, 0 to 1."""
 
@@ -223,15 +228,18 @@ def diagnose_prepared(
     try:
         engine.on_trial = _Trials(progress, "fitting", _SEARCH)
         result = stepwise_selection(engine, known.append)
-        offset = with_run_offsets(dataset, engine.regression, result.final)
-        if offset is not None:
+
+        def searched(offset: Dataset) -> tuple[TimeSeriesSelection, SelectionResult]:
             other = selection_engine(offset, catalogue)
             other.on_trial = _Trials(progress, "with an offset per run, fitting", _SEARCH)
-            searched = stepwise_selection(other)
-            if predicts_better(
-                (other, searched.final, searched.noise), (engine, result.final, result.noise)
-            ):
-                dataset, engine, result = offset, other, searched
+            return other, stepwise_selection(other)
+
+        dataset, (engine, result) = with_offsets_where_better(
+            dataset,
+            (engine, result),
+            searched,
+            lambda found: (found[0], found[1].final, found[1].noise),
+        )
         reduced = without_impacts(dataset, result.last_model)
         if reduced is not None:
             engine = selection_engine(reduced, catalogue)
@@ -243,6 +251,39 @@ def diagnose_prepared(
         if interrupted is not None and known:
             interrupted(_known_at_interrupt(engine, known[0]))
         raise
+
+
+def with_offsets_where_better(
+    dataset: Dataset,
+    found: Found,
+    again: Callable[[Dataset], Found],
+    final: Callable[[Found], tuple[TimeSeriesSelection, Fit, Noise]],
+) -> tuple[Dataset, Found]:
+    """Result with an offset per run, where one is found that predicts held-out blocks better.
+
+    Parameters
+    ----------
+    dataset
+        Runs of the result.
+    found
+        Result without further offsets.
+    again
+        Result on a data set with offsets.
+    final
+        Engine, fitted model and noise of a result.
+
+    Returns
+    -------
+    tuple
+        Data set and result, the given ones where offsets are not needed.
+    """
+    engine, fitted, noise = final(found)
+    offset = with_run_offsets(dataset, engine.regression, fitted)
+    if offset is None:
+        return dataset, found
+    other = again(offset)
+    better = predicts_better(final(other), (engine, fitted, noise))
+    return (offset, other) if better else (dataset, found)
 
 
 class _Trials:
@@ -321,10 +362,10 @@ def _answer(
         judgement = reweighted_judgement(engine, judgement)
         reported = judgement.reported
     found, spread = reported, _spread(engine, reported)
-    for index in insignificant_additions(engine, reported, spread, sets):
+    for index in negligible_additions(engine, reported, spread, sets):
         fewer = without_term(engine, reported, index)
         if judge_with_specification_test(engine, fewer).reported is fewer:
-            note = _insignificant_note(sets[index - added.start])
+            note = _negligible_note(sets[index - added.start])
             return _answer(engine, fewer, tuple(dict.fromkeys((*notes, *reasons, note))))
     sets, steps, closest = plausible_sets(engine, reported, sets, spread)
     if closest:
@@ -394,9 +435,9 @@ def _beside_notes(equivalence: EquivalenceSet) -> Iterator[str]:
         yield f"{effect} predicts the runs as well as {equivalence.effects[0]} beside {further}"
 
 
-def _insignificant_note(equivalence: EquivalenceSet) -> str:
+def _negligible_note(equivalence: EquivalenceSet) -> str:
     names = ", ".join(equivalence.effects)
-    return f"not named: {names}; beside the other effects it is not significant"
+    return f"not named: {names}; beside the other effects it is not significant or changes little"
 
 
 def selection_engine(

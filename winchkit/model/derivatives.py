@@ -222,6 +222,11 @@ class Clock:
             return int(np.ceil(self.spline.reach))
         return max(1, round(_LOAD_SPAN / self._step))
 
+    @cached_property
+    def support(self) -> int:
+        """Samples to either side beyond which an acceleration hardly depends on a sample."""
+        return self.reach if self.spline is None else int(np.ceil(self.spline.support))
+
     @property
     def span(self) -> float:
         """The same in seconds."""

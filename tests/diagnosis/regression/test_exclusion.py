@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,23 @@ def test_impacts_exclude_torque_and_under_a_known_weight_tension(load_mass: floa
         for index in np.flatnonzero(left["motor_torque"]):
             assert np.min(np.abs(backs - index)) < 60
     assert any("impacts of gear-backlash" in note for note in calm.notes)
+
+
+def test_impacts_of_uneven_samples_exclude_what_the_spline_takes_from_them() -> None:
+    """The spline through a noiseless angle oscillates over five samples to either side."""
+    kept = np.random.default_rng(5).random(RIDE.samples) > 0.05
+    run = made(0, load_mass=10.0, ride=RIDE)
+    channels = {
+        name: replace(channel, values=channel.values[kept]) for name, channel in run.channels.items()
+    }
+    uneven = prepare([replace(run, time=run.time[kept], channels=channels)], GROOVED)
+    calm = without_impacts(uneven, with_play(uneven))
+    assert calm is not None
+    before, after = uneven.recordings[0], calm.recordings[0]
+    assert before.raw.clock.support >= 5
+    left = before.valid["motor_torque"] & ~after.valid["motor_torque"]
+    widths = np.diff(np.flatnonzero(np.diff(left.astype(int), prepend=0, append=0)))[::2]
+    assert min(widths[1:-1]) >= 2 * (before.raw.clock.support + 2) + 1
 
 
 def test_without_backlash_no_sample_is_excluded() -> None:

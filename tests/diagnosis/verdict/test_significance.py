@@ -18,7 +18,7 @@ from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.significance import (
     excess_evidence,
-    insignificant_additions,
+    negligible_additions,
     variance_inflation,
 )
 from winchkit.effects.term import Term
@@ -85,7 +85,7 @@ def test_insignificant_effects_come_the_weakest_first() -> None:
         excess_evidence(engine, final, noise, spread, index, threshold=5.0) for index in range(3)
     ]
     assert evidence[1] > 0.0 > max(evidence[0], evidence[2])
-    found = list(insignificant_additions(engine, result, spread, sets))
+    found = list(negligible_additions(engine, result, spread, sets))
     assert found == sorted((0, 2), key=lambda index: evidence[index])
 
 

@@ -20,7 +20,7 @@ __all__ = ["transient_mask", "uncertain_force_mask", "white_noise", "with_neighb
 
 Mask = NDArray[np.bool_]
 _NEIGHBOURS = 2
-"""Samples to either side of a transient, besides the reach of the finite differences."""
+"""Samples to either side of a transient, besides the reach of the derivatives."""
 _MOVING = 0.9
 _LEAST_TRANSIENT = 2.0
 """In units of the white noise; a smaller transient only marks where a layer begins."""
@@ -28,13 +28,13 @@ _NORMAL = 1.4826
 """Standard deviation of normal noise over its median absolute deviation."""
 
 
-def transient_mask(time: Array, measured: Array, output: str, motion: Motion) -> Mask:
+def transient_mask(measured: Array, output: str, motion: Motion) -> Mask:
     """Samples of an output near a change of layer whose transient exceeds the noise.
 
     Parameters
     ----------
-    time, measured : (n,) arrays
-        s, and N or N m.
+    measured : (n,) array
+        N or N m.
     output
         ``tension`` or ``motor_torque``.
     motion
@@ -47,20 +47,20 @@ def transient_mask(time: Array, measured: Array, output: str, motion: Motion) ->
         while the cable rests does not count.
     """
     drum = drum_of(motion.at.profile)
-    none = np.zeros(len(time), dtype=bool)
+    none = np.zeros(len(measured), dtype=bool)
     if motion.load_mass is None or not isinstance(drum, Spiral):
         return none
     at, speed = motion.at, np.abs(motion.at.speed)
     steps = np.diff(np.floor(at.wound_angle / (2 * np.pi)), prepend=np.nan) != 0
     steps[0] = False
-    force = motion.load_mass * speed * (drum.growth / drum.winding_radius) / Clock(time).span
+    force = motion.load_mass * speed * (drum.growth / drum.winding_radius) / motion.clock.span
     if output == "motor_torque":
         force = force * speed / np.maximum(np.abs(at.motor_rate), 1e-12)
     acting = force > _LEAST_TRANSIENT * white_noise(measured)
     transients = steps & (np.abs(at.direction) > _MOVING) & acting
     if not transients.any():
         return none
-    return with_neighbours(transients, time)
+    return with_neighbours(transients, motion.clock)
 
 
 def uncertain_force_mask(measured: Array, nominal: Array, motion: Motion) -> Mask:
@@ -86,9 +86,9 @@ def uncertain_force_mask(measured: Array, nominal: Array, motion: Motion) -> Mas
     return np.asarray(std > _LEAST_TRANSIENT * usual)
 
 
-def with_neighbours(marked: Mask, time: Array) -> Mask:
-    """Extend a mask by the samples whose finite differences reach across a marked one."""
-    reach = _NEIGHBOURS + Clock(time).reach
+def with_neighbours(marked: Mask, clock: Clock) -> Mask:
+    """Extend a mask by the samples whose derivatives reach across a marked one."""
+    reach = _NEIGHBOURS + clock.support
     return np.asarray(np.convolve(marked, np.ones(2 * reach + 1), mode="same") > 0)
 
 

@@ -73,7 +73,7 @@ def _without_impacts(recording: Recording, terms: Sequence[Term]) -> Recording:
     left = set(_FORCES if known_weight else _FORCES[1:]) & recording.valid.keys()
     if not impacts.any() or not left:
         return recording
-    near = with_neighbours(impacts, at.time)
+    near = with_neighbours(impacts, recording.raw.clock)
     valid = {
         output: good & ~near if output in left else good for output, good in recording.valid.items()
     }

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from winchkit.diagnosis.regression.base import Folds
 from winchkit.diagnosis.regression.cross_validation import (
     held_out,
     held_out_rms,
@@ -19,7 +20,18 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["MIN_GAIN", "RELEVANT_RATIO", "best_accepted", "is_accepted", "predicts_better"]
+__all__ = [
+    "MIN_GAIN",
+    "RELEVANT_RATIO",
+    "Fitted",
+    "best_accepted",
+    "is_accepted",
+    "is_relevant",
+    "predicts_better",
+]
+
+Fitted = tuple[SelectionEngine, Fit, Noise]
+"""A fit with its noise and the engine that they are of."""
 
 _LEVEL = 0.02
 MIN_GAIN = 2.0
@@ -84,9 +96,7 @@ def is_accepted(
         signed_rank_p_value(before, after) > _LEVEL and not gains_in_every_group
     ):
         return False
-    was = held_out_rms(regression, present, noise, groups)
-    now = held_out_rms(regression, larger, noise, groups)
-    ratios = [now[output] / was[output] for output in regression.outputs]
+    ratios = _error_ratios((engine, larger, noise), (engine, present, noise), groups)
     # A significant but irrelevant effect, such as a clock offset of 1 ms, is not added.
     return bool(np.sum(gain) > 0 and min(ratios) < largest_ratio and max(ratios) < _NO_WORSE)
 
@@ -100,15 +110,25 @@ def _added(present: Fit, larger: Fit) -> int:
     return max(1, after - before)
 
 
-def predicts_better(
-    new: tuple[SelectionEngine, Fit, Noise], old: tuple[SelectionEngine, Fit, Noise]
-) -> bool:
+def is_relevant(engine: SelectionEngine, smaller: Fit, larger: Fit, noise: Noise) -> bool:
+    """Whether a larger model decreases some held-out error by 2 %, in the folds of acceptance."""
+    folds = engine.folds(larger, noise)
+    ratios = _error_ratios((engine, larger, noise), (engine, smaller, noise), folds)
+    return min(ratios) < RELEVANT_RATIO
+
+
+def predicts_better(new: Fitted, old: Fitted) -> bool:
     """Whether a fit predicts held-out blocks of time of some output relevantly better.
 
     Both fits are of the same runs, with other nuisance parameters or excluded samples.
     """
-    was, now = (
-        held_out_rms(engine.regression, fitted, noise, engine.regression.blocks)
-        for engine, fitted, noise in (old, new)
+    return min(_error_ratios(new, old)) < RELEVANT_RATIO
+
+
+def _error_ratios(new: Fitted, old: Fitted, folds: Folds | None = None) -> list[float]:
+    """Held-out errors of a fit over those of another, by output; by default in blocks of time."""
+    now, was = (
+        held_out_rms(engine.regression, fitted, noise, folds or engine.regression.blocks)
+        for engine, fitted, noise in (new, old)
     )
-    return min(now[output] / was[output] for output in was) < RELEVANT_RATIO
+    return [now[output] / was[output] for output in was]

@@ -1,10 +1,10 @@
-"""Significance of every effect of a final model beside the others: quasi-likelihood ratio.
+"""Significance and relevance of every effect of a final model beside the others.
 
 Effects are added one at a time where their score exceeds the level of the largest score under noise
 alone. An effect that was added early must exceed the same threshold beside those that followed. The
 noise variance of the rows is not enough for that: blocks of time vary, parts of the data contradict
 each other, the motion is sampled. The decrease of χ² is therefore divided by the ratio of the
-variance that the intervals have to that of the likelihood.
+variance that the intervals have to that of the likelihood: a quasi-likelihood ratio.
 
 References
 ----------
@@ -25,24 +25,29 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread, spread_of, whitened_jacobian
 from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof, sums_per_band
 from winchkit.diagnosis.regression.projection import partialled_out
+from winchkit.diagnosis.selection.acceptance import is_relevant
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.scores import score_by_chance
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["excess_evidence", "insignificant_additions", "variance_inflation"]
+__all__ = ["excess_evidence", "negligible_additions", "variance_inflation"]
 
 _UNIDENTIFIABLE = 1e-9
 
 
-def insignificant_additions(
+def negligible_additions(
     engine: SelectionEngine,
     result: SelectionResult,
     spread: Spread,
     sets: Sequence[EquivalenceSet],
 ) -> Iterator[int]:
-    """Additions beside others of whose set no member is significant, the weakest first.
+    """Additions beside others that are not relevant or not significant, the weakest first.
+
+    An addition is not significant where no member of its set is, and not relevant where it
+    decreases no held-out error by 2 %: what acceptance asks of an addition alone holds for every
+    effect of the final model beside the others.
 
     Parameters
     ----------
@@ -68,14 +73,18 @@ def insignificant_additions(
         for place in range(len(sets))
     ]
     for place in np.argsort(excess).tolist():
+        index = first + int(place)
         if excess[place] > 0.0:
-            break
-        if not any(
-            _last_is_significant(engine, rival, noise, result.threshold)
-            for rival in sets[place].fits
-            if rival is not final
-        ):
-            yield first + int(place)
+            without = engine.refit(final.hypothesis.without(index), noise)
+            negligible = not is_relevant(engine, without, final, noise)
+        else:
+            negligible = not any(
+                _last_is_significant(engine, rival, noise, result.threshold)
+                for rival in sets[place].fits
+                if rival is not final
+            )
+        if negligible:
+            yield index
 
 
 def _last_is_significant(
