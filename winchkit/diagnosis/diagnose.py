@@ -25,7 +25,12 @@ from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import Attribution, attributions, harmonics
+from winchkit.diagnosis.residuals.attribution import (
+    MOST_PLACES,
+    Attribution,
+    attributions,
+    harmonics,
+)
 from winchkit.diagnosis.residuals.traces import Trace, trace_columns, traces_of
 from winchkit.diagnosis.results import (
     Diagnosis,
@@ -69,7 +74,6 @@ __all__ = [
     "with_offsets_where_better",
 ]
 
-_WHERE = 6
 _UNSEARCHED = (
     "no effect was looked for, since a sign or unit looks wrong: correct the file, or confirm it "
     "with --as-recorded"
@@ -81,8 +85,8 @@ Found = TypeVar("Found")
 ProgressCallback = Callable[[str, float], None]
 """Called with the present step and the share of the work done, 0 to 1."""
 
-_USUAL_TRIALS = 25.0
-_SEARCH = (0.3, 0.8)
+_USUAL_TRIALS = 7.0
+_SEARCH = (0.4, 0.8)
 _NAMING = (0.8, 1.0)
 
 
@@ -471,4 +475,4 @@ def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[A
         middle = low if not np.isfinite(high) else (low + high) / 2
         share = float(excess_power[largest] / np.sum(np.maximum(excess_power, 0)))
         out.append(Attribution(output, "time", share, frequency=middle))
-    return tuple(sorted(out, key=lambda w: -w.share)[:_WHERE])
+    return tuple(sorted(out, key=lambda w: -w.share)[:MOST_PLACES])

@@ -24,11 +24,11 @@ from winchkit.units import GRAVITY
 
 __all__ = ["Line", "Motion"]
 
-_CREEP_SPEED = 1e-3
+CREEP_SPEED = 1e-3
 """m/s, and with `_CREEP_RATE`, rad/s at the motor, the rates that always have a direction, whatever
 their noise. Rule of thumb: below the slowest programmed speed."""
 _CREEP_RATE = 0.5
-"""rad/s: 5 turns a minute of the motor; see `_CREEP_SPEED`."""
+"""rad/s: 5 turns a minute of the motor; see `CREEP_SPEED`."""
 _NEWTON_STEPS = 4
 """Each step multiplies the error by the share by which elongation and periodic errors change the
 slope, at most some per cent: four reach 1e-7 of the start's error of some centimetres."""
@@ -142,7 +142,7 @@ class Line:
             drum_angle=drum_angle,
             wound_angle=self._reference_wound + drum_angle,
             speed=speed,
-            direction=direction(speed, cable_noise, _CREEP_SPEED),
+            direction=direction(speed, cable_noise, CREEP_SPEED),
             free_length=length,
             tension=zero if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
@@ -282,7 +282,7 @@ class Line:
             drum_angle=drum_angle,
             wound_angle=self._reference_wound + drum_angle,
             speed=speed,
-            direction=np.tanh(speed / _CREEP_SPEED),
+            direction=np.tanh(speed / CREEP_SPEED),
             free_length=length,
             tension=tension,
             temperature=temperature,

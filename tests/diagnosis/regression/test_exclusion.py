@@ -55,7 +55,8 @@ def test_impacts_of_uneven_samples_exclude_what_the_spline_takes_from_them() -> 
     kept = np.random.default_rng(5).random(RIDE.samples) > 0.05
     run = made(0, load_mass=10.0, ride=RIDE)
     channels = {
-        name: replace(channel, values=channel.values[kept]) for name, channel in run.channels.items()
+        name: replace(channel, values=channel.values[kept])
+        for name, channel in run.channels.items()
     }
     uneven = prepare([replace(run, time=run.time[kept], channels=channels)], GROOVED)
     calm = without_impacts(uneven, with_play(uneven))

@@ -13,7 +13,7 @@ from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.results import Diagnosis
-from winchkit.diagnosis.selection.stepwise import initial_result
+from winchkit.diagnosis.selection.stepwise import initial_result, stepwise_selection
 from winchkit.diagnosis.verdict.decision import judge
 from winchkit.effects.term import Term
 from winchkit.report.words.sentence import sentence
@@ -91,6 +91,18 @@ def test_a_significant_wave_of_a_fifth_of_the_noise_is_a_note_and_the_model_adeq
     assert length.noise_rms is not None
     assert length.heldout_rms_after < 1.02 * length.noise_rms
     assert any("a lack of fit is significant" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("scale", "verdict"), [(1.0, "explained"), (10.0, "adequate")])
+def test_errors_below_the_noise_of_repeats_are_not_explained(scale: float, verdict: str) -> None:
+    """As beside a resolution above the error: repeats round alike, and an offset seems certain."""
+    engine = selection_engine(prepare(runs((DRAG,)), GROOVED), CATALOGUE)
+    result = stepwise_selection(engine)
+    rms = {output: scale * value for output, value in result.noise.rms.items()}
+    found = judge(engine, replace(result, noise=replace(result.noise, rms=rms)))
+    assert found.verdict == verdict
+    named = found.reported.final.labels
+    assert named == (("motor-coulomb",) if verdict == "explained" else ())
 
 
 def test_partly() -> None:

@@ -118,7 +118,7 @@ def _poses_text(plan: PosePlan) -> str:
 
 def _indistinguishable(plan: PosePlan) -> list[str]:
     """What no poses distinguish, and what does."""
-    from winchkit.diagnosis.robot.pose_design import LEAST_POWER
+    from winchkit.diagnosis.design.discrimination import LEAST_POWER
     from winchkit.effects.effect import told_apart
     from winchkit.report.words.columns import paragraph
 

@@ -23,7 +23,7 @@ from winchkit.model.line import Motion
 from winchkit.model.stages import At
 from winchkit.runs.run import Run
 
-__all__ = ["Decimation", "decimation_for"]
+__all__ = ["LEAST_RATE", "Decimation", "decimation_for"]
 
 _LEAST_SAMPLES = 200_000
 """Samples of all runs from which decimation begins."""
@@ -31,7 +31,7 @@ _TARGET_SAMPLES = 90_000
 """Samples that decimation aims at."""
 _RELATIVE_CUT_OFF = 0.25
 """Cut-off over the new sampling rate: below it aliases come from three times the cut-off."""
-_LEAST_RATE = 20.0
+LEAST_RATE = 20.0
 """Least sampling rate that is left, Hz: reversals and lags last about a tenth of a second."""
 _TAPS = 10
 _BETA = 7.857
@@ -159,7 +159,7 @@ def decimation_for(runs: Sequence[Run]) -> Decimation | None:
         default=0.0,
     )
     allowed = rate * _RELATIVE_CUT_OFF / highest if highest else np.inf
-    factor = int(min(target_factor, allowed, rate / _LEAST_RATE))
+    factor = int(min(target_factor, allowed, rate / LEAST_RATE))
     return Decimation(factor, _RELATIVE_CUT_OFF * rate / factor) if factor > 1 else None
 
 

@@ -35,12 +35,12 @@ from winchkit.runs.sanity.finding import Finding
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["length_words", "sign_and_scale"]
+__all__ = ["MOST_SAMPLES", "length_words", "sign_and_scale"]
 
 _LARGEST = 1.8
 _BLOCKS = 8
 _SIGMAS = 5.0
-_MOST_SAMPLES = 20_000
+MOST_SAMPLES = 20_000
 _EQUAL = 1.1
 _LEAST_SAMPLES = 50
 _NEAR = 0.05
@@ -241,9 +241,9 @@ def _slope(measured: Array, columns: Array) -> Slope | None:
 
 
 def _complete_rows(measured: Array, columns: Array) -> NDArray[np.intp]:
-    """Rows without a missing value, decimated to about `_MOST_SAMPLES`."""
+    """Rows without a missing value, decimated to about `MOST_SAMPLES`."""
     rows = np.flatnonzero(np.isfinite(measured) & np.all(np.isfinite(columns), axis=1))
-    return rows[:: max(1, len(rows) // _MOST_SAMPLES)]
+    return rows[:: max(1, len(rows) // MOST_SAMPLES)]
 
 
 def _jackknifed(x: Array, y: Array) -> Array:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.sign_and_scale import length_words
+from winchkit.diagnosis.data.sign_and_scale import MOST_SAMPLES, length_words
 from winchkit.diagnosis.data.statics import is_at_rest
 from winchkit.errors import Fault, RunError
 from winchkit.model.line import Line
@@ -28,8 +28,6 @@ _SLOPE_RANGE = 0.75, 1.3333
 _LEAST_FINITE_SHARE = 0.5
 _LEAST_TRAVEL = 0.01
 _LEAST_CORRELATION = 0.5
-_MOST_SAMPLES = 20_000
-"""Samples on which the slope of the measured over the predicted length is fitted."""
 
 
 def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
@@ -163,7 +161,7 @@ def _other_winch(run: Run, profile: WinchProfile) -> list[Fault]:
         message = f"recorded with profile '{named}', compared with '{profile.name}'"
         return [Fault(message + "; give the profile of this winch", where, key="metadata profile")]
     good = np.isfinite(run["motor_angle"]) & np.isfinite(run["cable_length"])
-    few = np.flatnonzero(good)[:: max(1, len(run) // _MOST_SAMPLES)]
+    few = np.flatnonzero(good)[:: max(1, len(run) // MOST_SAMPLES)]
     line = Line(profile)
     signals = Signals(run.time[few], run["motor_angle"][few])
     predicted = line.predict(line.motion(signals))["cable_length"]

@@ -25,12 +25,21 @@ from winchkit.diagnosis.results import NextRun
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 
-__all__ = ["SEPARATED_AT", "Information", "information_of", "next_runs", "power_of", "separation"]
+__all__ = [
+    "LEAST_POWER",
+    "SEPARATED_AT",
+    "Information",
+    "information_of",
+    "next_runs",
+    "power_of",
+    "separation",
+]
 
 SEPARATED_AT = 3.841
 """95 % quantile of χ² with one degree of freedom."""
 _MOST_OFFERS = 2
-_LEAST_POWER = 0.2
+LEAST_POWER = 0.2
+"""Least power of a programme or of poses that are offered."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,7 @@ def next_runs(
         # Of programmes with equal power the one with the largest λ per minute comes first.
         offers.sort(key=lambda offer: (-round(offer[1], 2), -offer[0]))
         names = (first.effect.id, second.effect.id)
-        useful = [offer for offer in offers if offer[1] >= _LEAST_POWER][:_MOST_OFFERS]
+        useful = [offer for offer in offers if offer[1] >= LEAST_POWER][:_MOST_OFFERS]
         out += [NextRun(names, name, power) for _, power, name in useful]
         if not useful:
             # No motion separates them: the advice of the catalogue, whose power is not known.

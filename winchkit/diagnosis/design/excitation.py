@@ -9,13 +9,13 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.repeats import mean_load
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.residuals.attribution import LEAST_TEMPERATURE_RANGE
+from winchkit.model.line import CREEP_SPEED
 
 __all__ = ["missing_excitation"]
 
 _LEAST_LOAD_RANGE = 0.05
 _LEAST_SHARE_OF_DIRECTION = 0.02
-_LEAST_TEMPERATURE_RANGE = 1.0
-_LEAST_SPEED = 1e-3
 _SPEED_TOLERANCE = 0.1
 _SHARE_AT_ONE_SPEED = 0.75
 
@@ -58,8 +58,7 @@ def missing_excitation(regression: TimeSeriesRegression) -> list[str]:
     if any(t is None for t in temperatures):
         notes.append("no temperature measured: thermal effects cannot be detected")
     elif (
-        np.ptp(np.concatenate([t for t in temperatures if t is not None]))
-        < _LEAST_TEMPERATURE_RANGE
+        np.ptp(np.concatenate([t for t in temperatures if t is not None])) < LEAST_TEMPERATURE_RANGE
     ):
         notes.append(
             "temperature nearly constant: a thermal effect looks like an offset or a wrong radius, "
@@ -70,7 +69,7 @@ def missing_excitation(regression: TimeSeriesRegression) -> list[str]:
 
 def _motions(speeds: Sequence[Array]) -> list[str]:
     """Notes on directions, reversals and speeds; ``speeds`` in m/s, one array per run."""
-    moving = [speed[np.abs(speed) > _LEAST_SPEED] for speed in speeds]
+    moving = [speed[np.abs(speed) > CREEP_SPEED] for speed in speeds]
     all_speeds = np.concatenate(moving)
     notes = []
     share_winding_in = float(np.mean(all_speeds > 0)) if len(all_speeds) else 0.0

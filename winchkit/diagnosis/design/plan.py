@@ -8,7 +8,12 @@ from typing import Any
 
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.design.detectability import DetectionThreshold
-from winchkit.diagnosis.design.discrimination import information_of, power_of, separation
+from winchkit.diagnosis.design.discrimination import (
+    LEAST_POWER,
+    information_of,
+    power_of,
+    separation,
+)
 from winchkit.diagnosis.design.programmes import (
     CANDIDATE_PROGRAMMES,
     CandidateProgramme,
@@ -26,7 +31,6 @@ from winchkit.schema.programme import Programme, Step
 __all__ = ["Offer", "inseparable", "offers", "programme_of"]
 
 _HIGH_POWER = 0.9
-_LEAST_POWER = 0.2
 """Power below which a programme is not worth a run."""
 _LOADING_MINUTES, _WARMING_MINUTES = 1 / 3, 20.0
 """Time of an operator to change a load, and to warm the machine, minutes."""
@@ -54,7 +58,7 @@ class Offer:
         nothing is to be separated, effects that become detectable per minute.
         """
         separated = sum(power >= _HIGH_POWER for power in self.powers)
-        summed = round(sum(power for power in self.powers if power >= _LEAST_POWER), 1)
+        summed = round(sum(power for power in self.powers if power >= LEAST_POWER), 1)
         per_minute, detected_per_minute = 1 / self.minutes, len(self.shows) / self.minutes
         return (
             (separated, summed, per_minute, detected_per_minute)
@@ -149,7 +153,7 @@ def inseparable(
     return [
         pair
         for index, pair in enumerate(pairs)
-        if max(offer.powers[index] for offer in found) < _LEAST_POWER
+        if max(offer.powers[index] for offer in found) < LEAST_POWER
     ]
 
 

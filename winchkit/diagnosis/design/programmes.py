@@ -8,6 +8,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset, assemble
+from winchkit.diagnosis.data.decimation import LEAST_RATE
 from winchkit.diagnosis.data.repeats import mean_load
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.line import Line
@@ -27,7 +28,6 @@ __all__ = [
     "usual_temperature",
 ]
 
-_RATE = 20.0
 _MARGIN = 0.05
 """Share of a bench's stroke that is kept free at each end."""
 _RESERVE = 1.5
@@ -160,15 +160,18 @@ def _run(
     temperature: float | None,
 ) -> Run:
     at = operating_range.low
-    pieces = [np.full(round(kind.hold * _RATE), at)]
+    pieces = [np.full(round(kind.hold * LEAST_RATE), at)]
     for share, speed in kind.moves:
         target, fastest = operating_range.at(share), operating_range.fastest
         move = plan(target - at, max(speed * fastest, 1e-4), 4 * fastest, 40 * fastest)
-        time = np.arange(0.0, move.duration, 1 / _RATE)
-        pieces += [at + np.asarray(move.at(time)[0]), np.full(round(kind.hold * _RATE), target)]
+        time = np.arange(0.0, move.duration, 1 / LEAST_RATE)
+        pieces += [
+            at + np.asarray(move.at(time)[0]),
+            np.full(round(kind.hold * LEAST_RATE), target),
+        ]
         at = target
     length = np.concatenate(pieces)
-    time = np.arange(len(length)) / _RATE
+    time = np.arange(len(length)) / LEAST_RATE
     angle = Line(dataset.profile).nominal_motor_angle(length)
     temperatures = None if temperature is None else np.full_like(time, temperature)
     return _as_run(dataset, time, angle, mass, temperatures)

@@ -25,13 +25,20 @@ from winchkit.diagnosis.results import Diagnosis, Step
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect, Parameter
 
-__all__ = ["Pooled", "SharedEffect", "alarms", "pooled", "shared_effects"]
+__all__ = [
+    "WINCHES_PER_OUTLYING",
+    "Pooled",
+    "SharedEffect",
+    "alarms",
+    "pooled",
+    "shared_effects",
+]
 
 _HOMOGENEITY_LEVEL = 0.01
 """Level of the homogeneity test."""
 _LEAST_WINCHES = 3
 """Winches from which one may be outlying: of two that differ neither is."""
-_WINCHES_PER_OUTLYING = 4
+WINCHES_PER_OUTLYING = 4
 """At most one in this many winches may be outlying: of more, a few agree by chance."""
 Member = tuple[str, tuple[float, ...]]
 """An effect with its orders: cogging of two orders counts as two effects."""
@@ -257,7 +264,7 @@ def _homogeneous_subset(x: Array, s: Array) -> NDArray[np.bool_]:
     """Homogeneous winches after removal of one, or a quarter; all where that fails."""
     kept = np.ones(len(x), dtype=bool)
     while _cochran(x[kept], s[kept])[1] < _HOMOGENEITY_LEVEL:
-        if len(x) < _LEAST_WINCHES or (~kept).sum() >= max(1, len(x) // _WINCHES_PER_OUTLYING):
+        if len(x) < _LEAST_WINCHES or (~kept).sum() >= max(1, len(x) // WINCHES_PER_OUTLYING):
             return np.ones(len(x), dtype=bool)
         kept[_most_outlying(x, s, kept)] = False
     return kept

@@ -25,12 +25,12 @@ from scipy.optimize import minimize_scalar
 from scipy.special import stdtr
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.fleet.meta_analysis import WINCHES_PER_OUTLYING
 
 __all__ = ["PartialPooling", "odd_p_values", "partial_pooling"]
 
 LEAST_WINCHES = 4
 """Winches from which one can differ from a majority of the others."""
-_WINCHES_PER_ODD = 4
 _GRID = 60
 
 
@@ -106,7 +106,7 @@ def odd_p_values(values: Array, stds: Array) -> Array:
     own, left = stds**2, np.arange(n)
     between, common, _ = _common(values, own)
     order, p_values = [], []
-    for _ in range(n // _WINCHES_PER_ODD):
+    for _ in range(n // WINCHES_PER_OUTLYING):
         distance = np.abs(values[left] - common) / np.sqrt(own[left] + between)
         winch = int(left[np.argmax(distance)])
         left = left[left != winch]

@@ -25,6 +25,9 @@ from winchkit.schema.profiles.axis import AxisProfile
 
 __all__ = [
     "BINS",
+    "LEAST_SHARE",
+    "LEAST_TEMPERATURE_RANGE",
+    "MOST_PLACES",
     "Attribution",
     "attributions",
     "binned_share",
@@ -48,7 +51,12 @@ _LARGEST_CONDITION = 1e6
 _LEVEL = 0.01
 _OF_THE_CABLE = "cable_length", "directed_length"
 """Variables of a cable, which an axis lacks."""
-_LEAST_SHARE = 0.02
+LEAST_SHARE = 0.02
+"""Least share of the variance that is reported."""
+LEAST_TEMPERATURE_RANGE = 1.0
+"""Range below which the temperature counts as constant, K."""
+MOST_PLACES = 6
+"""Lines of residual attribution that are reported."""
 _LEAST_JOINT_GAIN = 0.05
 """Share that two variables together must explain beyond either of them."""
 
@@ -171,7 +179,7 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribu
             if found is None:
                 continue
             by_chance = 2 * float(np.log(orders / _LEVEL)) / kept_rows(regression, output)
-            if found[1] > max(_LEAST_SHARE, by_chance):
+            if found[1] > max(LEAST_SHARE, by_chance):
                 out.append(Attribution(output, name, found[1], order=found[0]))
     return sorted(out, key=lambda f: -f.share)
 
@@ -183,7 +191,7 @@ def kept_rows(regression: TimeSeriesRegression, output: str) -> int:
 
 def chance_share(bins: int, kept: int) -> float:
     """Share that independent residuals hardly reach: 3 √(2 bins) / rows, at least 2 %."""
-    return max(_LEAST_SHARE, 3 * float(np.sqrt(2 * bins)) / kept)
+    return max(LEAST_SHARE, 3 * float(np.sqrt(2 * bins)) / kept)
 
 
 def binned_share(variable: Array, error: Array, kept: int) -> float:

@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import chance_share, kept_rows, variables_of
+from winchkit.diagnosis.residuals.attribution import (
+    LEAST_TEMPERATURE_RANGE,
+    chance_share,
+    kept_rows,
+    variables_of,
+)
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 from winchkit.plain_json import significant
 
@@ -35,7 +40,7 @@ _FIRST_CELLS, _SECOND_CELLS = 16, 10
 _LEAST_SAMPLES = 3
 _TAILS = 0.002
 _DIGITS = 5
-_LEAST_CHANGE = {"temperature": 1.0}
+_LEAST_CHANGE = {"temperature": LEAST_TEMPERATURE_RANGE}
 """A smaller range is noise of the instrument, K."""
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.residuals.attribution import Attribution, quantile_edges
+from winchkit.diagnosis.residuals.attribution import LEAST_SHARE, Attribution, quantile_edges
 from winchkit.diagnosis.robot.errors import Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.robot import angles_of
@@ -32,8 +32,6 @@ AXES = ("x", "y", "z")
 ON_PLATFORM = tuple(f"platform_{name}" for name in (*AXES, "roll", "pitch", "yaw"))
 """Variables of the pose itself."""
 _BINS = 8
-_LEAST_SHARE = 0.02
-"""Least share that is reported (rule of thumb)."""
 _LEAST_DEVIATIONS = 3.0
 """Standard deviations by chance that a share must exceed."""
 _LINE_SHARE = 0.5
@@ -79,7 +77,7 @@ def pose_attributions(regression: PoseRegression, errors: Errors) -> list[Attrib
             if values.shape[1] not in (1, error.shape[1]):
                 continue
             taken = _taken(np.broadcast_to(values, error.shape), error)
-            if taken.share > max(_LEAST_SHARE, taken.chance_share):
+            if taken.share > max(LEAST_SHARE, taken.chance_share):
                 line = lines[taken.column] if taken.own_share else None
                 found.append(Attribution(output, name, taken.share, line=line))
         if output != "platform_position":
@@ -165,7 +163,7 @@ def _constants(regression: PoseRegression, output: str, error: Array) -> list[At
     kinds = {"winch": winch} if regression.dataset.moves else {"winch": winch, "pose": pose}
     for name, values in kinds.items():
         taken = _category_share(values[known], error[known])
-        if taken.share > max(_LEAST_SHARE, taken.chance_share):
+        if taken.share > max(LEAST_SHARE, taken.chance_share):
             own = name == "winch" and taken.own_share
             line = regression.dataset.names[taken.column] if own else None
             out.append(Attribution(output, name, taken.share, line=line))

@@ -20,10 +20,10 @@ from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["RobotDataset", "prepare_poses"]
+__all__ = ["LEAST_POSES", "RobotDataset", "prepare_poses"]
 
-_LEAST_POSES = 10
-"""Least number of poses (rule of thumb)."""
+LEAST_POSES = 10
+"""Least number of poses, of a data set and of a run that is a fold of its own (rule of thumb)."""
 _ANGLE_TOLERANCE = 0.02
 """Rms difference of motor angles within which rows repeat a pose, in their standard deviation."""
 _TENSION_TOLERANCE = 0.03
@@ -109,9 +109,9 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
             measured, notes=(*measured.notes, _motion_note(measured, trajectory, robot))
         )
     place = ", ".join(run.path or run.name for run in runs)
-    if len(measured) < _LEAST_POSES:
+    if len(measured) < LEAST_POSES:
         raise RunError(
-            Fault(f"only {len(measured)} poses; at least {_LEAST_POSES} are needed to judge", place)
+            Fault(f"only {len(measured)} poses; at least {LEAST_POSES} are needed to judge", place)
         )
     kinds = (measured.motor_angle, measured.position, measured.angles)
     spare = sum(int(np.isfinite(values).sum()) for values in kinds) - 6 * len(measured)

@@ -24,7 +24,7 @@ from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.residuals.attribution import MOST_PLACES, Attribution
 from winchkit.diagnosis.residuals.traces import PoseTrace, pose_traces
 from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, plain_step
 from winchkit.diagnosis.robot.attribution import pose_attributions
@@ -63,7 +63,6 @@ __all__ = [
     "diagnose_robot",
 ]
 
-_MOST_PLACES = 6
 _LEAST_FALL, _LARGEST_RATIO = 0.7, 1.1
 """Residuals beside a free geometry are shown where some error falls below the first ratio and none
 rises above the second one."""
@@ -264,7 +263,7 @@ def _registered_steps(
 def _places(selection: RobotSelection) -> tuple[Attribution, ...]:
     """Variables that explain the unexplained residual, the largest share first."""
     places = pose_attributions(*selection.rest)
-    return tuple(sorted(places, key=lambda w: -w.share)[:_MOST_PLACES])
+    return tuple(sorted(places, key=lambda w: -w.share)[:MOST_PLACES])
 
 
 def _geometry_step(engine: PoseSelection, reported: SelectionResult, output: OutputFit) -> Step:

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from winchkit.arguments import require_type
-from winchkit.diagnosis.design.discrimination import SEPARATED_AT
+from winchkit.diagnosis.design.discrimination import LEAST_POWER, SEPARATED_AT
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.diagnosis.robot.pose_design import (
-    LEAST_POWER,
     POSES,
     PoseOffer,
     Question,

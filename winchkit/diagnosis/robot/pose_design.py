@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of
+from winchkit.diagnosis.design.discrimination import LEAST_POWER, SEPARATED_AT, power_of
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.results import NextRun
 from winchkit.diagnosis.robot.dataset import RobotDataset
@@ -40,7 +40,6 @@ from winchkit.model.robot.identification.pose_design import (
 from winchkit.runs.poses import Measured, joined
 
 __all__ = [
-    "LEAST_POWER",
     "POSES",
     "POSE_CANDIDATES",
     "PoseCandidates",
@@ -193,7 +192,7 @@ Question = tuple[Term, Term | None]
 """An effect and the rival from which it is to be separated; None asks for its detection."""
 POSES = 12
 """Poses per offer."""
-_HIGH_POWER, LEAST_POWER = 0.9, 0.2
+_HIGH_POWER = 0.9
 _OFFERED = 2
 _SUFFICIENT_MARGIN = 3.04
 """Standard deviations above the threshold beyond which more information is not counted: a power of

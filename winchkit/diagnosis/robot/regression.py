@@ -22,7 +22,7 @@ from winchkit.diagnosis.regression.base import Folds, Regression, Segment
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.robot.adjustment import STD_OF_ZERO, instrument_zeros
 from winchkit.diagnosis.robot.candidates import lacking, lacking_parts
-from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.diagnosis.robot.dataset import LEAST_POSES, RobotDataset
 from winchkit.diagnosis.robot.equations import POSED, Equations
 from winchkit.diagnosis.robot.prior import GeometryPrior, profile_with_geometry
 from winchkit.effects.effect import Effect
@@ -39,7 +39,6 @@ COPIES = 5
 """Rows per number with a prior, distributed over the folds."""
 _GROUPS = 5
 _BLOCKS = 24
-_LEAST_POSES_OF_RUN = 10
 _LEAST_SINGULAR_VALUE = 1e-9
 
 
@@ -205,7 +204,7 @@ class PoseRegression(Regression):
         sizes = np.bincount(dataset.measured.run)
         together = [set(dataset.pose[dataset.measured.run == n]) for n in range(len(sizes))]
         disjoint = sum(map(len, together)) == len(set().union(*together))
-        if len(sizes) > 1 and sizes.min() >= _LEAST_POSES_OF_RUN and disjoint:
+        if len(sizes) > 1 and sizes.min() >= LEAST_POSES and disjoint:
             return self._folded(dataset.measured.run, len(sizes))
         return self._folded(dataset.pose % _GROUPS, _GROUPS)
 

@@ -73,8 +73,10 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     added = result.final.labels[engine.n_initial_terms :]
     if not result.lack_of_fit_at_start:
         return Judgement("adequate", 0.0, outputs, result, ())
-    if not added and _error_ratio(outputs) < 1 / RELEVANT_RATIO:
-        return Judgement("adequate", 0.0, outputs, result, (_irrelevant(result),))
+    # Without repeats the noise is what no candidate explains, below the error of any effect.
+    known = result.noise.from_repeats or not added
+    if known and _error_ratio(outputs, before=True) < 1 / RELEVANT_RATIO:
+        return replace(withheld(engine, result, 0.0, _irrelevant(result)), verdict="adequate")
     share = _unexplained(engine, result)
     verdict = _verdict(result, outputs, share) if added else "unknown"
     # Only the effect itself explains nearly all of a residual far above the noise floor.
@@ -171,11 +173,12 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     return min(1.0, share)
 
 
-def _error_ratio(outputs: Mapping[str, OutputFit]) -> float:
-    """Held-out error of the final model over the noise, in the output where it is largest."""
+def _error_ratio(outputs: Mapping[str, OutputFit], *, before: bool = False) -> float:
+    """Held-out error of the final or initial model over the noise, in the output of the largest."""
+    errors = (o.heldout_rms_before if before else o.heldout_rms_after for o in outputs.values())
     return max(
-        fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
-        for fitted in outputs.values()
+        error / fitted.noise_rms if fitted.noise_rms else np.inf
+        for error, fitted in zip(errors, outputs.values(), strict=True)
     )
 
 

@@ -69,7 +69,7 @@ def judge_with_specification_test(
     """
     judgement = judge(engine, result)
     test = SpecificationTest(engine, result)
-    if not test.added or judgement.verdict == "unknown":
+    if not test.added or judgement.verdict in ("unknown", "adequate"):
         return judgement
     in_part, terms = judgement.reported is not result, test.terms
     if curve := test.outperforming_curve(test.added):

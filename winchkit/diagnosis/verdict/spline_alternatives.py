@@ -20,7 +20,7 @@ from winchkit.diagnosis.data.dataset import Recording
 from winchkit.diagnosis.regression.base import Segment
 from winchkit.diagnosis.regression.prediction_cache import masked
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import variables_of
+from winchkit.diagnosis.residuals.attribution import LEAST_TEMPERATURE_RANGE, variables_of
 from winchkit.model.variables import ANGLES, COMPOUND
 
 __all__ = [
@@ -40,7 +40,6 @@ _COARSE_KNOTS = (6, 12)
 _POWERS = (1.5, 2.0, 3.0)
 _EXCLUDED_VARIABLES = (*ANGLES, *COMPOUND, "direction")
 """Variables over which the catalogue has every curve already, or that are tried in a product."""
-_LEAST_TEMPERATURE_RANGE = 1.0
 """A smaller range is noise of the thermometer, K."""
 Law = tuple[Array, int]
 """Values of a curve at the knots, (knots, k) for k parameters, and the number that is penalised."""
@@ -133,7 +132,7 @@ def _products(names: Sequence[str]) -> list[tuple[str, str]]:
 
 def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
     low, high = np.quantile(np.concatenate(values), [_TAILS, 1 - _TAILS])
-    least = _LEAST_TEMPERATURE_RANGE if name == "temperature" else 1e-9 * max(abs(low), abs(high))
+    least = LEAST_TEMPERATURE_RANGE if name == "temperature" else 1e-9 * max(abs(low), abs(high))
     return (float(low), float(high)) if high - low > least else None
 
 
