@@ -92,6 +92,8 @@ class Parameter:
     """Fitted as 1/value, since the null is infinite (stiffnesses)."""
     grid: tuple[float, ...] = ()
     """Coarse grid of a shape for the scores."""
+    onset: float = 0.0
+    """For the time from which the effect acts: spacing at which it is scanned, s; else zero."""
     plausible: Plausible | None = None
     """Range of real machines; None where the bounds are all that is known."""
     whole: bool = False

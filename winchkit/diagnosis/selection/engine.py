@@ -135,7 +135,7 @@ class SelectionEngine(ABC):
         self._optima: dict[Hashable, Hypothesis] = {}
         self._refits: list[tuple[Hypothesis, Noise, float, Fit]] = []
         self._refitted: dict[Hashable, Hypothesis] = {}
-        self._new_orders(initial_model)
+        self._extend_grids(initial_model)
         self.signatures = self._signatures(initial_model)
 
     @abstractmethod
@@ -217,8 +217,8 @@ class SelectionEngine(ABC):
         there = {t.effect.id for t in self.initial_model.terms if not t.effect.repeatable}
         return [effect for effect in self._candidates if effect.id not in there]
 
-    def _new_orders(self, present: Hypothesis) -> bool:
-        """Extend the grids of candidates by orders in the residual; False where there are none."""
+    def _extend_grids(self, present: Hypothesis) -> bool:
+        """Extend the grids of candidates by what the residual shows; False where nothing is new."""
         return False
 
     def further_orders(self, fitted: Fit, effect: Effect, noise: Noise) -> tuple[Term, ...]:
@@ -232,7 +232,7 @@ class SelectionEngine(ABC):
         does.
         """
         self._last_projected = LastValue()
-        effects = self._absent() if self._new_orders(present) else []
+        effects = self._absent() if self._extend_grids(present) else []
         updated = updated_signatures(
             self.regression, present, self.signatures, effects, self.coarse
         )

@@ -18,6 +18,7 @@ from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.onset import best_onset, onset_of, with_onset
 from winchkit.diagnosis.selection.orders import (
     further_orders,
     has_orders,
@@ -117,15 +118,12 @@ class TimeSeriesSelection(SelectionEngine):
             for output in regression.outputs
         }
 
-    def _new_orders(self, present: Hypothesis) -> bool:
-        """Extend the grids of effects with an order by the significant orders of the residual.
+    def _extend_grids(self, present: Hypothesis) -> bool:
+        """Extend the grids of candidates by significant orders and by the best onset.
 
         The noise is the residual's own power per band, so that a line is significant only where it
         exceeds everything else in its band.
         """
-        orders = [effect for effect in self._candidates if has_orders(effect)]
-        if not orders:
-            return False
         regression = self.regression
         vector = regression.vector(present)
         unknowns = regression.jacobian(vector, present) if len(vector) else np.zeros((0, 0))
@@ -133,19 +131,37 @@ class TimeSeriesSelection(SelectionEngine):
         if unknowns.shape[1]:
             residual = partialled_out(unknowns, residual)
         noise = noise_saturated(regression, residual, np.zeros((regression.n_rows, 0)))
-        inverse_sigma = noise.inverse_sigma(regression)
-        extended = {}
-        for effect in orders:
-            scan = periodogram(regression, present, effect, residual, inverse_sigma)
-            new = set(
-                scan.peaks(Coordinates(effect).n_parameters * self.penalty_per_parameter)[
-                    :_MOST_PEAKS
-                ]
+        new = [self._extended(effect, present, residual, noise) for effect in self._candidates]
+        extended = any(a is not b for a, b in zip(new, self._candidates, strict=True))
+        self._candidates = tuple(new)
+        return extended
+
+    def _extended(
+        self, effect: Effect, present: Hypothesis, residual: Array, noise: Noise
+    ) -> Effect:
+        """The effect with further points of its grid, or itself."""
+        regression = self.regression
+        least = Coordinates(effect).n_parameters * self.penalty_per_parameter
+        if has_orders(effect):
+            scan = periodogram(
+                regression, present, effect, residual, noise.inverse_sigma(regression)
             )
-            if not new <= set(map(int, effect.parameter("order").grid)):
-                extended[effect.id] = with_orders(effect, new)
-        self._candidates = tuple(extended.get(e.id, e) for e in self._candidates)
-        return bool(extended)
+            new = set(scan.peaks(least)[:_MOST_PEAKS])
+            known = new <= set(map(int, effect.parameter("order").grid))
+            return effect if known else with_orders(effect, new)
+        onset = onset_of(effect)
+        if onset is None:
+            return effect
+        coarse = self._coarse
+        if coarse is None:
+            best = best_onset(regression, present, effect, noise.inverse_sigma(regression))
+        else:
+            best = best_onset(
+                coarse.regression, coarse.reduced(present), effect, coarse.inverse_sigma(noise)
+            )
+        if best is None or best[1] < least or best[0] in onset.grid:
+            return effect
+        return with_onset(effect, best[0])
 
     def further_orders(self, fitted: Fit, effect: Effect, noise: Noise) -> tuple[Term, ...]:
         """Further orders of a fit's last effect that its residual contains."""

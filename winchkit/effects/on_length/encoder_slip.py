@@ -30,6 +30,7 @@ EFFECT = Effect(
             high=86400.0,
             role="shape",
             grid=(2, 6, 12, 20, 30, 45, 60, 80, 100, 125, 150, 180),
+            onset=_DURATION,
         ),
     ),
     apply=apply,

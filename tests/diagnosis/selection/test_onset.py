@@ -1,0 +1,66 @@
+"""The time of a slip is found between the points of its grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.regression.noise import noise_saturated
+from winchkit.diagnosis.selection.onset import best_onset, onset_of, with_onset
+from winchkit.runs.run import Run
+
+RIDE = Ride(samples=2500)
+SLIP = CATALOGUE["encoder-slip"]
+
+
+def slipped(time: float) -> list[Run]:
+    hidden = (term("encoder-slip", step=0.02, time=time),)
+    return [made(seed, GROOVED, hidden, load_mass=10.0 + seed, ride=RIDE) for seed in range(3)]
+
+
+@pytest.mark.parametrize("time", [7.3, 25.9, 38.7])
+def test_the_score_has_its_maximum_at_the_onset(time: float) -> None:
+    engine = selection_engine(prepare(slipped(time), GROOVED), CATALOGUE)
+    regression, present = engine.regression, engine.initial_model
+    residual = regression.residual(present)
+    noise = noise_saturated(regression, residual, np.zeros((regression.n_rows, 0)))
+    found = best_onset(regression, present, SLIP, noise.inverse_sigma(regression))
+    assert found is not None
+    assert found[0] == pytest.approx(time, abs=0.4)
+    assert found[1] > 2 * np.log(regression.n_rows)
+    # It is a point of the grid from which a fit begins.
+    extended = next(e for e in engine._candidates if e.id == SLIP.id)
+    assert min(abs(point - time) for point in extended.parameter("time").grid) <= 0.4
+
+
+def test_without_a_slip_no_onset_is_added() -> None:
+    runs = [made(seed, GROOVED, load_mass=10.0 + seed, ride=RIDE) for seed in range(3)]
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    (same,) = [effect for effect in engine._candidates if effect.id == SLIP.id]
+    assert same is SLIP
+
+
+def test_an_onset_is_a_point_of_the_grid_and_nothing_else_changes() -> None:
+    parameter = onset_of(SLIP)
+    assert parameter is not None
+    assert parameter.name == "time"
+    longer = with_onset(SLIP, 33.3)
+    assert set(longer.parameter("time").grid) == {*parameter.grid, 33.3}
+    assert longer.parameter("step") == SLIP.parameter("step")
+    assert onset_of(CATALOGUE["drum-radius"]) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("time", [25.9, 38.7])
+def test_a_slip_between_the_points_of_the_grid_is_named(time: float) -> None:
+    found = diagnose(slipped(time), GROOVED).diagnosis
+    assert [step.effects for step in found.steps] == [("encoder-slip",)]
+    values = found.steps[0].parameters["encoder-slip"]
+    assert values["time"].value == pytest.approx(time, abs=0.05)
+    assert values["step"].value == pytest.approx(0.02, abs=4 * values["step"].std)
+    assert NOISE["cable_length"] == pytest.approx(
+        found.outputs["cable_length"].heldout_rms_after, rel=0.1
+    )
