@@ -98,8 +98,9 @@ def test_errors_below_the_noise_of_repeats_are_not_explained(scale: float, verdi
     """As beside a resolution above the error: repeats round alike, and an offset seems certain."""
     engine = selection_engine(prepare(runs((DRAG,)), GROOVED), CATALOGUE)
     result = stepwise_selection(engine)
-    rms = {output: scale * value for output, value in result.noise.rms.items()}
-    found = judge(engine, replace(result, noise=replace(result.noise, rms=rms)))
+    rms = {output: scale * value for output, value in result.initial_noise.rms.items()}
+    noise = replace(result.initial_noise, rms=rms)
+    found = judge(engine, replace(result, initial_noise=noise))
     assert found.verdict == verdict
     named = found.reported.final.labels
     assert named == (("motor-coulomb",) if verdict == "explained" else ())

@@ -130,7 +130,8 @@ def starting_points(
         size = float(column @ column)
         return float((column @ residual) ** 2) / size if size else 0.0
 
-    at, step = values[place.name], grid_spacing(place.grid, values[place.name])
+    at = item.candidate.shape[place.name]
+    step = grid_spacing(place.grid, at)
     best = gain(at)
     for _ in range(_HALVINGS):
         step /= 2

@@ -74,9 +74,10 @@ def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
     if not result.lack_of_fit_at_start:
         return Judgement("adequate", 0.0, outputs, result, ())
     # Without repeats the noise is what no candidate explains, below the error of any effect.
-    known = result.noise.from_repeats or not added
-    if known and _error_ratio(outputs, before=True) < 1 / RELEVANT_RATIO:
-        return replace(withheld(engine, result, 0.0, _irrelevant(result)), verdict="adequate")
+    if result.noise.from_repeats or not added:
+        irrelevant = withheld(engine, result, 0.0, _irrelevant(result))
+        if _error_ratio(irrelevant.outputs) < 1 / RELEVANT_RATIO:
+            return replace(irrelevant, verdict="adequate")
     share = _unexplained(engine, result)
     verdict = _verdict(result, outputs, share) if added else "unknown"
     # Only the effect itself explains nearly all of a residual far above the noise floor.
@@ -173,12 +174,11 @@ def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
     return min(1.0, share)
 
 
-def _error_ratio(outputs: Mapping[str, OutputFit], *, before: bool = False) -> float:
-    """Held-out error of the final or initial model over the noise, in the output of the largest."""
-    errors = (o.heldout_rms_before if before else o.heldout_rms_after for o in outputs.values())
+def _error_ratio(outputs: Mapping[str, OutputFit]) -> float:
+    """Held-out error of the later model over the noise, in the output where it is largest."""
     return max(
-        error / fitted.noise_rms if fitted.noise_rms else np.inf
-        for error, fitted in zip(errors, outputs.values(), strict=True)
+        fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
+        for fitted in outputs.values()
     )
 
 
