@@ -29,7 +29,7 @@ from winchkit.diagnosis.selection.scores import Projected, Score, score
 from winchkit.diagnosis.selection.signatures import Signatures, signatures, updated_signatures
 from winchkit.diagnosis.selection.starting_values import (
     shape_at_bound,
-    starting_points,
+    starting_values,
     truncated_series,
 )
 from winchkit.effects.effect import Effect
@@ -367,7 +367,7 @@ class SelectionEngine(ABC):
             else:
                 if best is None:
                     own = replace(item, candidate=item.candidate.with_law(law))
-                    starts = self._starts(hypothesis, present, own, inverse_sigma)
+                    starts = self._starts(hypothesis, own)
                 else:
                     starts = [best.fit.hypothesis.with_law(law)]
                 fitted = fit_from(
@@ -405,12 +405,9 @@ class SelectionEngine(ABC):
         longer = Trial(fitted, self.criterion(fitted))
         return min(trial, longer, key=lambda one: one.criterion)
 
-    def _starts(
-        self, hypothesis: Hypothesis, present: Fit, item: Score, inverse_sigma: Array
-    ) -> list[Hypothesis]:
+    def _starts(self, hypothesis: Hypothesis, item: Score) -> list[Hypothesis]:
         """Starting values of a hypothesis with a candidate added."""
-        places = starting_points(self.regression, hypothesis, present, item, inverse_sigma)
-        terms = [Term(item.candidate.effect, values) for values in places]
+        terms = [Term(item.candidate.effect, values) for values in starting_values(item)]
         starts = [hypothesis.with_term(term, self.regression.n_runs) for term in terms]
         return starts + [one for start in starts for one in self._without_discretization(start)]
 
