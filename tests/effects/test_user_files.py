@@ -54,6 +54,15 @@ def test_a_file_adds_its_effects_to_the_catalogue(tmp_path: Path) -> None:
         (MINE.replace("what=", 'needs="load", what='), "needs = 'load': must be a tuple of names"),
         (MINE.replace('("cable_length",)', '("length",)'), "outputs: unknown name 'length'"),
         (MINE.replace('("cable_length",)', "()"), "outputs: empty"),
+        (MINE.replace("null=0.0", "null=0.0, onset=0.5"), "onset 0.5: role 'amplitude', unit m"),
+        (
+            MINE.replace(
+                "parameters=(",
+                'parameters=(Parameter("t0", "s", null=0.0, typical=9.0, low=0.0, role="shape", '
+                'onset=0.5), Parameter("more", "m", null=0.0, typical=1e-3), ',
+            ),
+            "onset: the effect has 2 amplitudes (more, size) and 0 probes",
+        ),
     ],
 )
 def test_a_broken_file_is_named_with_what_is_wrong(tmp_path: Path, text: str, said: str) -> None:

@@ -7,6 +7,7 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
+from math import isfinite
 from pathlib import Path
 from pkgutil import iter_modules
 
@@ -161,6 +162,12 @@ def _wrong_with(effect: Effect) -> list[str]:
         ]
     if not effect.outputs:
         wrong.append(f"outputs: empty; one at least of {', '.join(OUTPUTS)}")
+    amplitudes = [p.name for p in effect.parameters if p.role == "amplitude"]
+    if any(p.onset for p in effect.parameters) and (len(amplitudes) != 1 or effect.probes):
+        wrong.append(
+            f"onset: the effect has {len(amplitudes)} amplitudes ({', '.join(amplitudes)}) and "
+            f"{len(effect.probes)} probes; the scan of an onset needs one amplitude and no probe"
+        )
     return wrong + [
         f"{parameter.name}: {text}"
         for parameter in effect.parameters
@@ -175,6 +182,17 @@ def _wrong_with_parameter(parameter: Parameter) -> str:
         return (
             f"unknown unit '{parameter.unit}'; the SI ones are {known}; a compliance is a "
             "stiffness with null=inf and reciprocal=True"
+        )
+    if parameter.onset and not (
+        parameter.onset > 0.0
+        and parameter.unit == "s"
+        and parameter.role == "shape"
+        and isfinite(parameter.low)
+    ):
+        return (
+            f"onset {parameter.onset:g}: role '{parameter.role}', unit {parameter.unit}, low "
+            f"{parameter.low:g}; it is the positive spacing at which a shape in s is scanned, "
+            "whose low is the start of a run, 0"
         )
     if not parameter.low <= parameter.null <= parameter.high:
         return (
