@@ -139,6 +139,22 @@ def test_large_weights_leave_the_derivatives_of_a_parabola(weight: float) -> Non
     assert spline.smoothed(0.05 * time**2, 2) == pytest.approx(np.full(100, 0.1), abs=1e-6)
 
 
+@pytest.mark.parametrize("weight", [1.0, 1e4, 1e6, 1e8])
+def test_a_noisy_signal_is_smoothed_as_by_a_dense_least_squares_solution(weight: float) -> None:
+    time = jittered(8, count=200)
+    design = Design(time, 0.05)
+    signal = np.sin(time) + 0.3 * np.random.default_rng(9).standard_normal(len(time))
+    basis = design.matrix(0).toarray()
+    penalty = np.sqrt(weight) * np.diff(np.eye(design.count), 3, axis=0)
+    rows, right = np.vstack([basis, penalty]), np.concatenate([signal, np.zeros(len(penalty))])
+    expected = np.linalg.lstsq(rows, right, rcond=None)[0]
+    spline = SmoothingSpline(design, weight, 0.3)
+    for derivative in range(3):
+        exact = design.matrix(derivative) @ expected
+        size = float(np.max(np.abs(exact)))
+        assert spline.smoothed(signal, derivative) == pytest.approx(exact, abs=1e-6 * size)
+
+
 @pytest.mark.parametrize("weight", [1e-8, 1e-2, 1.0, 1e2, 1e4])
 def test_beyond_its_support_a_sample_changes_the_second_derivative_by_two_percent(
     weight: float,

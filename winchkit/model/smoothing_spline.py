@@ -345,7 +345,7 @@ class SmoothingSpline:
         if self.weight > _WELL_CONDITIONED:
             # One step of iterative refinement: the differences of the coefficients are exact where
             # the product with the band cancels (Higham 2002, chapter 12).
-            bent = np.convolve(np.diff(found, len(_PENALTY) - 1), _PENALTY[::-1])
+            bent = np.convolve(np.diff(found, len(_PENALTY) - 1), _PENALTY)
             rest = right - basis.T @ (basis @ found) - self.weight * bent
             rest[held] -= self._hold * found[held]
             found += cho_solve_banded(factor, rest, check_finite=False)
