@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 _STARTS = 4
-_Addition = tuple[TimeSeriesSelection, tuple[Fit, Noise], tuple[Fit, Noise]]
+_Fits = tuple[TimeSeriesSelection, tuple[Fit, Noise], tuple[Fit, Noise]]
 """Engine, and the fits before and after the addition, each with its noise."""
 
 
@@ -186,7 +186,7 @@ def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -
             f"effect '{effect_id}' cannot be seen in these runs: without {', '.join(lacking)}"
         )
 
-    def fitted_on(runs: Dataset) -> _Addition:
+    def fitted_on(runs: Dataset) -> _Fits:
         other = _engine(runs, candidates, effect)
         return other, *_fitted(other, effect_id)
 

@@ -91,10 +91,11 @@ def compared(
     regression = TimeSeriesRegression(
         prepare(runs, profile, band, kept_cut_offs=WHOLE_TRANSITION, catalogue=catalogue)
     )
-    residual, offset = _without_offsets(profile, catalogue, regression)
+    hypothesis = initial_hypothesis(profile, catalogue, regression)
+    residual, offset = _without_offsets(hypothesis, regression)
     shares, orders = attributions(regression, residual), harmonics(regression, residual)
     noise = replicate_rms(regression, residual)
-    offsets = _offsets_between_runs(profile, catalogue, regression)
+    offsets = _offsets_between_runs(hypothesis, regression)
     outputs = {}
     for output in regression.dataset.outputs:
         error = regression.compared_samples(residual, output)
@@ -131,14 +132,15 @@ def compared(
 
 def initial_residual(catalogue: Catalogue, regression: TimeSeriesRegression) -> Array:
     """Measured minus predicted by a profile at its file values, only the length offset fitted."""
-    return _without_offsets(regression.dataset.profile, catalogue, regression)[0]
+    hypothesis = initial_hypothesis(regression.dataset.profile, catalogue, regression)
+    return _without_offsets(hypothesis, regression)[0]
 
 
 def _without_offsets(
-    profile: WinchProfile, catalogue: Catalogue | None, regression: TimeSeriesRegression
+    hypothesis: Hypothesis, regression: TimeSeriesRegression
 ) -> tuple[Array, float | None]:
-    """Residual of a profile with the offsets of the length fitted, and their mean, m."""
-    residual = regression.residual(initial_hypothesis(profile, catalogue, regression))
+    """Residual of a hypothesis with the offsets of the length fitted, and their mean, m."""
+    residual = regression.residual(hypothesis)
     offsets = regression.n_run_offsets + int(regression.fits_offset)
     if not offsets:
         return residual, None
@@ -149,7 +151,7 @@ def _without_offsets(
 
 
 def _offsets_between_runs(
-    profile: WinchProfile, catalogue: Catalogue | None, regression: TimeSeriesRegression
+    hypothesis: Hypothesis, regression: TimeSeriesRegression
 ) -> dict[str, float]:
     """Standard deviation of an offset between runs without repeats, SI, of outputs that have one.
 
@@ -158,8 +160,7 @@ def _offsets_between_runs(
     """
     if regression.dataset.repeated:
         return {}
-    even = np.ones(regression.n_rows)
-    at = evaluated(regression, initial_hypothesis(profile, catalogue, regression), even)
+    at = evaluated(regression, hypothesis, np.ones(regression.n_rows))
     found = {output: offset_between_runs(regression, at, output) for output in regression.outputs}
     return {output: one.value for output, one in found.items() if one is not None}
 

@@ -7,7 +7,6 @@ from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
-from math import isfinite
 from pathlib import Path
 from pkgutil import iter_modules
 
@@ -187,7 +186,7 @@ def _wrong_with_parameter(parameter: Parameter) -> str:
         parameter.onset > 0.0
         and parameter.unit == "s"
         and parameter.role == "shape"
-        and isfinite(parameter.low)
+        and parameter.low == 0.0
     ):
         return (
             f"onset {parameter.onset:g}: role '{parameter.role}', unit {parameter.unit}, low "

@@ -232,8 +232,7 @@ class SmoothingSpline:
 
         With m samples per knot it is (λ/m) to the power of a sixth, in knots.
         """
-        density = self.design.samples_per_knot
-        return density * float(max(1.0, (self.weight / density) ** (1 / (2 * (len(_PENALTY) - 1)))))
+        return self.design.samples_per_knot * max(1.0, self._smoothing_length)
 
     @property
     def support(self) -> float:
@@ -246,10 +245,14 @@ class SmoothingSpline:
         ----------
         Schoenberg, I. J. (1973). Cardinal Spline Interpolation. SIAM.
         """
-        density = self.design.samples_per_knot
-        smoothing = 2 * float((self.weight / density) ** (1 / (2 * (len(_PENALTY) - 1))))
-        interpolating = 1 / float(np.log(1 / _CARDINAL_ROOT))
-        return density * float(np.log(1 / _NEGLIGIBLE)) * max(smoothing, interpolating)
+        decay = max(2 * self._smoothing_length, 1 / float(np.log(1 / _CARDINAL_ROOT)))
+        return self.design.samples_per_knot * float(np.log(1 / _NEGLIGIBLE)) * decay
+
+    @property
+    def _smoothing_length(self) -> float:
+        """(λ/m)^⅙ for m samples per knot: the scale of the kernel of large weights, knots."""
+        relative = self.weight / self.design.samples_per_knot
+        return float(relative ** (1 / (2 * (len(_PENALTY) - 1))))
 
     def std(self, derivative: int) -> Array:
         """Standard deviation of a derivative of the signal to which the weight was fitted.

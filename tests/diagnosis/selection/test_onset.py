@@ -9,7 +9,8 @@ from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.noise import noise_saturated
-from winchkit.diagnosis.selection.onset import best_onset, onset_of, with_onset
+from winchkit.diagnosis.selection.candidates import with_grid_points
+from winchkit.diagnosis.selection.onset import best_onset, onset_of
 from winchkit.runs.run import Run
 
 RIDE = Ride(samples=2500)
@@ -27,7 +28,7 @@ def test_the_score_has_its_maximum_at_the_onset(time: float) -> None:
     regression, present = engine.regression, engine.initial_model
     residual = regression.residual(present)
     noise = noise_saturated(regression, residual, np.zeros((regression.n_rows, 0)))
-    found = best_onset(regression, present, SLIP, noise.inverse_sigma(regression))
+    found = best_onset(regression, present, noise.inverse_sigma(regression), SLIP)
     assert found is not None
     assert found[0] == pytest.approx(time, abs=0.4)
     assert found[1] > 2 * np.log(regression.n_rows)
@@ -47,7 +48,7 @@ def test_an_onset_is_a_point_of_the_grid_and_nothing_else_changes() -> None:
     parameter = onset_of(SLIP)
     assert parameter is not None
     assert parameter.name == "time"
-    longer = with_onset(SLIP, 33.3)
+    longer = with_grid_points(SLIP, "time", [33.3])
     assert set(longer.parameter("time").grid) == {*parameter.grid, 33.3}
     assert longer.parameter("step") == SLIP.parameter("step")
     assert onset_of(CATALOGUE["drum-radius"]) is None

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
+from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.gls import Fit
@@ -87,6 +87,26 @@ def test_insignificant_effects_come_the_weakest_first() -> None:
     assert evidence[1] > 0.0 > max(evidence[0], evidence[2])
     found = list(negligible_additions(engine, result, spread, sets))
     assert found == sorted((0, 2), key=lambda index: evidence[index])
+
+
+def test_a_significant_effect_that_changes_no_error_by_two_percent_is_negligible() -> None:
+    """An offset of a tenth of the noise is certain after 4000 samples, and changes 0.5 %."""
+    offset = term("cell-offset", offset=0.1 * NOISE["tension"])
+    ride = Ride(samples=4000)
+    runs = [
+        made(10 * load + repeat, GROOVED, (DRAG, offset), load_mass=10.0 * load, ride=ride)
+        for load in (1, 2)
+        for repeat in range(2)
+    ]
+    engine = selection_engine(prepare(runs, GROOVED), CATALOGUE)
+    final, noise, spread = fitted_with(engine, (offset, DRAG))
+    assert excess_evidence(engine, final, noise, spread, 0, threshold=5.0) > 0.0
+    result = replace(initial_result(engine), final=final, noise=noise, threshold=5.0)
+    sets = [
+        EquivalenceSet(one, (one.effect.id,), (one,), (final,), {})
+        for one in final.hypothesis.terms
+    ]
+    assert list(negligible_additions(engine, result, spread, sets)) == [0]
 
 
 def test_the_variance_of_one_amplitude_is_that_of_its_interval() -> None:

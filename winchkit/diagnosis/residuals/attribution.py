@@ -54,7 +54,7 @@ _OF_THE_CABLE = "cable_length", "directed_length"
 LEAST_SHARE = 0.02
 """Least share of the variance that is reported."""
 LEAST_TEMPERATURE_RANGE = 1.0
-"""Range below which the temperature counts as constant, K."""
+"""Range below which the temperature counts as constant, K: noise of the thermometer."""
 MOST_PLACES = 6
 """Lines of residual attribution that are reported."""
 _LEAST_JOINT_GAIN = 0.05

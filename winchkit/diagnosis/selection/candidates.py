@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["Point", "points"]
+__all__ = ["Point", "points", "with_grid_points"]
 
 Point = tuple[Effect, dict[str, float], list[dict[str, float]]]
 """An effect, a point of its shape grid, and its values of a usual size there."""
@@ -23,3 +24,13 @@ def points(regression: Regression, effects: Iterable[Effect]) -> Iterator[Point]
         for shape in coordinates.grid():
             if regression.excites(shape):
                 yield effect, shape, coordinates.usual_steps()
+
+
+def with_grid_points(effect: Effect, name: str, values: Iterable[float]) -> Effect:
+    """The effect with further values in the grid of a shape; itself where it has them all."""
+    known = set(effect.parameter(name).grid)
+    longer = tuple(sorted({*known, *map(float, values)}))
+    if len(longer) == len(known):
+        return effect
+    parameters = (replace(p, grid=longer) if p.name == name else p for p in effect.parameters)
+    return replace(effect, parameters=tuple(parameters))

@@ -15,8 +15,6 @@ Biometrika 44, 248-252.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from winchkit.arrays import Array
@@ -28,7 +26,7 @@ from winchkit.effects.effect import Effect, Parameter
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["best_onset", "onset_of", "with_onset"]
+__all__ = ["best_onset", "onset_of"]
 
 _MOST_ONSETS = 1000
 """Bounds memory: 32 MB each 4000 rows of the coarse regression."""
@@ -39,16 +37,8 @@ def onset_of(effect: Effect) -> Parameter | None:
     return next((p for p in effect.parameters if p.onset), None)
 
 
-def with_onset(effect: Effect, time: float) -> Effect:
-    """The effect with one more time in its grid."""
-    parameters = tuple(
-        replace(p, grid=tuple(sorted({*p.grid, time}))) if p.onset else p for p in effect.parameters
-    )
-    return replace(effect, parameters=parameters)
-
-
 def best_onset(
-    regression: TimeSeriesRegression, present: Hypothesis, effect: Effect, inverse_sigma: Array
+    regression: TimeSeriesRegression, present: Hypothesis, inverse_sigma: Array, effect: Effect
 ) -> tuple[float, float] | None:
     """Onset of an effect with the largest score, and that score.
 
@@ -58,10 +48,10 @@ def best_onset(
         The data and the model, as a rule the coarse one.
     present
         Model beside which the effect is added.
-    effect
-        Effect with an onset, see :func:`onset_of`, and one amplitude.
     inverse_sigma
         1/σ of every row, shape (n_rows,).
+    effect
+        Effect with an onset, see :func:`onset_of`, and one amplitude.
 
     Returns
     -------

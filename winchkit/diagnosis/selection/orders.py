@@ -14,7 +14,7 @@ Pati, Y. C., Rezaiifar, R., Krishnaprasad, P. S. (1993). Orthogonal matching pur
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +33,7 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.series import orders_of
 from winchkit.effects.term import Term
 
-__all__ = ["Periodogram", "further_orders", "has_orders", "periodogram", "with_orders"]
+__all__ = ["Periodogram", "further_orders", "has_orders", "periodogram"]
 
 _LEVEL = 0.01
 _MOST_IN_SERIES = 24
@@ -74,15 +74,6 @@ def has_orders(effect: Effect) -> bool:
     """Whether an effect may stand several times with whole orders per motor turn."""
     names = {p.name for p in effect.parameters if p.whole}
     return effect.polar is not None and names == {"order"} and effect.id not in EMPIRICAL
-
-
-def with_orders(effect: Effect, orders: Collection[int]) -> Effect:
-    """The effect with further orders in its grid."""
-    parameters = tuple(
-        replace(p, grid=tuple(sorted({*p.grid, *map(float, orders)}))) if p.whole else p
-        for p in effect.parameters
-    )
-    return replace(effect, parameters=parameters)
 
 
 def periodogram(

@@ -17,13 +17,13 @@ from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit
 from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.selection.candidates import with_grid_points
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.onset import best_onset, onset_of, with_onset
+from winchkit.diagnosis.selection.onset import best_onset, onset_of
 from winchkit.diagnosis.selection.orders import (
     further_orders,
     has_orders,
     periodogram,
-    with_orders,
 )
 from winchkit.diagnosis.selection.scores import Projected
 from winchkit.effects.effect import Effect
@@ -124,6 +124,8 @@ class TimeSeriesSelection(SelectionEngine):
         The noise is the residual's own power per band, so that a line is significant only where it
         exceeds everything else in its band.
         """
+        if not any(has_orders(effect) or onset_of(effect) for effect in self._candidates):
+            return False
         regression = self.regression
         vector = regression.vector(present)
         unknowns = regression.jacobian(vector, present) if len(vector) else np.zeros((0, 0))
@@ -131,37 +133,29 @@ class TimeSeriesSelection(SelectionEngine):
         if unknowns.shape[1]:
             residual = partialled_out(unknowns, residual)
         noise = noise_saturated(regression, residual, np.zeros((regression.n_rows, 0)))
-        new = [self._extended(effect, present, residual, noise) for effect in self._candidates]
-        extended = any(a is not b for a, b in zip(new, self._candidates, strict=True))
-        self._candidates = tuple(new)
-        return extended
-
-    def _extended(
-        self, effect: Effect, present: Hypothesis, residual: Array, noise: Noise
-    ) -> Effect:
-        """The effect with further points of its grid, or itself."""
-        regression = self.regression
-        least = Coordinates(effect).n_parameters * self.penalty_per_parameter
-        if has_orders(effect):
-            scan = periodogram(
-                regression, present, effect, residual, noise.inverse_sigma(regression)
-            )
-            new = set(scan.peaks(least)[:_MOST_PEAKS])
-            known = new <= set(map(int, effect.parameter("order").grid))
-            return effect if known else with_orders(effect, new)
-        onset = onset_of(effect)
-        if onset is None:
-            return effect
-        coarse = self._coarse
-        if coarse is None:
-            best = best_onset(regression, present, effect, noise.inverse_sigma(regression))
+        inverse_sigma = noise.inverse_sigma(regression)
+        if self._coarse is None:
+            sampled = regression, present, inverse_sigma
         else:
-            best = best_onset(
-                coarse.regression, coarse.reduced(present), effect, coarse.inverse_sigma(noise)
-            )
-        if best is None or best[1] < least or best[0] in onset.grid:
+            coarse = self._coarse
+            sampled = coarse.regression, coarse.reduced(present), coarse.inverse_sigma(noise)
+
+        def extended(effect: Effect) -> Effect:
+            """The effect with further points of its grid, or itself."""
+            least = Coordinates(effect).n_parameters * self.penalty_per_parameter
+            if has_orders(effect):
+                scan = periodogram(regression, present, effect, residual, inverse_sigma)
+                return with_grid_points(effect, "order", scan.peaks(least)[:_MOST_PEAKS])
+            if onset := onset_of(effect):
+                best = best_onset(*sampled, effect)
+                if best is not None and best[1] >= least:
+                    return with_grid_points(effect, onset.name, best[:1])
             return effect
-        return with_onset(effect, best[0])
+
+        new = tuple(map(extended, self._candidates))
+        changed = any(a is not b for a, b in zip(new, self._candidates, strict=True))
+        self._candidates = new
+        return changed
 
     def further_orders(self, fitted: Fit, effect: Effect, noise: Noise) -> tuple[Term, ...]:
         """Further orders of a fit's last effect that its residual contains."""

@@ -223,14 +223,16 @@ def output_fits(
         By output; rms in SI.
     """
     regression, folds = engine.regression, folds or engine.folds(*final)
-    before, after = _rms(regression, initial_model[0]), _rms(regression, final[0])
-    held_before = held_out_rms(regression, *initial_model, folds)
-    held_after = held_out_rms(regression, *final, folds)
     noise, leakage = final[1], StopBandLeakage(regression)
-    leakage_power = (
-        leakage.residual(initial_model[0].hypothesis),
-        leakage.residual(final[0].hypothesis),
-    )
+
+    def errors(model: tuple[Fit, Noise]) -> tuple[dict[str, float], ...]:
+        """Rms in sample and held out, and what leaks from above the cut-off, by output."""
+        held = held_out_rms(regression, *model, folds)
+        return _rms(regression, model[0]), held, leakage.residual(model[0].hypothesis)
+
+    first = errors(initial_model)
+    before, held_before, leakage_before = first
+    after, held_after, leakage_after = first if final is initial_model else errors(final)
     noise_leakage = leakage.noise(final[0].hypothesis)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
@@ -238,10 +240,10 @@ def output_fits(
             unit=OUTPUT_UNITS[output],
             band=next(s.band.cut_off for s in regression.segments if s.output == output),
             signal_rms=regression.signal_rms(output),
-            rms_before=_with(before[output], leakage_power[0].get(output)),
-            rms_after=_with(after[output], leakage_power[1].get(output)),
-            heldout_rms_before=_with(held_before[output], leakage_power[0].get(output)),
-            heldout_rms_after=_with(held_after[output], leakage_power[1].get(output)),
+            rms_before=_with(before[output], leakage_before.get(output)),
+            rms_after=_with(after[output], leakage_after.get(output)),
+            heldout_rms_before=_with(held_before[output], leakage_before.get(output)),
+            heldout_rms_after=_with(held_after[output], leakage_after.get(output)),
             noise_rms=_with(noise.rms[output], noise_leakage.get(output)),
             noise_source=source,
         )

@@ -40,7 +40,6 @@ _COARSE_KNOTS = (6, 12)
 _POWERS = (1.5, 2.0, 3.0)
 _EXCLUDED_VARIABLES = (*ANGLES, *COMPOUND, "direction")
 """Variables over which the catalogue has every curve already, or that are tried in a product."""
-"""A smaller range is noise of the thermometer, K."""
 Law = tuple[Array, int]
 """Values of a curve at the knots, (knots, k) for k parameters, and the number that is penalised."""
 _ChangeByCurve = Callable[[Recording, Array, Array], Array]
