@@ -52,13 +52,18 @@ _LEAST_SAMPLES = 50
 thumb)."""
 _MOST_KNOTS = 200_000
 """Bounds time and memory, both linear in it: each band of six rows is 10 MB."""
-_LONG_GAP, _SPAN = 300, 200
-"""Knots without a sample above which every 200th coefficient between is held at a straight line.
+_LONG_GAP = 300
+"""Knots without a sample above which both sides are smoothed on their own.
 
-The penalty alone determines n coefficients with a condition number of 64 (n/π)⁶: 4·10¹² for 200
-and 5·10¹³ for 300, but above 10¹⁶, where no factor exists, for 750."""
-_HELD, _HELD_SHARE = 1e-3, 1e-10
-"""Weight of that line, in samples and as a share of the penalty's: above its rounding of 10⁻¹⁶."""
+The penalty alone determines n coefficients with a condition number of 64 (n/π)⁶: 5·10¹³ for 300,
+and above 10¹⁶, where no factor exists, for 750. The kernel of the largest weight has fallen to 6 %
+of its peak."""
+_FEW_SAMPLES = 8
+"""Fewer between two long gaps do not determine a motion, and are held near standstill (rule of
+thumb)."""
+_HELD = 1e-3
+"""Weight of their first differences: small beside that of a sample, 1, and above the rounding of
+the largest penalty, 2·10⁻⁴."""
 
 
 @dataclass(frozen=True)
@@ -72,9 +77,37 @@ class Design:
     _matrices: dict[int, csr_array] = field(default_factory=dict, init=False, repr=False)
 
     @cached_property
+    def _starts(self) -> NDArray[np.intp]:
+        """First sample of each part between long gaps."""
+        long = np.flatnonzero(np.diff(self.time) > _LONG_GAP * self.spacing) + 1
+        return np.concatenate(([0], long))
+
+    @cached_property
+    def _samples(self) -> NDArray[np.intp]:
+        """Number of samples of each part."""
+        return np.asarray(np.diff(np.append(self._starts, len(self.time))))
+
+    @cached_property
+    def _counts(self) -> NDArray[np.intp]:
+        """Number of coefficients of each part."""
+        ends = self._starts + self._samples - 1
+        spans = (self.time[ends] - self.time[self._starts]) / self.spacing
+        return np.asarray(spans.astype(np.intp) + 1 + _DEGREE)
+
+    @cached_property
     def count(self) -> int:
         """Number of coefficients."""
-        return int((self.time[-1] - self.time[0]) / self.spacing) + 1 + _DEGREE
+        return int(self._counts.sum())
+
+    @cached_property
+    def undetermined(self) -> int:
+        """Dimension of what the penalty leaves free: a parabola for each part."""
+        return (len(_PENALTY) - 1) * len(self._samples)
+
+    @cached_property
+    def few(self) -> NDArray[np.bool_]:
+        """Samples of parts that do not determine a motion, (n,)."""
+        return np.repeat(self._samples < _FEW_SAMPLES, self._samples)
 
     @cached_property
     def samples_per_knot(self) -> float:
@@ -84,9 +117,12 @@ class Design:
     @cached_property
     def _position(self) -> tuple[NDArray[np.intp], Array]:
         """First coefficient that acts on every sample, and its place between two knots, 0 to 1."""
-        place = (self.time - self.time[0]) / self.spacing
-        cell = np.minimum(place.astype(np.intp), self.count - 1 - _DEGREE)
-        return cell, place - cell
+        start = np.repeat(self.time[self._starts], self._samples)
+        place = (self.time - start) / self.spacing
+        last = np.repeat(self._counts - 1 - _DEGREE, self._samples)
+        cell = np.minimum(place.astype(np.intp), last)
+        before = np.repeat(np.cumsum(self._counts) - self._counts, self._samples)
+        return before + cell, place - cell
 
     def basis(self, derivative: int) -> tuple[NDArray[np.intp], Array]:
         """First coefficient and the six weights of every sample, (n,) and (n, 6)."""
@@ -126,21 +162,17 @@ class Design:
         return band
 
     @cached_property
-    def held(self) -> NDArray[np.bool_]:
-        """Coefficients within long gaps that are held at a straight line, (count,)."""
-        empty = np.concatenate(([False], self.gram[0] == 0, [False]))
-        ends = np.flatnonzero(np.diff(empty.astype(np.int8)))
-        found = np.zeros(self.count, dtype=bool)
-        for first, last in zip(ends[::2], ends[1::2], strict=True):
-            if last - first > _LONG_GAP:
-                found[first + _SPAN : last - _SPAN // 2 : _SPAN] = True
-        return found
+    def penalised(self) -> NDArray[np.bool_]:
+        """Third differences within one part, (count − 3,)."""
+        part = np.repeat(np.arange(len(self._counts)), self._counts)
+        return np.asarray(part[3:] == part[:-3])
 
     @cached_property
-    def centres(self) -> Array:
-        """Times of the coefficients, (count,), s: those of a straight line are its values there."""
-        number = np.arange(self.count) - (_DEGREE - 1) / 2
-        return np.asarray(self.time[0] + number * self.spacing)
+    def held(self) -> NDArray[np.bool_]:
+        """First differences within a part of few samples, (count − 1,)."""
+        part = np.repeat(np.arange(len(self._counts)), self._counts)
+        few = np.repeat(self._samples < _FEW_SAMPLES, self._counts)
+        return np.asarray((part[1:] == part[:-1]) & few[1:])
 
 
 @dataclass(frozen=True)
@@ -181,7 +213,10 @@ class SmoothingSpline:
         """
         from scipy.optimize import minimize_scalar
 
-        spacing = max(float(np.median(np.diff(time))), float(time[-1] - time[0]) / _MOST_KNOTS)
+        steps = np.diff(time)
+        usual = float(np.median(steps))
+        # A long gap has no knots.
+        spacing = max(usual, float(np.minimum(steps, _LONG_GAP * usual).sum()) / _MOST_KNOTS)
         levels = np.unique(signal)
         step = float(np.min(np.diff(levels))) if len(levels) > 1 else 0.0
         alike = round(step / float(np.mean(np.abs(np.diff(signal))))) if step else 1
@@ -194,6 +229,11 @@ class SmoothingSpline:
         least = max(step**2 / 12, (1e-12 * float(np.ptp(signal))) ** 2, 1e-300)
 
         design = Design(time, spacing)
+        if design.few.any() and not design.few.all():
+            # They do not determine the weight either.
+            kept = cls.fit(time[~design.few], signal[~design.few])
+            design = Design(time, kept.design.spacing)
+            return cls(design, kept.weight, kept.noise, kept.deviance)
 
         def reml(weight: float) -> tuple[float, float]:
             return cls(design, weight, 1.0)._reml(signal, least)
@@ -320,39 +360,37 @@ class SmoothingSpline:
         """Lower band of the Cholesky factor of B'B + λ D'D, (6, count)."""
         from scipy.linalg import cholesky_banded
 
-        count = self.design.count
         band = self.design.gram.copy()
-        for row in range(len(_PENALTY)):
+        size, weights = len(_PENALTY), self.weight * self.design.penalised
+        for row in range(size):
             for column in range(row + 1):
-                rows = slice(column, count - len(_PENALTY) + 1 + column)
-                band[row - column, rows] += self.weight * _PENALTY[row] * _PENALTY[column]
-        band[0, self.design.held] += self._hold
+                rows = slice(column, column + len(weights))
+                band[row - column, rows] += weights * _PENALTY[row] * _PENALTY[column]
+        hold = _HELD * self.design.held
+        band[0, :-1] += hold
+        band[0, 1:] += hold
+        band[1, :-1] -= hold
         return np.asarray(cholesky_banded(band, lower=True))
-
-    @property
-    def _hold(self) -> float:
-        """Weight of the straight line in long gaps."""
-        return max(_HELD, _HELD_SHARE * self.weight)
 
     def _coefficients(self, signal: Array) -> Array:
         from scipy.linalg import cho_solve_banded
 
         basis = self.design.matrix(0)
         right = basis.T @ signal
-        held = self.design.held
-        if held.any():
-            line = np.interp(self.design.centres[held], self.design.time, signal)
-            right[held] += self._hold * line
         factor = self._factor, True
         found = np.asarray(cho_solve_banded(factor, right, check_finite=False))
         if self.weight > _WELL_CONDITIONED:
             # One step of iterative refinement: the differences of the coefficients are exact where
             # the product with the band cancels (Higham 2002, chapter 12).
-            bent = np.convolve(np.diff(found, len(_PENALTY) - 1), _PENALTY)
+            bent = np.convolve(self._bent(found), _PENALTY)
             rest = right - basis.T @ (basis @ found) - self.weight * bent
-            rest[held] -= self._hold * found[held]
-            found += cho_solve_banded(factor, rest, check_finite=False)
+            moved = np.convolve(self.design.held * np.diff(found), [-1.0, 1.0])
+            found += cho_solve_banded(factor, rest + _HELD * moved, check_finite=False)
         return found
+
+    def _bent(self, coefficients: Array) -> Array:
+        """Penalised third differences, (count − 3,)."""
+        return self.design.penalised * np.diff(coefficients, len(_PENALTY) - 1)
 
     def _at_samples(self, coefficients: Array, derivative: int) -> Array:
         return np.asarray(self.design.matrix(derivative) @ coefficients)
@@ -362,12 +400,12 @@ class SmoothingSpline:
         centred = signal - signal.mean()
         coefficients = self._coefficients(centred)
         residual = centred - self._at_samples(coefficients, 0)
-        bent = np.diff(coefficients, len(_PENALTY) - 1)
+        bent = self._bent(coefficients)
         squares = float(residual @ residual) + self.weight * float(bent @ bent)
-        free = len(signal) - len(_PENALTY) + 1
+        free = max(1, len(signal) - self.design.undetermined)
         variance = max(squares / free, least)
         determinant = 2 * float(np.sum(np.log(self._factor[0])))
-        penalised = self.design.count - len(_PENALTY) + 1
+        penalised = int(np.count_nonzero(self.design.penalised))
         value = free * np.log(variance) + squares / variance + determinant
         return float(value - penalised * np.log(self.weight)), variance
 

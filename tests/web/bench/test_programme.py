@@ -11,17 +11,20 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
+from playwright.sync_api import TimeoutError as PlaywrightTimeout
+
 from browsing import Served, number, opened, until
 from chromium import NEEDS_CHROMIUM
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime, NEEDS_CHROMIUM]
 
 MOVING = {"winding in", "paying out"}
-PROGRAMME = """\
+HEAD = """\
 schema = 1
 kind = "programme"
 name = "stroke"
-
+"""
+STEP = """
 [[step]]
 winch = "A"
 by = "{change}"
@@ -51,10 +54,10 @@ def length(page: Any) -> float:
     return number(page.inner_text("#values .value >> nth=0"))
 
 
-def choose(page: Any, folder: Path, change: str, speed: str) -> None:
-    """Open the dialog of the programmes with a file of one move."""
+def choose(page: Any, folder: Path, change: str, speed: str, moves: int = 1) -> None:
+    """Open the dialog of the programmes with a file of one move, or of several alike."""
     path = folder / "stroke.toml"
-    path.write_text(PROGRAMME.format(change=change, speed=speed))
+    path.write_text(HEAD + moves * STEP.format(change=change, speed=speed))
     page.click("#programmes")
     until(page, lambda: page.locator("#dialog .hold").count() == 1, 10.0)
     page.set_input_files("#dialog input[type=file]", str(path))
@@ -105,6 +108,24 @@ def test_a_button_that_is_not_held_long_enough_starts_nothing(
     assert state(page) == "at rest"
 
 
+def test_the_button_that_ends_a_programme_stays_the_same_from_step_to_step(
+    page: Any, tmp_path: Path
+) -> None:
+    # The browser clicks an element where the pointer went down and up on the same one.
+    choose(page, tmp_path, "-20 mm", "0.05 m/s", moves=3)
+    press(page, 1.0)
+    until(page, lambda: page.locator("text=End programme").count() == 1, 10.0)
+    button = page.locator("text=End programme").element_handle()
+    texts = set()
+    while "is done" not in (text := page.inner_text("#programme")):
+        if text:
+            texts.add(text)
+            assert button.evaluate("each => each.isConnected") or "is done" in page.inner_text(
+                "#programme"
+            )
+    assert len(texts) > 1, "the programme advanced while its button was there"
+
+
 @pytest.mark.parametrize("way", ["Space", "button", "End programme"])
 def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way: str) -> None:
     # Half a minute: a busy browser clicks seconds later.
@@ -117,7 +138,10 @@ def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way
     elif way == "button":
         page.click("header .stop")
     else:
-        page.click("text=End programme")
+        try:
+            page.click("text=End programme", timeout=10_000)
+        except PlaywrightTimeout as error:
+            raise AssertionError(f"the page shows: {page.inner_text('#programme')}") from error
     until(page, lambda: state(page) not in MOVING, 2.0)
     until(page, lambda: "stroke ended early" in page.inner_text("#programme"), 5.0)
     stopped = length(page)

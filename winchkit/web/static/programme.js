@@ -67,10 +67,18 @@ export function progress(host, now, send) {
   const text = JSON.stringify(now);
   if (host.dataset.text === text) return;
   host.dataset.text = text;
-  const share = now.steps ? ((now.repeat ? now.repeat - 1 : 0) * now.steps + Math.max(0, now.step - 1)) / (now.repeats * now.steps) : null;
+  if (now.ended) {
+    fill(host, el("div", { class: `alert ${now.error ? "" : "done"}` }, el("div", {}, el("b", {}, `${now.name} ${now.error ? "ended early" : "is done"}`), el("p", {}, now.error || `${now.files.length} run${now.files.length === 1 ? "" : "s"}: ${now.files.map((path) => path.split("/").at(-1)).join(", ")}`)), el("button", { class: "plain", onclick: () => { fill(host); host.dataset.text = text; } }, "Close")));
+    return;
+  }
+  // A button under the pointer stays the same element from step to step, so that no click is lost.
+  if (!host.querySelector(".running")) fill(host, el("div", { class: "alert running", role: "status" }, el("div", {}, el("b", {}), el("span", {}), el("progress", { "aria-label": "Progress", max: 1 })), el("button", { class: "primary", hidden: true, onclick: () => send("answer_programme") }, "It is done"), el("button", { onclick: () => send("end_programme") }, "End programme")));
   const place = now.repeat ? `repeat ${now.repeat} of ${now.repeats}${now.steps ? `, step ${now.step} of ${now.steps}` : ""}` : "beginning";
-  if (now.ended) fill(host, el("div", { class: `alert ${now.error ? "" : "done"}` }, el("div", {}, el("b", {}, `${now.name} ${now.error ? "ended early" : "is done"}`), el("p", {}, now.error || `${now.files.length} run${now.files.length === 1 ? "" : "s"}: ${now.files.map((path) => path.split("/").at(-1)).join(", ")}`)), el("button", { class: "plain", onclick: () => { fill(host); host.dataset.text = text; } }, "Close")));
-  else fill(host, el("div", { class: "alert running", role: "status" }, el("div", {}, el("b", {}, now.name), ` ${place}: ${now.asks ? `please ${now.asks}` : now.does}`, el("progress", share === null ? { "aria-label": "Progress" } : { value: share, max: 1, "aria-label": "Progress" })), now.asks ? el("button", { class: "primary", onclick: () => send("answer_programme") }, "It is done") : null, el("button", { onclick: () => send("end_programme") }, "End programme")));
+  host.querySelector("b").textContent = now.name;
+  host.querySelector("span").textContent = ` ${place}: ${now.asks ? `please ${now.asks}` : now.does}`;
+  const bar = host.querySelector("progress");
+  if (now.steps) bar.value = ((now.repeat ? now.repeat - 1 : 0) * now.steps + Math.max(0, now.step - 1)) / (now.repeats * now.steps); else bar.removeAttribute("value");
+  host.querySelector(".primary").hidden = !now.asks;
 }
 
 export const refused = (commands, trips) => { if (!commands) alarm("This page only watches; request command first."); else if (trips) alarm("Tripped: reset first."); return !commands || trips; };
