@@ -180,10 +180,10 @@ class Recorder:
 
         A warning is new by its kind and winch: its words may hold a number of each cycle.
         """
-        winches = tuple((w.phase, w.state, w.commander) for w in snapshot.winch.values())
-        warned = tuple((warning.kind, warning.winch) for warning in snapshot.warnings)
-        tares = tuple(self._tares.items())
-        said = (winches, snapshot.tripped, snapshot.overruns, warned, tares)
+        winches = [(w.phase, w.state, w.commander) for w in snapshot.winch.values()]
+        warned = [(warning.kind, warning.winch) for warning in snapshot.warnings]
+        # The tares are another dictionary only where one has changed.
+        said = (winches, snapshot.tripped, snapshot.overruns, warned, self._tares)
         if said == self._said:
             return
         self._said = said
