@@ -38,7 +38,7 @@ __all__ = ["Hidden", "diagnosed", "drawn", "judged"]
 _REAL = ("none", "home length", "exit point", "drum radius")
 _BY_NAME = {case.name: case for case in CASES}
 _EFFECT = {"frame": "tracker-frame", "reflector": "reflector-offset", "scale": "tracker-scale"}
-_LIMIT_M, _LIMIT_RAD = 4e-5, np.radians(0.03)
+_LIMIT_M, _LIMIT_RAD = 4e-5, float(np.radians(0.03))
 
 
 @dataclass(frozen=True)

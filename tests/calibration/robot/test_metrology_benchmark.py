@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,7 @@ def test_a_small_run_is_right(tmp_path: Path) -> None:
         folder = tmp_path / str(n)
         folder.mkdir()
         rows.append(judged(hidden, folder))
+    assert json.loads(json.dumps(rows)) == rows
     told = summary(rows)
     assert told["instrument and effect in the first set"] == "3 of 3"
     assert told["a wrong line named alone"] == "0 of 3"
