@@ -14,6 +14,8 @@ import pytest
 pytest.importorskip("starlette")
 pytest.importorskip("playwright.sync_api")
 
+from playwright.sync_api import TimeoutError as PlaywrightTimeout
+
 from browsing import Served, opened, texts, until
 from chromium import NEEDS_CHROMIUM
 from recordings_of_others import lay_out
@@ -180,8 +182,14 @@ def test_emps_from_its_authors_file_and_a_log_of_another_program(
 
 def saved_as(page: Any, name: str, kind: str, folder: Path) -> Path:
     """A file that a plot's button saves."""
-    with page.expect_download() as waiting:
-        page.click(f"[aria-label='Save {name} as {kind}']")
+    button = page.locator(f"[aria-label='Save {name} as {kind}']").element_handle()
+    try:
+        with page.expect_download() as waiting:
+            button.click()
+    except PlaywrightTimeout as error:
+        stays = button.evaluate("each => each.isConnected")
+        words = f"no {kind} of {name}; its button is {'there' if stays else 'another one now'}"
+        raise AssertionError(words) from error
     path = folder / f"{name}.{kind.lower()}"
     waiting.value.save_as(path)
     return path
