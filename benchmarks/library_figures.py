@@ -5,9 +5,9 @@
 
 ``throughput``: CPU time of diagnoses of simulated sessions in the plain loop alone, in two plain
 loops at once, which share memory and caches, and by two processes of a cluster, start-up left out,
-and whether the rows are equal byte for byte. ``index``: ``--runs``
-small runs, new and unchanged. ``tasks``: the sessions of these runs through scheduler and tables
-with results of 20 kB and without diagnoses; memory of the process that has client and scheduler.
+and whether the rows are equal byte for byte. ``index``: ``--runs`` small runs, new and unchanged.
+``tasks``: the sessions of these runs through scheduler and tables with results of 20 kB and without
+diagnoses; memory of the process that has client and scheduler.
 ``query``: a slope per winch and effect over 10⁶ estimates. CPU times are those of a busy machine as
 well; ``load`` is that of this computer before and after. About a CPU minute each.
 """

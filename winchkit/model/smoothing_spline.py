@@ -100,6 +100,11 @@ class Design:
         return int(self._counts.sum())
 
     @cached_property
+    def _part(self) -> NDArray[np.intp]:
+        """Number of the part of each coefficient, (count,)."""
+        return np.repeat(np.arange(len(self._counts)), self._counts)
+
+    @cached_property
     def undetermined(self) -> int:
         """Dimension of what the penalty leaves free: a parabola for each part."""
         return (len(_PENALTY) - 1) * len(self._samples)
@@ -164,15 +169,14 @@ class Design:
     @cached_property
     def penalised(self) -> NDArray[np.bool_]:
         """Third differences within one part, (count − 3,)."""
-        part = np.repeat(np.arange(len(self._counts)), self._counts)
-        return np.asarray(part[3:] == part[:-3])
+        reach = len(_PENALTY) - 1
+        return np.asarray(self._part[reach:] == self._part[:-reach])
 
     @cached_property
     def held(self) -> NDArray[np.bool_]:
         """First differences within a part of few samples, (count − 1,)."""
-        part = np.repeat(np.arange(len(self._counts)), self._counts)
-        few = np.repeat(self._samples < _FEW_SAMPLES, self._counts)
-        return np.asarray((part[1:] == part[:-1]) & few[1:])
+        few = (self._samples < _FEW_SAMPLES)[self._part[1:]]
+        return np.asarray((self._part[1:] == self._part[:-1]) & few)
 
 
 @dataclass(frozen=True)
@@ -361,8 +365,8 @@ class SmoothingSpline:
         from scipy.linalg import cholesky_banded
 
         band = self.design.gram.copy()
-        size, weights = len(_PENALTY), self.weight * self.design.penalised
-        for row in range(size):
+        weights = self.weight * self.design.penalised
+        for row in range(len(_PENALTY)):
             for column in range(row + 1):
                 rows = slice(column, column + len(weights))
                 band[row - column, rows] += weights * _PENALTY[row] * _PENALTY[column]
@@ -405,7 +409,7 @@ class SmoothingSpline:
         free = max(1, len(signal) - self.design.undetermined)
         variance = max(squares / free, least)
         determinant = 2 * float(np.sum(np.log(self._factor[0])))
-        penalised = int(np.count_nonzero(self.design.penalised))
+        penalised = self.design.count - self.design.undetermined
         value = free * np.log(variance) + squares / variance + determinant
         return float(value - penalised * np.log(self.weight)), variance
 
