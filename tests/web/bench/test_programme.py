@@ -126,6 +126,21 @@ def test_the_button_that_ends_a_programme_stays_the_same_from_step_to_step(
     assert len(texts) > 1, "the programme advanced while its button was there"
 
 
+def test_progress_is_drawn_again_after_the_connection_was_lost(page: Any) -> None:
+    # In between the page knows of no programme; the state after it may be the same.
+    shown = page.evaluate(
+        """async () => {
+          const { progress } = await import("/static/programme.js");
+          const host = document.createElement("div"), none = () => {};
+          const now = { name: "stroke", does: "moves", repeat: 1, repeats: 2, step: 1, steps: 3 };
+          return [now, null, now].map((each) => (progress(host, each, none), host.textContent));
+        }"""
+    )
+    assert shown[1] == ""
+    assert "stroke" in shown[0]
+    assert shown[2] == shown[0]
+
+
 @pytest.mark.parametrize("way", ["Space", "button", "End programme"])
 def test_a_programme_that_is_stopped_ends_at_rest(page: Any, tmp_path: Path, way: str) -> None:
     # Half a minute: a busy browser clicks seconds later.

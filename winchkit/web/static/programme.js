@@ -61,7 +61,7 @@ function curves(plan) {
 
 // The programme under way: signs of life while this page is seen, progress, its questions, its end.
 export function progress(host, now, send) {
-  if (!now) { clearInterval(signs); signs = null; if (host && host.firstChild) fill(host); return; }
+  if (!now) { clearInterval(signs); signs = null; if (host && host.firstChild) { fill(host); delete host.dataset.text; } return; }
   if (now.ended) { clearInterval(signs); signs = null; } else if (!signs) signs = setInterval(() => { if (!document.hidden) send("programme"); }, SIGN);
   if (!host) return;
   const text = JSON.stringify(now);

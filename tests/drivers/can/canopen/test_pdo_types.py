@@ -138,7 +138,7 @@ def test_a_drive_is_moved_with_slower_feedback_of_its_speed(
 ) -> None:
     _, bus = rig
     spec = with_second_tpdo(transmission, event_timer)
-    axis = Cia402Axis(bus, 1, spec, WatchSpec(127, 0.05, 0.004, True, prove=False), CLOCK)
+    axis = Cia402Axis(bus, 1, spec, WatchSpec(127, 0.2, 0.004, True, prove=False), CLOCK)
     axis.commission()
     for number in range(50):
         axis.begin_cycle(number, CLOCK.now())

@@ -51,7 +51,7 @@ class Rig:
         spec = bus_spec()
         self.drive = DriveOnBus(spec).__enter__()
         self.bus = CanBus(spec, "can", CLOCK)
-        options = WatchSpec(127, 0.05, CYCLE, True, prove=False, **watch)  # type: ignore[arg-type]
+        options = WatchSpec(127, 0.2, CYCLE, True, prove=False, **watch)  # type: ignore[arg-type]
         self.axis = Cia402Axis(self.bus, 1, device_in(mode), options, CLOCK)
         self._syncs = itertools.count(1)
 

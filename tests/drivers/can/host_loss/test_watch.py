@@ -146,7 +146,9 @@ def test_nothing_is_enabled_before_the_host_s_heartbeat_began(rig: Rig) -> None:
     drive, bus = rig
     axis = axis_on(bus)
     axis.commission()
-    for number in range(20):
+    for number in range(1500):
+        if axis.state is State.OPERATION_ENABLED:
+            break
         axis.begin_cycle(number, CLOCK.now())
         bus.sync()
         if number == 10:
