@@ -218,7 +218,7 @@ class Winch(WinchStatus):
                 f"winch {self.name}: a tension of {tension} N with {travel} m of travel at {speed} "
                 f"m/s held for {hold} s cannot be meant; all are above zero"
             )
-        cell = self.sensors.get("load") or self.sensors.get("cell")
+        cell = self.load_cell
         if cell is None:
             raise NotPermitted(f"winch {self.name} has no load cell, by which to hold a tension")
         limits = self.wiring.limits

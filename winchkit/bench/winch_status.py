@@ -107,6 +107,11 @@ class WinchStatus:
         commanders = self._bench.commanders
         return commanders.holder(self.name) is commanders.actor
 
+    @property
+    def load_cell(self) -> Sensor | None:
+        """By which the tension is controlled: the load's instrument, else the winch's cell."""
+        return self.sensors.get("load") or self.sensors.get("cell")
+
     def tension_reading(self, now: float) -> TensionReading:
         """Tension at the platform end: the load's instrument, else the cell with its correction.
 
@@ -120,8 +125,7 @@ class WinchStatus:
         TensionReading
             Newest value with its age.
         """
-        load, cell = self.sensors.get("load"), self.sensors.get("cell")
-        sensor = load or cell
+        load, sensor = self.sensors.get("load"), self.load_cell
         newest = None if sensor is None else sensor.latest
         if newest is None:
             return TensionReading(math.nan, math.inf)

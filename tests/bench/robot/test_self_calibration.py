@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import robot_rectangle
 import robot_self_calibrated
 from winchkit.bench.bench import Bench
-from winchkit.bench.robot.self_calibration import PoseVolume, self_calibrated
+from winchkit.bench.robot.self_calibration import PoseVolume, _stages, self_calibrated
 from winchkit.bench.robot.tracker import TrackedPose, Tracker
 from winchkit.errors import MotionError, UsageError
 from winchkit.runs.run import Run
@@ -21,6 +23,25 @@ def test_the_benchmark_calibrates_a_hidden_geometry() -> None:
     assert not found["refused"]
     assert found["held_out_before_mm"] > 0.2
     assert found["held_out_after_mm"] < 0.25 * found["held_out_before_mm"]
+
+
+@pytest.mark.slow
+def test_cables_stay_taut_where_the_points_are_5_mm_wrong() -> None:
+    """A cable of this robot falls below 2 N where motions go on by the profile's geometry."""
+    found = robot_self_calibrated.measure(281141, 20, 4, "40 ms")
+    assert not found["refused"]
+    assert found["held_out_after_mm"] < 0.04 < found["held_out_before_mm"]
+
+
+@given(st.integers(10, 500))
+def test_the_volume_grows_with_the_poses_that_are_fitted(poses: int) -> None:
+    stages = _stages(poses)
+    counts, shares = zip(*stages, strict=True)
+    assert sum(counts) == poses
+    assert min(counts) >= 10
+    assert list(shares) == sorted(shares)
+    assert shares[-1] == 1.0
+    assert len(stages) == min(3, poses // 10)
 
 
 @pytest.mark.slow

@@ -151,6 +151,25 @@ def test_without_a_cell_at_each_winch_it_is_refused(bench: Bench) -> None:
 
 
 @pytest.mark.slow
+def test_forces_that_the_drives_do_not_give_are_refused_before_anything_moves() -> None:
+    """The middle of 5 N and 220 N at a drum of 60 mm is 6.75 N m, of 6 N m."""
+    sim = read_simbench(find("sim", "cabtive-robot"))
+    assert sim.bench.robot is not None
+    wiring = replace(sim.bench.robot, tension=(5.0, 220.0))
+    sim = replace(sim, bench=replace(sim.bench, cycle=0.04, robot=wiring))
+    clock = SimulatedClock()
+    with LiveBench(sim, simulated_time=clock) as live, open_bench(live.bench_spec, clock) as bench:
+        clock.sleep(0.5)
+        with pytest.raises(
+            NotPermitted, match=r"needs 6\.\d+ N m .* the drive gives 6 N m at most"
+        ):
+            bench.robot.trim()
+        assert not bench.robot.moving
+        # A motion by length moves; the correction at its end is what is refused.
+        bench.robot.move(bench.robot.moved({"z": 0.005}, relative=True))
+
+
+@pytest.mark.slow
 def test_a_declared_trim_follows_each_motion_and_a_stop_ends_it(
     structure: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:

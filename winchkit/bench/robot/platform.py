@@ -106,6 +106,11 @@ class Platform:
         return moved(self.pose, change, relative=relative)
 
     @property
+    def has_cells(self) -> bool:
+        """Whether every winch has a load cell, by which the cable forces can be corrected."""
+        return all(winch.load_cell is not None for winch in self._winches)
+
+    @property
     def moving(self) -> bool:
         """Whether a motion is under way."""
         return any(winch.moving for winch in self._winches)
@@ -155,7 +160,8 @@ class Platform:
             Keep the drives enabled at the end.
         preload : (n,) array, optional
             Motor angles at its end less those of the plan, rad; by default those at its beginning.
-            What differs at the beginning is removed in proportion to the travelled path.
+            What differs at the beginning is removed in proportion to the travelled path. Where
+            ``[robot]`` declares ``tension_trim``, the last correction of the forces is kept.
 
         Returns
         -------
@@ -169,7 +175,9 @@ class Platform:
             For a winch that may not move.
         """
         present = self._angles()[0] - planned.motor_angle[0]
-        kept = present if preload is None else preload
+        kept: Array = present
+        if preload is not None and not self.planner.wiring.tension_trim:
+            kept = preload
         share = planned.distance[:, None] / planned.path.length
         angles = planned.motor_angle + present + share * (kept - present)
         self._permit(planned, angles)
@@ -273,7 +281,7 @@ class Platform:
     ) -> list[CableTrim]:
         """A correction toward cable forces (n,) at a pose, of each winch."""
         robot, winches = self.robot, self._winches
-        cells = [winch.sensors.get("load") or winch.sensors.get("cell") for winch in winches]
+        cells = [winch.load_cell for winch in winches]
         for winch, cell in zip(winches, cells, strict=True):
             winch.require_length()
             if cell is None:
@@ -289,6 +297,7 @@ class Platform:
                 None if axial_stiffness is None else axial_stiffness / (length + cable.dead_length)
             )
             stiffness.append(greatest_stiffness(cable, length, bound))
+        self._require_torque(force)
         null = null_space(robot.structure(pose)[0])
         limits = [winch.wiring.limits for winch in winches]
         ages = [cell.max_age for cell in cells if cell is not None]
@@ -316,6 +325,20 @@ class Platform:
 
         common = ForceTrim(setting, limits, readings, trip)
         return [CableTrim(common, i, winch.cable, holds=hold) for i, winch in enumerate(winches)]
+
+    def _require_torque(self, force: Array) -> None:
+        """Raise NotPermitted where a drive's torque does not hold a cable force (n,)."""
+        angles = self._angles()[0].tolist()
+        for winch, pull, angle in zip(self._winches, force.tolist(), angles, strict=True):
+            drive = self._bench.axes[winch.name].drive
+            most = float("nan") if drive is None else drive.limits.torque
+            torque = pull * abs(winch.cable.at(angle)[1])
+            if torque > most:
+                raise NotPermitted(
+                    f"winch {winch.name}: the cable force {pull:.0f} N, of the limits `tension` of "
+                    f"[robot], needs {torque:.3g} N m at its motor, and the drive gives "
+                    f"{most:.3g} N m at most (6072h); lower `tension` of [robot]"
+                )
 
     def _start(self, sources: Sequence[MotionSource]) -> None:
         """Begin the motion of each winch, all in one cycle."""
