@@ -205,6 +205,36 @@ def test_what_ships_is_without_fault(path: Path) -> None:
     assert load(path).warnings == ()
 
 
+def test_shipped_declarations_are_read_by_their_names() -> None:
+    assert read_profile("bench-spiral") == read_profile(find("profiles", "bench-spiral"))
+    assert read_robot("cabtive").name == "cabtive"
+    assert read_device("generic-cia402").name == "generic-cia402"
+    assert read_simbench("spiral-bench").name == "spiral-bench"
+    assert read_programme("programme-demo").name == "demo"
+
+
+def test_a_file_of_the_name_counts_before_the_shipped_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = find("profiles", "bench-spiral").read_text()
+    (tmp_path / "bench-spiral.toml").write_text(text.replace('"bench-spiral"', '"mine"'))
+    monkeypatch.chdir(tmp_path)
+    assert read_profile("bench-spiral").name == "mine"
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("bench-spirl", "did you mean 'bench-spiral'"),
+        ("bench-spirl.toml", "there is no such file"),
+        ("here/bench-spiral", "there is no such file"),
+    ],
+)
+def test_neither_a_file_nor_a_shipped_name_is_an_error(name: str, words: str) -> None:
+    with pytest.raises(FileError, match=words):
+        read_profile(name)
+
+
 def test_shipped_devices_are_found_by_name() -> None:
     for name in names("devices"):
         assert read_device(find("devices", name)).name == name

@@ -1,6 +1,7 @@
 """Readers of declarations in TOML into frozen dataclasses in SI.
 
-    winch = read_profile("profiles/bench-spiral.toml")
+    winch = read_profile("my-winch.toml")
+    winch = read_profile("bench-spiral")  # shipped
 
 Every function raises FileError with all faults of the file at once, each with its line:
 ``bench.toml:12: winch.A.limits.speed: unknown speed unit 'm/sec'; use one of m/s, mm/s``.
@@ -13,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from winchkit.arguments import path_of
+from winchkit.catalog import Kind, find
 from winchkit.errors import Fault, FileError
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.calibration import CellCalibration, TareBook
@@ -83,7 +86,7 @@ def read_profile(path: PathLike) -> WinchProfile:
     Parameters
     ----------
     path : str or Path
-        File in TOML of the kind ``winch`` or ``axis``.
+        File in TOML of the kind ``winch`` or ``axis``, or the name of a shipped one.
 
     Returns
     -------
@@ -96,6 +99,7 @@ def read_profile(path: PathLike) -> WinchProfile:
     FileError
         With every fault of the file, each with its line.
     """
+    path = _located("profiles", path)
     value = read_any(path)
     # The reader of winches refuses every other kind in its own words.
     return value if isinstance(value, WinchProfile) else read_winch(path)
@@ -107,7 +111,7 @@ def read_winch(path: PathLike) -> WinchProfile:
     Parameters
     ----------
     path : str or Path
-        File in TOML of the kind ``winch``.
+        File in TOML of the kind ``winch``, or the name of a shipped one.
 
     Returns
     -------
@@ -119,7 +123,7 @@ def read_winch(path: PathLike) -> WinchProfile:
     FileError
         With every fault of the file, and for an axis.
     """
-    return _read(path, "winch", WinchProfile)
+    return _read(_located("profiles", path), "winch", WinchProfile)
 
 
 def read_robot(path: PathLike) -> RobotProfile:
@@ -128,7 +132,7 @@ def read_robot(path: PathLike) -> RobotProfile:
     Parameters
     ----------
     path : str or Path
-        File in TOML of the kind ``robot``.
+        File in TOML of the kind ``robot``, or the name of a shipped one.
 
     Returns
     -------
@@ -140,7 +144,7 @@ def read_robot(path: PathLike) -> RobotProfile:
     FileError
         With every fault of the file, each with its line.
     """
-    return _read(path, "robot", RobotProfile)
+    return _read(_located("profiles", path), "robot", RobotProfile)
 
 
 def read_bench(path: PathLike) -> BenchSpec:
@@ -170,7 +174,7 @@ def read_programme(path: PathLike) -> Programme:
     Parameters
     ----------
     path : str or Path
-        File in TOML of the kind ``programme``.
+        File in TOML of the kind ``programme``, or the name of a shipped one.
 
     Returns
     -------
@@ -182,7 +186,7 @@ def read_programme(path: PathLike) -> Programme:
     FileError
         With every fault of the file, each with its line.
     """
-    return _read(path, "programme", Programme)
+    return _read(_located("sim", path), "programme", Programme)
 
 
 def read_robot_programme(path: PathLike) -> RobotProgramme:
@@ -191,7 +195,7 @@ def read_robot_programme(path: PathLike) -> RobotProgramme:
     Parameters
     ----------
     path : str or Path
-        File in TOML of the kind ``robot-programme``.
+        File in TOML of the kind ``robot-programme``, or the name of a shipped one.
 
     Returns
     -------
@@ -203,7 +207,7 @@ def read_robot_programme(path: PathLike) -> RobotProgramme:
     FileError
         With every fault of the file, each with its line.
     """
-    return _read(path, "robot-programme", RobotProgramme)
+    return _read(_located("sim", path), "robot-programme", RobotProgramme)
 
 
 def read_simbench(path: PathLike) -> SimBench:
@@ -212,7 +216,7 @@ def read_simbench(path: PathLike) -> SimBench:
     Parameters
     ----------
     path : str or Path
-        File in TOML of the kind ``sim-bench``.
+        File in TOML of the kind ``sim-bench``, or the name of a shipped one.
 
     Returns
     -------
@@ -224,7 +228,7 @@ def read_simbench(path: PathLike) -> SimBench:
     FileError
         With every fault of the file, each with its line.
     """
-    return _read(path, "sim-bench", SimBench)
+    return _read(_located("sim", path), "sim-bench", SimBench)
 
 
 def read_device(path: PathLike) -> DeviceSpec:
@@ -233,7 +237,7 @@ def read_device(path: PathLike) -> DeviceSpec:
     Parameters
     ----------
     path : PathLike
-        TOML file of the kind ``device``.
+        TOML file of the kind ``device``, or the name of a shipped one.
 
     Returns
     -------
@@ -245,7 +249,7 @@ def read_device(path: PathLike) -> DeviceSpec:
     FileError
         With every fault of the file.
     """
-    return _read(path, "device", DeviceSpec)
+    return _read(_located("devices", path), "device", DeviceSpec)
 
 
 def read_size(path: PathLike) -> SizeSpec:
@@ -383,6 +387,14 @@ def load(path: PathLike, kind: str | None = None) -> Declaration:
     reading.refuse_faults()
     assert value is not None, "a reader that returns nothing has noted why"
     return Declaration(found, value, _warnings(reading, value))
+
+
+def _located(kind: Kind, path: PathLike) -> Path:
+    """A file; else, of a name without folder and ending, the shipped declaration."""
+    here = path_of(path)
+    if here.is_file() or here.suffix or here.parent != Path():
+        return here
+    return find(kind, str(here))
 
 
 def _read(path: PathLike, kind: str, expected: type[T]) -> T:
