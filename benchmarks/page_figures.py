@@ -191,7 +191,7 @@ def live(page: Any, url: str, pid: int, seconds: float) -> dict[str, float]:
     page.wait_for_timeout(2000)
     page.evaluate(
         "window.frames_of_bench = 0; new MutationObserver(() => window.frames_of_bench++)"
-        ".observe(document.querySelector('#values'), { childList: true })"
+        ".observe(document.querySelector('#values'), { attributeFilter: ['data-time'] })"
     )
     pids = browsers()
     before, server, start = sum(map(used, pids)), used(pid), time.monotonic()

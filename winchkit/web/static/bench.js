@@ -1,5 +1,5 @@
 // The Bench view, and the Stop of all views. A jog lasts as long as its messages: one each 50 ms.
-import { alarm, ask, attempt, download, el, fill, icon, number, say, socket, svg } from "./page.js";
+import { alarm, ask, attempt, download, el, fill, icon, number, renew, say, socket, svg } from "./page.js";
 import { cycles } from "./cycle.js";
 import { frames } from "./frames.js";
 import { objects } from "./objects.js";
@@ -10,7 +10,7 @@ import { consequences, together, trip } from "./trip.js";
 import { card, picture as drawn, words as said } from "./winch.js";
 
 const PERIOD = 50, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
-let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, cardsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
+let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
 
 // A request that fails is repeated: without it there is no Stop.
 export async function station(state) {
@@ -190,6 +190,7 @@ function build() {
   if (tab === "Trip") trip(document.getElementById("trip"), lastTrip, winch, declared);
   if (tab === "Bus frames") frames(document.getElementById("frames"));
   if (tab === "Drive objects") objects(document.getElementById("objects"), winch);
+  drawnAt = 0;
   refresh();
 }
 
@@ -309,19 +310,20 @@ function refresh() {
   if (record) { record.hidden = !mine; named.hidden = !mine || Boolean(log); }
   if (record) { record.textContent = log ? "End" : "Record"; record.disabled = !commands(); }
   if (!state) { fill(values, el("p", { class: "note" }, "No values of the bench yet.")); return; }
-  if (at - drawnAt < 90) return;
-  drawnAt = at;
+  if (drawnAt === picture.status.time) return;
+  drawnAt = picture.status.time;
+  values.dataset.time = drawnAt;
   const cell = (name, value, digits, unit, low, high, limits) => el("div", {}, el("span", { class: "note" }, name), el("div", { class: "value" }, value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, unit)), gauge(value, low, high, limits, unit));
   const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, winding = state.cable_speed === null ? null : -state.cable_speed;
   const kind = tripped().length ? "tripped" : MOVING.has(state.phase) ? "moving" : state.phase === "stopping" ? "stopping" : "";
-  fill(values, cell("Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell("Tension", state.tension, 1, "N", 0, top * 1.05, tension),
+  renew(values, cell("Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell("Tension", state.tension, 1, "N", 0, top * 1.05, tension),
     cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
     el("div", {}, el("span", { class: "note" }, "State"), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
-  fill(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));
+  renew(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));
   const host = document.getElementById("cycles");
   if (host && picture.status.cycle_time) cycles(host, picture.status.cycle_time, picture.status.overruns);
   charts(at);
-  cards(at);
+  cards();
 }
 
 // The strip charts, five times a second: one pixel of 60 s is 0.08 s, and they cost most of a picture.
@@ -331,12 +333,9 @@ function charts(at) {
   strips.refresh();
 }
 
-// Every winch of the bench as a card; four times a second.
-function cards(at) {
+// Every winch of the bench as a card.
+function cards() {
   const box = document.getElementById("cards");
-  if (!box || at - cardsAt < 240) return;
-  cardsAt = at;
-  const focus = document.activeElement && document.activeElement.closest("#cards button"), place = focus ? [...box.children].indexOf(focus) : -1;
-  fill(box, Object.entries(picture.status.winch).map(([name, state]) => card(name, declared.winch[name], state, drum(name), tripped().length > 0, name === winch, () => chooseWinch(name))));
-  if (place >= 0) box.children[place].focus();
+  if (!box) return;
+  renew(box, Object.entries(picture.status.winch).map(([name, state]) => card(name, declared.winch[name], state, drum(name), tripped().length > 0, name === winch, () => chooseWinch(name))));
 }

@@ -53,6 +53,29 @@ export function fill(node, ...children) {
   node.replaceChildren(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
 }
 
+// As fill, but elements that are there already stay and take what differs: a live picture costs what
+// changed of it, and keeps focus and listeners. For pictures whose listeners do not change.
+export function renew(node, ...children) {
+  matched(node, children.flat().filter((child) => child !== null && child !== undefined && child !== false));
+}
+
+function matched(node, wanted) {
+  const there = [...node.childNodes];
+  wanted.forEach((item, i) => {
+    const old = there[i];
+    if (!old) node.append(item);
+    else if (old.nodeName !== item.nodeName) old.replaceWith(item);
+    else if (old.nodeType === Node.TEXT_NODE) { if (old.nodeValue !== item.nodeValue) old.nodeValue = item.nodeValue; }
+    else {
+      for (const { name, value } of item.attributes) if (name !== "style" && old.getAttribute(name) !== value) old.setAttribute(name, value);
+      for (const { name } of [...old.attributes]) if (!item.hasAttribute(name)) old.removeAttribute(name);
+      if (old.style.cssText !== item.style.cssText) old.style.cssText = item.style.cssText;
+      matched(old, [...item.childNodes]);
+    }
+  });
+  for (const old of there.slice(wanted.length)) old.remove();
+}
+
 export function svg(name, attributes = {}, ...children) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);
   for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
