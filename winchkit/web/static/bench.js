@@ -1,5 +1,5 @@
 // The Bench view, and the Stop of all views. A jog lasts as long as its messages: one each 50 ms.
-import { alarm, ask, attempt, download, el, fill, icon, number, renew, say, socket, svg } from "./page.js";
+import { alarm, ask, attempt, download, el, fill, icon, match, number, renew, say, socket, svg } from "./page.js";
 import { cycles } from "./cycle.js";
 import { frames } from "./frames.js";
 import { objects } from "./objects.js";
@@ -7,7 +7,7 @@ import { choose, progress, refused } from "./programme.js";
 import { live } from "./robot.js";
 import * as strips from "./strips.js";
 import { consequences, together, trip } from "./trip.js";
-import { card, picture as drawn, words as said } from "./winch.js";
+import { card, cardText, picture as drawn, words as said } from "./winch.js";
 
 const PERIOD = 50, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
 let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
@@ -284,9 +284,9 @@ function offer() {
 }
 
 function gauge(value, low, high, limits, unit) {
-  const span = high - low || 1, x = (v) => Math.max(0, Math.min(100, ((v - low) / span) * 100));
+  const span = high - low || 1, x = (v) => Math.max(0, Math.min(100, ((v - low) / span) * 100)).toFixed(2);
   const parts = [svg("rect", { x: 0, y: 4, width: "100%", height: 8, fill: "var(--band)" })];
-  const zone = (a, b) => parts.push(svg("rect", { x: `${x(a)}%`, y: 4, width: `${Math.max(0, x(b) - x(a))}%`, height: 8, fill: "url(#hatch)" }));
+  const zone = (a, b) => parts.push(svg("rect", { x: `${x(a)}%`, y: 4, width: `${Math.max(0, x(b) - x(a)).toFixed(2)}%`, height: 8, fill: "url(#hatch)" }));
   if (limits[0] !== null) { zone(low, limits[0]); parts.push(svg("text", { x: `${x(limits[0])}%`, y: 28, "font-size": 12, fill: "var(--ink2)" }, number(limits[0], 3))); }
   if (limits[1] !== null) { zone(limits[1], high); parts.push(svg("text", { x: `${x(limits[1])}%`, y: 28, "font-size": 12, "text-anchor": "end", fill: "var(--ink2)" }, number(limits[1], 3))); }
   if (value !== null) parts.push(svg("rect", { x: `calc(${x(value)}% - 1.5px)`, y: 0, width: 3, height: 16, fill: "var(--ink)" }));
@@ -333,9 +333,16 @@ function charts(at) {
   strips.refresh();
 }
 
-// Every winch of the bench as a card.
+// Every winch of the bench as a card; one that shows the same is not drawn again.
 function cards() {
-  const box = document.getElementById("cards");
+  const box = document.getElementById("cards"), trip = tripped().length > 0;
   if (!box) return;
-  renew(box, Object.entries(picture.status.winch).map(([name, state]) => card(name, declared.winch[name], state, drum(name), tripped().length > 0, name === winch, () => chooseWinch(name))));
+  Object.entries(picture.status.winch).forEach(([name, state], i) => {
+    const seen = cardText(state, drum(name), `${trip}|${name === winch}`), old = box.children[i];
+    if (old && shownCards.get(old) === seen) return;
+    const item = card(name, declared.winch[name], state, drum(name), trip, name === winch, () => chooseWinch(name));
+    if (old) match(old, item); else box.append(item);
+    shownCards.set(old || item, seen);
+  });
 }
+const shownCards = new WeakMap();

@@ -61,24 +61,25 @@ export function renew(node, ...children) {
 
 function matched(node, wanted) {
   const there = [...node.childNodes];
-  wanted.forEach((item, i) => {
-    const old = there[i];
-    if (!old) node.append(item);
-    else if (old.nodeName !== item.nodeName) old.replaceWith(item);
-    else if (old.nodeType === Node.TEXT_NODE) { if (old.nodeValue !== item.nodeValue) old.nodeValue = item.nodeValue; }
-    else {
-      for (const { name, value } of item.attributes) if (name !== "style" && old.getAttribute(name) !== value) old.setAttribute(name, value);
-      for (const { name } of [...old.attributes]) if (!item.hasAttribute(name)) old.removeAttribute(name);
-      if (old.style.cssText !== item.style.cssText) old.style.cssText = item.style.cssText;
-      matched(old, [...item.childNodes]);
-    }
-  });
+  wanted.forEach((item, i) => (there[i] ? match(there[i], item) : node.append(item)));
   for (const old of there.slice(wanted.length)) old.remove();
+}
+
+// Makes a node look like another one.
+export function match(old, item) {
+  if (old.isEqualNode(item)) return;
+  if (old.nodeName !== item.nodeName) { old.replaceWith(item); return; }
+  if (old.nodeType === Node.TEXT_NODE) { if (old.nodeValue !== item.nodeValue) old.nodeValue = item.nodeValue; return; }
+  for (const { name, value } of item.attributes) if (name !== "style" && old.getAttribute(name) !== value) old.setAttribute(name, value);
+  for (const { name } of [...old.attributes]) if (!item.hasAttribute(name)) old.removeAttribute(name);
+  if (old.style.cssText !== item.style.cssText) old.style.cssText = item.style.cssText;
+  matched(old, [...item.childNodes]);
 }
 
 export function svg(name, attributes = {}, ...children) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+  // A hundredth of a pixel is not seen, and noise below it changes nothing that is drawn.
+  for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, typeof value === "number" ? Math.round(100 * value) / 100 : value);
   node.append(...children.flat().filter((child) => child !== null && child !== undefined && child !== false));
   return node;
 }

@@ -21,7 +21,7 @@ function tangent([ax, ay], ra, [bx, by], rb) {
 export function picture(name, own, state, drum, tripped) {
   const limits = own.limits.length || [0, Math.max(1, state.cable_length || 1)], rim = own.drum.flange_radius || 1.25 * own.drum_radius;
   const scale = Math.min(72 / Math.max(rim, drum.radius || 0), ...own.pulleys.map((p) => 36 / p.radius)), r0 = own.drum_radius * scale, wound = Math.max(r0, (drum.radius || own.drum_radius) * scale);
-  const most = limits[1] * 1.06, y = (length) => 60 + (Math.max(0, Math.min(most, length)) / most) * 350, at = y(state.cable_length || 0), centre = [100, 260];
+  const most = limits[1] * 1.06, y = (length) => 60 + (Math.max(0, Math.min(most, length)) / most) * 350, at = Math.round(10 * y(state.cable_length || 0)) / 10, centre = [100, 260];
   const places = own.pulleys.length > 1 ? [[150, 92], [252, 122]] : [[212, 92]], wheels = own.pulleys.slice(0, 2).map((p, i) => ({ at: places[i], r: p.radius * scale, wrap: p.wrap }));
   const narrow = matchMedia("(max-width: 699px)").matches, size = narrow ? 16 : 12, parts = [];
   const text = (x, top, content, more = {}) => svg("text", { x, y: top, fill: "var(--muted)", ...more }, content);
@@ -67,9 +67,15 @@ export function picture(name, own, state, drum, tripped) {
   return svg("svg", { viewBox: "0 0 460 460", width: "100%", "font-size": size, role: "img", "aria-label": `Winch ${name}: ${words(state, tripped)}, ${number(state.cable_length)} m, ${state.tension === null ? "no tension" : `${number(state.tension, 4)} N`}` }, parts.filter(Boolean));
 }
 
+// What a card shows, in the digits that it has: equal texts are equal cards.
+export function cardText(state, drum, more) {
+  const rounded = (value, digits) => (value === null || value === undefined ? "" : value.toFixed(digits));
+  return [more, state.phase, state.commander, rounded(state.cable_length, 3), rounded(state.tension, 0), rounded(state.cable_speed, 3), rounded(state.motor_angle, 1), rounded(drum.turns, 1)].join("|");
+}
+
 // A card of one winch among several: a small picture, state and values; a click enlarges it.
 export function card(name, own, state, drum, tripped, chosen, choose) {
-  const limits = own.limits.length || [0, 5], most = limits[1] * 1.06, x = (v, top) => `${Math.max(0, Math.min(100, (v / top) * 100))}%`, high = own.limits.tension[1] || 500;
+  const limits = own.limits.length || [0, 5], most = limits[1] * 1.06, x = (v, top) => `${Math.max(0, Math.min(100, (v / top) * 100)).toFixed(1)}%`, high = own.limits.tension[1] || 500;
   const bar = (value, top, [low, up], unit, digits) => el("span", { class: "bar" }, svg("svg", { width: "100%", height: 10, "aria-hidden": "true" }, svg("rect", { y: 3, width: "100%", height: 5, fill: "var(--band)" }),
     low ? svg("rect", { y: 2, width: x(low, top), height: 7, fill: "url(#hatch)" }) : null, up ? svg("rect", { x: x(up, top), y: 2, width: `${100 - parseFloat(x(up, top))}%`, height: 7, fill: "url(#hatch)" }) : null,
     value === null ? null : svg("rect", { x: `calc(${x(value, top)} - 1px)`, width: 2, height: 10, fill: "var(--ink)" })), el("b", {}, value === null ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, ` ${unit}`)));
