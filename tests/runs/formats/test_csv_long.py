@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from winchkit.errors import RunError
-from winchkit.runs.formats.csv_read import read_csv
+from winchkit.runs.formats.csv_read import _plain, read_csv
 
 ROWS = 30_000
 HEADER = "time [s],motor_angle [rad],tension [N],load [N],remark"
@@ -39,6 +41,55 @@ def test_a_wrong_cell_far_down_is_reported_with_its_line(tmp_path: Path) -> None
     with pytest.raises(RunError) as told:
         read_csv(saved(tmp_path / "wrong.csv", rows))
     assert [fault.line for fault in told.value.faults] == [4095 + 3, 12_345 + 3]
+
+
+def test_a_cell_over_two_lines_at_the_end_of_a_block_is_one_cell(tmp_path: Path) -> None:
+    rows = lines()
+    rows[4095] = '4.095,1,2,3,"begun\nanew"'
+    rows[9000] = "9.000,1,2,wrong,5"
+    with pytest.raises(RunError) as told:
+        read_csv(saved(tmp_path / "two.csv", rows))
+    assert [fault.line for fault in told.value.faults] == [9000 + 4]
+
+
+def test_events_gaps_and_blank_lines_between_blocks_of_numbers(tmp_path: Path) -> None:
+    rows = lines()
+    rows[5000] = f"5.000,,1,2,{5000}"
+    rows.insert(9000, "# event 9.000 s: {}")
+    rows.insert(15_000, "")
+    rows.insert(15_001, "# a remark")
+    run = read_csv(saved(tmp_path / "events.csv", rows))
+    np.testing.assert_array_equal(run["remark"], np.arange(ROWS))
+    assert list(np.flatnonzero(np.isnan(run["motor_angle"]))) == [5000]
+
+
+NUMBERS = st.floats() | st.sampled_from([1e-320, 5e-324, 1.7976931348623157e308, -0.0, 0.1 + 0.2])
+
+
+@given(st.lists(NUMBERS, min_size=1, max_size=20), st.sampled_from(["r", ".17g", ".3e", "+.6f"]))
+def test_numbers_are_read_as_python_reads_them(values: list[float], form: str) -> None:
+    texts = [repr(value) if form == "r" else format(value, form) for value in values]
+    read = _plain([f"{text},1\n" for text in texts], 2)
+    assert read is not None
+    np.testing.assert_array_equal(read[:, 0], [float(text) for text in texts])
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ["1,2\n", "3\n"],
+        ["1,2,3\n"],
+        ["1,\n"],
+        ["1_0,2\n"],
+        ["1,2\n", "\n"],
+        ["\n", "1,2\n"],
+        ["1,fain\n"],
+        ["0x1,2\n"],
+        ['"1",2\n'],
+    ],
+)
+def test_other_lines_are_not_taken_for_numbers(rows: list[str]) -> None:
+    assert _plain(rows, 2) is None
 
 
 def test_text_far_down_makes_an_unknown_column_text(tmp_path: Path) -> None:
