@@ -73,7 +73,10 @@ def read_mat(path: str, data: bytes) -> Table:
         if str(name).startswith("__"):
             continue
         if "MatlabOpaque" in str(type(value)):
-            notes.append(_object_note(*(_first(value, key) for key in ("s0", "s2"))))
+            # scipy before 1.18 has the name in the object.
+            own = "s0" in value.dtype.names
+            kind = _first(value, "s2" if own else "_Class")
+            notes.append(_object_note(_first(value, "s0") if own else str(name), kind))
             continue
         arrays.update(_flat(name, value, 0))
     _refuse_objects(path, arrays, notes)
