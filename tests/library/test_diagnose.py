@@ -270,6 +270,31 @@ def test_a_scheduler_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.slow
+def test_a_cluster_that_has_lost_all_workers_ends_the_diagnosis(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "_PATIENCE", 2.0)
+    due = tasks(12, "a")
+    found: list[Outcome] = []
+
+    def collected(small: Any) -> None:
+        for one in cluster_outcomes(due, scheduler=small.scheduler_address, work=slow_outcome):
+            found.append(one)
+            if len(found) == 3:
+                small.scale(0)
+
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
+        ) as small,
+        pytest.raises(ConnectionLost, match="no workers for 2 s; what was diagnosed is kept"),
+    ):
+        collected(small)
+    assert 3 <= len(found) < len(due)
+
+
+@pytest.mark.slow
 def test_an_interruption_on_a_cluster_keeps_what_is_done_and_the_next_call_goes_on(
     library: Path, workers: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from itertools import islice
 from typing import Any
@@ -21,6 +23,8 @@ _LOSSES = 3
 """Lost workers after which a task counts as the cause and fails."""
 _PATIENCE = 30.0
 """s: a scheduler answers at once, and workers of a cluster that is starting come within it."""
+_LOOK = 1.0
+"""s between two looks at the workers."""
 
 
 def cluster_outcomes(
@@ -52,7 +56,7 @@ def cluster_outcomes(
     UsageError
         Without Dask; for workers with another version of winchkit.
     ConnectionLost
-        For a scheduler that does not answer, or has no workers.
+        For a scheduler that does not answer, or has no workers any more.
     """
     try:
         dask: Any = import_module("dask")
@@ -98,26 +102,65 @@ def _outcomes(
     distributed: Any = import_module("distributed")
     tasks = iter(due)
     window = _AHEAD * max(len(client.scheduler_info(n_workers=-1)["workers"]), 1)
-    running: dict[Any, tuple[Task, int]] = {}
+    running: dict[str, tuple[Any, Task, int]] = {}
+    """Future, task and attempt by the key of the future."""
 
     def submit(task: Task, attempt: int) -> Any:
         future = client.submit(work, task, key=f"winchkit-{task.key}-{attempt}")
-        running[future.key] = (task, attempt)
+        running[future.key] = (future, task, attempt)
         return future
 
     first = [submit(task, 0) for task in islice(tasks, window)]
     ended = distributed.as_completed(first, loop=client.loop)
-    for future in ended:
-        task, attempt = running.pop(future.key)
-        error = future.exception()
-        outcome = failed(task, f"{type(error).__name__}: {error}") if error else future.result()
-        future.release()
-        if outcome.diagnosis.get("failure") is not None and attempt == 0:
-            ended.add(submit(task, 1))
-            continue
-        yield outcome
-        for task in islice(tasks, 1):
-            ended.add(submit(task, 0))
+
+    def give_up() -> None:
+        client.cancel([future for future, _, _ in list(running.values())])
+
+    with _watched(client, give_up) as deserted:
+        for future in ended:
+            if deserted.is_set():
+                raise ConnectionLost(
+                    f"the cluster has had no workers for {_PATIENCE:g} s; what was diagnosed is "
+                    "kept: look at the memory of its computers and repeat the command"
+                )
+            _, task, attempt = running.pop(future.key)
+            error = future.exception()
+            outcome = failed(task, f"{type(error).__name__}: {error}") if error else future.result()
+            future.release()
+            if outcome.diagnosis.get("failure") is not None and attempt == 0:
+                ended.add(submit(task, 1))
+                continue
+            yield outcome
+            for task in islice(tasks, 1):
+                ended.add(submit(task, 0))
+
+
+@contextmanager
+def _watched(client: Any, give_up: Callable[[], object]) -> Iterator[threading.Event]:
+    """Event that is set, before ``give_up`` is called, once no worker has been there for 30 s.
+
+    A worker that ends is started again by its nanny, which gives up itself where that takes too
+    long; tasks of a cluster without workers would wait forever.
+    """
+    deserted, over = threading.Event(), threading.Event()
+
+    def watch() -> None:
+        alone = 0.0
+        while not over.wait(_LOOK):
+            there = client.scheduler_info(n_workers=-1)["workers"]
+            alone = 0.0 if there else alone + _LOOK
+            if alone >= _PATIENCE:
+                deserted.set()
+                give_up()
+                return
+
+    watcher = threading.Thread(target=watch, name="workers of the cluster", daemon=True)
+    watcher.start()
+    try:
+        yield deserted
+    finally:
+        over.set()
+        watcher.join()
 
 
 def _processes() -> int:
