@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from importlib import import_module
 from itertools import islice
@@ -118,14 +119,18 @@ def _outcomes(
 
     with _watched(client, give_up) as deserted:
         for future in ended:
-            if deserted.is_set():
+            _, task, attempt = running[future.key]
+            try:
+                outcome = _result(future, task)
+            except CancelledError:
+                if not deserted.is_set():
+                    raise
                 raise ConnectionLost(
                     f"the cluster has had no workers for {_PATIENCE:g} s; what was diagnosed is "
                     "kept: look at the memory of its computers and repeat the command"
-                )
-            _, task, attempt = running.pop(future.key)
-            error = future.exception()
-            outcome = failed(task, f"{type(error).__name__}: {error}") if error else future.result()
+                ) from None
+            # Not before: a result whose worker is lost is computed again, or given up.
+            del running[future.key]
             future.release()
             if outcome.diagnosis.get("failure") is not None and attempt == 0:
                 ended.add(submit(task, 1))
@@ -133,6 +138,14 @@ def _outcomes(
             yield outcome
             for task in islice(tasks, 1):
                 ended.add(submit(task, 0))
+
+
+def _result(future: Any, task: Task) -> Outcome:
+    """Outcome of a future that has ended, or its failure; raises CancelledError."""
+    if error := future.exception():
+        return failed(task, f"{type(error).__name__}: {error}")
+    found: Outcome = future.result()
+    return found
 
 
 @contextmanager
