@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import islice
 from typing import Any
@@ -160,7 +160,9 @@ def _watched(client: Any, give_up: Callable[[], object]) -> Iterator[threading.E
     def watch() -> None:
         alone = 0.0
         while not over.wait(_LOOK):
-            there = client.scheduler_info(n_workers=-1)["workers"]
+            there: Mapping[str, object] = {}
+            with suppress(OSError):  # the scheduler does not answer
+                there = client.scheduler_info(n_workers=-1)["workers"]
             alone = 0.0 if there else alone + _LOOK
             if alone >= _PATIENCE:
                 deserted.set()

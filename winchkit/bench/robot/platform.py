@@ -106,11 +106,6 @@ class Platform:
         return moved(self.pose, change, relative=relative)
 
     @property
-    def has_cells(self) -> bool:
-        """Whether every winch has a load cell, by which the cable forces can be corrected."""
-        return all(winch.load_cell is not None for winch in self._winches)
-
-    @property
     def moving(self) -> bool:
         """Whether a motion is under way."""
         return any(winch.moving for winch in self._winches)
@@ -207,6 +202,7 @@ class Platform:
         travel: float = _TRIM_TRAVEL,
         speed: float = _TRIM_SPEED,
         axial_stiffness: float | None = None,
+        keep: Array | None = None,
         wait: bool = True,
         hold: bool = False,
     ) -> None:
@@ -226,6 +222,9 @@ class Platform:
             Of each cable, m/s.
         axial_stiffness : float, optional
             Upper bound for the cables, N; by default that of the profile, else of a steel bar.
+        keep : (n,) array, optional
+            Forces beside the distribution that are to stay, N, such as :meth:`force_deviation` had
+            them at another pose.
         wait : bool
             Return when all winches are at rest.
         hold : bool
@@ -252,6 +251,8 @@ class Platform:
                 "no cable forces within the limits `tension` of [robot] hold the platform here; "
                 "move it, or change the limits"
             )
+        if keep is not None:
+            force = force + self._balanced(pose) @ keep
         for winch in self._winches:
             self._bench.permit(winch.name, Direction.BOTH)
         self._start(
@@ -267,6 +268,30 @@ class Platform:
         )
         if wait:
             self.wait()
+
+    def force_deviation(self) -> Array:
+        """Measured cable forces less the distribution of the present pose, (n,), N.
+
+        As far as they balance each other: the preload that the plan does not describe. NaN where a
+        winch has no valid reading.
+        """
+        pose = self.pose
+        measured = self._readings(self._bench.clock.now())
+        return np.asarray(self._balanced(pose) @ (measured - self._forces(pose)[0]))
+
+    def _balanced(self, pose: Pose) -> Array:
+        """Projection on the forces that balance each other at a pose, (n, n)."""
+        null = null_space(self.robot.structure(pose)[0])
+        return np.asarray(null @ null.T)
+
+    def _readings(self, now: float) -> Array:
+        """Valid tensions at the platform end, (n,), N; NaN without one."""
+        out = np.full(len(self._winches), np.nan)
+        for i, winch in enumerate(self._winches):
+            cell, reading = winch.load_cell, winch.tension_reading(now)
+            if cell is not None and reading.age <= cell.max_age:
+                out[i] = reading.value
+        return out
 
     def _trims(
         self,
@@ -298,13 +323,12 @@ class Platform:
             )
             stiffness.append(greatest_stiffness(cable, length, bound))
         self._require_torque(force)
-        null = null_space(robot.structure(pose)[0])
         limits = [winch.wiring.limits for winch in winches]
         ages = [cell.max_age for cell in cells if cell is not None]
         setting = TrimSetting(
             robot.names,
             force,
-            null @ null.T,
+            self._balanced(pose),
             np.array(stiffness),
             max(ages) + max(one.response_time for one in limits),
             travel,
@@ -312,18 +336,10 @@ class Platform:
             duration,
         )
 
-        def readings(now: float) -> Array:
-            out = np.full(len(winches), np.nan)
-            for i, (winch, age) in enumerate(zip(winches, ages, strict=True)):
-                reading = winch.tension_reading(now)
-                if reading.age <= age:
-                    out[i] = reading.value
-            return out
-
         def trip(index: int, words: str) -> None:
             winches[index].trip_tension(words)
 
-        common = ForceTrim(setting, limits, readings, trip)
+        common = ForceTrim(setting, limits, self._readings, trip)
         return [CableTrim(common, i, winch.cable, holds=hold) for i, winch in enumerate(winches)]
 
     def _require_torque(self, force: Array) -> None:

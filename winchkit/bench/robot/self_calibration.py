@@ -8,7 +8,8 @@ and the load cells are averaged. Poses of the validation are never used in the f
 Cables are moved by their lengths, so that errors of the geometry change the cable forces, the more
 the farther the platform is from where these were right: 1 mm of a steel cable of 20 N/mm are 20 N.
 Hence the first poses are near home, the geometry is fitted to them, motions are planned with the
-fitted robot from then on, and the forces are corrected by the load cells after each of these fits.
+fitted robot from then on, and the preload of the beginning is restored by the load cells after each
+of these fits.
 """
 
 from __future__ import annotations
@@ -177,7 +178,6 @@ def self_calibrated(
 
     with stopped_after(bench.stop):
         progress(f"measuring pose 1 of {total}", 0.0)
-        driver.correct_forces()
         fit: Run | None = None
         for count, share in _stages(poses):
             if fit is not None:
@@ -275,23 +275,21 @@ class _Driver:
         self._planner = bench.robot.planner
         self._here = bench.robot.pose
         self._preload: Array | None = None
+        self._deviation = bench.robot.force_deviation()
         self._stops = bench.stops
         self._began = bench.clock.now()
 
-    def correct_forces(self) -> None:
-        """Correct the cable forces at the present pose, where all winches have load cells."""
-        platform = self.bench.robot
-        self._look()
-        if platform.has_cells:
-            platform.trim(hold=True)
-            self._preload = None
-
     def refine(self, fit: Run, options: Options | None) -> None:
-        """Plan with the robot that fits the poses so far, and correct the forces."""
+        """Plan with the robot that fits the poses so far, and restore the preload.
+
+        Without a load cell at each winch that is left as it is.
+        """
         found = self._compute(self._look, _refitted, self.bench.spec, fit, options)
         if found is not None:
             self._planner = replace(self._planner, robot=found)
-            self.correct_forces()
+            self._preload = None
+            if np.all(np.isfinite(self._deviation)):
+                self.bench.robot.trim(keep=self._deviation, hold=True)
 
     def drawn(self, random: np.random.Generator, count: int, share: float = 1.0) -> Iterator[Array]:
         """Rows of random poses within the limits, in a share of the volume's widths."""
