@@ -1,5 +1,5 @@
 // The Bench view, and the Stop of all views. A jog lasts as long as its messages: one each 50 ms.
-import { alarm, ask, attempt, download, el, fill, icon, match, number, renew, say, socket, svg } from "./page.js";
+import { alarm, ask, attempt, download, el, fill, icon, number, renew, say, socket, svg } from "./page.js";
 import { cycles } from "./cycle.js";
 import { frames } from "./frames.js";
 import { objects } from "./objects.js";
@@ -7,7 +7,7 @@ import { choose, progress, refused } from "./programme.js";
 import { live } from "./robot.js";
 import * as strips from "./strips.js";
 import { consequences, together, trip } from "./trip.js";
-import { card, cardText, picture as drawn, words as said } from "./winch.js";
+import { card, picture as drawn, words as said } from "./winch.js";
 
 const PERIOD = 50, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
 let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
@@ -333,16 +333,8 @@ function charts(at) {
   strips.refresh();
 }
 
-// Every winch of the bench as a card; one that shows the same is not drawn again.
+// Every winch of the bench as a card.
 function cards() {
-  const box = document.getElementById("cards"), trip = tripped().length > 0;
-  if (!box) return;
-  Object.entries(picture.status.winch).forEach(([name, state], i) => {
-    const seen = cardText(state, drum(name), `${trip}|${name === winch}`), old = box.children[i];
-    if (old && shownCards.get(old) === seen) return;
-    const item = card(name, declared.winch[name], state, drum(name), trip, name === winch, () => chooseWinch(name));
-    if (old) match(old, item); else box.append(item);
-    shownCards.set(old || item, seen);
-  });
+  const box = document.getElementById("cards");
+  if (box) renew(box, Object.entries(picture.status.winch).map(([name, state]) => card(name, declared.winch[name], state, drum(name), tripped().length > 0, name === winch, () => chooseWinch(name))));
 }
-const shownCards = new WeakMap();

@@ -66,7 +66,7 @@ function matched(node, wanted) {
 }
 
 // Makes a node look like another one.
-export function match(old, item) {
+function match(old, item) {
   if (old.isEqualNode(item)) return;
   if (old.nodeName !== item.nodeName) { old.replaceWith(item); return; }
   if (old.nodeType === Node.TEXT_NODE) { if (old.nodeValue !== item.nodeValue) old.nodeValue = item.nodeValue; return; }

@@ -67,12 +67,6 @@ export function picture(name, own, state, drum, tripped) {
   return svg("svg", { viewBox: "0 0 460 460", width: "100%", "font-size": size, role: "img", "aria-label": `Winch ${name}: ${words(state, tripped)}, ${number(state.cable_length)} m, ${state.tension === null ? "no tension" : `${number(state.tension, 4)} N`}` }, parts.filter(Boolean));
 }
 
-// What a card shows, in the digits that it has: equal texts are equal cards.
-export function cardText(state, drum, more) {
-  const rounded = (value, digits) => (value === null || value === undefined ? "" : value.toFixed(digits));
-  return [more, state.phase, state.commander, rounded(state.cable_length, 3), rounded(state.tension, 0), rounded(state.cable_speed, 3), rounded(state.motor_angle, 1), rounded(drum.turns, 1)].join("|");
-}
-
 // A card of one winch among several: a small picture, state and values; a click enlarges it.
 export function card(name, own, state, drum, tripped, chosen, choose) {
   const limits = own.limits.length || [0, 5], most = limits[1] * 1.06, x = (v, top) => `${Math.max(0, Math.min(100, (v / top) * 100)).toFixed(1)}%`, high = own.limits.tension[1] || 500;

@@ -68,6 +68,14 @@ def run_until(
     raise AssertionError(f"it did not come to that; the drive is {axis.state}")
 
 
+def run_up(rig: Rig, axis: Cia402Axis, velocity: float, above: float) -> None:
+    """Cycles until the motor turns faster than ``above`` (rad/s)."""
+    drive, bus = rig
+    run_until(
+        lambda: drive.shaft.motor_velocity > above, bus, axis, RequestedState.ENABLE, velocity
+    )
+
+
 def run_to_rest(drive: DriveOnBus, bus: CanBus, axis: Cia402Axis) -> None:
     """Cycles until the drive is disabled and the motor stands."""
     run_until(
@@ -215,13 +223,7 @@ def test_stops_end_disabled_whatever_605a_says(rig: Rig, code: int) -> None:
         drive.drive.objects.put(0x605A, 0, code)
     axis = axis_on(bus)
     axis.commission()
-    run_until(
-        lambda: drive.shaft.motor_velocity > 3.0,
-        bus,
-        axis,
-        RequestedState.ENABLE,
-        velocity=5.0,
-    )
+    run_up(rig, axis, velocity=5.0, above=3.0)
     before = words_so_far(drive, bus)
     run_to_rest(drive, bus, axis)
     run_cycles(bus, axis, RequestedState.DISABLE, 20)
@@ -255,13 +257,7 @@ def test_a_drive_left_enabled_is_stopped_before_anything_else(rig: Rig) -> None:
     axis = axis_on(bus)
     axis.commission()
     other = axis_on(bus)
-    run_until(
-        lambda: drive.shaft.motor_velocity > 1.0,
-        bus,
-        axis,
-        RequestedState.ENABLE,
-        velocity=2.0,
-    )
+    run_up(rig, axis, velocity=2.0, above=1.0)
     drive.frames.clear()
     other.commission()
     controls = [w for w in sdo_writes(drive) if w[0] == 0x6040]
