@@ -7,9 +7,11 @@ import os
 import resource
 import shutil
 import signal
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -59,6 +61,15 @@ def outcome(task: Task) -> Outcome:
 
 def slow_outcome(task: Task) -> Outcome:
     time.sleep(0.05)
+    return outcome(task)
+
+
+def interrupted_outcome(task: Task) -> Outcome:
+    """As a terminal does, Ctrl-C reaches the worker too; the first two tasks lose theirs."""
+    os.kill(os.getpid(), signal.SIGINT)
+    if task.key in {"c0", "c1"} and not (lost := Path(task.library) / task.key).exists():
+        lost.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
     return outcome(task)
 
 
@@ -256,6 +267,32 @@ def test_killed_workers_and_a_second_client_lose_nothing_and_give_nothing_twice(
     for found in (first, second):
         assert len(found) == len(due)
         assert {one.diagnosis["key"]: one for one in found} == plain
+
+
+@pytest.mark.slow
+def test_workers_of_this_computer_never_get_sigint_not_even_those_that_replace_lost_ones(
+    tmp_path: Path,
+) -> None:
+    pytest.importorskip("distributed")
+    due = [replace(task, library=str(tmp_path)) for task in tasks(6, "c")]
+    found = list(cluster_outcomes(due, jobs=2, work=interrupted_outcome))
+    assert {one.diagnosis["key"]: one for one in found} == {t.key: outcome(t) for t in due}
+    assert {path.name for path in tmp_path.iterdir()} == {"c0", "c1"}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signal masks")
+def test_an_interruption_while_workers_start_comes_when_they_have_started() -> None:
+    pytest.importorskip("distributed")
+    reached = []
+
+    def start() -> None:
+        with cluster._without_sigint():
+            os.kill(os.getpid(), signal.SIGINT)
+            reached.append(1)
+
+    with pytest.raises(KeyboardInterrupt):
+        start()
+    assert reached
 
 
 @pytest.mark.slow

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import logging
+import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import islice
+from multiprocessing import resource_tracker
 from typing import Any
 
 from winchkit.errors import ConnectionLost, UsageError
@@ -70,13 +74,15 @@ def cluster_outcomes(
     with dask.config.set({"distributed.scheduler.allowed-failures": _LOSSES}):
         if scheduler is None:
             threads = {f"{name}_NUM_THREADS": "1" for name in ("OPENBLAS", "OMP", "MKL")}
-            local = distributed.LocalCluster(
-                n_workers=min(jobs or _processes(), len(due)),
-                threads_per_worker=1,
-                processes=True,
-                dashboard_address="127.0.0.1:0",
-                env=threads,
-            )
+            with _without_sigint():
+                local = distributed.LocalCluster(
+                    n_workers=min(jobs or _processes(), len(due)),
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address="127.0.0.1:0",
+                    env=threads,
+                    silence_logs=logging.ERROR,  # cancelled tasks are no news
+                )
             with local, distributed.Client(local) as client:
                 yield from _outcomes(client, due, work)
             return
@@ -94,6 +100,25 @@ def cluster_outcomes(
                 ) from None
             _require_version(client, scheduler)
             yield from _outcomes(client, due, work)
+
+
+@contextmanager
+def _without_sigint() -> Iterator[None]:
+    """Processes and threads that begin here never get SIGINT; this thread gets it afterwards.
+
+    A terminal sends Ctrl-C to workers too, which would end with tracebacks. The signal mask is
+    inherited, also by the worker that a nanny starts in place of a lost one.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    # Before: where it starts the tracker, it unblocks SIGINT in the thread that asks for it.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _outcomes(
