@@ -278,7 +278,8 @@ _MOST = 1000.0
 """Highest order of a file, far above those tested (40): at 1 kHz it is aliased from half a turn a
 second on."""
 MOTOR_ORDERS = (*map(float, range(1, 13)), 18.0, 24.0, 36.0)
-"""Orders per motor turn at which effects of poles, slots and teeth are tested."""
+"""Orders per motor turn at which effects of poles, slots and teeth are tested on a robot's poses;
+runs in motion are scanned for every order."""
 
 
 def order_per_turn(orders: tuple[float, ...], typical: float) -> Parameter:

@@ -15,7 +15,10 @@ Biometrika 44, 248-252.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.spectrum import to_frequency, to_time
@@ -29,7 +32,11 @@ from winchkit.effects.term import Term
 __all__ = ["best_onset", "onset_of"]
 
 _MOST_ONSETS = 1000
-"""Bounds memory: 32 MB each 4000 rows of the coarse regression."""
+"""Bounds the spacing where runs are long."""
+_EVERY = 16
+"""The length of a column varies little between neighbouring times, except near a run's end."""
+_REFINED = 32
+"""Largest scores by interpolated lengths whose lengths are computed."""
 
 
 def onset_of(effect: Effect) -> Parameter | None:
@@ -66,36 +73,65 @@ def best_onset(
     spacing = max(parameter.onset, longest / _MOST_ONSETS)
     times = spacing * np.arange(1.0, _MOST_ONSETS + 1.0)
     times = times[times < longest]
-    columns = _columns(regression, present, effect, parameter, times) * inverse_sigma[:, None]
+    change = _change(regression, present, effect, parameter)
     residual = regression.residual(present) * inverse_sigma
+    known = np.zeros((len(residual), 0))
     if len(vector := regression.vector(present)):
-        jacobian = regression.jacobian(vector, present)
-        known = orthonormal(jacobian * inverse_sigma[:, None])
-        columns -= known @ (known.T @ columns)
-        residual -= known @ (known.T @ residual)
-    lengths = np.sum(columns**2, axis=0)
-    scores = (columns.T @ residual) ** 2 / np.where(lengths > 0.0, lengths, np.inf)
+        known = orthonormal(regression.jacobian(vector, present) * inverse_sigma[:, None])
+    residual -= known @ (known.T @ residual)
+
+    products = _products(regression, change, times, residual * inverse_sigma)
+
+    def squared_lengths(some: NDArray[np.intp]) -> Array:
+        """Of the whitened columns of some times, the unknowns of the model projected out."""
+        columns = _columns(regression, change, times[some]) * inverse_sigma[:, None]
+        return np.asarray(np.sum(columns**2, axis=0) - np.sum((known.T @ columns) ** 2, axis=0))
+
+    every = np.arange(len(times))
+    some = np.union1d(every[::_EVERY], every[-_EVERY:])
+    lengths = np.interp(every, some, squared_lengths(some))
+    scores = products**2 / np.where(lengths > 0.0, lengths, np.inf)
+    largest = np.argsort(scores)[-_REFINED:]
+    lengths = squared_lengths(largest)
+    scores = products[largest] ** 2 / np.where(lengths > 0.0, lengths, np.inf)
     if not np.any(scores > 0.0):
         return None
     best = int(np.argmax(scores))
-    return float(times[best]), float(scores[best])
+    return float(times[largest[best]]), float(scores[best])
 
 
-def _columns(
-    regression: TimeSeriesRegression,
-    present: Hypothesis,
-    effect: Effect,
-    parameter: Parameter,
-    times: Array,
-) -> Array:
-    """Change of the prediction by a usual step of the effect from each time on, (n_rows, times)."""
+def _change(
+    regression: TimeSeriesRegression, present: Hypothesis, effect: Effect, parameter: Parameter
+) -> list[Array]:
+    """Change in time of every segment by a usual step of the effect from the first sample on."""
     (step,) = Coordinates(effect).usual_steps()
     term = Term(effect, {**effect.null, **step, parameter.name: parameter.low})
     whole = regression.change(present.with_term(term, regression.n_runs))
     whole -= regression.change(present)
-    columns = np.zeros((len(whole), len(times)))
-    for segment in regression.segments:
+    return [to_time(whole[segment.rows], segment.band) for segment in regression.segments]
+
+
+def _products(
+    regression: TimeSeriesRegression, change: Sequence[Array], times: Array, weighted: Array
+) -> Array:
+    """Inner products of every time's column with a vector of weighted rows, (n_times,).
+
+    A column is the low-passed change from a sample on, so that its product is the sum, from that
+    sample on, of the change times the low-passed vector in time.
+    """
+    products = np.zeros(len(times))
+    for segment, own in zip(regression.segments, change, strict=True):
+        band = segment.band
+        terms = own * to_time(band.gain * weighted[segment.rows], band)
+        from_sample = np.append(np.cumsum(terms[::-1])[::-1], 0.0)
+        products += from_sample[np.searchsorted(regression.motions[segment.run].time, times)]
+    return products
+
+
+def _columns(regression: TimeSeriesRegression, change: Sequence[Array], times: Array) -> Array:
+    """Change of the prediction by a usual step of the effect from each time on, (n_rows, times)."""
+    columns = np.zeros((regression.n_rows, len(times)))
+    for segment, own in zip(regression.segments, change, strict=True):
         time = regression.motions[segment.run].time
-        change = to_time(whole[segment.rows], segment.band)
-        columns[segment.rows] = to_frequency(change * (time >= times[:, None]), segment.band).T
+        columns[segment.rows] = to_frequency(own * (time >= times[:, None]), segment.band).T
     return columns

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -58,7 +59,8 @@ class TimeSeriesSelection(SelectionEngine):
         candidates: Iterable[Effect],
     ) -> None:
         self._coarse = coarse_regression(regression)
-        super().__init__(regression, initial_model, candidates)
+        one_order = (_with_first_order(e) if has_orders(e) else e for e in candidates)
+        super().__init__(regression, initial_model, one_order)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Noise from the contrasts of repeats; without repeats from the saturated model."""
@@ -122,7 +124,8 @@ class TimeSeriesSelection(SelectionEngine):
         """Extend the grids of candidates by significant orders and by the best onset.
 
         The noise is the residual's own power per band, so that a line is significant only where it
-        exceeds everything else in its band.
+        exceeds everything else in its band. An order that is significant as one effect is tested
+        as every other that has orders.
         """
         if not any(has_orders(effect) or onset_of(effect) for effect in self._candidates):
             return False
@@ -140,15 +143,24 @@ class TimeSeriesSelection(SelectionEngine):
             coarse = self._coarse
             sampled = coarse.regression, coarse.reduced(present), coarse.inverse_sigma(noise)
 
+        def least(effect: Effect) -> float:
+            """Decrease of χ² that the effect needs."""
+            return Coordinates(effect).n_parameters * self.penalty_per_parameter
+
+        power: dict[int, float] = {}
+        for effect in filter(has_orders, self._candidates):
+            scan = periodogram(regression, present, effect, residual, inverse_sigma)
+            for order in scan.peaks(least(effect)):
+                power[order] = max(power.get(order, 0.0), float(scan.power[order - 1]))
+        orders = sorted(power, key=power.__getitem__, reverse=True)[:_MOST_PEAKS]
+
         def extended(effect: Effect) -> Effect:
             """The effect with further points of its grid, or itself."""
-            least = Coordinates(effect).n_parameters * self.penalty_per_parameter
             if has_orders(effect):
-                scan = periodogram(regression, present, effect, residual, inverse_sigma)
-                return with_grid_points(effect, "order", scan.peaks(least)[:_MOST_PEAKS])
+                return with_grid_points(effect, "order", orders)
             if onset := onset_of(effect):
                 best = best_onset(*sampled, effect)
-                if best is not None and best[1] >= least:
+                if best is not None and best[1] >= least(effect):
                     return with_grid_points(effect, onset.name, best[:1])
             return effect
 
@@ -188,3 +200,11 @@ class TimeSeriesSelection(SelectionEngine):
             for index in range(candidate.columns.start, candidate.columns.stop)
         ]
         return self.signatures.columns[:, thermal].astype(np.float64)
+
+
+def _with_first_order(effect: Effect) -> Effect:
+    """The effect with the first order of its grid alone: the scan of all orders adds the others."""
+    parameters = (
+        replace(p, grid=p.grid[:1]) if p.name == "order" else p for p in effect.parameters
+    )
+    return replace(effect, parameters=tuple(parameters))
