@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.errors import RunError
-from winchkit.runs.formats.csv_read import _plain, read_csv
+from winchkit.runs.formats import csv_read
+from winchkit.runs.formats.csv_read import _arrow_parser, _numpy_columns, _plain, read_csv
 
+PARSERS = [_numpy_columns]
+with suppress(ImportError):
+    PARSERS.append(_arrow_parser())
 ROWS = 30_000
 HEADER = "time [s],motor_angle [rad],tension [N],load [N],remark"
 
@@ -26,6 +31,15 @@ def saved(path: Path, rows: list[str]) -> Path:
     return path
 
 
+@pytest.fixture(params=["numpy", "arrow"])
+def _either_parser(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are never as large as Arrow needs, or always."""
+    if request.param == "arrow":
+        pytest.importorskip("pyarrow")
+    monkeypatch.setattr(csv_read, "_LARGE", 0 if request.param == "arrow" else 1 << 40)
+
+
+@pytest.mark.usefixtures("_either_parser")
 def test_every_row_is_there_in_its_order(tmp_path: Path) -> None:
     run = read_csv(saved(tmp_path / "long.csv", lines()))
     number = np.arange(ROWS)
@@ -34,6 +48,7 @@ def test_every_row_is_there_in_its_order(tmp_path: Path) -> None:
     np.testing.assert_array_equal(run["remark"], number)
 
 
+@pytest.mark.usefixtures("_either_parser")
 def test_a_wrong_cell_far_down_is_reported_with_its_line(tmp_path: Path) -> None:
     rows = lines()
     rows[4095] = "4.095,x,1,1,1"
@@ -43,6 +58,7 @@ def test_a_wrong_cell_far_down_is_reported_with_its_line(tmp_path: Path) -> None
     assert [fault.line for fault in told.value.faults] == [4095 + 3, 12_345 + 3]
 
 
+@pytest.mark.usefixtures("_either_parser")
 def test_a_cell_over_two_lines_at_the_end_of_a_block_is_one_cell(tmp_path: Path) -> None:
     rows = lines()
     rows[4095] = '4.095,1,2,3,"begun\nanew"'
@@ -52,6 +68,7 @@ def test_a_cell_over_two_lines_at_the_end_of_a_block_is_one_cell(tmp_path: Path)
     assert [fault.line for fault in told.value.faults] == [9000 + 4]
 
 
+@pytest.mark.usefixtures("_either_parser")
 def test_events_gaps_and_blank_lines_between_blocks_of_numbers(tmp_path: Path) -> None:
     rows = lines()
     rows[5000] = f"5.000,,1,2,{5000}"
@@ -66,32 +83,38 @@ def test_events_gaps_and_blank_lines_between_blocks_of_numbers(tmp_path: Path) -
 NUMBERS = st.floats() | st.sampled_from([1e-320, 5e-324, 1.7976931348623157e308, -0.0, 0.1 + 0.2])
 
 
-@given(st.lists(NUMBERS, min_size=1, max_size=20), st.sampled_from(["r", ".17g", ".3e", "+.6f"]))
-def test_numbers_are_read_as_python_reads_them(values: list[float], form: str) -> None:
+@pytest.mark.parametrize("parser", PARSERS)
+@pytest.mark.parametrize("form", ["r", ".17g", ".3e", "+.6f"])
+@given(values=st.lists(NUMBERS, min_size=1, max_size=20))
+def test_numbers_are_read_as_python_reads_them(
+    parser: csv_read.Parser, form: str, values: list[float]
+) -> None:
     texts = [repr(value) if form == "r" else format(value, form) for value in values]
-    read = _plain([f"{text},1\n" for text in texts], 2)
+    read = _plain([f"{text},1\n" for text in texts], 2, parser)
     assert read is not None
-    np.testing.assert_array_equal(read[:, 0], [float(text) for text in texts])
+    np.testing.assert_array_equal(read[0], [float(text) for text in texts])
 
 
+@pytest.mark.parametrize("parser", PARSERS)
 @pytest.mark.parametrize(
     "rows",
     [
         ["1,2\n", "3\n"],
         ["1,2,3\n"],
-        ["1,\n"],
         ["1_0,2\n"],
         ["1,2\n", "\n"],
         ["\n", "1,2\n"],
         ["1,fain\n"],
         ["0x1,2\n"],
         ['"1",2\n'],
+        ["1,2\n3,\n4\n"],
     ],
 )
-def test_other_lines_are_not_taken_for_numbers(rows: list[str]) -> None:
-    assert _plain(rows, 2) is None
+def test_other_lines_are_not_taken_for_numbers(parser: csv_read.Parser, rows: list[str]) -> None:
+    assert _plain(rows, 2, parser) is None
 
 
+@pytest.mark.usefixtures("_either_parser")
 def test_text_far_down_makes_an_unknown_column_text(tmp_path: Path) -> None:
     rows = lines()
     rows[20_000] = "20.000,1,1,1,begun anew"
@@ -100,6 +123,7 @@ def test_text_far_down_makes_an_unknown_column_text(tmp_path: Path) -> None:
     assert any("'remark' contains text" in note for note in run.notes)
 
 
+@pytest.mark.usefixtures("_either_parser")
 def test_a_file_cut_off_far_down_is_reported_so(tmp_path: Path) -> None:
     with pytest.raises(RunError) as told:
         read_csv(saved(tmp_path / "cut.csv", [*lines(), "30.0,1"]))
@@ -108,6 +132,7 @@ def test_a_file_cut_off_far_down_is_reported_so(tmp_path: Path) -> None:
     assert "is the file cut off?" in fault.message
 
 
+@pytest.mark.usefixtures("_either_parser")
 def test_reading_holds_little_more_than_the_numbers(tmp_path: Path) -> None:
     """The text of these rows, held as one list of cells, is over 9 MB."""
     path = saved(tmp_path / "long.csv", lines())
