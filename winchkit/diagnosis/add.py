@@ -257,7 +257,7 @@ def _candidates_of(engine: TimeSeriesSelection, effect_id: str, noise: Noise) ->
     """Grid points of an effect with the largest scores."""
     initial_model = engine.refit(engine.initial_model, noise)
     projected = engine.projected(initial_model, noise)
-    ranked = score(projected, initial_model.residual, engine.regression.n_rows)
+    ranked = score(projected, initial_model.residual, engine.regression.n_observations)
     return [item for item in ranked if item.candidate.effect.id == effect_id][:_STARTS]
 
 

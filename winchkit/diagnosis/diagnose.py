@@ -36,6 +36,7 @@ from winchkit.diagnosis.results import (
     Diagnosis,
 )
 from winchkit.diagnosis.selection.acceptance import predicts_better
+from winchkit.diagnosis.selection.contribution import ordered_by_contribution
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import (
     SelectionResult,
@@ -250,7 +251,7 @@ def diagnose_prepared(
             engine.on_trial = _Trials(progress, "without impacts, fitting", _SEARCH)
             result = stepwise_selection(engine)
         engine.on_trial = _Trials(progress, "naming, compared with", _NAMING)
-        return _answer(engine, result)
+        return _answer(engine, ordered_by_contribution(engine, result))
     except KeyboardInterrupt:
         if interrupted is not None and known:
             interrupted(_known_at_interrupt(engine, known[0]))

@@ -23,6 +23,7 @@ from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, even_instants
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
+from winchkit.diagnosis.data.standstill import standstill_finding, standstill_mask
 from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs, without_constants
@@ -220,7 +221,15 @@ def prepare(
     return replace(
         dataset,
         notes=tuple(notes),
-        sanity=(*copied, *left_out, *coarse, *sanity, *zeroed, *rounded_alike(dataset, resolution)),
+        sanity=(
+            *copied,
+            *left_out,
+            *coarse,
+            *sanity,
+            *zeroed,
+            *_at_standstill(dataset),
+            *rounded_alike(dataset, resolution),
+        ),
         zeroed_anew=frozenset(finding.channel for finding in zeroed),
         resolution=resolution,
         decimation_factor=factor,
@@ -289,6 +298,16 @@ def _aligned_errors(dataset: Dataset, group: Repeats, output: str) -> Array:
             for r, rows in zip(own, group.rows, strict=True)
         ]
     )
+
+
+def _at_standstill(dataset: Dataset) -> list[Finding]:
+    """Findings on torques that are not compared at standstills."""
+    found = [
+        standstill_finding(r.name, r.measured["motor_torque"], r.nominal["motor_torque"], r.raw)
+        for r in dataset.recordings
+        if "motor_torque" in r.measured
+    ]
+    return [finding for finding in found if finding is not None]
 
 
 def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
@@ -463,4 +482,6 @@ def _valid(run: Run, output: str, motion: Motion, nominal: Mapping[str, Array]) 
         compared &= away_from(~np.isfinite(run["motor_angle"]), 1 + motion.clock.reach)
     measured = bridged(run[output])
     uncertain = uncertain_force_mask(measured, nominal[output], motion)
+    if output == "motor_torque":
+        uncertain |= standstill_mask(measured, nominal[output], motion)
     return compared & ~uncertain & ~transient_mask(measured, output, motion)

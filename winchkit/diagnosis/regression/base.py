@@ -125,6 +125,14 @@ class Regression(ABC):
     def n_observations(self) -> int:
         """Number of rows that are observations, the sample size n of the BIC."""
 
+    @property
+    def share_of_row(self) -> Array:
+        """Share of the samples behind a row that are compared, shape (n_rows,).
+
+        A row of a run of which a half is compared has half the variance and counts half.
+        """
+        return np.ones(self.n_rows)
+
     @abstractmethod
     def n_samples(self, output: str) -> int:
         """Number of compared samples of an output, at least one."""

@@ -79,7 +79,7 @@ def lack_of_fit_test(
         return LackOfFitTest(float("nan"), nothing, nothing.astype(bool))
     split = replicate_contrasts(regression, residual)
     total = sums_per_band(split.mean**2, split.mean_band, count)
-    dof = sums_per_band(np.ones_like(split.mean), split.mean_band, count)
+    dof = sums_per_band(split.mean_share, split.mean_band, count)
     basis = orthonormal(jacobian * noise.inverse_sigma(regression)[:, None])
     # Each fitted unknown takes degrees of freedom in proportion to its leverage.
     taken = sums_per_band(np.sum(basis**2, axis=1), regression.band_of_row, count)

@@ -74,7 +74,7 @@ class Noise:
 
         Coloured noise has few independent values: most of its power lies in the lowest bands.
         """
-        rows = sums_per_band(np.ones(regression.n_rows), regression.band_of_row, len(self.power))
+        rows = sums_per_band(regression.share_of_row, regression.band_of_row, len(self.power))
         total, spread = self.power * rows, (self.power * rows) ** 2
         out = {}
         for output in self.rms:
@@ -94,16 +94,22 @@ class ReplicateContrasts:
         Helmert contrasts of the repeats of every group and output.
     difference_band : ndarray of int, shape (n_differences,)
         Noise band of every contrast.
+    difference_share : ndarray of shape (n_differences,)
+        Share of the samples that are compared.
     mean : ndarray of shape (n_means,)
         Mean of the repeats, scaled to the variance of one run.
     mean_band : ndarray of int, shape (n_means,)
         Noise band of every mean.
+    mean_share : ndarray of shape (n_means,)
+        Share of the samples that are compared.
     """
 
     difference: Array
     difference_band: NDArray[np.intp]
+    difference_share: Array
     mean: Array
     mean_band: NDArray[np.intp]
+    mean_share: Array
 
 
 def noise_from_repeats(
@@ -126,7 +132,7 @@ def noise_from_repeats(
     """
     split = replicate_contrasts(regression, residual)
     count = len(regression.bands)
-    dof = sums_per_band(np.ones_like(split.difference), split.difference_band, count)
+    dof = sums_per_band(split.difference_share, split.difference_band, count)
     power = _power(regression, split.difference, split.difference_band, dof)
     whole = dof
     taken = _differences(regression, own)
@@ -170,7 +176,7 @@ def noise_saturated(
     """
     count = len(regression.bands)
     bands = regression.band_of_row
-    total = sums_per_band(np.ones(regression.n_rows), bands, count)
+    total = sums_per_band(regression.share_of_row, bands, count)
     power = _even(regression, residual)
     gram, products = _inner_products(regression, residual, columns)
     through = _orthonormalizing(
@@ -250,6 +256,10 @@ def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContras
     nothing, nowhere = np.zeros(0), np.zeros(0, dtype=np.intp)
     parts: tuple[list[Array], list[Array]] = ([nothing], [nothing])
     bands: tuple[list[NDArray[np.intp]], list[NDArray[np.intp]]] = ([nowhere], [nowhere])
+    shares: tuple[list[Array], list[Array]] = ([nothing], [nothing])
+    share_of = {
+        (s.run, s.output): regression.share_of_row[s.rows.start] for s in regression.segments
+    }
     bands_of = {(s.run, s.output): s.band for s in regression.segments}
     for group in regression.replicates:
         for output in regression.outputs:
@@ -268,6 +278,9 @@ def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContras
             first, own = edges[output]
             ids = first + np.searchsorted(own, frequency, side="right") - 1
             spectra = np.asarray(dct(differences, type=2, norm="ortho", axis=1))[:, kept]
+            share = float(np.mean([share_of[run, output] for run in group.runs]))
+            shares[0].append(np.full(spectra.size, share))
+            shares[1].append(np.full(len(frequency), share))
             parts[0].append(spectra.ravel())
             bands[0].append(np.tile(ids, len(spectra)))
             parts[1].append(np.asarray(dct(mean, type=2, norm="ortho"))[kept])
@@ -275,8 +288,10 @@ def replicate_contrasts(regression: Regression, rows: Array) -> ReplicateContras
     return ReplicateContrasts(
         np.concatenate(parts[0]),
         np.concatenate(bands[0]),
+        np.concatenate(shares[0]),
         np.concatenate(parts[1]),
         np.concatenate(bands[1]),
+        np.concatenate(shares[1]),
     )
 
 
@@ -321,11 +336,11 @@ def _nearest(inverse_sigma: Array, split: ReplicateContrasts) -> Array:
 
 
 def _fewest_rows(regression: Regression) -> int:
-    """Number of rows of the output with the fewest."""
-    rows = dict.fromkeys(regression.outputs, 0)
+    """Number of rows of the output with the fewest, as far as their samples are compared."""
+    rows = dict.fromkeys(regression.outputs, 0.0)
     for segment in regression.segments:
-        rows[segment.output] += len(segment.band.frequency)
-    return min(rows.values())
+        rows[segment.output] += float(np.sum(regression.share_of_row[segment.rows]))
+    return round(min(rows.values()))
 
 
 def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
@@ -374,9 +389,10 @@ def _even(regression: Regression, residual: Array) -> Array:
     """One variance per output, the same in all its bands."""
     out = np.empty(len(regression.bands))
     for output in regression.outputs:
-        rows = np.concatenate([residual[s.rows] for s in regression.segments if s.output == output])
+        parts = [s.rows for s in regression.segments if s.output == output]
+        share = sum(float(np.sum(regression.share_of_row[rows])) for rows in parts)
         own = [band[0] == output for band in regression.bands]
-        out[own] = np.mean(rows**2)
+        out[own] = sum(float(np.sum(residual[rows] ** 2)) for rows in parts) / max(share, 1.0)
     return np.maximum(out, regression.power_floor)
 
 
@@ -391,6 +407,9 @@ def _rms(regression: Regression, power: Array) -> dict[str, float]:
     out = {}
     for output in regression.outputs:
         own = [s for s in regression.segments if s.output == output]
-        total = sum(float(np.sum(power[regression.band_of_row[s.rows]])) for s in own)
+        total = sum(
+            float(power[regression.band_of_row[s.rows]] @ regression.share_of_row[s.rows])
+            for s in own
+        )
         out[output] = float(np.sqrt(total / regression.n_samples(output)))
     return out

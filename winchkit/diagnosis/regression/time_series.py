@@ -110,15 +110,23 @@ class TimeSeriesRegression(Regression):
         repeats = {run: len(group.runs) for group in self.replicates for run in group.runs}
         for segment in self.segments:
             bands = self.band_of_row[segment.rows]
-            np.add.at(count, bands, 1.0)
-            valid = self.dataset.recordings[segment.run].valid[segment.output]
-            measured = float(np.mean(valid)) * segment.band.gain**2
+            np.add.at(count, bands, self.share_of_row[segment.rows])
+            measured = self.share_of_row[segment.rows] * segment.band.gain**2
             own = np.zeros(len(bands))
             for error in self.rounding_errors(segment):
                 shared = np.sum(error.components**2, axis=0)
                 own += error.white * measured + repeats.get(segment.run, 1) * shared
             np.add.at(power, bands, own / self.dataset.decimation_factor)
         return power / np.maximum(count, 1.0)
+
+    @cached_property
+    def share_of_row(self) -> Array:
+        """Share of a run's samples of an output that are compared, at every row, (n_rows,)."""
+        out = np.empty(self.n_rows)
+        for segment in self.segments:
+            valid = self.dataset.recordings[segment.run].valid[segment.output]
+            out[segment.rows] = np.mean(valid)
+        return out
 
     @cached_property
     def _noise_before_rounding(self) -> dict[str, float]:
@@ -142,8 +150,8 @@ class TimeSeriesRegression(Regression):
 
     @property
     def n_observations(self) -> int:
-        """Number of rows."""
-        return self.n_rows
+        """Number of rows, less the share that is not compared."""
+        return max(1, round(float(np.sum(self.share_of_row))))
 
     def n_samples(self, output: str) -> int:
         """Number of compared samples of an output; the others are zero in every residual."""

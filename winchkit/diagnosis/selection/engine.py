@@ -282,8 +282,10 @@ class SelectionEngine(ABC):
 
     def scores_at_all_points(self, present: Fit, noise: Noise) -> list[Score]:
         """Scores of all candidates at every point of their shape grids, best first."""
-        ranked = score(self.projected(present, noise), present.residual, self.regression.n_rows)
-        return admissible(ranked, present.hypothesis, self.regression.n_rows)
+        ranked = score(
+            self.projected(present, noise), present.residual, self.regression.n_observations
+        )
+        return admissible(ranked, present.hypothesis, self.regression.n_observations)
 
     def pairs(self, present: Fit, noise: Noise) -> list[Pair]:
         """Pairs of candidates with a positive net gain, best first."""

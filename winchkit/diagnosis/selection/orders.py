@@ -1,9 +1,10 @@
 """Spectrum of a residual over the motor angle: least-squares periodogram at whole orders.
 
-Every order from 1 to half the samples per turn is scanned for an effect whose change of an output
-is ``E(t) sin(kθ + p)``: cogging (E constant), ripple of the torque constant (E in proportion to the
-torque), transmission error of a gear. The inner products with the whitened residual are exact; the
-squared lengths of the columns are those under the noise variance at the local frequency k θ'/2π.
+Every order from 1 to half the samples per turn, or to 36, is scanned for an effect whose change of
+an output is ``E(t) sin(kθ + p)``: cogging (E constant), ripple of the torque constant (E in
+proportion to the torque), transmission error of a gear. The inner products with the whitened
+residual are exact; the squared lengths of the columns are those under the noise variance at the
+local frequency k θ'/2π.
 
 References
 ----------
@@ -27,7 +28,7 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import half_of_samples_per_turn, sums_by_order
-from winchkit.effects.effect import Effect
+from winchkit.effects.effect import MOTOR_ORDERS, Effect
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.series import orders_of
@@ -256,9 +257,10 @@ def _envelopes(
 
 
 def _orders_per_turn(regression: TimeSeriesRegression) -> int:
-    """Half the samples per turn, where the motor moves most slowly for a whole turn; else zero.
+    """Half the samples per turn, where the motor moves most slowly for a whole turn; at least 36.
 
-    Zero also where no run covers a whole turn: periods are not observed there.
+    Orders of poles and slots that are aliased there are still distinguished by the changes of
+    speed. Zero where no run covers a whole turn: periods are not observed there.
     """
     whole = []
     for recording in regression.dataset.recordings:
@@ -266,4 +268,5 @@ def _orders_per_turn(regression: TimeSeriesRegression) -> int:
         # A map of a whole turn ends one step before its beginning.
         if float(np.ptp(angle)) + 2 * float(np.median(np.abs(np.diff(angle)))) >= _TURN:
             whole.append(angle)
-    return half_of_samples_per_turn(whole)
+    half = half_of_samples_per_turn(whole)
+    return max(half, int(MOTOR_ORDERS[-1])) if half else 0

@@ -179,7 +179,7 @@ def _forward_selection(
 
 def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
     """Largest score that noise alone exceeds in 1 % of cases."""
-    chance = null_maxima(engine.projected(present, noise), engine.regression.n_rows)
+    chance = null_maxima(engine.projected(present, noise), engine.regression.n_observations)
     return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
 
 

@@ -17,8 +17,9 @@ __all__ = ["CONSTANTS", "Answers", "ColumnAnswer", "permitted", "read_column", "
 _COLUMN = re.compile(
     r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"
     r"(?:\*\s*(?:(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
-    r"(?:\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
+    r"(?:(?!(?<=\S)\[\d+\]\s*$)\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
 )
+"""A number in brackets at the end of a name is an index of it: ``tau[0]``."""
 
 
 _PERMITTED: dict[str, tuple[str, ...]] = {

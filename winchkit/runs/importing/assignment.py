@@ -11,12 +11,9 @@ from winchkit.runs.importing.unit_spelling import SpelledUnit
 
 __all__ = ["Assignment", "Candidate", "Choice", "Confidence", "Guess", "Question"]
 
+_MEASURED = {"actual", "act", "ist", "measured", "meas"}
 _PREFERRED = {
-    "actual",
-    "act",
-    "ist",
-    "measured",
-    "meas",
+    *_MEASURED,
     "motor",
     "mot",
     "feedback",
@@ -107,6 +104,8 @@ class Candidate:
         words = set(words_of(" ".join((*self.column.labels, self.column.name))).split())
         is_current = self.unit is not None and self.unit.dimension == "current"
         preference = len(words & _AVOIDED) - len(words & _PREFERRED)
+        # Beside a measured torque, that of the feedback is the controller's.
+        preference -= len(words & _MEASURED)
         is_foreign = bool(self.column.unit) and self.unit is None
         return self.rank, is_foreign, is_current, preference
 

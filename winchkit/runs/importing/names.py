@@ -51,7 +51,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         r"\b(soll\w*|\w+soll|target|tar(?= (pos|vel|tor|cur|ang|spe))|set ?points?|"
         r"set (?=pos|vel|tor|cur|ang|spe)|"
         r"sp|cmd|cmptd|computed|commande?d?|demand(ed)?|desired|des|"
-        r"reference|ref|consigne|consigna|goal|planned|vorgabe|fuhrungs\w*|profile|offset|"
+        r"reference|ref|consigne|consigna|goal|planned|feed ?forward|"
+        r"vorgabe|fuhrungs\w*|profile|offset|"
         r"limit\w*)\b",
         1,
         IGNORED,
@@ -80,8 +81,8 @@ _RULES: tuple[tuple[str, int, str], ...] = (
         1,
         IGNORED,
     ),
-    # Quantities of the tool of a robot.
-    (r"\btcp\b", 1, IGNORED),
+    # Quantities of the tool of a robot; its components by number are no joints.
+    (r"\btcp\b|\b(ee|eef|end ?effector|tool)\b.* \d$", 1, IGNORED),
     # Torques of what the motor drives: of a brake on a test bench, of the load.
     (r"\b(brake|absorber|load|external|ext|brems\w*)( \w+)? (torques?|moments?)\b", 1, IGNORED),
     (r"\b(brems|last)(dreh)?moment\b", 1, IGNORED),

@@ -1,0 +1,55 @@
+"""Order of the effects of a model: by the error that each removes alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.stepwise import SelectionResult
+
+__all__ = ["ordered_by_contribution"]
+
+
+def ordered_by_contribution(engine: SelectionEngine, result: SelectionResult) -> SelectionResult:
+    """The result with its additions in the order of the error that each leaves alone.
+
+    The search compares under the noise of each frequency band: an effect with sharp changes may
+    come before one that removes more of the error. The error is the sum of the outputs' held-out
+    mean squares, each in units of the noise.
+
+    Parameters
+    ----------
+    engine : SelectionEngine
+        Engine of the search.
+    result : SelectionResult
+        Its result.
+
+    Returns
+    -------
+    SelectionResult
+        The same model; the result itself where the order is that already.
+    """
+    hypothesis, noise, first = result.final.hypothesis, result.noise, engine.n_initial_terms
+    added = list(range(first, len(hypothesis.terms)))
+    if len(added) < 2:
+        return result
+    folds = engine.folds(result.final, noise)
+
+    def chosen(indices: list[int]) -> Hypothesis:
+        kept = [*range(first), *indices]
+        return Hypothesis(
+            tuple(hypothesis.terms[index] for index in kept),
+            hypothesis.nuisances,
+            tuple(hypothesis.starts[index] for index in kept),
+        )
+
+    def error(index: int) -> float:
+        alone = engine.refit(chosen([index]), noise)
+        errors = engine.held_out_errors(alone, noise, folds)
+        return sum((rms / noise.rms[output]) ** 2 for output, rms in errors.items())
+
+    order = sorted(added, key=error)
+    if order == added:
+        return result
+    return replace(result, final=engine.refit(chosen(order), noise))
