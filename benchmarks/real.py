@@ -24,11 +24,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 import numpy as np
 from numpy.typing import NDArray
 
-from campaign.rivals import SELECTIONS, Regression, in_time
+from campaign.rivals import SELECTIONS, Regression, all_columns, in_time
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.diagnose import diagnose, selection_engine
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.selection.signatures import Signatures
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.runs.read import read_run
@@ -142,7 +143,9 @@ class Table:
     """Block of time of every sample."""
 
 
-def table_of(engine: TimeSeriesSelection, fitted: Hypothesis, runs: range) -> Table:
+def table_of(
+    engine: TimeSeriesSelection, tried: Signatures, fitted: Hypothesis, runs: range
+) -> Table:
     """Samples of some runs, after the profile's own effects at their fitted values."""
     regression = engine.regression
     segments = [s for s in regression.segments if s.run in runs and s.output == OUTPUT]
@@ -152,7 +155,7 @@ def table_of(engine: TimeSeriesSelection, fitted: Hypothesis, runs: range) -> Ta
     for segment in segments:
         recording = regression.dataset.recordings[segment.run]
         at = recording.raw.at
-        rows = np.column_stack([left, engine.signatures.columns])[segment.rows]
+        rows = np.column_stack([left, tried.columns])[segment.rows]
         values = np.column_stack(
             [
                 in_time(rows, segment.band),
@@ -193,7 +196,10 @@ def results(recording: Recording, folder: Path) -> list[Result]:
     nominal = own.fit_with_noise(own.initial_model)[0].hypothesis
     n_fit, n_all = len(fit), len(fit) + len(held_out)
     known = _known(nominal, n_all)
-    train, test = (table_of(engine, known, runs) for runs in (range(n_fit), range(n_fit, n_all)))
+    tried = all_columns(engine)
+    train, test = (
+        table_of(engine, tried, known, runs) for runs in (range(n_fit), range(n_fit, n_all))
+    )
 
     def result(method: str, left: Array, names: Sequence[str] = (), seconds: float = 0.0) -> Result:
         rms = float(np.sqrt(np.mean(left**2)))
@@ -203,14 +209,14 @@ def results(recording: Recording, folder: Path) -> list[Result]:
         )
 
     best = _known(answer.result.final.hypothesis, n_all)
-    left = table_of(engine, best, range(n_fit, n_all)).residual
+    left = table_of(engine, tried, best, range(n_fit, n_all)).residual
     names = [" / ".join(step.effects) for step in answer.diagnosis.steps]
     out = [result("profile", test.residual), result(OURS, left, names, ours)]
     for name, select in SELECTIONS.items():
         start = _cpu()
-        chosen, coefficients = _selected(engine, train, select)
+        chosen, coefficients = _selected(tried, train, select)
         left = test.residual - test.columns[:, chosen] @ coefficients
-        effects = _effects(engine)
+        effects = _effects(tried)
         names = list(dict.fromkeys(effects[i] for i in chosen))
         out.append(result(name, left, names, _cpu() - start))
     start = _cpu()
@@ -227,25 +233,25 @@ def _known(fitted: Hypothesis, runs: int) -> Hypothesis:
     return model
 
 
-def _effects(engine: TimeSeriesSelection) -> list[str]:
+def _effects(tried: Signatures) -> list[str]:
     """Effect of every column."""
-    effects = [""] * engine.signatures.columns.shape[1]
-    for candidate in engine.signatures.candidates:
+    effects = [""] * tried.columns.shape[1]
+    for candidate in tried.candidates:
         for index in range(candidate.columns.start, candidate.columns.stop):
             effects[index] = candidate.effect.id
     return effects
 
 
 def _selected(
-    engine: TimeSeriesSelection, train: Table, select: Callable[[Regression], list[int]]
+    tried: Signatures, train: Table, select: Callable[[Regression], list[int]]
 ) -> tuple[list[int], Array]:
     """Columns that a method selects, and their coefficients by least squares."""
     length = np.maximum(np.sqrt(np.sum(train.columns**2, axis=0)), 1e-12)
     data = Regression(
         train.residual / max(float(np.std(train.residual)), 1e-12),
         train.columns / length,
-        tuple(_effects(engine)),
-        tuple(candidate.columns for candidate in engine.signatures.candidates),
+        tuple(_effects(tried)),
+        tuple(candidate.columns for candidate in tried.candidates),
         train.fold,
     )
     chosen = select(data)

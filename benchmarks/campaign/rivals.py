@@ -17,7 +17,11 @@ from scipy.stats import chi2
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.spectrum import Band, to_time
+from winchkit.diagnosis.selection.candidates import with_grid_points
+from winchkit.diagnosis.selection.orders import has_orders
+from winchkit.diagnosis.selection.signatures import Signatures, signatures
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.effects.effect import MOTOR_ORDERS
 
 __all__ = ["RIVALS", "SELECTIONS", "Regression", "in_time", "regression_of"]
 
@@ -62,8 +66,9 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
         count = sum(s.rows.stop - s.rows.start for s in own)
         for segment in own:
             size[segment.rows] = np.sqrt(total / count) or 1.0
+    tried = all_columns(engine)
     rows = np.column_stack(
-        [regression.nominal_residual, regression.nuisance_columns, engine.signatures.columns]
+        [regression.nominal_residual, regression.nuisance_columns, tried.columns]
     )
     rows = rows / size[:, None]
     every = max(1, regression.n_rows // _MOST_ROWS)
@@ -81,7 +86,7 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
     columns = whole[:, 1 + nuisances :]
     length = np.sqrt(np.sum(columns**2, axis=0))
     columns = columns / np.maximum(length, _NOTHING)
-    atoms = engine.signatures.candidates
+    atoms = tried.candidates
     effects = [""] * columns.shape[1]
     for atom in atoms:
         for index in range(atom.columns.start, atom.columns.stop):
@@ -90,6 +95,19 @@ def regression_of(engine: TimeSeriesSelection) -> Regression:
     return Regression(
         residual, columns, tuple(effects), tuple(a.columns for a in atoms), np.concatenate(folds)
     )
+
+
+def all_columns(engine: TimeSeriesSelection) -> Signatures:
+    """Columns of all candidates, those with an order at all that the catalogue lists too.
+
+    winchkit scans every order anew after each step; the other methods choose among columns.
+    """
+    effects = {candidate.effect.id: candidate.effect for candidate in engine.signatures.candidates}
+    longer = (
+        with_grid_points(effect, "order", MOTOR_ORDERS) if has_orders(effect) else effect
+        for effect in effects.values()
+    )
+    return signatures(engine.regression, engine.initial_model, longer)
 
 
 def in_time(rows: Array, band: Band) -> Array:

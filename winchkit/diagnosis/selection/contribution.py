@@ -1,4 +1,4 @@
-"""Order of the effects of a model: by the error that each removes alone."""
+"""Order of the effects of a model: that in which it grows by the largest decrease of the error."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ __all__ = ["ordered_by_contribution"]
 
 
 def ordered_by_contribution(engine: SelectionEngine, result: SelectionResult) -> SelectionResult:
-    """The result with its additions in the order of the error that each leaves alone.
+    """The result with its additions in the order of forward selection among themselves.
 
-    The search compares under the noise of each frequency band: an effect with sharp changes may
-    come before one that removes more of the error. The error is the sum of the outputs' held-out
-    mean squares, each in units of the noise.
+    The search compares under the noise of each frequency band and exchanges effects: one with sharp
+    changes may come before another that removes more of the error. Here every next addition is the
+    one with which the error is least: the sum of the outputs' held-out mean squares, each in units
+    of the noise.
 
     Parameters
     ----------
@@ -44,12 +45,15 @@ def ordered_by_contribution(engine: SelectionEngine, result: SelectionResult) ->
             tuple(hypothesis.starts[index] for index in kept),
         )
 
-    def error(index: int) -> float:
-        alone = engine.refit(chosen([index]), noise)
-        errors = engine.held_out_errors(alone, noise, folds)
+    def error(indices: list[int]) -> float:
+        errors = engine.held_out_errors(engine.refit(chosen(indices), noise), noise, folds)
         return sum((rms / noise.rms[output]) ** 2 for output, rms in errors.items())
 
-    order = sorted(added, key=error)
+    order: list[int] = []
+    while len(order) < len(added) - 1:
+        left = [index for index in added if index not in order]
+        order.append(min(left, key=lambda index: error([*order, index])))
+    order += [index for index in added if index not in order]
     if order == added:
         return result
     return replace(result, final=engine.refit(chosen(order), noise))
