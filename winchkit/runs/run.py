@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
@@ -13,7 +14,7 @@ from winchkit.rendering import Plotted
 from winchkit.tabular import Columns, Tabular
 from winchkit.units import parse, suggest
 
-__all__ = ["ANGLE_INTEGRATED", "CHANNEL_DIMENSIONS", "Channel", "Run"]
+__all__ = ["ANGLE_INTEGRATED", "CHANNEL_DIMENSIONS", "Channel", "Run", "lost_samples"]
 
 
 ANGLE_INTEGRATED = "integral of motor_velocity"
@@ -33,6 +34,33 @@ CHANNEL_DIMENSIONS: dict[str, str] = {
     "swivel": "angle",
 }
 """Dimension of every channel of a winch that the model uses."""
+
+
+_GAP = 2.5
+"""Shortest gap in median intervals, as in the comparison: one missing sample and jitter."""
+_WHOLE = 0.05
+"""Deviation of an interval from a whole number of usual ones up to which it has lost samples."""
+
+
+def lost_samples(time: Array) -> NDArray[np.bool_]:
+    """Intervals in which samples were lost.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Stamps, s, increasing.
+
+    Returns
+    -------
+    (n - 1,) array of bool
+        Longer than 2.5 median intervals, or a whole number of them to 5 %.
+    """
+    steps = np.diff(time)
+    if not len(steps):
+        return np.zeros(0, dtype=bool)
+    steps = steps / np.median(steps)
+    whole = np.round(steps)
+    return np.asarray((steps > _GAP) | ((whole > 1) & (np.abs(steps - whole) <= _WHOLE)))
 
 
 @dataclass(frozen=True)
@@ -122,8 +150,8 @@ class Run(Plotted, Tabular):
 
     @property
     def gaps(self) -> int:
-        """Number of intervals longer than 1.5 sampling intervals."""
-        return int(np.count_nonzero(np.diff(self.time) > 1.5 * self.interval))
+        """Number of intervals in which samples were lost, see :func:`lost_samples`."""
+        return int(np.count_nonzero(lost_samples(self.time)))
 
     def winches(self) -> list[str]:
         """Names of the winches, from columns ``A.motor_angle``; ``[""]`` without prefixes."""

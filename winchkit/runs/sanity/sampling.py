@@ -8,17 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.runs.run import Run
+from winchkit.runs.run import Run, lost_samples
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import counted, share
 
 __all__ = ["increasing_rows", "sampling", "with_lost_samples"]
 
-_GAP = 2.5
-"""Shortest gap in median intervals, as in the comparison: one missing sample and jitter."""
 _JITTER = 0.05
-"""Standard deviation of the intervals, relative to their mean, that is reported; an interval that
-is a whole number of usual ones to within as much has lost samples."""
+"""Standard deviation of the intervals, relative to their mean, that is reported."""
 _LEAST_SAMPLES = 20
 """Fewer samples have no usual step; rule of thumb."""
 
@@ -29,7 +26,7 @@ def sampling(run: Run) -> Iterator[Finding]:
         return
     steps = np.diff(run.time)
     usual = float(np.median(steps))
-    lost_some = _lost_some(run.time)
+    lost_some = lost_samples(run.time)
     gaps, even = steps[lost_some], steps[~lost_some]
     jitter = float(np.std(even) / np.mean(even))
     if jitter > _JITTER:
@@ -71,14 +68,7 @@ def with_lost_samples(time: Array, values: Array) -> Array:
     """
     if len(time) < _LEAST_SAMPLES:
         return values
-    return np.insert(values, np.flatnonzero(_lost_some(time)) + 1, np.nan)
-
-
-def _lost_some(time: Array) -> NDArray[np.bool_]:
-    """Intervals, (n − 1,), in which samples were lost."""
-    steps = np.diff(time) / np.median(np.diff(time))
-    whole = np.round(steps)
-    return (steps > _GAP) | ((whole > 1) & (np.abs(steps - whole) <= _JITTER))
+    return np.insert(values, np.flatnonzero(lost_samples(time)) + 1, np.nan)
 
 
 def increasing_rows(time: Array, run: str) -> tuple[NDArray[np.intp], list[Finding]]:
