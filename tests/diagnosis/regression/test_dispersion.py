@@ -39,6 +39,7 @@ DATA = cast(
         bands=[("torque", float(b), b + 1.0) for b in range(5)],
         band_of_row=BAND,
         power_floor=np.zeros(len(ROWS)),
+        share_of_row=np.ones(len(BAND)),
     ),
 )
 NOISE = Noise(np.ones(len(ROWS)), np.full(len(ROWS), 200.0), {"torque": 1.0}, from_repeats=True)

@@ -61,7 +61,8 @@ def test_evidence_is_the_decrease_of_chi_square_beyond_penalty_and_threshold() -
     engine = engine_of((DRAG,))
     final, noise, spread = fitted_with(engine, (DRAG,), 1.0)
     without = engine.refit(final.hypothesis.without(0), noise)
-    decrease, penalty = without.chi_square - final.chi_square, np.log(engine.regression.n_rows)
+    decrease = without.chi_square - final.chi_square
+    penalty = np.log(engine.regression.n_observations)
     found = excess_evidence(engine, final, noise, spread, 0, threshold=5.0)
     assert found == pytest.approx(decrease - penalty - 5.0)
     # Intervals that are as many times longer take the evidence away.

@@ -361,7 +361,7 @@ def assemble(
     repeats = find_repeats(signals)
     smooth = denoised_motions(line, signals, raw, repeats)
     nominal = [line.predict(motion) for motion in raw]
-    cut_off = _torque_cut_off(runs, nominal, filtering)
+    cut_off = _torque_cut_off(runs, nominal, raw, filtering)
     outputs = ("motor_torque",) if isinstance(profile, AxisProfile) else OUTPUTS
     recordings = tuple(
         Recording(
@@ -446,16 +446,28 @@ def _signals(run: Run, profile: WinchProfile, clock: Clock | None = None) -> Sig
 
 
 def _torque_cut_off(
-    runs: Sequence[Run], nominal: Sequence[Mapping[str, Array]], filtering: Filtering
+    runs: Sequence[Run],
+    nominal: Sequence[Mapping[str, Array]],
+    motions: Sequence[Motion],
+    filtering: Filtering,
 ) -> float:
-    """Cut-off of the torque's low-pass, Hz, the same for all runs."""
+    """Cut-off of the torque's low-pass, Hz, the same for all runs.
+
+    It follows the residuals with zeros at standstills that are not compared: the samples between
+    them, in stick-slip, have a spectrum of their own.
+    """
     if filtering.band is not None:
         return filtering.band
     rate = 1 / max(run.interval for run in runs)
     if filtering.decimation is not None:
         return torque_cut_off([], rate * filtering.decimation.factor)
-    pairs = [(run, own) for run, own in zip(runs, nominal, strict=True) if "motor_torque" in run]
-    return torque_cut_off([run["motor_torque"] - own["motor_torque"] for run, own in pairs], rate)
+    residuals = []
+    for run, own, motion in zip(runs, nominal, motions, strict=True):
+        if "motor_torque" in run:
+            measured, predicted = run["motor_torque"], own["motor_torque"]
+            stands = standstill_mask(bridged(measured), predicted, motion)
+            residuals.append(np.where(stands, 0.0, measured - predicted))
+    return torque_cut_off(residuals, rate)
 
 
 def _band(run: Run, output: str, filtering: Filtering, torque_cut_off: float) -> Band:

@@ -110,7 +110,7 @@ def _of_residual(regression: Regression, fit: Fit, noise: Noise) -> tuple[Array,
     total = sums_per_band(squares, bands, count)
     fourth = sums_per_band(squares**2, bands, count)
     basis = orthonormal(whitened_jacobian(regression, fit, noise))
-    rows = sums_per_band(1.0 - np.sum(basis**2, axis=1), bands, count)
+    rows = sums_per_band(regression.share_of_row - np.sum(basis**2, axis=1), bands, count)
     rows = np.maximum(rows, 1.0)
     effective = np.divide(3 * total**2, fourth, out=np.ones_like(total), where=fourth > 0.0)
     dof = np.clip(effective, 1.0, rows)

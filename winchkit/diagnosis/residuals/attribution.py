@@ -185,8 +185,12 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribu
 
 
 def kept_rows(regression: TimeSeriesRegression, output: str) -> int:
-    """Number of independent values of an output: coefficients that its low-pass keeps."""
-    return sum(s.rows.stop - s.rows.start for s in regression.segments if s.output == output)
+    """Number of independent values of an output: coefficients that its low-pass keeps.
+
+    Of a run of which a part is compared they count by that share.
+    """
+    own = [s.rows for s in regression.segments if s.output == output]
+    return max(1, round(sum(float(np.sum(regression.share_of_row[rows])) for rows in own)))
 
 
 def chance_share(bins: int, kept: int) -> float:

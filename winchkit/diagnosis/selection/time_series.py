@@ -59,8 +59,10 @@ class TimeSeriesSelection(SelectionEngine):
         candidates: Iterable[Effect],
     ) -> None:
         self._coarse = coarse_regression(regression)
-        one_order = (_with_first_order(e) if has_orders(e) else e for e in candidates)
-        super().__init__(regression, initial_model, one_order)
+        if regression.replicates:
+            # Without repeats the noise is that beside all candidates, those of every listed order.
+            candidates = [_with_first_order(e) if has_orders(e) else e for e in candidates]
+        super().__init__(regression, initial_model, candidates)
 
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
         """Noise from the contrasts of repeats; without repeats from the saturated model."""
