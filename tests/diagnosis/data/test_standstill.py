@@ -132,6 +132,17 @@ def test_a_slow_motion_of_a_coarse_encoder_is_no_standstill() -> None:
     assert dataset.used_share["motor_torque"] > 0.95
 
 
+def test_a_joint_that_never_slips_is_compared_where_it_stands() -> None:
+    """There is nothing else, and the diagnosis must say something of such a file."""
+    run = stick_slip(1, gravity=0.0, kinetic=20.0, static=20.0)
+    angle = run["motor_angle"] + np.where(np.arange(len(run)) % 700 == 0, RESOLUTION, 0.0)
+    dataset = prepare([run_of(run.time, angle, run["motor_torque"])], JOINT)
+    assert at_standstill(dataset) == []
+    assert dataset.used_share["motor_torque"] > 0.9
+    found = diagnose([run_of(run.time, angle, run["motor_torque"])], JOINT).diagnosis
+    assert found.verdict in {"unknown", "partly"}
+
+
 def test_the_two_variances_are_those_of_white_noise() -> None:
     """Both estimate its variance; of a ramp the second does not contain the trend."""
     noise = np.random.default_rng(4).normal(scale=0.3, size=20_000)

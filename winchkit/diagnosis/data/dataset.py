@@ -23,7 +23,7 @@ from winchkit.diagnosis.data.repeats import Repeats, find_repeats
 from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, even_instants
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
-from winchkit.diagnosis.data.standstill import standstill_finding, standstill_mask
+from winchkit.diagnosis.data.standstill import standstill_findings, standstill_mask
 from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs, without_constants
@@ -227,7 +227,11 @@ def prepare(
             *coarse,
             *sanity,
             *zeroed,
-            *_at_standstill(dataset),
+            *standstill_findings(
+                (r.name, r.measured["motor_torque"], r.nominal["motor_torque"], r.raw)
+                for r in dataset.recordings
+                if "motor_torque" in r.measured
+            ),
             *rounded_alike(dataset, resolution),
         ),
         zeroed_anew=frozenset(finding.channel for finding in zeroed),
@@ -300,16 +304,6 @@ def _aligned_errors(dataset: Dataset, group: Repeats, output: str) -> Array:
     )
 
 
-def _at_standstill(dataset: Dataset) -> list[Finding]:
-    """Findings on torques that are not compared at standstills."""
-    found = [
-        standstill_finding(r.name, r.measured["motor_torque"], r.nominal["motor_torque"], r.raw)
-        for r in dataset.recordings
-        if "motor_torque" in r.measured
-    ]
-    return [finding for finding in found if finding is not None]
-
-
 def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
     """A run that differs from its repeats, and the finding on it."""
     for group in dataset.repeated:
@@ -361,14 +355,20 @@ def assemble(
     repeats = find_repeats(signals)
     smooth = denoised_motions(line, signals, raw, repeats)
     nominal = [line.predict(motion) for motion in raw]
-    cut_off = _torque_cut_off(runs, nominal, raw, filtering)
+    stands = [
+        standstill_mask(bridged(run["motor_torque"]), predicted["motor_torque"], motion)
+        if "motor_torque" in run and "motor_torque" in predicted
+        else np.zeros(len(run), dtype=bool)
+        for run, predicted, motion in zip(runs, nominal, raw, strict=True)
+    ]
+    cut_off = _torque_cut_off(runs, nominal, stands, filtering)
     outputs = ("motor_torque",) if isinstance(profile, AxisProfile) else OUTPUTS
     recordings = tuple(
         Recording(
             name=run.name,
             signals=own,
             measured={output: bridged(run[output]) for output in shown},
-            valid={output: _valid(run, output, motion, predicted) for output in shown},
+            valid={output: _valid(run, output, motion, predicted, still) for output in shown},
             bands={output: _band(run, output, filtering, cut_off) for output in shown},
             zeroed=run.length_zeroed,
             raw=motion,
@@ -379,8 +379,8 @@ def assemble(
             path=run.path,
             decimated=decimation is not None,
         )
-        for run, own, motion, denoised, predicted in zip(
-            runs, signals, raw, smooth, nominal, strict=True
+        for run, own, motion, denoised, predicted, still in zip(
+            runs, signals, raw, smooth, nominal, stands, strict=True
         )
         for shown in ([output for output in outputs if output in run and output in predicted],)
     )
@@ -448,7 +448,7 @@ def _signals(run: Run, profile: WinchProfile, clock: Clock | None = None) -> Sig
 def _torque_cut_off(
     runs: Sequence[Run],
     nominal: Sequence[Mapping[str, Array]],
-    motions: Sequence[Motion],
+    stands: Sequence[Mask],
     filtering: Filtering,
 ) -> float:
     """Cut-off of the torque's low-pass, Hz, the same for all runs.
@@ -461,12 +461,11 @@ def _torque_cut_off(
     rate = 1 / max(run.interval for run in runs)
     if filtering.decimation is not None:
         return torque_cut_off([], rate * filtering.decimation.factor)
-    residuals = []
-    for run, own, motion in zip(runs, nominal, motions, strict=True):
-        if "motor_torque" in run:
-            measured, predicted = run["motor_torque"], own["motor_torque"]
-            stands = standstill_mask(bridged(measured), predicted, motion)
-            residuals.append(np.where(stands, 0.0, measured - predicted))
+    residuals = [
+        np.where(still, 0.0, run["motor_torque"] - own["motor_torque"])
+        for run, own, still in zip(runs, nominal, stands, strict=True)
+        if "motor_torque" in run
+    ]
     return torque_cut_off(residuals, rate)
 
 
@@ -477,8 +476,12 @@ def _band(run: Run, output: str, filtering: Filtering, torque_cut_off: float) ->
     return Band(len(run), 1 / run.interval, cut_off, filtering.kept_cut_offs)
 
 
-def _valid(run: Run, output: str, motion: Motion, nominal: Mapping[str, Array]) -> Mask:
+def _valid(
+    run: Run, output: str, motion: Motion, nominal: Mapping[str, Array], still: Mask
+) -> Mask:
     """Samples of an output that are compared: measured, with known inputs, away from transients.
+
+    A torque at standstills that static friction determines (``still``) is not compared.
 
     Measured and predicted signals pass the same low-pass after samples that are not compared were
     set to zero in both. Such samples therefore change no other one, and no further ones are left
@@ -495,5 +498,5 @@ def _valid(run: Run, output: str, motion: Motion, nominal: Mapping[str, Array]) 
     measured = bridged(run[output])
     uncertain = uncertain_force_mask(measured, nominal[output], motion)
     if output == "motor_torque":
-        uncertain |= standstill_mask(measured, nominal[output], motion)
+        uncertain |= still
     return compared & ~uncertain & ~transient_mask(measured, output, motion)

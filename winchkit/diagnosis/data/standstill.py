@@ -15,7 +15,7 @@ and compensation methods for the control of machines with friction. Automatica 3
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from winchkit.runs.sanity.text import size
 __all__ = [
     "STANDSTILL",
     "spread_at_standstill",
-    "standstill_finding",
+    "standstill_findings",
     "standstill_mask",
     "standstills",
 ]
@@ -37,6 +37,8 @@ __all__ = [
 STANDSTILL = "standstill"
 _LEAST_SAMPLES = 5
 """A shorter interval has hardly a variance, and a slow motion crosses its noise in it."""
+_LEAST_MOVING = 50
+"""Samples in motion without which the standstills are compared as well: they are all there is."""
 _DEVIATIONS = 3.0
 """Standard deviations of the angle to either side, which one sample in 370 exceeds."""
 _COUNTS = 1.5
@@ -131,30 +133,38 @@ def standstill_mask(measured: Array, nominal: Array, motion: Motion) -> NDArray[
     Returns
     -------
     (n,) array of bool
-        All false where the residual is as steady at standstills as its noise.
+        All false where the residual is as steady at standstills as its noise, or where hardly
+        anything else is there.
     """
     mask = np.zeros(len(measured), dtype=bool)
-    residual = measured - nominal
     intervals = standstills(motion)
-    within, noise = spread_at_standstill(residual, intervals)
-    if within > _WANDERS * noise:
-        for interval in intervals:
-            mask[interval] = True
+    for interval in intervals:
+        mask[interval] = True
+    within, noise = spread_at_standstill(measured - nominal, intervals)
+    if within <= _WANDERS * noise or np.count_nonzero(~mask) < _LEAST_MOVING:
+        mask[:] = False
     return mask
 
 
-def standstill_finding(
-    name: str, measured: Array, nominal: Array, motion: Motion
-) -> Finding | None:
-    """Finding on a run whose torque is not compared at standstills; None where it is."""
-    mask = standstill_mask(measured, nominal, motion)
-    if not mask.any():
-        return None
-    within, _ = spread_at_standstill(measured - nominal, standstills(motion))
-    spread = float(np.sqrt(within))
-    text = (
-        f"changes by {size(spread, 'N m')} rms while the motor stands still: static friction "
-        f"holds any torque below its limit; these {np.mean(mask):.0%} of the samples are not "
-        "compared"
-    )
-    return Finding(STANDSTILL, name, "motor_torque", spread, text)
+def standstill_findings(runs: Iterable[tuple[str, Array, Array, Motion]]) -> list[Finding]:
+    """Findings on runs whose torque is not compared at standstills.
+
+    Parameters
+    ----------
+    runs : iterable of tuple
+        Name, measured and predicted torque (n,) and nominal motion of each.
+    """
+    found = []
+    for name, measured, nominal, motion in runs:
+        mask = standstill_mask(measured, nominal, motion)
+        if not mask.any():
+            continue
+        within, _ = spread_at_standstill(measured - nominal, standstills(motion))
+        spread = float(np.sqrt(within))
+        text = (
+            f"changes by {size(spread, 'N m')} rms while the motor stands still: static friction "
+            f"holds any torque below its limit; these {np.mean(mask):.0%} of the samples are not "
+            "compared"
+        )
+        found.append(Finding(STANDSTILL, name, "motor_torque", spread, text))
+    return found
