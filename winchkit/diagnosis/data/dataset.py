@@ -451,11 +451,7 @@ def _torque_cut_off(
     stands: Sequence[Mask],
     filtering: Filtering,
 ) -> float:
-    """Cut-off of the torque's low-pass, Hz, the same for all runs.
-
-    It follows the residuals with zeros at standstills that are not compared: the samples between
-    them, in stick-slip, have a spectrum of their own.
-    """
+    """Cut-off of the torque's low-pass for all runs, Hz; residuals are zero at standstills."""
     if filtering.band is not None:
         return filtering.band
     rate = 1 / max(run.interval for run in runs)
