@@ -40,7 +40,7 @@ def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:
     """Findings on ``motor_velocity``.
 
     ``inverted-sign`` and ``wrong-factor`` have the slope as value, ``inconsistent-velocity`` the
-    squared correlation.
+    squared correlation, or a slope that no unit explains.
 
     Notes
     -----
@@ -108,6 +108,12 @@ def _judged(run: Run, name: str, slope: Slope) -> Iterator[Finding]:
     margin = _SIGMAS * slope.std
     if abs(slope.value) + margin < _RANGE[0] or abs(slope.value) - margin > _RANGE[1]:
         known = named_factor(slope, is_angle=True)
-        why = f"that is {known}" if known else "no known constant explains it"
-        text = f"the unit looks wrong: {beside}; {why}"
-        yield Finding("wrong-factor", run.name, name, slope.value, text)
+        if known:
+            text = f"the unit looks wrong: {beside}; that is {known}"
+            yield Finding("wrong-factor", run.name, name, slope.value, text)
+        elif slope.value > 0:
+            text = (
+                f"it is not the derivative of the motor angle: {beside}, which no unit explains; "
+                "the derivative of the angle is used instead: check the ranges of both"
+            )
+            yield Finding(INCONSISTENT, run.name, name, slope.value, text)
