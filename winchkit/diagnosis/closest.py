@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from winchkit.diagnosis.regression.conditioning import collinearity
 from winchkit.diagnosis.regression.intervals import Spread
 from winchkit.diagnosis.results import Closest, Step
 from winchkit.diagnosis.selection.stepwise import SelectionResult
@@ -15,6 +16,10 @@ from winchkit.diagnosis.verdict.plausibility import implausible
 
 __all__ = ["beside_the_named", "imitations", "plausible_sets", "unnamed_sets"]
 
+_LARGEST_COLLINEARITY = 1e5
+"""Law and channel are accurate to 0.3 % at best: where the others imitate an effect's change to
+within that, what distinguishes it is less than their error."""
+_CANCELS = "the others imitate its change to within 0.3 %: their values cancel each other"
 _IMITATES = "a part of the residual is unexplained: it may imitate the cause"
 
 
@@ -27,15 +32,20 @@ def plausible_sets(
     """Sets without members of implausible values, their steps, and the effects of empty sets.
 
     Where a set has no other member, nothing is named: the other effects were fitted beside it.
+    Nor is anything named where the change of one is nearly that of the others together.
     """
     dataset, found = engine.regression.dataset, list(sets)
     if not found:
         return [], (), ()
     steps = steps_of(engine, result, found, dataset, spread)
     kept, closest = [], []
-    for equivalence, step in zip(found, steps, strict=True):
+    for index, (equivalence, step) in enumerate(zip(found, steps, strict=True)):
+        place = engine.n_initial_terms + index
+        ratio = collinearity(engine.regression, result.final, result.noise, place)
+        cancels = _CANCELS if ratio > _LARGEST_COLLINEARITY else None
         reasons = {
             term.effect.id: implausible(term, step.parameters[term.effect.id], dataset.profile)
+            or cancels
             for term in equivalence.terms
         }
         possible = [effect for effect, reason in reasons.items() if reason is None]

@@ -1,4 +1,4 @@
-"""Covariance of fitted values, and the condition number of a fit.
+"""Covariance of fitted values, the condition number of a fit, collinearity of an effect.
 
 References
 ----------
@@ -17,10 +17,11 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["ValueCovariance", "value_covariance"]
+__all__ = ["ValueCovariance", "collinearity", "value_covariance"]
 
 _STEP = 1e-4
 
@@ -68,6 +69,36 @@ def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCov
     names, slopes = _slopes(regression, fit)
     condition = np.sqrt(values[-1] / max(float(values[0]), floor)) if len(values) else np.nan
     return ValueCovariance(names, slopes @ covariance @ slopes.T, float(condition))
+
+
+def collinearity(regression: Regression, fit: Fit, noise: Noise, index: int) -> float:
+    """Squared length of an effect's change over that of the part which the others cannot imitate.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        Fitted model.
+    noise
+        Noise variance.
+    index
+        Of the effect in the hypothesis.
+
+    Returns
+    -------
+    float
+        Variance inflation factor of the effect at its fitted values, 1 where it is orthogonal to
+        the others' derivatives.
+    """
+    hypothesis, inverse_sigma = fit.hypothesis, noise.inverse_sigma(regression)
+    change = regression.change(hypothesis) - regression.change(hypothesis.without(index))
+    change *= inverse_sigma
+    others = ~regression.unknowns_of(index, hypothesis)
+    basis = orthonormal(fit.jacobian[:, others] * inverse_sigma[:, None])
+    left = change - basis @ (basis.T @ change)
+    size = float(left @ left)
+    return float(change @ change) / size if size else float("inf")
 
 
 def _slopes(regression: Regression, fit: Fit) -> tuple[tuple[str, ...], Array]:
