@@ -8,6 +8,7 @@ import resource
 import shutil
 import signal
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -287,7 +288,8 @@ def test_an_interruption_while_workers_start_comes_when_they_have_started() -> N
 
     def start() -> None:
         with cluster._without_sigint():
-            os.kill(os.getpid(), signal.SIGINT)
+            # To this thread: another one of the test's process may take what the process gets.
+            signal.pthread_kill(threading.get_ident(), signal.SIGINT)
             reached.append(1)
 
     with pytest.raises(KeyboardInterrupt):

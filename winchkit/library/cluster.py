@@ -106,6 +106,8 @@ def cluster_outcomes(
 def _without_sigint() -> Iterator[None]:
     """Processes and threads that begin here never get SIGINT; this thread gets it afterwards.
 
+    Where the process has other threads, one of them takes the signal at once, which is as good.
+
     A terminal sends Ctrl-C to workers too, which would end with tracebacks. The signal mask is
     inherited, also by the worker that a nanny starts in place of a lost one.
     """
