@@ -137,13 +137,19 @@ def standstill_mask(measured: Array, nominal: Array, motion: Motion) -> NDArray[
         anything else is there.
     """
     mask = np.zeros(len(measured), dtype=bool)
-    intervals = standstills(motion)
-    for interval in intervals:
+    for interval in _reactions(measured - nominal, motion)[0]:
         mask[interval] = True
-    within, noise = spread_at_standstill(measured - nominal, intervals)
-    if within <= _WANDERS * noise or np.count_nonzero(~mask) < _LEAST_MOVING:
-        mask[:] = False
     return mask
+
+
+def _reactions(residual: Array, motion: Motion) -> tuple[list[slice], float]:
+    """Standstills that are not compared, none where they are, and the variance within them."""
+    intervals = standstills(motion)
+    within, noise = spread_at_standstill(residual, intervals)
+    moving = len(residual) - sum(i.stop - i.start for i in intervals)
+    if within <= _WANDERS * noise or moving < _LEAST_MOVING:
+        return [], 0.0
+    return intervals, within
 
 
 def standstill_findings(runs: Iterable[tuple[str, Array, Array, Motion]]) -> list[Finding]:
@@ -156,14 +162,14 @@ def standstill_findings(runs: Iterable[tuple[str, Array, Array, Motion]]) -> lis
     """
     found = []
     for name, measured, nominal, motion in runs:
-        mask = standstill_mask(measured, nominal, motion)
-        if not mask.any():
+        intervals, within = _reactions(measured - nominal, motion)
+        if not intervals:
             continue
-        within, _ = spread_at_standstill(measured - nominal, standstills(motion))
         spread = float(np.sqrt(within))
+        share = sum(i.stop - i.start for i in intervals) / len(measured)
         text = (
             f"changes by {size(spread, 'N m')} rms while the motor stands still: static friction "
-            f"holds any torque below its limit; these {np.mean(mask):.0%} of the samples are not "
+            f"holds any torque below its limit; these {share:.0%} of the samples are not "
             "compared"
         )
         found.append(Finding(STANDSTILL, name, "motor_torque", spread, text))

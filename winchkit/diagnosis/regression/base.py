@@ -133,6 +133,11 @@ class Regression(ABC):
         """
         return np.ones(self.n_rows)
 
+    def compared_rows(self, output: str) -> float:
+        """Number of rows of an output, each by the share of its samples that is compared."""
+        own = [s.rows for s in self.segments if s.output == output]
+        return sum(float(np.sum(self.share_of_row[rows])) for rows in own)
+
     @abstractmethod
     def n_samples(self, output: str) -> int:
         """Number of compared samples of an output, at least one."""

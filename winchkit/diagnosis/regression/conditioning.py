@@ -91,11 +91,11 @@ def collinearity(regression: Regression, fit: Fit, noise: Noise, index: int) -> 
         Variance inflation factor of the effect at its fitted values, 1 where it is orthogonal to
         the others' derivatives.
     """
-    hypothesis, inverse_sigma = fit.hypothesis, noise.inverse_sigma(regression)
+    hypothesis = fit.hypothesis
     change = regression.change(hypothesis) - regression.change(hypothesis.without(index))
-    change *= inverse_sigma
+    change *= noise.inverse_sigma(regression)
     others = ~regression.unknowns_of(index, hypothesis)
-    basis = orthonormal(fit.jacobian[:, others] * inverse_sigma[:, None])
+    basis = orthonormal(whitened_jacobian(regression, fit, noise)[:, others])
     left = change - basis @ (basis.T @ change)
     size = float(left @ left)
     return float(change @ change) / size if size else float("inf")

@@ -337,10 +337,7 @@ def _nearest(inverse_sigma: Array, split: ReplicateContrasts) -> Array:
 
 def _fewest_rows(regression: Regression) -> int:
     """Number of rows of the output with the fewest, as far as their samples are compared."""
-    rows = dict.fromkeys(regression.outputs, 0.0)
-    for segment in regression.segments:
-        rows[segment.output] += float(np.sum(regression.share_of_row[segment.rows]))
-    return round(min(rows.values()))
+    return round(min(map(regression.compared_rows, regression.outputs)))
 
 
 def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
@@ -390,7 +387,7 @@ def _even(regression: Regression, residual: Array) -> Array:
     out = np.empty(len(regression.bands))
     for output in regression.outputs:
         parts = [s.rows for s in regression.segments if s.output == output]
-        share = sum(float(np.sum(regression.share_of_row[rows])) for rows in parts)
+        share = regression.compared_rows(output)
         own = [band[0] == output for band in regression.bands]
         out[own] = sum(float(np.sum(residual[rows] ** 2)) for rows in parts) / max(share, 1.0)
     return np.maximum(out, regression.power_floor)

@@ -189,8 +189,7 @@ def kept_rows(regression: TimeSeriesRegression, output: str) -> int:
 
     Of a run of which a part is compared they count by that share.
     """
-    own = [s.rows for s in regression.segments if s.output == output]
-    return max(1, round(sum(float(np.sum(regression.share_of_row[rows])) for rows in own)))
+    return max(1, round(regression.compared_rows(output)))
 
 
 def chance_share(bins: int, kept: int) -> float:

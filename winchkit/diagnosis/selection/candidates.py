@@ -9,7 +9,7 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["Point", "points", "with_grid_points"]
+__all__ = ["Point", "points", "with_grid", "with_grid_points"]
 
 Point = tuple[Effect, dict[str, float], list[dict[str, float]]]
 """An effect, a point of its shape grid, and its values of a usual size there."""
@@ -30,7 +30,10 @@ def with_grid_points(effect: Effect, name: str, values: Iterable[float]) -> Effe
     """The effect with further values in the grid of a shape; itself where it has them all."""
     known = set(effect.parameter(name).grid)
     longer = tuple(sorted({*known, *map(float, values)}))
-    if len(longer) == len(known):
-        return effect
-    parameters = (replace(p, grid=longer) if p.name == name else p for p in effect.parameters)
+    return effect if len(longer) == len(known) else with_grid(effect, name, longer)
+
+
+def with_grid(effect: Effect, name: str, values: tuple[float, ...]) -> Effect:
+    """The effect with another grid of a shape."""
+    parameters = (replace(p, grid=values) if p.name == name else p for p in effect.parameters)
     return replace(effect, parameters=tuple(parameters))

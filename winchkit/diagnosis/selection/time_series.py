@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest, lack_of_fit
 from winchkit.diagnosis.regression.noise import Noise, noise_from_repeats, noise_saturated
 from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.selection.candidates import with_grid_points
+from winchkit.diagnosis.selection.candidates import with_grid, with_grid_points
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.onset import best_onset, onset_of
 from winchkit.diagnosis.selection.orders import (
@@ -206,7 +205,4 @@ class TimeSeriesSelection(SelectionEngine):
 
 def _with_first_order(effect: Effect) -> Effect:
     """The effect with the first order of its grid alone: the scan of all orders adds the others."""
-    parameters = (
-        replace(p, grid=p.grid[:1]) if p.name == "order" else p for p in effect.parameters
-    )
-    return replace(effect, parameters=tuple(parameters))
+    return with_grid(effect, "order", effect.parameter("order").grid[:1])
