@@ -40,6 +40,7 @@ from winchkit.diagnosis.selection.contribution import ordered_by_contribution
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import (
     SelectionResult,
+    ended_with,
     initial_result,
     stepwise_selection,
     without_term,
@@ -372,7 +373,16 @@ def _answer(
         if judge_with_specification_test(engine, fewer).reported is fewer:
             note = _negligible_note(sets[index - added.start])
             return _answer(engine, fewer, tuple(dict.fromkeys((*notes, *reasons, note))))
-    sets, steps, closest = plausible_sets(engine, reported, sets, spread)
+    possible, steps, closest = plausible_sets(engine, reported, sets, spread)
+    for all_members, members in zip(sets, possible, strict=False):
+        if members.term is not all_members.term:
+            # The rival takes the place of an effect whose own values are implausible.
+            other = ordered_by_contribution(
+                engine, ended_with(engine, reported, members.fits[0].hypothesis)
+            )
+            if judge_with_specification_test(engine, other).reported is other:
+                return _answer(engine, other, tuple(dict.fromkeys((*notes, *reasons))))
+    sets = possible
     if closest:
         names = ", ".join(dict.fromkeys(f"{each.effect}: {each.reason}" for each in closest))
         judgement = withheld(engine, result, 1.0, f"closest, but not named: {names}")

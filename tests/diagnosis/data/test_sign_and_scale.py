@@ -173,6 +173,31 @@ def test_the_inertia_in_the_profile_is_a_prediction() -> None:
     assert codes([joint(1, 1.0)[0]], heavy) == []
 
 
+@pytest.mark.parametrize("inertia", ["0.07 kg m^2", "0.0004 kg m^2", "40 kg m^2"])
+def test_another_inertia_is_no_wrong_unit(inertia: str) -> None:
+    """The slope over a prediction that is inertia alone: an unknown load inertia, here 0.4."""
+    other = replace(GROOVED, effect=(EffectTable("rotor-inertia", {"inertia": inertia}),))
+    runs = [joint(seed, 1.0)[0] for seed in range(3)]
+    assert codes(runs, other) == []
+
+
+GRAVITY = {"amplitude": "4 N m", "phase": "1.5707963 rad", "order": 1}
+
+
+@pytest.mark.parametrize("factor", [1e-3, 9.80665, 60.0])
+def test_gravity_in_the_profile_determines_the_unit_without_a_load(factor: float) -> None:
+    known = replace(
+        GROOVED,
+        effect=(
+            EffectTable("motor-cogging", GRAVITY),
+            EffectTable("rotor-inertia", {"inertia": "0.4 kg m^2"}),
+        ),
+    )
+    run = joint(2, 1.0)[0]
+    assert codes([run], known) == []
+    assert codes([scaled(run, "motor_torque", factor)], known) == [("motor_torque", "wrong-factor")]
+
+
 def test_an_effect_of_the_user_in_the_profile_is_a_prediction() -> None:
     catalogue = load_catalogue()
     own = replace(catalogue["rotor-inertia"], id="mine")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf, nan
+from math import inf, isnan, nan
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ from winchkit.report.words.sentence import sentence
 
 def reason(effect: str, name: str, value: float, std: float = 1e-9) -> str | None:
     parameter = CATALOGUE[effect].parameter(name)
-    ends = (value - 1.96 * std, value + 1.96 * std)
+    ends = None if isnan(std) else (value - 1.96 * std, value + 1.96 * std)
     values = {name: Estimate(value, std, parameter.unit, ends)}
     return implausible(term(effect, **{name: value}), values, GROOVED)
 
@@ -48,7 +48,14 @@ def test_without_a_range_a_bound_is_implausible_and_the_null_is_not() -> None:
 
 
 def test_an_undetermined_value_is_not_judged() -> None:
-    assert reason("drum-winding-tension", "fraction", 0.05, std=nan) is None
+    assert reason("drum-winding-tension", "fraction", 0.04, std=nan) is None
+    assert reason("motor-dahl", "distance", 20.0, std=nan) is None
+
+
+def test_a_value_that_the_fit_held_at_a_bound_is_implausible() -> None:
+    assert reason("drum-winding-tension", "fraction", 0.05, std=nan) is not None
+    assert "within a motor turn" in str(reason("motor-dahl", "distance", 1000.0, std=nan))
+    assert reason("motor-dahl", "distance", 1e-6, std=nan) is None
 
 
 @pytest.mark.parametrize("effect", list(CATALOGUE), ids=lambda effect: effect.id)

@@ -327,20 +327,17 @@ def _have(guesses: Sequence[Guess], channels: set[str]) -> bool:
 
 
 def _unanswered(guesses: Sequence[Guess]) -> str:
-    """Message on what is not known, with the options that answer."""
-    lines = []
+    """Message on what is not known, with the options that answer; what several files ask, once."""
+    asking: dict[str, list[str]] = {}
     for guess in guesses:
-        path = guess.table.path
-        for question in guess.questions:
-            options = " or ".join(question.options)
-            lines.append(f"  {one_line(path)}: {question.text}: {options}")
-        if not guess.questions:
-            lines += [
-                f"  {one_line(path)}: '{item.source}' as {item.channel} [{item.unit}] is "
-                f"{item.confidence} ({item.reason})"
-                for item in guess.used
-                if item.confidence in {"derived", "assumed"}
-            ]
+        texts = [f"{q.text}: {' or '.join(q.options)}" for q in guess.questions] or [
+            f"'{item.source}' as {item.channel} [{item.unit}] is {item.confidence} ({item.reason})"
+            for item in guess.used
+            if item.confidence in {"derived", "assumed"}
+        ]
+        for text in texts:
+            asking.setdefault(text, []).append(one_line(guess.table.path))
+    lines = [f"  {_shortened(paths)}: {text}" for text, paths in asking.items()]
     if any(_NO_ANGLE in guess.notes for guess in guesses):
         lines.append(f"  {_NO_ANGLE}")
     if any(guess.questions for guess in guesses):
@@ -349,6 +346,13 @@ def _unanswered(guesses: Sequence[Guess]) -> str:
         lines.append("  no column has the motor angle: it is the integral of motor_velocity from 0")
     accept = 'accept the guess by --yes, or correct it by --column "CHANNEL=COLUMN [UNIT]":'
     return "\n".join([accept, *lines])
+
+
+def _shortened(paths: Sequence[str]) -> str:
+    """``a.csv``, ``a.csv and b.csv`` or ``5 files, a.csv to e.csv``."""
+    if len(paths) < 3:
+        return " and ".join(paths)
+    return f"{len(paths)} files, {paths[0]} to {paths[-1]}"
 
 
 def _mapping_of(files: Sequence[str], guesses: Sequence[Guess]) -> ImportMapping:

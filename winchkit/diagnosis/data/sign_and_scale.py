@@ -4,14 +4,16 @@ Every run's tension and torque are regressed on their prediction; a slope far fr
 of a winch, but a wrong unit, factor or sign of a channel. The standard deviation of the slope is
 that of a block jackknife. Friction and inertia, which the profile may lack, are fitted beside; a
 run whose motion does not separate them from the load, as one in one direction, has the slope of all
-runs together. A factor is the same in all runs, or in some and the others have none: where the
-slopes of the others differ from each other, as with an offset for every run, none is suspected.
-Without a load the prediction of the torque may vanish: then the work of its dissipative part must
-not be negative (passivity).
+runs together. A prediction that is friction and inertia alone, as of an axis without a load, has no
+slope of its own: a wrong unit and another inertia are the same there. A factor is the same in all
+runs, or in some and the others have none: where the slopes of the others differ from each other, as
+with an offset for every run, none is suspected. Without a load the prediction of the torque may
+vanish: then the work of its dissipative part must not be negative (passivity).
 
 References
 ----------
 Künsch, H. R. (1989). Ann. Statist. 17, 1217-1241.
+Marquardt, D. W. (1970). Technometrics 12, 591-612 (variance inflation).
 Willems, J. C. (1972). Dissipative dynamical systems. Arch. Ration. Mech. Anal. 45, 321-351.
 """
 
@@ -43,6 +45,7 @@ _SIGMAS = 5.0
 MOST_SAMPLES = 20_000
 _EQUAL = 1.1
 _LEAST_SAMPLES = 50
+_LARGEST_INFLATION = 10.0
 _NEAR = 0.05
 
 
@@ -160,10 +163,10 @@ def _rows(
     beside = [at.motor_rate, np.sign(at.motor_rate), at.motor_acceleration]
     outputs = {"tension": beside[:2], "motor_torque": beside}
     if not np.any(predicted["motor_torque"]):
-        # Without a load the profile's own inertia and friction are the prediction.
+        # Without a load the prediction is that of the profile's effects, such as gravity.
         whole = line_of(profile, catalogue)
         predicted["motor_torque"] = whole.predict(motion)["motor_torque"]
-        outputs["motor_torque"] = [np.ones(len(signals.time))]
+        outputs["motor_torque"] = [np.ones(len(signals.time)), *beside]
     return {
         name: (run[name], np.column_stack([predicted[name], *columns]))
         for name, columns in outputs.items()
@@ -226,13 +229,17 @@ def _differ(slopes: Sequence[Slope]) -> bool:
 def _slope(measured: Array, columns: Array) -> Slope | None:
     """Coefficient of the first column by least squares, with its block jackknife.
 
-    None where it is not five standard deviations from zero.
+    None where it is not five standard deviations from zero, or where the other columns explain the
+    first to nine tenths of its square.
     """
     rows = _complete_rows(measured, columns)
     if len(rows) < _LEAST_SAMPLES:
         return None
     x, y = columns[rows], measured[rows]
     x = x / np.maximum(np.sqrt(np.mean(x**2, axis=0)), 1e-300)
+    own = x[:, 0] - x[:, 1:] @ np.linalg.lstsq(x[:, 1:], x[:, 0], rcond=None)[0]
+    if _LARGEST_INFLATION * float(np.mean(own**2)) < 1:
+        return None
     scale = float(np.sqrt(np.mean(columns[rows, 0] ** 2)))
     without = _jackknifed(x, y)[:, 0] / scale
     value = float(np.linalg.lstsq(x, y, rcond=None)[0][0]) / scale

@@ -32,6 +32,7 @@ from winchkit.effects.term import Term
 
 __all__ = [
     "SelectionResult",
+    "ended_with",
     "initial_result",
     "stepwise_selection",
     "with_pair",
@@ -185,7 +186,7 @@ def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
 
 def without_term(engine: SelectionEngine, result: SelectionResult, index: int) -> SelectionResult:
     """Result as if the selection had ended without one of its additions."""
-    return _ended(engine, result, result.final.hypothesis.without(index))
+    return ended_with(engine, result, result.final.hypothesis.without(index))
 
 
 def with_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResult | None:
@@ -193,13 +194,13 @@ def with_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResu
     if len(result.final.hypothesis.terms) != engine.n_initial_terms + 1:
         return None
     better = _accepted_pair_exchange(engine, result.final, result.noise, result.initial_model)
-    return None if better is None else _ended(engine, result, better.hypothesis)
+    return None if better is None else ended_with(engine, result, better.hypothesis)
 
 
-def _ended(
+def ended_with(
     engine: SelectionEngine, result: SelectionResult, hypothesis: Hypothesis
 ) -> SelectionResult:
-    """Result as if the selection had ended with this hypothesis."""
+    """Result as if the selection had ended with another hypothesis."""
     present, noise = engine.fit_with_noise(hypothesis, result.noise)
     lack_of_fit_test = engine.lack_of_fit_test(present, noise)
     lack_of_fit = _has_lack_of_fit(
