@@ -418,3 +418,26 @@ def _on_terminal(arguments: Sequence[str], talk: Sequence[tuple[str, str]]) -> s
     assert process.wait(10) == 0, shown
     assert not answers, shown
     return shown
+
+
+def test_a_sample_rate_is_that_of_the_file_without_times(tmp_path: Path) -> None:
+    """A controller that writes no times beside an instrument that has its own."""
+    t, seen = np.arange(0, 30, 0.01), np.arange(2.0, 25.0, 1 / 120)
+
+    def angle(time: np.ndarray) -> np.ndarray:
+        return np.asarray(5 * np.sin(0.4 * time) + 2 * np.sin(1.7 * time + 0.3) + 0.3 * time)
+
+    (tmp_path / "drive.csv").write_text(
+        "position [rad]\n" + "".join(f"{value:.5f}\n" for value in angle(t))
+    )
+    rows = (f"{a - 2.0:.6f},{0.06 * b:.6f}\n" for a, b in zip(seen, angle(seen), strict=True))
+    (tmp_path / "laser.csv").write_text("time [s],cable length [m]\n" + "".join(rows))
+    files = tmp_path / "drive.csv", tmp_path / "laser.csv"
+    out = tmp_path / "out"
+    result = command(*files, "--join", "--sample-rate", "100 Hz", "--yes", "-o", out)
+    assert result.exit_code == 0, result.output
+    run = read_run(out / "drive.csv")
+    inside = np.isfinite(run["cable_length"])
+    assert run["cable_length"][inside] == pytest.approx(
+        0.06 * run["motor_angle"][inside], abs=2e-3
+    )

@@ -48,13 +48,13 @@ def test_without_a_range_a_bound_is_implausible_and_the_null_is_not() -> None:
 
 
 def test_an_undetermined_value_is_not_judged() -> None:
-    assert reason("drum-winding-tension", "fraction", 0.04, std=nan) is None
-    assert reason("motor-dahl", "distance", 20.0, std=nan) is None
+    assert reason("drum-winding-tension", "fraction", 0.05, std=nan) is None
+    assert reason("cell-clipping", "share", 1.0, std=nan) is None
 
 
-def test_a_value_that_the_fit_held_at_a_bound_is_implausible() -> None:
-    assert reason("drum-winding-tension", "fraction", 0.05, std=nan) is not None
-    assert "within a motor turn" in str(reason("motor-dahl", "distance", 1000.0, std=nan))
+def test_a_shape_that_the_fit_held_at_an_end_of_its_range_is_implausible() -> None:
+    """Dahl friction over a whole turn is a spring, and Coulomb friction near zero."""
+    assert "within a motor turn" in str(reason("motor-dahl", "distance", 6.3, std=nan))
     assert reason("motor-dahl", "distance", 1e-6, std=nan) is None
 
 

@@ -9,8 +9,8 @@ import pytest
 
 from winchkit.arrays import Array
 from winchkit.errors import RunError
-from winchkit.runs.importing.clocks import joined
-from winchkit.runs.importing.join import agreement_of
+from winchkit.runs.importing.clocks.joint import joined
+from winchkit.runs.importing.clocks.lag import agreement_of
 from winchkit.runs.importing.streams import Stream, Streams
 
 LAG, DRIFT = 3.2173, 80e-6
@@ -144,3 +144,65 @@ def test_a_channel_of_two_files_is_that_of_the_first() -> None:
     whole, _ = joined([replace(first, streams=(both,)), second], lag=0.0)
     assert [name for item in whole.streams for name in item.channels].count("cable_length") == 1
     assert any("cable_length left out" in note for note in whole.notes)
+
+
+def robot(seed: int, turn: float) -> tuple[Streams, Streams]:
+    """A planar robot of four cables, and a tracker that stands in another frame.
+
+    The platform tilts by up to ``turn`` rad; lengths are from distances of points.
+    """
+    rng = np.random.default_rng(seed)
+
+    def pose(t: Array) -> tuple[Array, Array]:
+        place = np.stack(
+            [
+                1.4 + 0.7 * np.sin(0.61 * t) + 0.2 * np.sin(1.9 * t + 1),
+                1.2 + 0.6 * np.sin(0.47 * t + 2) + 0.2 * np.cos(2.3 * t),
+                np.zeros(len(t)),
+            ],
+            axis=1,
+        )
+        return place, turn * np.sin(1.3 * t)
+
+    ours, theirs = np.arange(0, 30, 0.01), np.arange(0, 25, 1 / 120)
+    place, tilt = pose(ours)
+    exits = np.array([[2.9, 0.0], [2.9, 2.3], [0.0, 2.3], [0.0, 0.0]])
+    angles = {}
+    for n, point in enumerate(exits):
+        corner = 0.06 * np.sign(point - 1.2)
+        reach = np.stack([np.cos(tilt), -np.sin(tilt), np.sin(tilt), np.cos(tilt)], axis=1)
+        anchor = place[:, :2] + reach.reshape(-1, 2, 2) @ corner
+        length = np.linalg.norm(anchor - point, axis=1) + 0.001 * rng.standard_normal(len(ours))
+        angles[f"{n + 1}.motor_angle"] = (length - 1.7) / 0.0127
+    seen = pose(theirs * (1 + DRIFT) + LAG)[0] @ np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    seen += 0.0005 * rng.standard_normal(seen.shape)
+    return (
+        file("robot.csv", ours, angles),
+        file("tracker.csv", theirs, {f"platform_{x}": seen[:, i] for i, x in enumerate("xyz")}),
+    )
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.1])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_tracker_is_joined_by_all_lines_of_a_robot(seed: int, turn: float) -> None:
+    """One line alone follows a coordinate with a correlation of 0.9, and is largest elsewhere."""
+    lines, tracker = robot(seed, turn)
+    for first, second, sign in ((lines, tracker, 1.0), (tracker, lines, -1.0)):
+        found = agreement_of(first, second)
+        assert found is not None
+        assert found.is_known
+        assert found.correlation > 0.995
+        true = sign * (LAG + DRIFT * (found.reference if sign > 0 else found.reference - LAG))
+        assert found.lag == pytest.approx(true, abs=max(4 * found.lag_std, 0.002))
+        assert found.drift == pytest.approx(sign * DRIFT, abs=max(4 * found.drift_std, 1e-4))
+        assert "4 lines" in found.text
+
+
+def test_the_same_circle_again_and_again_has_no_lag() -> None:
+    time, turn = np.arange(0, 30, 0.01), 2 * np.pi / 3
+    circle = {f"{n}.motor_angle": np.sin(turn * time + n) for n in range(1, 5)}
+    seen = np.arange(0, 25, 1 / 120)
+    same = {"platform_x": np.cos(turn * seen), "platform_y": np.sin(turn * seen)}
+    found = agreement_of(file("robot.csv", time, circle), file("tracker.csv", seen, same))
+    assert found is not None
+    assert not found.is_known

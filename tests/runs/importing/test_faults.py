@@ -314,3 +314,16 @@ def test_records_of_several_kinds_are_refused_and_no_long_header(tmp_path: Path)
     samples = [line for line in lines if not line.startswith("Set")]
     found = guessed(tmp_path / "samples.csv", samples)
     assert len(found.file.columns[0].values) == 500
+
+
+def test_messages_of_the_controller_between_the_rows_are_left_out(tmp_path: Path) -> None:
+    lines = [HEAD, *rows()]
+    lines[7:7] = ["START TRAJECTORY"]
+    lines[15:15] = ["warning: cable 3 slack", "fault; 2"]
+    with pytest.raises(RunError) as caught:
+        run(tmp_path / "log.csv", lines)
+    (fault,) = caught.value.faults
+    assert fault.line == 17
+    del lines[16]
+    found = guessed(tmp_path / "log.csv", lines)
+    assert any("2 lines of words" in note for note in found.table.notes)

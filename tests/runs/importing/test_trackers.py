@@ -22,7 +22,7 @@ from winchkit.errors import RunError
 from winchkit.model.robot.rotation import rotation_from_quaternion, rotation_of
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.assignment import Guess
-from winchkit.runs.importing.clocks import joined
+from winchkit.runs.importing.clocks.joint import joined
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.runs import run_of

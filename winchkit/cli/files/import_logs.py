@@ -22,7 +22,7 @@ from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 if TYPE_CHECKING:
     from winchkit.runs.importing.answers import Answers
     from winchkit.runs.importing.assignment import Guess
-    from winchkit.runs.importing.clocks import Joint
+    from winchkit.runs.importing.clocks.joint import Joint
     from winchkit.runs.importing.streams import Streams
     from winchkit.runs.run import Run
     from winchkit.schema.mapping import ImportMapping
@@ -89,7 +89,8 @@ _NO_ANGLE = (
     "--sample-rate",
     metavar="RATE",
     type=Quantity("frequency", example="1 kHz"),
-    help="Rate of the rows, in place of times, e.g. '1 kHz'.",
+    help="Rate of the rows, in place of times, e.g. '1 kHz'; of several files, of those that have "
+    "none.",
 )
 @click.option(
     "--axis",
@@ -286,9 +287,23 @@ def _guesses(
     if not unknown:
         # A column of one file is no question about the others.
         guesses = [_without_foreign(guess) for guess in guesses] if len(guesses) > 1 else guesses
+    if declared is None and len(guesses) > 1 and answers.sample_rate:
+        guesses = _with_own_times(guesses, answers)
     if declared is None and _lack_angle(guesses):
         guesses = [replace(guess, notes=(*guess.notes, _NO_ANGLE)) for guess in guesses]
     return guesses, declared
+
+
+def _with_own_times(guesses: Sequence[Guess], answers: Answers) -> list[Guess]:
+    """Guesses in which the sample rate is that of the files without times, where there are any."""
+    from winchkit.runs.importing.guess import guess_columns
+
+    without_rate = replace(answers, sample_rate=None)
+    own = [guess_columns(guess.file, without_rate) for guess in guesses]
+    timed = [_have([guess], {"time"}) for guess in own]
+    if all(timed):
+        return list(guesses)
+    return [a if has else b for a, b, has in zip(own, guesses, timed, strict=True)]
 
 
 def _without_foreign(guess: Guess) -> Guess:
@@ -429,7 +444,7 @@ def _runs(
     lag: float | None,
 ) -> tuple[list[tuple[int, Run]], tuple[Joint, ...]]:
     """Runs with the index of their file; files without a motor angle are joined to the one with."""
-    from winchkit.runs.importing.clocks import joined
+    from winchkit.runs.importing.clocks.joint import joined
     from winchkit.runs.importing.runs import has_angle, run_of, with_angle
 
     if not any(has_angle(part) for part in parts):

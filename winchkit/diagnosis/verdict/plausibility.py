@@ -40,9 +40,9 @@ def implausible(
     -----
     A value is beyond its plausible range where its whole 95 % interval is. Where an effect declares
     no range, a value at a bound of the fit other than the null is beyond it. A value that the data
-    do not determine (NaN standard deviation) is judged only at a bound of the fit, where the fit
-    held it. The inertia of an axis has no range: it includes the arm or carriage that the axis
-    moves.
+    do not determine (NaN standard deviation) is judged only where the fit held a shape at an end of
+    its range: there the law is that of another effect, such as a spring or an offset of Dahl's. The
+    inertia of an axis has no range: it includes the arm or carriage that the axis moves.
     """
     return next(_reasons(term, values, profile), None)
 
@@ -52,15 +52,20 @@ def _reasons(
 ) -> Iterator[str]:
     for name, estimate in values.items():
         parameter = term.effect.parameter(name)
-        at_bound = _is_at_bound(estimate.value, parameter)
         if parameter.whole or not isfinite(estimate.value):
-            continue
-        if not (isfinite(estimate.std) or at_bound):
             continue
         shown = f"{name} = {_text(estimate.value, parameter)}"
         known = plausible_range(parameter, profile)
+        if (
+            known is not None
+            and parameter.role == "shape"
+            and _is_held(estimate.value, known[:2], parameter)
+        ):
+            yield f"{shown} is at the end of the plausible range ({known[2]}): {_CHECK}"
+        if not isfinite(estimate.std):
+            continue
         if known is None:
-            if at_bound:
+            if _is_held(estimate.value, (parameter.low, parameter.high), parameter):
                 yield f"{shown} is at a bound of the fit: {_CHECK}"
             continue
         low, high, reason = known
@@ -70,9 +75,9 @@ def _reasons(
             yield f"{shown} is beyond the plausible range ({span}; {reason}): {_CHECK}"
 
 
-def _is_at_bound(value: float, parameter: Parameter) -> bool:
-    """Whether a value is at a bound of the fit other than the null."""
-    bounds = [b for b in (parameter.low, parameter.high) if b != parameter.null and isfinite(b)]
+def _is_held(value: float, ends: tuple[float, float], parameter: Parameter) -> bool:
+    """Whether a value is at one of two ends, other than the null."""
+    bounds = [b for b in ends if b != parameter.null and isfinite(b)]
     size = abs(parameter.typical - parameter.null) if isfinite(parameter.null) else 1.0
     return any(abs(value - b) <= _ROUNDING * max(size, abs(b)) for b in bounds)
 

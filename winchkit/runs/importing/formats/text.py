@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
@@ -295,6 +296,17 @@ def _remark(cells: Sequence[str], dialect: Dialect) -> int:
     return len(cells) - 1 - places[-1] if places else 0
 
 
+def _not_data(cells: Sequence[str], dialect: Dialect, *, is_title: bool, is_last: bool) -> str:
+    """What a line between the rows of numbers is; empty for a row with a fault."""
+    if is_title:
+        return "repeated lines of the header"
+    if cells[0].startswith(("#", "%")) or cells[0].upper() in {"EOF", "END"}:
+        return "comments between the rows"
+    # The last line may be cut off.
+    is_words = not is_last and all(number(cell, dialect.decimal) is None for cell in cells)
+    return "lines of words between the rows" if is_words else ""
+
+
 def _kept(
     path: str,
     rows: Sequence[Row],
@@ -305,10 +317,10 @@ def _kept(
     is_ended: bool,
     is_padded: bool,
 ) -> _Rows:
-    """Rows of numbers without blank lines, comments and repeated headers."""
+    """Rows of numbers without blank lines, comments, messages and repeated headers."""
     width = dialect.width
     found = _Rows([_Cells(dialect.decimal) for _ in range(width)])
-    repeated, comments, remarks = 0, 0, 0
+    left_out, remarks = Counter[str](), 0
     is_blank, least = dialect.delimiter == BLANKS, width - _remark(rows[first][1][:width], dialect)
     last = next((n for n, cells in reversed(rows) if any(cells)), 0)
     titles = {row[0] for row in header.rows}
@@ -323,10 +335,8 @@ def _kept(
         is_title = cells[0] in titles and tuple(cells) in header.rows
         if len(cells) == width and not is_title:
             found.add(line, cells)
-        elif is_title:
-            repeated += 1
-        elif cells[0].startswith(("#", "%")) or cells[0].upper() in {"EOF", "END"}:
-            comments += 1
+        elif kind := _not_data(cells, dialect, is_title=is_title, is_last=line == last):
+            left_out[kind] += 1
         elif line == last and len(cells) < width and not is_ended:
             found.notes.append(
                 f"the last line has {len(cells)} cells of {width} and no line end; it is left out: "
@@ -337,10 +347,7 @@ def _kept(
             cut = "; is the file cut off?" if line == last and len(cells) < width else ""
             found.faults.append(Fault(message + cut, path, line))
     found.finish()
-    if repeated:
-        found.notes.append(f"{repeated} repeated lines of the header are left out")
+    found.notes += [f"{count} {kind} are left out" for kind, count in left_out.items()]
     if remarks:
         found.notes.append(f"{remarks} rows have more or fewer words behind their numbers")
-    if comments:
-        found.notes.append(f"{comments} comments between the rows are left out")
     return found

@@ -1,10 +1,9 @@
-"""Alignment of the clocks of two files, by their stamps or by cross-correlation.
+"""Cross-correlation of two signals: lag, its standard deviation, and a drift of the clocks.
 
-The lag maximises the correlation of two signals that follow each other: a quantity that both files
-have, or a tension and a torque, a cable length and an angle. Each signal is band-limited by its own
-sampling; both are interpolated on the finer time base. The lag is known when the residual variance
-at every other maximum exceeds that at the best one by more than chance (F test), so that a periodic
-motion, which repeats its maxima, is refused.
+The lag maximises the correlation. Each signal is band-limited by its own sampling; both are
+interpolated on the finer time base. The lag is known when the residual variance at every other
+maximum exceeds that at the best one by more than chance (F test), so that a periodic motion, which
+repeats its maxima, is refused.
 
 References
 ----------
@@ -15,8 +14,7 @@ IEEE Trans. ASSP 24, 1976.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -24,34 +22,42 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.runs.importing.streams import Streams
 
-__all__ = ["Agreement", "agreement_of", "shifted", "span_of"]
+__all__ = [
+    "LEAST_CORRELATION",
+    "LEAST_OVERLAP",
+    "Agreement",
+    "Signal",
+    "correlated",
+    "drift_of",
+    "independent_count",
+    "interval_of",
+    "is_better",
+    "lag_std_of",
+    "rival_of",
+    "signals_by_base",
+    "vertex_of",
+]
 
-_PAIRS = (
-    ("motor_angle", "motor_angle"),
-    ("tension", "tension"),
-    ("cable_length", "cable_length"),
-    ("motor_torque", "motor_torque"),
-    ("motor_velocity", "motor_velocity"),
-    ("cable_length", "motor_angle"),
-    ("tension", "motor_torque"),
-    ("load", "motor_torque"),
-    ("load", "tension"),
-    ("platform_x", "motor_angle"),
-    ("platform_y", "motor_angle"),
-    ("platform_z", "motor_angle"),
-)
-"""Channels that follow each other up to a scale, an offset and a small error."""
 _MOST = 200_000
 """Most samples of the common time base."""
-_LEAST_OVERLAP = 0.4
+LEAST_OVERLAP = 0.4
 """Least share of the shorter recording that overlaps at a lag."""
-_LEAST_CORRELATION = 0.8
+LEAST_CORRELATION = 0.8
 """Of two recordings of one motion; noise of velocities leaves more. Rule of thumb."""
 _CHANCE = 1e-4
 """Level of the F test that the best lag is better than its rival: a wrong join is worse than
 none."""
 _WINDOWS = 6
 """Parts of a recording in which the delay is estimated again, to see a drift of the clocks."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One channel over time."""
+
+    channel: str
+    time: Array
+    values: Array
 
 
 @dataclass(frozen=True)
@@ -94,99 +100,24 @@ class Agreement:
         )
 
 
-def agreement_of(first: Streams, second: Streams) -> Agreement | None:
-    """Lag of two files by the channel pair with the largest correlation.
-
-    Parameters
-    ----------
-    first, second : Streams
-        Files with times.
-
-    Returns
-    -------
-    Agreement, optional
-        None without channels that follow each other.
-    """
-    best: Agreement | None = None
-    for one, two in _signals(first, second):
-        found = _correlated(one, two)
-        if found is None:
-            continue
-        better = best is None or (found.is_known, abs(found.correlation)) > (
-            best.is_known,
-            abs(best.correlation),
-        )
-        if better:
-            best = found
-    return best
-
-
-def span_of(streams: Streams) -> tuple[float, float]:
-    """First and last time of a file, s."""
-    times = [item.time for item in streams.streams if len(item.time)]
-    return min(float(t[0]) for t in times), max(float(t[-1]) for t in times)
-
-
-def shifted(streams: Streams, lag: float, drift: float = 0.0, reference: float = 0.0) -> Streams:
-    """Streams on another clock: t + lag + drift (t − reference).
-
-    Parameters
-    ----------
-    streams : Streams
-        A file.
-    lag : float
-        s.
-    drift : float
-        Relative difference of the rates.
-    reference : float
-        Time at which the lag is valid, s.
-
-    Returns
-    -------
-    Streams
-        The same samples.
-    """
-    moved = tuple(
-        replace(item, time=item.time + lag + drift * (item.time - reference))
-        for item in streams.streams
-    )
-    return replace(streams, streams=moved)
-
-
-@dataclass(frozen=True)
-class _Signal:
-    channel: str
-    time: Array
-    values: Array
-
-
-def _signals(first: Streams, second: Streams) -> Iterator[tuple[_Signal, _Signal]]:
-    """Pairs of signals of the two files."""
-    ours, theirs = _by_base(first), _by_base(second)
-    for one, two in _PAIRS:
-        for a, b in {(one, two), (two, one)}:
-            for left in ours.get(a, ()):
-                for right in theirs.get(b, ()):
-                    yield left, right
-
-
-def _by_base(streams: Streams) -> dict[str, list[_Signal]]:
-    found: dict[str, list[_Signal]] = {}
+def signals_by_base(streams: Streams) -> dict[str, list[Signal]]:
+    """Varying channels of a file by their name without a winch's."""
+    found: dict[str, list[Signal]] = {}
     for item in streams.streams:
         for name, values in item.channels.items():
             known = np.isfinite(values) & np.isfinite(item.time)
             if np.count_nonzero(known) >= 16 and np.ptp(values[known]) > 0:
-                signal = _Signal(name, item.time[known], values[known])
+                signal = Signal(name, item.time[known], values[known])
                 found.setdefault(name.rpartition(".")[2], []).append(signal)
     return found
 
 
-def _correlated(one: _Signal, two: _Signal) -> Agreement | None:
+def correlated(one: Signal, two: Signal) -> Agreement | None:
     """Lag with the largest magnitude of the correlation."""
     # The slower sampling limits both: the faster signal is averaged over the slower interval.
-    interval = max(_interval(one), _interval(two))
+    interval = max(interval_of(one), interval_of(two))
     step = max(
-        min(_interval(one), _interval(two)),
+        min(interval_of(one), interval_of(two)),
         interval / 4,
         (np.ptp(one.time) + np.ptp(two.time)) / _MOST,
     )
@@ -194,25 +125,25 @@ def _correlated(one: _Signal, two: _Signal) -> Agreement | None:
     shorter = min(len(a), len(b))
     if shorter < 16:
         return None
-    lags, r, counts = _normalised(a, b, max(16, int(_LEAST_OVERLAP * shorter)))
+    lags, r, counts = _normalised(a, b, max(16, int(LEAST_OVERLAP * shorter)))
     if not len(lags):
         return None
     size = np.abs(r)
     top = int(np.argmax(size))
     if not math.isfinite(size[top]) or size[top] == 0:
         return None
-    offset = _vertex(size, top)
+    offset = vertex_of(size, top)
     start = float(one.time[0] - two.time[0])
     lag = start + (float(lags[top]) + offset) * step
-    rival = _rival(size, top)
+    rival = rival_of(size, top)
     independent = _independent(a, b, int(lags[top]))
-    known = size[top] >= _LEAST_CORRELATION and _is_better(float(size[top]), rival, independent)
+    known = size[top] >= LEAST_CORRELATION and is_better(float(size[top]), rival, independent)
     overlap = float(counts[top]) * step
     middle = float(two.time[0]) + 0.5 * float(np.ptp(two.time))
-    std = _lag_std(b, step, float(size[top]), independent)
+    std = lag_std_of(b, step, float(size[top]), independent)
     drift, drift_std = math.nan, math.nan
     if known:
-        drift, drift_std, lag, spread, middle = _drift(one, two, lag, interval, middle)
+        drift, drift_std, lag, spread, middle = drift_of(one, two, lag, interval, middle)
         std = spread or std
     return Agreement(
         (one.channel, two.channel),
@@ -228,14 +159,15 @@ def _correlated(one: _Signal, two: _Signal) -> Agreement | None:
     )
 
 
-def _interval(signal: _Signal) -> float:
+def interval_of(signal: Signal) -> float:
+    """Mean interval of the samples, s."""
     return float(np.ptp(signal.time)) / (len(signal.time) - 1)
 
 
-def _even(signal: _Signal, step: float, window: float) -> Array:
+def _even(signal: Signal, step: float, window: float) -> Array:
     """Samples at even times, averaged over a window where the signal has a finer sampling."""
     time = signal.time[0] + step * np.arange(int(np.ptp(signal.time) / step) + 1)
-    own = _interval(signal)
+    own = interval_of(signal)
     values = signal.values
     width = round(window / own)
     if width > 1:
@@ -274,7 +206,7 @@ def _normalised(a: Array, b: Array, least: int) -> tuple[Array, Array, Array]:
     return lags[kept].astype(np.float64), r[kept], n[kept]
 
 
-def _vertex(size: Array, top: int) -> float:
+def vertex_of(size: Array, top: int) -> float:
     """Offset of a maximum between samples, by a parabola."""
     if not 0 < top < len(size) - 1:
         return 0.0
@@ -283,7 +215,7 @@ def _vertex(size: Array, top: int) -> float:
     return float(0.5 * (left - right) / bend) if bend < 0 else 0.0
 
 
-def _rival(size: Array, top: int) -> float:
+def rival_of(size: Array, top: int) -> float:
     """Largest correlation outside the maximum's own lobe."""
     left, right = top, top
     while left > 0 and size[left - 1] < size[left]:
@@ -305,10 +237,10 @@ def _residual(a: Array, b: Array, lag: int) -> Array:
 
 def _independent(a: Array, b: Array, lag: int) -> float:
     """Number of independent samples of the residual at a lag."""
-    return _effective_count(_residual(a, b, lag))
+    return independent_count(_residual(a, b, lag))
 
 
-def _effective_count(rest: Array) -> float:
+def independent_count(rest: Array) -> float:
     """n / (1 + 2 Σ ρ_k), the autocorrelation ρ summed to its first zero; at least 4."""
     n = len(rest)
     power = float(np.sum(rest**2))
@@ -322,7 +254,7 @@ def _effective_count(rest: Array) -> float:
     return max(4.0, n / (1 + 2 * float(np.sum(rho[1:end]))))
 
 
-def _is_better(best: float, rival: float, independent: float) -> bool:
+def is_better(best: float, rival: float, independent: float) -> bool:
     """F test of the residual variances at the best lag and at the next maximum."""
     from scipy.stats import f
 
@@ -330,7 +262,7 @@ def _is_better(best: float, rival: float, independent: float) -> bool:
     return bool(ratio > f.isf(_CHANCE, independent, independent))
 
 
-def _lag_std(b: Array, step: float, r: float, independent: float) -> float:
+def lag_std_of(b: Array, step: float, r: float, independent: float) -> float:
     """Standard deviation of the lag: residual noise over the slope of the signal.
 
     With a = s b(t − τ) + e, var τ = var e / (n s² mean(b'²)); var e / (s² var b) = (1 − r²)/r².
@@ -341,8 +273,8 @@ def _lag_std(b: Array, step: float, r: float, independent: float) -> float:
     return math.sqrt(noise / (independent * max(sharp, 1e-300)))
 
 
-def _drift(
-    one: _Signal, two: _Signal, lag: float, window: float, middle: float
+def drift_of(
+    one: Signal, two: Signal, lag: float, window: float, middle: float
 ) -> tuple[float, float, float, float, float]:
     """Drift of the clocks from the lags of parts of the recording, by a weighted line.
 
@@ -356,7 +288,7 @@ def _drift(
         inside = (two.time >= start) & (two.time <= end)
         if np.count_nonzero(inside) < 16 or np.ptp(two.values[inside]) == 0:
             continue
-        part = _Signal(two.channel, two.time[inside], two.values[inside])
+        part = Signal(two.channel, two.time[inside], two.values[inside])
         found = _local_lag(one, part, lag=lag, reach=reach, window=window)
         if found is not None:
             times.append(0.5 * (start + end))
@@ -377,7 +309,7 @@ def _drift(
 
 
 def _local_lag(
-    one: _Signal, two: _Signal, *, lag: float, reach: float, window: float
+    one: Signal, two: Signal, *, lag: float, reach: float, window: float
 ) -> tuple[float, float] | None:
     """Lag near an approximate one by least squares, with its standard deviation."""
     step = window / 4
@@ -405,7 +337,7 @@ def _local_lag(
         change = -float(solved[2] / scale[2])
         rest = a - (matrix / scale) @ solved
         power = float(np.mean(rest**2))
-        independent = _effective_count(rest)
+        independent = independent_count(rest)
         sharp = float(np.mean((slope - slope.mean()) ** 2))
         if sharp == 0:
             return None

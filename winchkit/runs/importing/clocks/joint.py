@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.join import Agreement, agreement_of, shifted, span_of
+from winchkit.runs.importing.clocks.lag import Agreement, agreement_of, shifted, span_of
 from winchkit.runs.importing.streams import Stream, Streams
 
 __all__ = ["Joint", "joined"]

@@ -1,0 +1,172 @@
+"""Lag of a tracker against the lines of a robot, by linear multilateration.
+
+Differences of the squared cable lengths of a platform that does not turn are linear in its
+position. With a cable length that is linear in the motor angle, each coordinate is a linear
+function of the motor angles of all lines and of their squares, whatever the frame of the tracker,
+the exit points, the drums and the home lengths are. The lag maximises the multiple correlation of
+all coordinates with these columns. One line alone follows a coordinate only roughly, and its
+correlation with it is largest at a wrong lag.
+
+References
+----------
+J. J. Caffery, "A new approach to the geometry of TOA location", IEEE VTC Fall 2000, 1943-1949.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.runs.importing.clocks.cross_correlation import (
+    LEAST_CORRELATION,
+    LEAST_OVERLAP,
+    Agreement,
+    Signal,
+    drift_of,
+    independent_count,
+    interval_of,
+    is_better,
+    lag_std_of,
+    rival_of,
+    signals_by_base,
+    vertex_of,
+)
+from winchkit.runs.importing.streams import Streams
+
+__all__ = ["pose_agreement"]
+
+_COORDINATES = ("platform_x", "platform_y", "platform_z")
+_LEAST_LINES = 3
+"""Two differences of squared lengths determine a position in a plane."""
+_MOST_ROWS = 2000
+"""Of the longer file in the search for the lag; the lag is then refined at all samples."""
+_RIDGE = 1e-9
+"""Of the normal equations with columns of unit variance: angles may be linearly dependent."""
+
+
+def pose_agreement(first: Streams, second: Streams) -> Agreement | None:
+    """Lag of two files of which one has the motor angles of a robot and the other its positions.
+
+    Parameters
+    ----------
+    first, second : Streams
+        Files with times.
+
+    Returns
+    -------
+    Agreement, optional
+        None without three lines in one file and a position in the other.
+    """
+    for lines, tracker in ((first, second), (second, first)):
+        angles = signals_by_base(lines).get("motor_angle", [])
+        found = signals_by_base(tracker)
+        position = [signal for name in _COORDINATES for signal in found.get(name, [])]
+        if len(angles) >= _LEAST_LINES and position:
+            return _agreement(angles, position, lines_first=lines is first)
+    return None
+
+
+def _agreement(
+    angles: Sequence[Signal], position: Sequence[Signal], *, lines_first: bool
+) -> Agreement | None:
+    interval = max(interval_of(signal) for signal in (*angles, *position))
+    spans = [float(np.ptp(signal.time)) for signal in (*angles, *position)]
+    step = max(interval, max(spans) / _MOST_ROWS)
+    begin, columns = _even_columns(angles, step)
+    start, coordinates = _even_columns(position, step)
+    x = _of_unit_variance(np.concatenate([columns, columns**2], axis=1))
+    least = max(8 * x.shape[1], int(LEAST_OVERLAP * min(len(x), len(coordinates))))
+    lags = np.arange(-(len(coordinates) - 1), len(x))
+    lags = lags[np.minimum(len(x), len(coordinates) + lags) - np.maximum(0, lags) >= least]
+    if len(lags) < 3:
+        return None
+    r = np.array([_multiple_correlation(x, coordinates, int(lag)) for lag in lags])
+    top = int(np.argmax(r))
+    # Of the tracker's clock, to be added for that of the lines.
+    lag = begin - start + (float(lags[top]) + vertex_of(r, top)) * step
+    a, b = _overlap(x, coordinates, int(lags[top]))
+    fitted = a @ _solved(a, b)
+    widest = int(np.argmax(np.var(b, axis=0)))
+    independent = independent_count((b - b.mean(axis=0) - fitted)[:, widest])
+    rival = rival_of(r, top)
+    known = bool(r[top] >= LEAST_CORRELATION) and is_better(float(r[top]), rival, independent)
+    measured = position[widest]
+    predicted = _predicted(angles, measured, lag)
+    one, two = (predicted, measured) if lines_first else (measured, predicted)
+    lag = lag if lines_first else -lag
+    middle = float(two.time[0]) + 0.5 * float(np.ptp(two.time))
+    std, drift, drift_std = (
+        lag_std_of(fitted[:, widest], step, float(r[top]), independent),
+        math.nan,
+        math.nan,
+    )
+    if known:
+        drift, drift_std, lag, spread, middle = drift_of(one, two, lag, interval, middle)
+        std = spread or std
+    return Agreement(
+        (one.channel, two.channel),
+        lag,
+        std,
+        float(r[top]),
+        rival,
+        drift,
+        drift_std,
+        len(a) * step,
+        known,
+        middle,
+    )
+
+
+def _even_columns(signals: Sequence[Signal], step: float) -> tuple[float, Array]:
+    """Common start of signals, and their samples at even times, shape (n, signals)."""
+    start = max(float(signal.time[0]) for signal in signals)
+    end = min(float(signal.time[-1]) for signal in signals)
+    time = start + step * np.arange(max(0, int((end - start) / step)) + 1)
+    columns = [np.interp(time, signal.time, signal.values) for signal in signals]
+    return start, np.stack(columns, axis=1)
+
+
+def _of_unit_variance(columns: Array) -> Array:
+    centred = columns - columns.mean(axis=0)
+    return np.asarray(centred / np.maximum(np.std(centred, axis=0), 1e-300))
+
+
+def _overlap(x: Array, y: Array, lag: int) -> tuple[Array, Array]:
+    """Rows of both at a lag, y[n] beside x[n + lag]; the columns of x without their means."""
+    start, end = max(0, lag), min(len(x), len(y) + lag)
+    inside = x[start:end]
+    return inside - inside.mean(axis=0), y[start - lag : end - lag]
+
+
+def _solved(a: Array, b: Array) -> Array:
+    gram = a.T @ a + _RIDGE * len(a) * np.eye(a.shape[1])
+    return np.asarray(np.linalg.solve(gram, a.T @ (b - b.mean(axis=0))))
+
+
+def _multiple_correlation(x: Array, y: Array, lag: int) -> float:
+    """Square root of the share of the coordinates' variance that the columns explain at a lag."""
+    a, b = _overlap(x, y, lag)
+    centred = b - b.mean(axis=0)
+    total = float(np.sum(centred**2))
+    if total == 0:
+        return 0.0
+    rest = centred - a @ _solved(a, b)
+    return math.sqrt(max(0.0, 1 - float(np.sum(rest**2)) / total))
+
+
+def _predicted(angles: Sequence[Signal], measured: Signal, lag: float) -> Signal:
+    """A coordinate by the angles at all of their samples, fitted at a lag."""
+    start = max(float(signal.time[0]) for signal in angles)
+    end = min(float(signal.time[-1]) for signal in angles)
+    time = angles[0].time[(angles[0].time >= start) & (angles[0].time <= end)]
+    columns = np.stack([np.interp(time, s.time, s.values) for s in angles], axis=1)
+    x = _of_unit_variance(np.concatenate([columns, columns**2], axis=1))
+    at = measured.time + lag
+    inside = (time >= at[0]) & (time <= at[-1])
+    b = np.interp(time[inside], at, measured.values)[:, None]
+    centre = x[inside].mean(axis=0)
+    values = (x - centre) @ _solved(x[inside] - centre, b)
+    return Signal(f"motor angles of {len(angles)} lines", time, values[:, 0] + float(b.mean()))
