@@ -37,6 +37,15 @@ MOVED = {
         Station(37.0, shift=(0.1, 0.2, -0.3), reflector=(0.03, 0.02, 0.08)),
         {"frame", "reflector"},
     ),
+    "0.24 deg, 0.5 m and 10/26/130 mm, angles of an IMU": (
+        Station(
+            0.24,
+            shift=(0.08, 0.28, 0.41),
+            reflector=(-0.01, -0.026, -0.13),
+            turns_rotation=False,
+        ),
+        {"frame", "reflector"},
+    ),
 }
 
 

@@ -227,6 +227,8 @@ def _fitted_with_tracker(
             # Of equal explanations the one that stands first is kept: a frame before a reflector.
             if chosen is None or fit.with_prior < chosen.with_prior - _DELTA_CHI_SQUARE:
                 chosen = fit
+        if chosen is None and best is None:
+            continue
         if chosen is None or (best is not None and not chosen.criterion < best.criterion):
             break
         best = chosen
