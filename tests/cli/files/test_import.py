@@ -438,6 +438,4 @@ def test_a_sample_rate_is_that_of_the_file_without_times(tmp_path: Path) -> None
     assert result.exit_code == 0, result.output
     run = read_run(out / "drive.csv")
     inside = np.isfinite(run["cable_length"])
-    assert run["cable_length"][inside] == pytest.approx(
-        0.06 * run["motor_angle"][inside], abs=2e-3
-    )
+    assert run["cable_length"][inside] == pytest.approx(0.06 * run["motor_angle"][inside], abs=2e-3)

@@ -182,3 +182,19 @@ def test_motor_angles_of_a_hanging_robot_lead_back() -> None:
     rest = forward(robot.geometry, robot.home_length[None] + 0.1, robot.home, HEAVY)
     again = robot.poses_at(robot.motor_angles(rest.pose), robot.home)
     np.testing.assert_allclose(again.pose.position, rest.pose.position, atol=1e-7)
+
+
+def test_cables_in_one_plane_leave_motions_without_curvature_where_they_are() -> None:
+    """Four cables of a planar robot whose lengths contradict each other by decimetres."""
+    side = np.array([[1.4, 0.0], [1.4, 2.4], [-1.4, 2.4], [-1.4, 0.0]])
+    corner = np.array([[0.09, -0.06], [0.09, 0.06], [-0.09, 0.06], [-0.09, -0.06]])
+    flat = Geometry(
+        np.stack([side[:, 0], np.zeros(4), side[:, 1]], axis=1),
+        np.stack([corner[:, 0], np.zeros(4), corner[:, 1]], axis=1),
+        np.zeros(4),
+        np.tile([0.0, 1.0, 0.0], (4, 1)),
+    )
+    start = Pose(np.array([[0.08, 0.0, 1.2]]), np.eye(3)[None])
+    wrong = np.array([[1.255, 1.94, 2.146, 1.736], [2.048, 1.876, 1.129, 1.348]])
+    found = forward(flat, wrong, start, PlatformSpec(1.0))
+    assert np.all(np.isfinite(found.pose.position[found.converged]))

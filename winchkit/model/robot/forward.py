@@ -232,7 +232,7 @@ class _Search:
         stiff, axes = np.linalg.eigh(reduced)
         # Turned uphill curvature leads to a rest that is stable; no curvature, no step.
         size = np.abs(stiff)
-        flat = size < _FLAT * np.max(size, axis=1, keepdims=True)
+        flat = size <= _FLAT * np.max(size, axis=1, keepdims=True)
         pull = (np.swapaxes(axes, 1, 2) @ np.swapaxes(null, 1, 2) @ down[..., None])[..., 0]
         slide = np.where(flat, 0.0, pull / np.where(flat, 1.0, size))
         return meet + (null @ axes @ slide[..., None])[..., 0], forces
