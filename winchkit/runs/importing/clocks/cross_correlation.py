@@ -23,16 +23,14 @@ from winchkit.arrays import Array
 from winchkit.runs.importing.streams import Streams
 
 __all__ = [
-    "LEAST_CORRELATION",
     "LEAST_OVERLAP",
     "Agreement",
+    "Peak",
     "Signal",
+    "agreement_at",
     "correlated",
-    "drift_of",
     "independent_count",
     "interval_of",
-    "is_better",
-    "lag_std_of",
     "rival_of",
     "signals_by_base",
     "vertex_of",
@@ -42,7 +40,7 @@ _MOST = 200_000
 """Most samples of the common time base."""
 LEAST_OVERLAP = 0.4
 """Least share of the shorter recording that overlaps at a lag."""
-LEAST_CORRELATION = 0.8
+_LEAST_CORRELATION = 0.8
 """Of two recordings of one motion; noise of velocities leaves more. Rule of thumb."""
 _CHANCE = 1e-4
 """Level of the F test that the best lag is better than its rival: a wrong join is worse than
@@ -58,6 +56,22 @@ class Signal:
     channel: str
     time: Array
     values: Array
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Largest correlation over the lags."""
+
+    lag: float
+    """s to be added to the times of the second signal."""
+    r: float
+    """Signed."""
+    rival: float
+    """Largest magnitude outside its own lobe."""
+    independent: float
+    """Number of independent samples of the residual."""
+    overlap: float
+    """s."""
 
 
 @dataclass(frozen=True)
@@ -132,28 +146,40 @@ def correlated(one: Signal, two: Signal) -> Agreement | None:
     top = int(np.argmax(size))
     if not math.isfinite(size[top]) or size[top] == 0:
         return None
-    offset = vertex_of(size, top)
     start = float(one.time[0] - two.time[0])
-    lag = start + (float(lags[top]) + offset) * step
-    rival = rival_of(size, top)
-    independent = _independent(a, b, int(lags[top]))
-    known = size[top] >= LEAST_CORRELATION and is_better(float(size[top]), rival, independent)
-    overlap = float(counts[top]) * step
+    lag = start + (float(lags[top]) + vertex_of(size, top)) * step
+    peak = Peak(
+        lag,
+        float(r[top]),
+        rival_of(size, top),
+        _independent(a, b, int(lags[top])),
+        float(counts[top]) * step,
+    )
+    return agreement_at(peak, one, two, b, step)
+
+
+def agreement_at(peak: Peak, one: Signal, two: Signal, even: Array, step: float) -> Agreement:
+    """Agreement at the lag of the largest correlation; a known lag is refined, with its drift.
+
+    ``even`` are samples of a signal at even steps, of which the standard deviation of the lag is.
+    """
+    interval = max(interval_of(one), interval_of(two))
+    known = abs(peak.r) >= _LEAST_CORRELATION and _is_better(peak)
+    lag, std = peak.lag, _lag_std(even, step, peak)
     middle = float(two.time[0]) + 0.5 * float(np.ptp(two.time))
-    std = lag_std_of(b, step, float(size[top]), independent)
     drift, drift_std = math.nan, math.nan
     if known:
-        drift, drift_std, lag, spread, middle = drift_of(one, two, lag, interval, middle)
+        drift, drift_std, lag, spread, middle = _drift(one, two, lag, interval, middle)
         std = spread or std
     return Agreement(
         (one.channel, two.channel),
         lag,
         std,
-        float(r[top]),
-        rival,
+        peak.r,
+        peak.rival,
         drift,
         drift_std,
-        overlap,
+        peak.overlap,
         known,
         middle,
     )
@@ -254,26 +280,26 @@ def independent_count(rest: Array) -> float:
     return max(4.0, n / (1 + 2 * float(np.sum(rho[1:end]))))
 
 
-def is_better(best: float, rival: float, independent: float) -> bool:
+def _is_better(peak: Peak) -> bool:
     """F test of the residual variances at the best lag and at the next maximum."""
     from scipy.stats import f
 
-    ratio = (1 - rival**2) / max(1 - best**2, 1e-12)
-    return bool(ratio > f.isf(_CHANCE, independent, independent))
+    ratio = (1 - peak.rival**2) / max(1 - peak.r**2, 1e-12)
+    return bool(ratio > f.isf(_CHANCE, peak.independent, peak.independent))
 
 
-def lag_std_of(b: Array, step: float, r: float, independent: float) -> float:
+def _lag_std(b: Array, step: float, peak: Peak) -> float:
     """Standard deviation of the lag: residual noise over the slope of the signal.
 
     With a = s b(t − τ) + e, var τ = var e / (n s² mean(b'²)); var e / (s² var b) = (1 − r²)/r².
     """
     slope = np.gradient(b, step)
     sharp = float(np.mean(slope**2)) / max(float(np.var(b)), 1e-300)
-    noise = max(1 - r**2, 1e-12) / r**2
-    return math.sqrt(noise / (independent * max(sharp, 1e-300)))
+    noise = max(1 - peak.r**2, 1e-12) / peak.r**2
+    return math.sqrt(noise / (peak.independent * max(sharp, 1e-300)))
 
 
-def drift_of(
+def _drift(
     one: Signal, two: Signal, lag: float, window: float, middle: float
 ) -> tuple[float, float, float, float, float]:
     """Drift of the clocks from the lags of parts of the recording, by a weighted line.

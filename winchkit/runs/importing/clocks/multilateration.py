@@ -21,15 +21,13 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.runs.importing.clocks.cross_correlation import (
-    LEAST_CORRELATION,
     LEAST_OVERLAP,
     Agreement,
+    Peak,
     Signal,
-    drift_of,
+    agreement_at,
     independent_count,
     interval_of,
-    is_better,
-    lag_std_of,
     rival_of,
     signals_by_base,
     vertex_of,
@@ -90,34 +88,17 @@ def _agreement(
     a, b = _overlap(x, coordinates, int(lags[top]))
     fitted = a @ _solved(a, b)
     widest = int(np.argmax(np.var(b, axis=0)))
-    independent = independent_count((b - b.mean(axis=0) - fitted)[:, widest])
-    rival = rival_of(r, top)
-    known = bool(r[top] >= LEAST_CORRELATION) and is_better(float(r[top]), rival, independent)
-    measured = position[widest]
-    predicted = _predicted(angles, measured, lag)
-    one, two = (predicted, measured) if lines_first else (measured, predicted)
-    lag = lag if lines_first else -lag
-    middle = float(two.time[0]) + 0.5 * float(np.ptp(two.time))
-    std, drift, drift_std = (
-        lag_std_of(fitted[:, widest], step, float(r[top]), independent),
-        math.nan,
-        math.nan,
-    )
-    if known:
-        drift, drift_std, lag, spread, middle = drift_of(one, two, lag, interval, middle)
-        std = spread or std
-    return Agreement(
-        (one.channel, two.channel),
-        lag,
-        std,
+    rest = (b - b.mean(axis=0) - fitted)[:, widest]
+    peak = Peak(
+        lag if lines_first else -lag,
         float(r[top]),
-        rival,
-        drift,
-        drift_std,
+        rival_of(r, top),
+        independent_count(rest),
         len(a) * step,
-        known,
-        middle,
     )
+    pair = _predicted(angles, position[widest], lag), position[widest]
+    one, two = pair if lines_first else pair[::-1]
+    return agreement_at(peak, one, two, fitted[:, widest], step)
 
 
 def _even_columns(signals: Sequence[Signal], step: float) -> tuple[float, Array]:
