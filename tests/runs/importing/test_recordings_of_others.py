@@ -16,6 +16,7 @@ from scipy.io import savemat
 from recordings_of_others import emps_variables, folder
 from winchkit.runs import read_run
 from winchkit.runs.importing.answers import Answers, read_column
+from winchkit.runs.importing.clocks.joint import joined
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.mapping import mapping_of, write_mapping
@@ -100,3 +101,43 @@ def _equal(run: Run, known: Run) -> None:
     assert set(run) == set(known)
     for name in known:
         assert run[name] == pytest.approx(known[name], rel=1e-9, abs=1e-12, nan_ok=True)
+
+
+PLANAR = None if REAL is None else REAL / "robots" / "planar"
+TAKE = "13_concentric_diamonds_1mps_cal"
+
+
+@pytest.mark.skipif(PLANAR is None or not PLANAR.is_dir(), reason="the recording is not here")
+def test_the_clock_of_a_tracker_beside_a_robot_of_four_cables() -> None:
+    """A controller's log without times beside an OptiTrack export.
+
+    Of the repository ``gchenfc/cable-robot`` (``analysis/gerry00_estimation``). The expected lag
+    is that of the authors: the controller's own estimate of the position against the tracker.
+    """
+    assert PLANAR is not None
+    lines = [read_column(f"{n + 1}.motor_angle={10 + 5 * n}*-100 [rad]") for n in range(4)]
+    log = guess_columns(
+        read_table(PLANAR / f"{TAKE}.txt"), Answers(columns=tuple(lines), sample_rate=100.0)
+    )
+    metres = read_column("platform_x=Rigid Body Rigid Body 2 Position X [m]")
+    tracker = guess_columns(read_table(PLANAR / f"{TAKE}.csv"), Answers(columns=(metres,)))
+    _, (joint,) = joined([streams_of(log), streams_of(tracker)])
+    table = np.array([row.split()[1:3] for row in rows_of(PLANAR / f"{TAKE}.txt")], dtype=float)
+    time = np.arange(len(table)) / 100.0
+    streams = {name: s for s in streams_of(tracker).streams for name in s.channels}
+    seen = streams["platform_z"]
+
+    def misfit(lag: float) -> float:
+        own = np.interp(time + lag, seen.time, seen.channels["platform_z"])
+        columns = np.column_stack([np.ones_like(own), own])
+        return float(np.linalg.lstsq(columns, table[:, 0], rcond=None)[1][0])
+
+    lags = np.arange(0.0, 3.0, 0.002)
+    expected = lags[np.argmin([misfit(lag) for lag in lags])]
+    assert -joint.lag == pytest.approx(expected, abs=0.005)
+    assert joint.agreement is not None
+    assert joint.agreement.correlation > 0.999
+
+
+def rows_of(path: Path) -> list[str]:
+    return [line for line in path.read_text().splitlines() if line[:1].isdigit()]
