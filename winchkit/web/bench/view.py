@@ -65,6 +65,19 @@ _LARGEST_PROGRAMME = 1_000_000
 """Bytes of a programme file of the browser."""
 
 
+class _Period:
+    """Instants at a fixed period: the time that the work takes is a part of it."""
+
+    def __init__(self) -> None:
+        self._due = time.monotonic()
+
+    def left(self) -> float:
+        """Time to the next instant, s; after a late one at least half a period."""
+        now = time.monotonic()
+        self._due = max(self._due + _PERIOD, now + _PERIOD / 2)
+        return self._due - now
+
+
 class BenchView:
     """A bench as the page shows and commands it; a context manager.
 
@@ -276,7 +289,8 @@ class BenchView:
             try:
                 with attach(self.file, self.effects, name="page", observer=True) as station:
                     self._lost, self._watcher = "", station
-                    while not (self._ended.wait(_PERIOD) or self._lent.is_set()):
+                    period = _Period()
+                    while not (self._ended.wait(period.left()) or self._lent.is_set()):
                         self._take(station.status())
                     self._watcher = None
             except WinchkitError as error:
@@ -317,6 +331,7 @@ class BenchView:
         working = [asyncio.ensure_future(task) for task in tasks]
         predicted: dict[str, Any] | None = None
         posed: dict[str, Any] | None = None
+        period = _Period()
         try:
             while not listening.done():
                 shown: dict[str, Any] = {
@@ -334,7 +349,7 @@ class BenchView:
                     predicted = self._predicted.get(browser.shown)
                     shown["predicted"] = {browser.shown: predicted}
                 await socket.send_json(shown)
-                await asyncio.wait({listening}, timeout=_PERIOD)
+                await asyncio.wait({listening}, timeout=period.left())
         except (WebSocketDisconnect, RuntimeError):
             pass
         finally:
