@@ -389,3 +389,25 @@ def test_an_unexpected_error_of_a_task_is_shown_and_not_lost(tmp_path: Path) -> 
     assert view["busy"] is None
     assert view["faults"] == ["calibrating: internal error: IndexError: pop from empty list"]
     workspace.close()
+
+
+def test_long_runs_are_drawn_before_they_are_compared(
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("winchkit.web.workspace._LONG", 1000)
+    seen: list[tuple[bool, list[str], bool]] = []
+    workspace = Workspace(tmp_path)
+
+    def note() -> None:
+        view = workspace.view()
+        seen.append((view["compared"], view["outputs"], view["diagnosis"] is not None))
+
+    workspace.changed = note
+    workspace.open([str(path) for path in sorted(recorded.glob("*.csv"))], "bench-spiral").result(
+        PATIENCE
+    )
+    outputs = ["cable_length", "tension", "motor_torque"]
+    first = next(at for at, (_, drawn, _) in enumerate(seen) if drawn)
+    assert seen[first] == (False, outputs, False)
+    assert seen[-1] == (True, outputs, True)
+    workspace.close()

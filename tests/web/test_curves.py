@@ -8,7 +8,8 @@ import pytest
 pytest.importorskip("starlette")
 
 from winchkit.arrays import Array
-from winchkit.web.curves import OutputCurves
+from winchkit.runs.run import Channel, Run
+from winchkit.web.curves import OutputCurves, recorded_curves
 
 N = 4000
 TURNS = np.linspace(0.0, 12.0, N)
@@ -65,3 +66,24 @@ def test_a_change_that_nothing_explains_has_no_variable() -> None:
     noise = np.random.default_rng(1).normal(size=N)
     assert curves(noise).main_variable(noise) is None
     assert curves(noise).main_variable(np.zeros(N)) is None
+
+
+def test_runs_are_drawn_as_recorded_before_they_are_compared() -> None:
+    time = np.arange(1000) * 0.02
+    runs = [
+        Run(
+            name,
+            5.0 + time,
+            {"motor_angle": Channel(time, "rad"), "tension": Channel(factor * time, "N")},
+            {"load_mass": f"{factor:g} kg"},
+        )
+        for name, factor in (("one", 10.0), ("two", 20.0))
+    ]
+    found = recorded_curves(runs)
+    assert list(found) == ["tension"]
+    shown = found["tension"].over_time(0.0, 40.0, 400)
+    assert shown["samples"] == 2000
+    assert max(shown["measured"]) == pytest.approx(20.0 * time[-1], rel=1e-4)
+    assert shown["runs"] == [{"at": 0.0, "name": "10 kg"}, {"at": 20.0, "name": "20 kg"}]
+    assert set(shown["predicted"]) == set(shown["residual"]) == {None}
+    assert not found["tension"].is_compared

@@ -33,8 +33,9 @@ from winchkit.report.figures.reduction import bin_edges, bin_means, decimated
 from winchkit.report.words.numbers import Scale, scale_for
 from winchkit.report.words.sentence import CLEAR_ORDER, capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.runs.run import Run
 
-__all__ = ["OutputCurves", "curves_of"]
+__all__ = ["OutputCurves", "curves_of", "recorded_curves"]
 
 _PANELS = 6
 """Small multiples; the design of the page has six."""
@@ -70,6 +71,8 @@ class OutputCurves:
     """Share of the residual variance that each variable explains (η²), largest first."""
     sizes: tuple[float, float]
     """Largest measured value and rms of the residual, by which the units are chosen."""
+    is_compared: bool = True
+    """Whether there is a prediction; without one it and the residual are NaN."""
 
     @property
     def scale(self) -> Scale:
@@ -99,7 +102,8 @@ class OutputCurves:
         """
         part = slice(*np.searchsorted(self.time, [first, last + 1e-9]))
         lines = [self.measured[part], self.predicted[part], self.residual[part] / self.scale.worth]
-        shown = decimated(lines, max(points, 16) // (2 * len(lines)))
+        drawn = lines if self.is_compared else lines[:1]
+        shown = decimated(drawn, max(points, 16) // (2 * len(drawn)))
         x, reduced = self.time[part][shown], [values[shown] for values in lines]
         whole = scale_for(self.sizes[0], OUTPUT_UNITS[self.output])
         measured, predicted = (values / whole.worth for values in reduced[:2])
@@ -281,11 +285,56 @@ def curves_of(
     return out
 
 
+def recorded_curves(runs: Sequence[Run]) -> dict[str, OutputCurves]:
+    """Outputs of runs as they were recorded, before they are compared.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Runs of one winch.
+
+    Returns
+    -------
+    dict
+        By output, of those that a run has.
+    """
+    out: dict[str, OutputCurves] = {}
+    for output in OUTPUT_UNITS:
+        own = [run for run in runs if output in run and len(run.time) > 1]
+        if not own:
+            continue
+        lasts = [float(np.ptp(run.time) + np.median(np.diff(run.time))) for run in own]
+        starts = [0.0, *np.cumsum(lasts)[:-1].tolist()]
+        times = [at + run.time - run.time[0] for at, run in zip(starts, own, strict=True)]
+        measured = np.concatenate([run[output] for run in own])
+        unknown = np.full(len(measured), np.nan)
+        out[output] = OutputCurves(
+            output,
+            np.concatenate(times),
+            measured,
+            unknown,
+            unknown,
+            tuple(
+                (at, _words(run.metadata.get("programme", ""), run.load_mass, run.name))
+                for at, run in zip(starts, own, strict=True)
+            ),
+            None,
+            {},
+            {},
+            (_largest(measured), 0.0),
+            is_compared=False,
+        )
+    return out
+
+
 def _label(recording: Recording) -> str:
+    return _words(recording.programme, recording.signals.load_mass, recording.name)
+
+
+def _words(programme: str, mass: float | None, name: str) -> str:
     """Programme and load of a run; its name where neither is known."""
-    mass = recording.signals.load_mass
-    words = [recording.programme, "" if mass is None else f"{mass:g} kg"]
-    return " ".join(word for word in words if word) or recording.name
+    words = [programme, "" if mass is None else f"{mass:g} kg"]
+    return " ".join(word for word in words if word) or name
 
 
 def _bins(samples: int) -> int:

@@ -186,6 +186,7 @@ class State:
             "said": self.said,
             "diagnosis": None,
             "outputs": list(self.curves),
+            "compared": all(own.is_compared for own in self.curves.values()),
             "can_undo": len(self.versions) > 1,
             "simulated": self.truth is not None,
         }

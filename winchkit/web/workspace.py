@@ -28,7 +28,7 @@ from winchkit.runs.writer import write_run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_profile
 from winchkit.web.candidate import candidate_card
-from winchkit.web.curves import OutputCurves, curves_of
+from winchkit.web.curves import OutputCurves, curves_of, recorded_curves
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
 from winchkit.web.foreign import imported
 from winchkit.web.library.runs import LibraryRun
@@ -39,6 +39,8 @@ __all__ = ["Cancelled", "Workspace"]
 
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
+_LONG = 200_000
+"""Samples above which runs are drawn before they are compared, which takes seconds."""
 _LOGGER = logging.getLogger(__name__)
 _NO_NAME = re.compile(r"[^\w.-]+")
 
@@ -302,6 +304,10 @@ class Workspace:
     def _loaded(self, runs: Sequence[LoadedRun], faults: Sequence[str]) -> None:
         self._set(runs=tuple(runs), answer=None, curves={}, faults=tuple(faults))
         if runs and self._state.versions:
+            if sum(len(item.run.time) for item in runs) > _LONG:
+                recorded = recorded_curves(self._state.winch_runs()[1])
+                self._set(curves=recorded, faults=tuple(faults))
+                self.changed()
             self._diagnose(faults)
 
     def _open_profile(self, profile: str) -> None:

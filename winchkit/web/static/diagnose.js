@@ -13,7 +13,7 @@ let view = null, root = null, shown = { effect: null, output: null, chosen: fals
 export function enter(main, state) { root = main; shown = { effect: null, output: null, chosen: false }; brushed = null; waiting = []; update(state); }
 
 export function update(state) {
-  const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, state.beside, !state.diagnosis && Boolean(state.busy)]);
+  const signature = JSON.stringify([state.runs, state.profile, state.diagnosis, state.outputs, state.compared, state.beside, !state.diagnosis && Boolean(state.busy)]);
   const same = root.dataset.signature === signature && root.firstChild;
   if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
   view = state;
@@ -255,6 +255,11 @@ async function drawTime() {
     const figure = () => ({ title: `${data.name}: measured and predicted, and the residual`, source: source(), legend: [{ name: "measured", tone: "ink" }, { name: "predicted, residual", tone: "today" }, { name: "noise floor ±1σ", tone: "edge" }],
       panels: [{ title: `${data.name} [${data.unit}]`, x: data.x, xLabel, marks, series: [{ name: `measured [${data.unit}]`, y: data.measured, tone: "ink", width: 2.4, opacity: 0.35 }, { name: `predicted [${data.unit}]`, y: data.predicted, tone: "today" }] },
         { title: `Residual [${data.residual_unit}]`, x: data.x, xLabel, marks, noise: data.noise, series: [{ name: `residual [${data.residual_unit}]`, y: data.residual, tone: "today" }] }] });
+    if (!view.compared) {
+      fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}; not compared yet`)), legend(["edge", "measured"])), upper);
+      plot(upper, [data.x, data.measured], [line("ink", 1.6, 0.7)], { height: 120, top: 22, left: 58, runs, zoom, xLabel: "s", sync: "time", label: `${data.name}, measured over time` });
+      return;
+    }
     fill(box, el("header", {}, el("h2", {}, data.name, el("span", { class: "note" }, ` ${data.unit}, residual ${data.residual_unit}`)), legend(["edge", "measured"], ["today", "predicted, residual"], ["band", "noise ±1σ", true]),
       el("span", { class: "note" }, span ? el("button", { class: "plain", onclick: () => zoom(null, null) }, "Whole record") : null, exporter(`${output}-over-time`, figure))), upper, lower);
     plot(upper, [data.x, data.measured, data.predicted], [line("ink", 2.4, 0.35), line("today", 1.25)], { height: 120, top: 22, bare: true, left: 58, runs, zoom, sync: "time", label: `${data.name}, measured and predicted over time` });
