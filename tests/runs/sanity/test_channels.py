@@ -162,6 +162,17 @@ def test_two_spikes_with_one_sample_between_them_are_outliers(
     assert np.flatnonzero(outlier_mask(values)).tolist() == [first, first + 2]
 
 
+@given(SEEDS, st.integers(0, 2**31), st.floats(-0.05, 0.05))
+@settings(max_examples=40, deadline=None)
+def test_three_zeros_within_six_samples_are_outliers(seed: int, place: int, speed: float) -> None:
+    """The two outer ones hide that between them: the local slope is that of the spikes."""
+    values = 150 + np.random.default_rng(seed).normal(0, 0.8, COUNT) + speed * np.arange(COUNT)
+    first = 10 + place % (COUNT - 20)
+    zeros = [first, first + 2, first + 5]
+    values[zeros] = 0.0
+    assert np.flatnonzero(outlier_mask(values)).tolist() == zeros
+
+
 @pytest.mark.parametrize("peaks", [False, True])
 def test_spikes_that_coincide_by_chance_are_outliers_and_peaks_are_not(peaks: bool) -> None:
     """Spikes in 1 % of the samples of two channels; or peaks of the force, which both show."""

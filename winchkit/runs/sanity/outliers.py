@@ -52,10 +52,11 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
     of the eight nearest steps), exceeds twelve local standard deviations (of the deviations, by
     their median over 50 samples), and the neighbours agree within a quarter of it. Where one of the
     two at a distance of two samples deviates as much, it is left out: of two spikes with one sample
-    between them, neither hides the other. A peak that lasts two samples, a step, or an oscillation
-    is none. The first and the last sample have neighbours on one side: they are spikes where the
-    step to the next sample exceeds twelve standard deviations and three times the largest other
-    step, and the next four samples agree.
+    between them, neither hides the other. The search is repeated without the spikes that were
+    found. A peak that lasts two samples, a step, or an oscillation is none. The first and the last
+    sample have neighbours on one side: they are spikes where the step to the next sample exceeds
+    twelve standard deviations and three times the largest other step, and the next four samples
+    agree.
     """
     spikes, _, ends = _spikes(values, resolution(values))
     return spikes | ends
@@ -125,7 +126,22 @@ def outliers(run: Run, masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Findi
 def _spikes(
     values: Array, step: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
-    """Spikes, samples whose deviation is large enough to be the same event, and ends apart."""
+    """Spikes, samples whose deviation is large enough to be the same event, and ends apart.
+
+    Of several spikes close together some hide others: the search is repeated without those found.
+    """
+    out, event, ends = _search(values, step)
+    found = out
+    while found.any():
+        found = _search(np.where(out, np.nan, values), step)[0]
+        out = out | found
+    return out, event, ends
+
+
+def _search(
+    values: Array, step: float
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Spikes, events and ends of one search."""
     out, event, ends = (np.zeros(len(values), dtype=bool) for _ in range(3))
     rows = np.flatnonzero(np.isfinite(values))
     known = values[rows]
