@@ -26,6 +26,7 @@ from winchkit.diagnosis.fleet.limit_date import LimitDate, limit_date
 from winchkit.diagnosis.fleet.partial_pooling import PartialPooling, odd_p_values, partial_pooling
 from winchkit.diagnosis.fleet.robust_variance import Variance
 from winchkit.diagnosis.fleet.sessions import SessionEstimate
+from winchkit.diagnosis.fleet.variance_function import moderated_stds, power_of_stated
 
 __all__ = ["FleetHistory", "FleetParameter", "WinchHistory", "fleet_history"]
 
@@ -279,21 +280,21 @@ class _Tested:
 
 
 def _tested(group: Mapping[str, Sequence[SessionEstimate]]) -> _Tested:
+    values = [np.array([e.value for e in own]) for own in group.values()]
+    stated = [np.array([e.std for e in own]) for own in group.values()]
+    power = power_of_stated(values, stated)
     series = [
-        Series(
-            np.array([e.time for e in own]),
-            np.array([e.value for e in own]),
-            np.array([e.std for e in own]),
-        )
-        for own in group.values()
+        Series(np.array([e.time for e in own]), y, moderated_stds(s, power))
+        for own, y, s in zip(group.values(), values, stated, strict=True)
     ]
     between = session_variance(series)
     changes = [change_of(each, between) for each in series]
-    values, stds = np.array(
+    present, stds = np.array(
         [_present(s, c, between) for s, c in zip(series, changes, strict=True)]
     ).T
-    pooling = partial_pooling(values, stds)
-    return _Tested(series, between, changes, values, stds, pooling, odd_p_values(values, stds))
+    pooling = partial_pooling(present, stds)
+    odd = odd_p_values(present, stds)
+    return _Tested(series, between, changes, present, stds, pooling, odd)
 
 
 def _present(series: Series, change: Change | None, between: Variance) -> tuple[float, float]:
