@@ -352,11 +352,15 @@ def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
 
 
 def _answer(
-    engine: TimeSeriesSelection, result: SelectionResult, notes: tuple[str, ...] = ()
+    engine: TimeSeriesSelection,
+    result: SelectionResult,
+    notes: tuple[str, ...] = (),
+    replaced: frozenset[str] = frozenset(),
 ) -> WinchAnswer:
     """Verdict, equivalence sets, intervals and next programmes of a selection.
 
-    ``notes`` are the reasons why effects of the search's result are not named.
+    ``notes`` are the reasons why effects of the search's result are not named; a rival took the
+    place of the effects ``replaced``.
     """
     judgement = judge_with_specification_test(engine, result)
     reported, reasons = judgement.reported, judgement.notes
@@ -372,16 +376,19 @@ def _answer(
         fewer = without_term(engine, reported, index)
         if judge_with_specification_test(engine, fewer).reported is fewer:
             note = _negligible_note(sets[index - added.start])
-            return _answer(engine, fewer, tuple(dict.fromkeys((*notes, *reasons, note))))
+            reasons = tuple(dict.fromkeys((*notes, *reasons, note)))
+            return _answer(engine, fewer, reasons, replaced)
     possible, steps, closest = plausible_sets(engine, reported, sets, spread)
     for all_members, members in zip(sets, possible, strict=False):
-        if members.term is not all_members.term:
+        left_out, rival = all_members.term, members.term
+        if rival is not left_out and rival.effect.id not in replaced:
             # The rival takes the place of an effect whose own values are implausible.
             other = ordered_by_contribution(
                 engine, ended_with(engine, reported, members.fits[0].hypothesis)
             )
             if judge_with_specification_test(engine, other).reported is other:
-                return _answer(engine, other, tuple(dict.fromkeys((*notes, *reasons))))
+                reasons = tuple(dict.fromkeys((*notes, *reasons)))
+                return _answer(engine, other, reasons, replaced | {left_out.effect.id})
     sets = possible
     if closest:
         names = ", ".join(dict.fromkeys(f"{each.effect}: {each.reason}" for each in closest))
