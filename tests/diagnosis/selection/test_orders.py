@@ -99,17 +99,34 @@ def test_noise_alone_has_no_peak() -> None:
     assert float(np.mean(np.concatenate(powers))) == pytest.approx(2.0, rel=0.1)
 
 
-def test_a_part_of_a_turn_is_not_scanned() -> None:
-    short = run_of("short", 1, {}, seconds=4.0)
-    regression = selection_engine(prepare([short], AXIS), CATALOGUE).regression
-    nothing = periodogram(
-        regression,
-        selection_engine(prepare([short], AXIS), CATALOGUE).initial_model,
-        COGGING,
-        np.zeros(regression.n_rows),
-        np.ones(regression.n_rows),
-    )
-    assert not len(nothing.orders)
+def scanned(seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """Orders and power of a motion that goes as far as 0.6 rad/s in that time."""
+    short = run_of("short", 1, {17: 0.05}, seconds)
+    engine = selection_engine(prepare([short], AXIS), CATALOGUE)
+    measured = engine.regression.residual(engine.initial_model)
+    weight = np.ones(engine.regression.n_rows)
+    scan = periodogram(engine.regression, engine.initial_model, COGGING, measured, weight)
+    return scan.orders, scan.power
+
+
+def test_from_half_a_turn_on_orders_of_three_periods_are_scanned() -> None:
+    """Of 0.38 of a turn, an order is open by two or three; 0.57 shows three periods of order 6."""
+    assert not len(scanned(4.0)[0])
+    orders, power = scanned(6.0)
+    assert np.all(power[:5] == 0.0)
+    assert power[5] > 0.0
+    assert abs(int(orders[np.argmax(power)]) - 17) <= 1
+
+
+@pytest.mark.slow
+def test_an_order_is_named_where_the_motor_turns_less_than_once() -> None:
+    runs = [run_of(name, seed, {12: 0.05}, seconds=9.0) for seed, name in enumerate("abcd")]
+    found = diagnose(runs, AXIS, CATALOGUE).diagnosis
+    assert found.verdict == "explained"
+    (cogging,) = [step for step in found.steps if step.effects[0] == "motor-cogging"]
+    values = cogging.parameters["motor-cogging"]
+    assert values["order"].value == 12
+    assert values["amplitude"].value == pytest.approx(0.05, rel=0.05)
 
 
 def fitted_axis(sizes: dict[int, float]) -> tuple[object, object, np.ndarray]:

@@ -39,6 +39,7 @@ __all__ = ["Periodogram", "further_orders", "has_orders", "periodogram"]
 _LEVEL = 0.01
 _MOST_IN_SERIES = 24
 _LEAST_WITHIN = 0.1
+_LEAST_PERIODS = 3.0
 _RATES = 200
 _TURN = 2 * np.pi
 
@@ -50,9 +51,10 @@ class Periodogram:
     Attributes
     ----------
     orders : ndarray of shape (n,)
-        1, 2, … up to half the samples per turn; empty where no run has a whole turn.
+        1, 2, … up to half the samples per turn.
     power : ndarray of shape (n,)
-        Decrease of χ² by each; zero beyond the band of the comparison.
+        Decrease of χ² by each; zero beyond the band of the comparison, and below three periods
+        where no run has a whole turn.
     """
 
     orders: NDArray[np.intp]
@@ -104,8 +106,8 @@ def periodogram(
     Periodogram
         Outputs are summed; runs are added with their phases.
     """
-    count = _orders_per_turn(regression)
-    if not count or regression.missing_needs(effect):
+    first, count = _orders_per_turn(regression)
+    if first > count or regression.missing_needs(effect):
         return Periodogram(np.arange(0), np.zeros(0))
     outputs = sorted(regression.outputs_of(effect.stage) & set(regression.outputs))
     envelopes = _envelopes(regression, hypothesis, effect, outputs)
@@ -125,6 +127,7 @@ def periodogram(
                 within += inside
                 whole += float(envelope @ envelope) / 2
         known = (lengths > 0) & (within > _LEAST_WITHIN * whole)
+        known[: first - 1] = False
         power[known] += np.abs(products[known]) ** 2 / lengths[known]
     return Periodogram(np.arange(1, count + 1), power)
 
@@ -256,17 +259,21 @@ def _envelopes(
     return out
 
 
-def _orders_per_turn(regression: TimeSeriesRegression) -> int:
-    """Half the samples per turn, where the motor moves most slowly for a whole turn; at least 36.
+def _orders_per_turn(regression: TimeSeriesRegression) -> tuple[int, int]:
+    """Lowest order, and half the samples per turn where the motor moves most slowly; at least 36.
 
     Orders of poles and slots that are aliased there are still distinguished by the changes of
-    speed. Zero where no run covers a whole turn: periods are not observed there.
+    speed. Where no run covers a whole turn, the lowest order is that of which the longest shows
+    three periods. Zero where none covers half a turn, which leaves an order open by more than two.
     """
-    whole = []
-    for recording in regression.dataset.recordings:
-        angle = recording.signals.motor_angle
-        # A map of a whole turn ends one step before its beginning.
-        if float(np.ptp(angle)) + 2 * float(np.median(np.abs(np.diff(angle)))) >= _TURN:
-            whole.append(angle)
-    half = half_of_samples_per_turn(whole)
-    return max(half, int(MOTOR_ORDERS[-1])) if half else 0
+    # A map of a whole turn ends one step before its beginning.
+    angles = [recording.signals.motor_angle for recording in regression.dataset.recordings]
+    reach = [float(np.ptp(a)) + 2 * float(np.median(np.abs(np.diff(a)))) for a in angles]
+    needed = min(_TURN, max(reach, default=0.0))
+    if needed < _TURN / 2:
+        return 1, 0
+    half = half_of_samples_per_turn(
+        [angle for angle, own in zip(angles, reach, strict=True) if own >= needed]
+    )
+    least = 1 if needed >= _TURN else int(np.ceil(_LEAST_PERIODS * _TURN / needed))
+    return least, max(half, int(MOTOR_ORDERS[-1])) if half else 0
