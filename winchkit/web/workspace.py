@@ -39,10 +39,19 @@ __all__ = ["Cancelled", "Workspace"]
 
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
+_READERS = 2
+"""Files that are read at once: a parser of large files runs beside the interpreter."""
 _LONG = 200_000
 """Samples above which runs are drawn before they are compared, which takes seconds."""
 _LOGGER = logging.getLogger(__name__)
 _NO_NAME = re.compile(r"[^\w.-]+")
+
+
+def _read(path: str | Path) -> Run | FileError:
+    try:
+        return read_run(path)
+    except FileError as error:
+        return error
 
 
 class Cancelled(Exception):
@@ -278,11 +287,11 @@ class Workspace:
         if profile is not None:
             self._open_profile(profile)
         runs, faults = [*self._state.runs], []
-        for path in paths:
-            try:
-                run = read_run(path)
-            except FileError as error:
-                faults += [str(fault) for fault in error.faults]
+        with ThreadPoolExecutor(_READERS) as pool:
+            read = list(pool.map(_read, paths))
+        for path, run in zip(paths, read, strict=True):
+            if isinstance(run, FileError):
+                faults += [str(fault) for fault in run.faults]
                 continue
             file = Path(path).resolve()
             runs = [item for item in runs if item.path != file]
