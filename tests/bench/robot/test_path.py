@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -64,6 +64,7 @@ def test_without_blend_the_platform_stops_and_goes_nowhere_twice() -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(corner=point, end=point, blend=st.floats(0.005, 0.2))
+@example(corner=(0.08664115128770666, 0.0, 0.1875), end=(0.1484375, 0.0, -0.25), blend=0.03125)
 def test_a_blended_corner_is_smooth_and_near_the_corner(
     corner: tuple[float, ...], end: tuple[float, ...], blend: float
 ) -> None:

@@ -27,6 +27,8 @@ _SPACING = 2e-3
 """Of samples along the path, m."""
 _FEWEST = 33
 """On each piece of a path: a curve of half a turn in 32 chords is off by 0.1 % of its radius."""
+_FEWEST_OF_CORNER = 65
+"""The speed along corners of up to 154 degrees is right to 0.4 %; with 33 samples, to 2 %."""
 _SAME = 1e-7
 """Points closer than this are one, m."""
 _STRAIGHT = 1e-6
@@ -176,8 +178,8 @@ def _toward(corner: Array, other: Array, distance: float) -> Array:
     return np.asarray(corner + share * (other - corner))
 
 
-def _share(length: float) -> Array:
-    return np.linspace(0.0, 1.0, max(_FEWEST, int(np.ceil(length / _SPACING)) + 1))
+def _share(length: float, fewest: int = _FEWEST) -> Array:
+    return np.linspace(0.0, 1.0, max(fewest, int(np.ceil(length / _SPACING)) + 1))
 
 
 def _line(start: Array, end: Array) -> Array:
@@ -188,7 +190,8 @@ def _line(start: Array, end: Array) -> Array:
 
 
 def _corner(start: Array, corner: Array, end: Array) -> Array:
-    u = _share(float(np.linalg.norm(corner - start) + np.linalg.norm(end - corner)))[:, None]
+    length = float(np.linalg.norm(corner - start) + np.linalg.norm(end - corner))
+    u = _share(length, _FEWEST_OF_CORNER)[:, None]
     v = 1 - u
     first, last = (start + corner) / 2, (end + corner) / 2
     inner = 10 * u**2 * v**3 * corner + 10 * u**3 * v**2 * corner
