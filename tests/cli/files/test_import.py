@@ -434,8 +434,24 @@ def test_a_sample_rate_is_that_of_the_file_without_times(tmp_path: Path) -> None
     (tmp_path / "laser.csv").write_text("time [s],cable length [m]\n" + "".join(rows))
     files = tmp_path / "drive.csv", tmp_path / "laser.csv"
     out = tmp_path / "out"
-    result = command(*files, "--join", "--sample-rate", "100 Hz", "--yes", "-o", out)
+    own = "--sample-rate", "100 Hz", "--column", "motor_angle=position [rad]"
+    result = command(*files, "--join", *own, "--yes", "-o", out)
     assert result.exit_code == 0, result.output
     run = read_run(out / "drive.csv")
     inside = np.isfinite(run["cable_length"])
     assert run["cable_length"][inside] == pytest.approx(0.06 * run["motor_angle"][inside], abs=2e-3)
+
+
+def test_a_number_is_no_column_of_a_file_beside_one_that_has_it_as_a_name(tmp_path: Path) -> None:
+    """A log without a header, whose columns are numbers, beside a table with one."""
+    times = np.arange(0, 5, 0.01)
+    (tmp_path / "log.txt").write_text("".join(f"{t:.2f} {7 * t:.4f}\n" for t in times))
+    rows = (f"{t:.2f},{100 - t:.3f}\n" for t in times)
+    (tmp_path / "cell.csv").write_text("time [s],tension [N]\n" + "".join(rows))
+    files = tmp_path / "cell.csv", tmp_path / "log.txt"
+    own = "--column", "time=1 [s]", "--column", "motor_angle=2 [rad]"
+    result = command(*files, *own, "--lag", "0 s", "--yes", "-o", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    run = read_run(tmp_path / "out" / "log.csv")
+    assert run["motor_angle"] == pytest.approx(7 * run.time, abs=1e-3)
+    assert run["tension"] == pytest.approx(100 - run.time, abs=1e-2)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from winchkit.runs.importing.assignment import Guess
     from winchkit.runs.importing.clocks.joint import Joint
     from winchkit.runs.importing.streams import Streams
+    from winchkit.runs.importing.table import Table
     from winchkit.runs.run import Run
     from winchkit.schema.mapping import ImportMapping
 
@@ -255,6 +256,7 @@ def _guesses(
     files: Sequence[str], mapping: str | None, answers: Answers, *, asking: bool
 ) -> tuple[list[Guess], ImportMapping | None]:
     """Assignments of every file; all faults of all files at once."""
+    from winchkit.runs.importing.answers import answers_of
     from winchkit.runs.importing.formats.source import read_table
     from winchkit.runs.importing.guess import guess_columns
     from winchkit.runs.importing.mapping import guess_by
@@ -262,53 +264,50 @@ def _guesses(
 
     declared = None if mapping is None else read_mapping(mapping)
     faults: list[Fault] = []
-    guesses = []
+    tables = []
     for file in files:
         try:
-            table = read_table(file)
-            guess = guess_by(table, declared) if declared else guess_columns(table, answers)
+            tables.append(read_table(file))
+        except FileError as error:
+            faults += error.faults
+    timed = [] if declared else _with_own_times(tables, answers)
+    guesses = []
+    for table in tables:
+        own = answers_of(table, tables, answers)
+        own = replace(own, sample_rate=None) if any(t is table for t in timed) else own
+        try:
+            guess = guess_by(table, declared) if declared else guess_columns(table, own)
         except FileError as error:
             faults += error.faults
             continue
         if asking and declared is None:
-            guess, answers = asked(guess, answers)
+            guess, told = asked(guess, own)
+            columns = (*answers.columns, *told.columns[len(own.columns) :])
+            rate = told.sample_rate or answers.sample_rate
+            answers = replace(told, columns=columns, sample_rate=rate)
         guesses.append(guess)
     if faults:
         raise RunError(faults)
-    unknown = [
-        item.source
-        for item in answers.columns
-        if item.source and declared is None and not any(g.file.column(item.source) for g in guesses)
-    ]
     for name in answers.unsigned:
         if not any(guess.file.column(name) for guess in guesses):
             has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
             raise UsageError(f"--unsigned: there is no column '{name}'; there are {has}")
-    if not unknown:
-        # A column of one file is no question about the others.
-        guesses = [_without_foreign(guess) for guess in guesses] if len(guesses) > 1 else guesses
-    if declared is None and len(guesses) > 1 and answers.sample_rate:
-        guesses = _with_own_times(guesses, answers)
     if declared is None and _lack_angle(guesses):
         guesses = [replace(guess, notes=(*guess.notes, _NO_ANGLE)) for guess in guesses]
     return guesses, declared
 
 
-def _with_own_times(guesses: Sequence[Guess], answers: Answers) -> list[Guess]:
-    """Guesses in which the sample rate is that of the files without times, where there are any."""
+def _with_own_times(tables: Sequence[Table], answers: Answers) -> list[Table]:
+    """Files with times beside others that have none, of which a sample rate is."""
+    from winchkit.runs.importing.answers import answers_of
     from winchkit.runs.importing.guess import guess_columns
 
+    if not answers.sample_rate or len(tables) < 2:
+        return []
     without_rate = replace(answers, sample_rate=None)
-    own = [guess_columns(guess.file, without_rate) for guess in guesses]
-    timed = [_have([guess], {"time"}) for guess in own]
-    if all(timed):
-        return list(guesses)
-    return [a if has else b for a, b, has in zip(own, guesses, timed, strict=True)]
-
-
-def _without_foreign(guess: Guess) -> Guess:
-    kept = tuple(q for q in guess.questions if not q.text.startswith("there is no column"))
-    return replace(guess, questions=kept)
+    own = [guess_columns(table, answers_of(table, tables, without_rate)) for table in tables]
+    timed = [table for table, guess in zip(tables, own, strict=True) if _have([guess], {"time"})]
+    return timed if len(timed) < len(tables) else []
 
 
 def _is_accepted(guesses: Sequence[Guess], yes: bool, as_json: bool) -> bool:

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from winchkit.errors import UsageError
 from winchkit.runs.columns import column_dimension
+from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE, read_unit
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
 from winchkit.schema.plausible import typed_quantity
 from winchkit.units import UNITS, suggest
 
-__all__ = ["CONSTANTS", "Answers", "ColumnAnswer", "permitted", "read_column", "read_constant"]
+__all__ = [
+    "CONSTANTS",
+    "Answers",
+    "ColumnAnswer",
+    "answers_of",
+    "permitted",
+    "read_column",
+    "read_constant",
+]
 
 _COLUMN = re.compile(
     r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"
@@ -137,6 +147,33 @@ class Answers:
     """Column that names the axis of each row; empty for a table whose rows are of all axes."""
     unsigned: tuple[str, ...] = ()
     """Columns whose numbers have no sign, although they look like signed ones that lost it."""
+
+
+def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answers:
+    """Answers without the columns that are those of other files.
+
+    Parameters
+    ----------
+    table : Table
+        One of the files.
+    tables : sequence of Table
+        All of them.
+    answers : Answers
+        What the user has said of all.
+
+    Returns
+    -------
+    Answers
+        A column is that of the files that have its name; where none has, of those that have its
+        number; where none has that either, of all, so that each says so.
+    """
+
+    def is_own(item: ColumnAnswer) -> bool:
+        having = [t for t in tables if any(c.source == item.source for c in t.columns)]
+        having = having or [t for t in tables if t.column(item.source) is not None]
+        return not item.source or not having or any(t is table for t in having)
+
+    return replace(answers, columns=tuple(item for item in answers.columns if is_own(item)))
 
 
 def read_column(text: str) -> ColumnAnswer:
