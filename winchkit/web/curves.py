@@ -262,8 +262,7 @@ def curves_of(
         own = [trace for trace in traces if trace.output == output]
         runs = [recordings[part.run] for part in regression.segments if part.output == output]
         known = [variables_of(run) for run in runs]
-        lasts = [float(trace.time[-1] + np.median(np.diff(trace.time))) for trace in own]
-        starts = [0.0, *np.cumsum(lasts)[:-1].tolist()]
+        starts = _starts([trace.time for trace in own])
         names = [name for name in known[0] if all(name in one for one in known)]
         variables = {name: np.concatenate([one[name] for one in known]) for name in names}
         measured = np.concatenate([trace.measured for trace in own])
@@ -303,9 +302,9 @@ def recorded_curves(runs: Sequence[Run]) -> dict[str, OutputCurves]:
         own = [run for run in runs if output in run and len(run.time) > 1]
         if not own:
             continue
-        lasts = [float(np.ptp(run.time) + np.median(np.diff(run.time))) for run in own]
-        starts = [0.0, *np.cumsum(lasts)[:-1].tolist()]
-        times = [at + run.time - run.time[0] for at, run in zip(starts, own, strict=True)]
+        since = [run.time - run.time[0] for run in own]
+        starts = _starts(since)
+        times = [at + time for at, time in zip(starts, since, strict=True)]
         measured = np.concatenate([run[output] for run in own])
         unknown = np.full(len(measured), np.nan)
         out[output] = OutputCurves(
@@ -325,6 +324,12 @@ def recorded_curves(runs: Sequence[Run]) -> dict[str, OutputCurves]:
             is_compared=False,
         )
     return out
+
+
+def _starts(times: Sequence[Array]) -> list[float]:
+    """Times at which runs start one after another, from their times since their starts, s."""
+    lasts = [float(time[-1] + np.median(np.diff(time))) for time in times]
+    return [0.0, *np.cumsum(lasts)[:-1].tolist()]
 
 
 def _label(recording: Recording) -> str:

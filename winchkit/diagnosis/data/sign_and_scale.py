@@ -242,7 +242,8 @@ def _slope(measured: Array, columns: Array) -> Slope | None:
         return None
     scale = float(np.sqrt(np.mean(columns[rows, 0] ** 2)))
     without = _jackknifed(x, y)[:, 0] / scale
-    value = float(np.linalg.lstsq(x, y, rcond=None)[0][0]) / scale
+    # The coefficient of what the other columns leave of the first (Frisch, Waugh).
+    value = float(own @ y) / float(own @ own) / scale
     slope = Slope(value, _jackknife_std(without))
     return slope if abs(slope.value) > _SIGMAS * slope.std else None
 

@@ -75,7 +75,7 @@ def _agreement(
     step = max(interval, max(spans) / _MOST_ROWS)
     begin, columns = _even_columns(angles, step)
     start, coordinates = _even_columns(position, step)
-    x = _of_unit_variance(np.concatenate([columns, columns**2], axis=1))
+    x = _with_squares(columns)
     least = max(8 * x.shape[1], int(LEAST_OVERLAP * min(len(x), len(coordinates))))
     lags = np.arange(-(len(coordinates) - 1), len(x))
     lags = lags[np.minimum(len(x), len(coordinates) + lags) - np.maximum(0, lags) >= least]
@@ -103,11 +103,25 @@ def _agreement(
 
 def _even_columns(signals: Sequence[Signal], step: float) -> tuple[float, Array]:
     """Common start of signals, and their samples at even times, shape (n, signals)."""
-    start = max(float(signal.time[0]) for signal in signals)
-    end = min(float(signal.time[-1]) for signal in signals)
-    time = start + step * np.arange(max(0, int((end - start) / step)) + 1)
-    columns = [np.interp(time, signal.time, signal.values) for signal in signals]
-    return start, np.stack(columns, axis=1)
+    start, end = _common_span(signals)
+    count = max(0, int((end - start) / step)) + 1
+    return start, _columns_at(signals, np.linspace(start, start + step * (count - 1), count))
+
+
+def _common_span(signals: Sequence[Signal]) -> tuple[float, float]:
+    """Times between which all signals have samples, s."""
+    starts, ends = ([float(signal.time[n]) for signal in signals] for n in (0, -1))
+    return max(starts), min(ends)
+
+
+def _columns_at(signals: Sequence[Signal], time: Array) -> Array:
+    """Signals at given times, shape (n, signals)."""
+    return np.stack([np.interp(time, own.time, own.values) for own in signals], axis=1)
+
+
+def _with_squares(columns: Array) -> Array:
+    """Columns and their squares, of mean zero and unit variance."""
+    return _of_unit_variance(np.concatenate([columns, columns**2], axis=1))
 
 
 def _of_unit_variance(columns: Array) -> Array:
@@ -140,11 +154,9 @@ def _multiple_correlation(x: Array, y: Array, lag: int) -> float:
 
 def _predicted(angles: Sequence[Signal], measured: Signal, lag: float) -> Signal:
     """A coordinate by the angles at all of their samples, fitted at a lag."""
-    start = max(float(signal.time[0]) for signal in angles)
-    end = min(float(signal.time[-1]) for signal in angles)
+    start, end = _common_span(angles)
     time = angles[0].time[(angles[0].time >= start) & (angles[0].time <= end)]
-    columns = np.stack([np.interp(time, s.time, s.values) for s in angles], axis=1)
-    x = _of_unit_variance(np.concatenate([columns, columns**2], axis=1))
+    x = _with_squares(_columns_at(angles, time))
     at = measured.time + lag
     inside = (time >= at[0]) & (time <= at[-1])
     b = np.interp(time[inside], at, measured.values)[:, None]
