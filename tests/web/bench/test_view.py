@@ -87,7 +87,7 @@ def test_a_message_of_the_page_names_the_direction(
     spec = read_simbench(find("sim", "spiral-bench")).bench
     browser = Browser("page", spec, Programmes(spec, tmp_path, tmp_path))
     browser.take(Station())  # type: ignore[arg-type]
-    browser.do(message["do"], {**message, "winch": "A"})
+    browser.action({**message, "winch": "A"})()
     assert seen == [(call[0], "A", call[1])]
 
 

@@ -165,8 +165,8 @@ function header() {
   const state = now();
   box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${number(state.cable_length)} m` : ""}${old() && picture ? ` · ${ago()}` : ""}`;
   box.querySelector("#tripped").hidden = !tripped().length;
-  const role = box.querySelector("#role"), kind = commands() ? "command" : "watch";
-  if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, icon(kind), commands() ? "You command" : "Watching")); }
+  const role = box.querySelector("#role"), kind = old() ? "unknown" : commands() ? "command" : "watch";
+  if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, icon(kind), { unknown: "No values", command: "You command", watch: "Watching" }[kind])); }
 }
 
 const words = (state) => said(state, tripped().length > 0);
@@ -226,9 +226,9 @@ function build() {
     el("section", { class: "panel controls offers", style: { marginTop: "16px" }, "aria-label": "Controls" },
       el("fieldset", { class: "jogs" }, el("legend", {}, "Jog"), el("div", { class: "row" }, jogButton(1), jogButton(-1))),
       el("fieldset", {}, el("legend", {}, "Jog speed, m/s"), el("div", { class: "segments", id: "speeds" }, speeds.map((v) => el("button", { "aria-pressed": String(v === speed), onclick: () => { speed = v; build(); } }, String(v))))),
-      el("fieldset", { class: "orders" }, el("legend", {}, `Inch at ${speed} m/s, mm (+ winds in)`), el("div", { class: "segments" }, [-10, -1, 1, 10].map(step))),
+      el("fieldset", { class: "orders" }, el("legend", {}, "Inch, mm (+ winds in)"), el("div", { class: "segments" }, [-10, -1, 1, 10].map(step)), el("span", { class: "note" }, `at ${speed} m/s`)),
       orders.move(speeds, (to, at) => { send("move", { winch, to, speed: at }); watchMotion(); }),
-      el("fieldset", { class: "orders" }, el("legend", {}, "Load cell"), el("div", { class: "row" }, el("button", { id: "tare", onclick: tare }, "Tare… ", el("kbd", {}, "T")), el("button", { id: "untare", hidden: true, onclick: () => send("undo_tare", { winch }) }, "Undo tare"))),
+      el("fieldset", { class: "orders" }, el("legend", {}, "Load cell"), el("div", { class: "upright" }, el("button", { id: "tare", onclick: tare }, "Tare… ", el("kbd", {}, "T")), el("button", { id: "untare", hidden: true, onclick: () => send("undo_tare", { winch }) }, "Undo tare"))),
       el("fieldset", { class: "orders" }, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused()) choose((name, folder) => send("run_programme", { name, folder })); } }, "Run…"))));
   fill(document.getElementById("stopbar"), jogButton(1), jogButton(-1), stopButton());
   if (tab === "Charts") strips.strips(document.getElementById("strips"), () => ({ rows: [...(history[winch] || [])], predicted: predictions[winch] }), { winch, limits, bench: declared.name, profile: declared.winch[winch].profile });
@@ -241,7 +241,7 @@ function build() {
 
 function chooseWinch(name) { release(); winch = name; orders.forget(); send("show", { winch }); build(); }
 
-function tare() { const own = winch; if (!refused()) orders.tare(own, tensions, () => send("tare", { winch: own })); }
+function tare() { const own = winch; if (!refused()) orders.tare(own, declared.winch[own].limits.tension, tensions, () => send("tare", { winch: own })); }
 
 function panel() {
   const own = (id, title, more = {}) => el("section", { class: "panel", "aria-label": tab, ...more }, el("header", {}, el("h2", {}, title)), el("div", { id }));
@@ -326,7 +326,7 @@ function mark() {
     button.className = `jog ${own ? (moving ? "held" : "pressed") : !held && state && state.phase === "running down" ? "ramping" : ""}`;
     button.disabled = !commands() || tripped().length > 0;
     button.querySelector("kbd").hidden = button.disabled;
-    button.querySelector("small").textContent = own ? (moving ? "held: moving" : "pressed") : button.disabled ? (tripped().length ? "tripped" : "watching") : "hold to move";
+    button.querySelector("small").textContent = own ? (moving ? "held: moving" : "pressed") : button.disabled ? (old() ? "no values" : tripped().length ? "tripped" : "watching") : "hold to move";
   }
 }
 

@@ -20,7 +20,7 @@ export function move(speeds, start) {
     tell(`${text ? `"${text}" is not a length.` : "No length is given."} Type metres, for example 2.5.`);
     field.focus();
   }
-  return el("fieldset", { class: "orders move" }, el("legend", {}, "Move to, m"), el("div", { class: "row" }, field, "at", at, el("button", { onclick: order }, "Move")), fault);
+  return el("fieldset", { class: "orders move" }, el("legend", {}, "Move to, m"), el("div", { class: "upright" }, el("div", { class: "row" }, field, el("button", { onclick: order }, "Move")), el("label", { class: "row" }, "at ", at)), fault);
 }
 
 const newtons = (value) => (value === null ? "–" : `${number(value, 4)} N`);
@@ -29,8 +29,9 @@ const newtons = (value) => (value === null ? "–" : `${number(value, 4)} N`);
 export const tensions = (state, tare) => ({ net: state.tension, gross: state.tension === null || tare === null || tare === undefined ? null : state.tension + tare });
 
 // Asks for a tare, with the readings as they are while it asks.
-export function tare(winch, read, start) {
-  confirmed(`Tare winch ${winch}`, "The net tension counts from what hangs on the load cell now. The limits of the tension act on the net value.", start,
+export function tare(winch, limits, read, start) {
+  const known = limits.filter((limit) => limit !== null).map((limit) => `${number(limit, 3)} N`);
+  confirmed(`Tare winch ${winch}`, `The net tension counts from what hangs on the load cell now.${known.length ? ` The limit${known.length > 1 ? "s" : ""} of ${known.join(" and ")} then act${known.length > 1 ? "" : "s"} on the net value.` : ""}`, start,
     el("p", { id: "tensions", style: { marginTop: "8px" } }, readings(read())));
 }
 
