@@ -19,7 +19,7 @@ pytest.importorskip("starlette")
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from winchkit.errors import NotPermitted, UsageError
+from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.web.bench.browser import Browser
 from winchkit.web.bench.messages import decoded
 from winchkit.web.bench.programmes import Programmes
@@ -56,7 +56,7 @@ class Station:
             if error is not None:
                 raise error
             self.calls.append((name, given, named))
-            return {}
+            return {"moving": name == "moving"}
 
         return call
 
@@ -233,8 +233,20 @@ def test_an_order_of_somebody_who_did_not_see_the_bench_begins_nothing(
 
 
 def test_what_ends_something_may_come_late(page: Page) -> None:
-    page.send({"do": "release", "winch": "A", "seen": now() - 9}, {"do": "alive", "winch": "all"})
-    assert [call[0] for call in page.station.calls] == ["release", "moving"]
+    page.send({"do": "release", "winch": "A", "seen": now() - 9}, {"do": "programme"})
+    assert [call[0] for call in page.station.calls] == ["release", "programme"]
+
+
+def test_what_ended_a_motion_is_told_once_and_only_to_the_page_that_ordered_it(page: Page) -> None:
+    alive, stopped = {"do": "alive", "winch": "A"}, MotionError("winch A was stopped")
+    page.send(alive)
+    assert page.station.calls == []
+    page.send({"do": "move", "winch": "A", "to": 2.5, "speed": 0.05, "seen": now()}, alive)
+    assert [call[0] for call in page.station.calls] == ["move", "moving"]
+    page.station.error = stopped
+    assert page.send(alive, alive) == str(stopped)
+    assert page.browser.said["number"] == 1
+    assert len(page.station.calls) == 2
 
 
 def test_a_refused_jog_is_not_taken_up_before_it_is_released(page: Page) -> None:
@@ -284,5 +296,5 @@ def test_a_tare_is_undone_with_what_it_was_before(page: Page) -> None:
     assert [call[:2] for call in page.station.calls] == [
         ("cell", ("tares", "A.cell")),
         ("tare", ("A",)),
-        ("cell", ("restore tares", "A.cell", {})),
+        ("cell", ("restore tares", "A.cell", {"moving": False})),
     ]

@@ -90,6 +90,8 @@ class Browser:
         self._log: tuple[str, float] | None = None
         self._counted: dict[str, Any] = {}
         self._tares: dict[str, dict[str, Any]] = {}
+        self._started: set[str] = set()
+        """Winches, or all, with a move or a step of this page whose end it was not told."""
         self.programme: dict[str, Any] | None = None
         """Where the programme is that this page started; None where it started none."""
 
@@ -112,6 +114,7 @@ class Browser:
         """Close the station: the owner ends what was started by it."""
         station, self._station, self._log = self._station, None, None
         self._counted, self.programme, self._tares = {}, None, {}
+        self._started.clear()
         if station is not None:
             with suppress(WinchkitError):
                 station.close()
@@ -145,25 +148,37 @@ class Browser:
             ),
             "release": lambda: partial(station.release, self._winch(asked)),
             "alive": lambda: partial(
-                station.moving, ALL if asked.get("winch") == ALL else self._winch(asked)
+                self._live, station, ALL if asked.get("winch") == ALL else self._winch(asked)
             ),
             "step": lambda: partial(
-                station.step,
-                self._winch(asked),
-                **directed(messages.change(asked, "change")),
-                speed=messages.speed(asked),
+                self._start,
+                winch := self._winch(asked),
+                partial(
+                    station.step,
+                    winch,
+                    **directed(messages.change(asked, "change")),
+                    speed=messages.speed(asked),
+                ),
             ),
             "move": lambda: partial(
-                station.move,
-                self._winch(asked),
-                to=messages.length(asked, "to"),
-                speed=messages.speed(asked),
+                self._start,
+                winch := self._winch(asked),
+                partial(
+                    station.move,
+                    winch,
+                    to=messages.length(asked, "to"),
+                    speed=messages.speed(asked),
+                ),
             ),
             "move_pose": lambda: partial(
-                station.move_pose,
-                {messages.name(asked, "axis", _AXES): messages.change(asked, "change")},
-                True,
-                messages.speed(asked),
+                self._start,
+                ALL,
+                partial(
+                    station.move_pose,
+                    {messages.name(asked, "axis", _AXES): messages.change(asked, "change")},
+                    True,
+                    messages.speed(asked),
+                ),
             ),
             "reset": lambda: station.reset,
             "tare": lambda: partial(self._tare, station, self._winch(asked)),
@@ -182,6 +197,18 @@ class Browser:
 
     def _winch(self, asked: Message) -> str:
         return messages.name(asked, "winch", self.spec.winch)
+
+    def _start(self, moved: str, order: Callable[[], object]) -> None:
+        order()
+        self._started.add(moved)
+
+    def _live(self, station: RemoteStation, moved: str) -> None:
+        """A sign of life for a motion of this page; what ended it is raised once."""
+        if moved not in self._started:
+            return
+        self._started.discard(moved)
+        if station.moving(moved):
+            self._started.add(moved)
 
     def _tare(self, station: RemoteStation, winch: str) -> None:
         """Tare a load cell, and note what it was tared by before."""
