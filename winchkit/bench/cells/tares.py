@@ -103,7 +103,7 @@ def restore_tares(desk: CellDesk, name: str, before: Mapping[str, Any]) -> dict[
     if others != book.tare:
         _keep(desk, book, others)
     _apply(desk, name, 0.0 if host is None else float(host["value"]))
-    return tares_now(desk, name)
+    return {}
 
 
 def device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:
