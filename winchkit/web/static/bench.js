@@ -358,7 +358,7 @@ function refresh() {
   offer();
   const take = document.getElementById("take");
   if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
-  document.getElementById("says").textContent = picture && picture.commander && !commands() ? `${picture.commander} commands` : "";
+  document.getElementById("says").textContent = picture && picture.commander && !commands() && !old() ? `${picture.commander} commands` : "";
   progress(document.getElementById("programme"), picture && picture.programme, send);
   const log = picture && picture.recording;
   document.getElementById("recording").textContent = log ? `● Recording ${log.file} · ${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "";

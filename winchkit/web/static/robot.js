@@ -105,7 +105,7 @@ export { drop };
 function render(state) {
   const found = view.calibration;
   fill(root, context(state), state.busy ? el("div", { class: "row", style: { paddingBottom: "12px" } }, el("progress", { "aria-label": "Progress" }), el("span", { class: "label" }, state.busy.what)) : null,
-    faults(state), found ? head(found) : el("div", { class: "verdict" }, el("h1", {}, view.poses ? `${view.poses} poses` : now ? "Platform and cables now" : "No poses yet"), view.poses ? null : el("p", {}, "Drop a recording of poses to calibrate the robot.")),
+    faults(state), found ? head(found) : el("div", { class: "verdict" }, el("h1", {}, view.poses ? `${view.poses} poses` : now ? "Platform and cables" : "No poses yet"), view.poses ? null : el("p", {}, "Drop a recording of poses to calibrate the robot.")),
     el("div", { class: "grid" },
       el("section", { class: "panel w7", id: "picture", "aria-label": "Cables and platform" }),
       el("div", { class: "w5 stack" }, found ? [error(found), el("section", { class: "panel", id: "details", "aria-label": "Errors of poses and cables" }), warnings(found)] : null, platform(), proposals())));
