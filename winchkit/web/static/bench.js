@@ -179,7 +179,8 @@ function show() {
   review();
   document.body.classList.toggle("old", old());
   for (const node of document.querySelectorAll(".offers, #dialog")) node.inert = old();
-  if (root) refresh(); else progress(null, picture && picture.programme, send);
+  progress(document.getElementById("programme"), picture && picture.programme, send);
+  if (root) refresh();
 }
 
 function banner() {
@@ -216,7 +217,6 @@ function build() {
       el("span", { class: "segments", id: "tabs" }, tabs().map((name) => el("button", { "aria-pressed": String(name === tab), onclick: () => { tab = name; build(); } }, name))),
       el("span", { class: "row end offers" }, el("span", { id: "recording", class: "note" }), el("span", { id: "says", class: "note" }),
         declared.allow_motion ? [file, el("button", { id: "record", onclick: () => (picture && picture.recording ? send("end_record") : send("record", { file: file.value })) }, "Record"), el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command")] : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),
-    el("div", { id: "programme", class: "offers" }),
     el("div", { class: `bench-grid${names.length > 1 ? " several" : ""}` },
       el("div", { class: "column" }, el("section", { class: "panel", "aria-label": `Winch ${winch}` }, el("header", {}, el("h2", {}, `Winch ${winch}`), el("span", { class: "note" }, `profile ${declared.winch[winch].profile}${declared.winch[winch].effects.length ? ` + ${declared.winch[winch].effects.length} effect${declared.winch[winch].effects.length === 1 ? "" : "s"}` : ""}`)), el("div", { id: "drawing" })),
         names.length > 1 ? el("section", { class: "panel", "aria-label": "All winches" }, el("div", { id: "cards" })) : null),
@@ -359,7 +359,6 @@ function refresh() {
   const take = document.getElementById("take");
   if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
   document.getElementById("says").textContent = picture && picture.commander && !commands() && !old() ? `${picture.commander} commands` : "";
-  progress(document.getElementById("programme"), picture && picture.programme, send);
   const log = picture && picture.recording;
   document.getElementById("recording").textContent = log ? `● Recording ${log.file} · ${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "";
   const record = document.getElementById("record"), mine = commands() || Boolean(log);

@@ -14,6 +14,7 @@ function route() {
   const next = views[wanted] ? wanted : "diagnose";
   if (next === name || !state) return;
   if (name && views[name].leave) views[name].leave();
+  alarm("", "order");
   name = next;
   for (const link of document.querySelectorAll("#views a")) { if (link.dataset.view === name) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current"); }
   document.title = `${name[0].toUpperCase()}${name.slice(1)} · winchkit`;

@@ -27,7 +27,7 @@ export function choose(start) {
         const plan = await ask(`/api/bench/programme?name=${encodeURIComponent(name)}`);
         if (mine !== asked) return;
         fill(shown, el("p", {}, plan.description || plan.name), curves(plan), el("p", { class: "note" }, `${plan.repeats} repeat${plan.repeats === 1 ? "" : "s"} of ${number(plan.duration, 3)} s${plan.asks.length ? `, ${plan.asks.length} question${plan.asks.length === 1 ? "" : "s"}` : ""}; all within the limits. It ends where this page is hidden or closed.`),
-          el("details", {}, el("summary", {}, `${plan.steps.length} step${plan.steps.length === 1 ? "" : "s"}`), el("ol", {}, plan.steps.map((words) => el("li", {}, words)))), held("Hold to start", () => { closeDialog(); start(name, folder.value); }));
+          el("details", {}, el("summary", {}, `${plan.steps.length} step${plan.steps.length === 1 ? "" : "s"}`), el("ol", {}, plan.steps.map((words) => el("li", {}, words)))), held("Hold to start", () => { closeDialog(); start(name, folder.value.trim() || "."); }));
       } catch (error) { if (mine === asked) fill(shown, el("p", {}, error.message)); }
     }
   });
@@ -61,9 +61,8 @@ function curves(plan) {
 
 // The programme under way: signs of life while this page is seen, progress, its questions, its end.
 export function progress(host, now, send) {
-  if (!now) { clearInterval(signs); signs = null; if (host && host.firstChild) { fill(host); delete host.dataset.text; } return; }
+  if (!now) { clearInterval(signs); signs = null; if (host.firstChild) { fill(host); delete host.dataset.text; } return; }
   if (now.ended) { clearInterval(signs); signs = null; } else if (!signs) signs = setInterval(() => { if (!document.hidden) send("programme"); }, SIGN);
-  if (!host) return;
   const text = JSON.stringify(now);
   if (host.dataset.text === text) return;
   host.dataset.text = text;
