@@ -184,7 +184,7 @@ function show() {
 }
 
 function banner() {
-  const box = document.getElementById("trips"), trips = tripped(), lost = (picture && !cut && picture.lost) || (old() ? "The bench sends no values: Stop cannot reach it. Use the emergency stop." : "");
+  const box = document.getElementById("trips"), trips = tripped(), lost = (!cut && picture && picture.lost) || (old() ? `${cut ? "The page's server does not answer" : "The bench sends no values"}: Stop cannot reach the bench. Use the emergency stop.` : "");
   const text = lost ? `lost:${lost}` : trips.length ? `${commands()}|${Boolean(lastTrip)}|${Boolean(root)}|${trips.join("|")}` : "";
   const aged = box.querySelector(".age");
   if (aged && picture) aged.textContent = `What is shown is ${ago()}.`;
