@@ -237,7 +237,9 @@ def test_what_ends_something_may_come_late(page: Page) -> None:
     assert [call[0] for call in page.station.calls] == ["release", "programme"]
 
 
-def test_what_ended_a_motion_is_told_once_and_only_to_the_page_that_ordered_it(page: Page) -> None:
+def test_what_ended_a_motion_is_reported_once_and_only_to_the_page_that_ordered_it(
+    page: Page,
+) -> None:
     alive, stopped = {"do": "alive", "winch": "A"}, MotionError("winch A was stopped")
     page.send(alive)
     assert page.station.calls == []

@@ -80,8 +80,8 @@ def test_what_is_no_length_is_said_at_its_field_and_moves_nothing(
 ) -> None:
     page, before = commanding.page, commanding.value(0)
     commanding.move(text)
-    told = f'"{text.strip()}" is not a length.' if text.strip() else "No length is given."
-    assert page.inner_text("#move-fault") == f"{told} Type metres, for example 2.5."
+    fault = f'"{text.strip()}" is not a length.' if text.strip() else "No length is given."
+    assert page.inner_text("#move-fault") == f"{fault} Type metres, for example 2.5."
     assert page.get_attribute(TARGET, "aria-invalid") == "true"
     page.wait_for_timeout(500)
     assert commanding.orders("move", "step", "jog") == []

@@ -91,7 +91,7 @@ class Browser:
         self._counted: dict[str, Any] = {}
         self._tares: dict[str, dict[str, Any]] = {}
         self._started: set[str] = set()
-        """Winches, or all, with a move or a step of this page whose end it was not told."""
+        """Winches, or all, with a move or a step of this page whose end was not reported."""
         self.programme: dict[str, Any] | None = None
         """Where the programme is that this page started; None where it started none."""
 

@@ -60,7 +60,7 @@ def name(
     """One of the known names of ``what``, by default the key; raises UsageError."""
     value = text(asked, key)
     if value not in known:
-        words = f"{_told(value)} is no {what or key}"
+        words = f"{_quoted(value)} is no {what or key}"
         raise UsageError(f"{words}; there are {', '.join(known)}")
     return value
 
@@ -69,7 +69,7 @@ def text(asked: Message, key: str) -> str:
     """A text that is not empty; raises UsageError."""
     value = asked.get(key)
     if not isinstance(value, str) or not value:
-        raise UsageError(f"{_told(value)} is no name of a {key}.")
+        raise UsageError(f"{_quoted(value)} is no name of a {key}.")
     return value
 
 
@@ -86,10 +86,10 @@ def _number(
             return number
     if value is None:
         raise UsageError(f"No {what.removeprefix('a ')} is given. {remedy}")
-    raise UsageError(f"{_told(value)} is not {what}. {remedy}")
+    raise UsageError(f"{_quoted(value)} is not {what}. {remedy}")
 
 
-def _told(value: object) -> str:
+def _quoted(value: object) -> str:
     """A wrong value in quotation marks, shortened."""
     words = value if isinstance(value, str) else json.dumps(value)
     return f'"{words if len(words) <= _SHOWN else words[:_SHOWN] + "…"}"'
