@@ -237,6 +237,15 @@ def test_what_ends_something_may_come_late(page: Page) -> None:
     assert [call[0] for call in page.station.calls] == ["release", "programme"]
 
 
+def test_a_page_that_only_watches_orders_nothing_and_its_late_signs_of_life_are_silent(
+    page: Page,
+) -> None:
+    page.view._commander = None
+    assert page.send({"do": "release", "winch": "A"}, {"do": "alive", "winch": "A"}) == ""
+    assert "only watches" in page.send({"do": "jog", "winch": "A", "speed": 0.1, "seen": now()})
+    assert page.station.calls == []
+
+
 def test_what_ended_a_motion_is_reported_once_and_only_to_the_page_that_ordered_it(
     page: Page,
 ) -> None:

@@ -301,7 +301,7 @@ function watchMotion(moved = winch) {
   alive = setInterval(() => {
     const state = now();
     const all = moved === "all" && picture ? Object.values(picture.status.winch) : [state];
-    if (!state || old() || (Date.now() > until && all.every((one) => one.phase === "disabled"))) { clearInterval(alive); return; }
+    if (!state || !commands() || (Date.now() > until && all.every((one) => one.phase === "disabled"))) { clearInterval(alive); return; }
     if (!document.hidden) send("alive", { winch: moved });
   }, 100);
 }
