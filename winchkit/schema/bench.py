@@ -55,6 +55,12 @@ class BusSpec(Table):
         float,
         Quantity("time", 2e-3, 1.0, why="a drive stops 2.5 heartbeats after the loss of its host"),
     ] = 0.05
+    sdo_timeout: Annotated[
+        float,
+        Quantity("time", 0.02, 10.0, why="every request to a dead drive takes as long"),
+    ] = 0.5
+    """For the answer to an SDO request: drives answer within some ms, and within some tenths while
+    they write a flash memory."""
     # serial, modbus-rtu and modbus-tcp
     port: str | int | None = None
     """Device path of a serial port; TCP or UDP port number for network buses."""
@@ -63,7 +69,7 @@ class BusSpec(Table):
     stopbits: Literal[1, 2] = 1
     bytesize: Literal[7, 8] = 8
     """Data bits of a character on a serial bus."""
-    # modbus-tcp
+    # modbus-tcp, and the interface socketcand
     host: str | None = None
     timeout: Annotated[
         float,
@@ -73,8 +79,12 @@ class BusSpec(Table):
     def rules(self) -> Iterator[Rule]:
         """Each kind of bus needs its own keys."""
         for key in NEEDED_BY_BUS[self.kind]:
-            if getattr(self, key) is None:
+            if getattr(self, key) in (None, ""):
                 yield key, f"missing; a {self.kind} bus needs it"
+        if self.interface == "socketcand":
+            for key in ("host", "port"):
+                if getattr(self, key) is None:
+                    yield key, "missing; the interface socketcand needs that of its daemon"
         if self.kind == "modbus-tcp" and isinstance(self.port, str):
             yield "port", f"'{self.port}' is not a TCP port; write a number such as 502"
 

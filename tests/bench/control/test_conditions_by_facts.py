@@ -33,7 +33,7 @@ NOW = 50.0
 GOOD = WinchInput(
     feedback_age=0.004,
     missed_syncs=0,
-    heartbeat_lost=False,
+    heartbeat_lost="",
     boot_ups=0,
     operational=True,
     mode_kept=True,
@@ -51,7 +51,7 @@ OTHERWISE = {
     "follows": (False, True),
     "disabled": (False, True),
     "winding_speed": (0.1, 0.0, 0.3),
-    "heartbeat_lost": (False, True),
+    "heartbeat_lost": ("", "gone"),
     "boot_ups": (0, 1, 2),
     "operational": (True, False),
     "mode_kept": (True, False),

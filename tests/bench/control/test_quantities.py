@@ -122,7 +122,7 @@ INPUTS = st.fixed_dictionaries(
     {
         "feedback_age": near(0.0, 0.1),
         "missed_syncs": st.integers(0, 7),
-        "heartbeat_lost": st.just(False),
+        "heartbeat_lost": st.just(""),
         "boot_ups": st.just(0),
         "operational": st.just(True),
         "mode_kept": st.sampled_from([True, True, True, False]),

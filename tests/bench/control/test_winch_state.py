@@ -28,7 +28,9 @@ def parts(*, faulty: bool) -> Any:
     feedback = Made(angle=3.0, velocity=2.0, time=99.5, sync=8, state=state, turns_known=True)
     axis = Made(
         feedback=feedback,
-        heartbeat=Made(lost=lambda now, resumed: ("lost", now, resumed), boot_ups=11),
+        heartbeat=Made(
+            missing="gone", lost=lambda now, resumed: (now, resumed) == (NOW, RESUMED), boot_ups=11
+        ),
         operational=faulty,
         mode_kept="mode kept",
         fault_text="fault text",
@@ -63,7 +65,7 @@ def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
     expected = {
         "feedback_age": 0.5,
         "missed_syncs": 1,
-        "heartbeat_lost": ("lost", NOW, RESUMED),
+        "heartbeat_lost": "gone",
         "boot_ups": 11,
         "operational": faulty,
         "mode_kept": "mode kept",

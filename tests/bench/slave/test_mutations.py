@@ -52,7 +52,7 @@ def well(now: float, change: State) -> WinchInput:
     base: State = {
         "feedback_age": 0.002,
         "missed_syncs": 0,
-        "heartbeat_lost": False,
+        "heartbeat_lost": "",
         "boot_ups": 1,
         "operational": True,
         "mode_kept": True,
@@ -124,7 +124,7 @@ CASES = (
     Case("second master", "", always(second_master="an SDO write of 6040h"), always()),
     Case("position", "", always(position_jump="6064h changed by 9.00 turns"), always()),
     Case("boot-up", "", always(boot_ups=2), always(boot_ups=1)),
-    Case("heartbeat", "", always(heartbeat_lost=True), always()),
+    Case("heartbeat", "", always(heartbeat_lost="gone"), always()),
     Case("nmt", "", always(operational=False, nmt="pre-operational"), always()),
     Case(
         "feedback",

@@ -129,6 +129,20 @@ def _stale_words(item: WinchInput, _own: Supervised, _memory: Memory) -> str:
     return f"no load cell reading {since} (limit {cell.max_age:.2f} s){reason}"
 
 
+def _slowing_words(item: WinchInput, own: Supervised, memory: Memory) -> str:
+    speeds = f"{item.winding_speed:.3f} m/s, commanded {item.target_speed:.3f} m/s"
+    if memory.reversed:
+        return (
+            f"the motor turns against its command: {speeds}; its direction is reversed (polarity "
+            "607Eh, motor phases, encoder), or the load drives it"
+        )
+    return (
+        f"the drive does not slow down as commanded: {speeds}, within "
+        f"{own.limits.response_time:g} s (limits.response_time); it does not receive its targets, "
+        "or they have no effect"
+    )
+
+
 CONDITIONS: tuple[Condition, ...] = (
     Condition(
         "second master",
@@ -153,10 +167,10 @@ CONDITIONS: tuple[Condition, ...] = (
     ),
     Condition(
         "heartbeat",
-        "age of the drive's heartbeat",
+        "age of the drive's heartbeat, or of its reply to node guarding",
         "2.5 heartbeat periods",
-        lambda item, _own, _memory: item.heartbeat_lost,
-        lambda *_: "the drive's heartbeat is gone; check its power and the bus, then reset",
+        lambda item, _own, _memory: bool(item.heartbeat_lost),
+        lambda item, *_: f"{item.heartbeat_lost}, then reset",
         latches=True,
         by_facts=True,
     ),
@@ -237,11 +251,7 @@ CONDITIONS: tuple[Condition, ...] = (
         "measured cable speed while the commanded speed falls",
         "the fastest commanded within limits.response_time, and 5 %",
         Exceeds("unresponsive", lambda _own: 0.0),
-        lambda item, own, _memory: (
-            f"the drive does not slow down as commanded: {item.winding_speed:.3f} m/s, commanded "
-            f"{item.target_speed:.3f} m/s, within {own.limits.response_time:g} s "
-            "(limits.response_time); it does not receive its targets, or they have no effect"
-        ),
+        _slowing_words,
         when="follows",
     ),
     Condition(

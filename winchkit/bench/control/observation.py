@@ -75,7 +75,9 @@ class WinchInput(NamedTuple):
     """Since the SYNC of the newest complete feedback, s; infinity before the first."""
     missed_syncs: int
     """SYNCs that were sent since then and are not answered, the one just sent left out."""
-    heartbeat_lost: bool
+    heartbeat_lost: str
+    """What is missing of the drive's heartbeat or its replies to node guarding, in words; empty
+    while it is in time."""
     boot_ups: int
     operational: bool
     mode_kept: bool
@@ -240,6 +242,8 @@ class Memory:
     tension_rate: float = 0.0
     """N/s, over at least 50 ms."""
     unresponsive: bool = False
+    reversed: bool = False
+    """Of an unresponsive drive: whether it turns the other way than it was ever commanded."""
     """Whether the drive did not slow down as it was commanded."""
     slip: float = 0.0
     """Change of the length sensor less that by the motor since the motion began, m."""
@@ -335,6 +339,7 @@ class Memory:
             return
         margin = max(own.ripple, _OVERSHOOT * fastest)
         self.unresponsive = sign * speed > max(0.0, fastest) + margin
+        self.reversed = fastest <= 0.0 and sign * target < 0.0
 
     def _follow_length(self, item: WinchInput) -> None:
         if not item.moving or self._began is None:

@@ -112,7 +112,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
         (
             feedback_age,
             missed_syncs,
-            heartbeat.lost(now, resumed),
+            heartbeat.missing if heartbeat.lost(now, resumed) else "",
             heartbeat.boot_ups,
             operational,
             axis.mode_kept,

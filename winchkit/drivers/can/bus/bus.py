@@ -125,6 +125,8 @@ class CanBus:
         self.fault: str | None = None
         self.beats: Counter[int] = Counter()
         """Heartbeats sent, by the node that they were sent for."""
+        self.sdo_timeout = spec.sdo_timeout
+        """For the answer to an SDO request, s."""
         self.sends_remote = sends_remote(spec)
         """Whether the interface sends remote frames, as far as that is known."""
         self.sync_held = self.heartbeat_held = False

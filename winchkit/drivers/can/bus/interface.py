@@ -32,6 +32,30 @@ _NO_BITRATE = ("virtual", "udp_multicast")
 _NO_REMOTE = ("socketcand", "neousys")
 """Interfaces for which python-can sends a remote frame as a data frame, or not at all."""
 
+_ON_SERIAL_PORT = "the package pyserial: pip install pyserial"
+_LIBRARIES = {
+    "canalystii": 'the package canalystii: pip install "python-can[canalystii]"',
+    "cantact": 'the package cantact: pip install "python-can[cantact]"',
+    "etas": "ETAS BOA, for Windows",
+    "gs_usb": 'the package gs_usb: pip install "python-can[gs-usb]"',
+    "iscan": "Thorsis isCAN, for Windows",
+    "ixxat": "Ixxat's VCI driver, for Windows; on Linux use socketcan",
+    "kvaser": "Kvaser's CANlib (kvaser.com, downloads); on Linux socketcan needs none",
+    "neousys": "Neousys' WDT_DIO driver",
+    "neovi": 'the package python-ics: pip install "python-can[neovi]"',
+    "nican": "the NI-CAN driver, for Windows",
+    "nixnet": 'NI-XNET, for Windows, and the package nixnet: pip install "python-can[nixnet]"',
+    "pcan": "PEAK's PCAN-Basic (peak-system.com, downloads); on Linux socketcan needs none",
+    "robotell": _ON_SERIAL_PORT,
+    "seeedstudio": _ON_SERIAL_PORT,
+    "serial": _ON_SERIAL_PORT,
+    "slcan": _ON_SERIAL_PORT,
+    "systec": "SYS TEC's USB-CANmodul driver, for Windows",
+    "usb2can": "8devices' usb2can driver and the package pywin32, for Windows",
+    "vector": "Vector's XL Driver Library, for Windows",
+}
+"""What python-can's interfaces need besides, in its version 4.6."""
+
 _GROUP, _PORT = "239.74.163.2", 43113
 """Default of python-can for ``udp_multicast``."""
 
@@ -195,8 +219,7 @@ def open_interface(spec: BusSpec, name: str) -> Interface:
     options: dict[str, Any] = {"interface": spec.interface, "channel": spec.channel}
     if spec.interface not in _NO_BITRATE:
         options["bitrate"] = spec.bitrate
-    if spec.port is not None:
-        options["port"] = spec.port
+    options |= {key: value for key in ("host", "port") if (value := getattr(spec, key)) is not None}
     try:
         if spec.interface == "socketcan" and spec.channel:
             # python-can leaves its socket open where it cannot be bound.
@@ -206,11 +229,33 @@ def open_interface(spec: BusSpec, name: str) -> Interface:
         bus = can.Bus(**options)
         if spec.interface == "socketcan":
             return SocketCan(bus)
-    except (can.CanError, OSError, ValueError, ImportError, NotImplementedError) as error:
-        hint = ""
-        if spec.interface == "udp_multicast" and isinstance(error, OSError):
-            hint = "; a machine with only `lo` needs: ip route add 239.0.0.0/8 dev lo"
+    except Exception as error:
+        # An interface whose library is missing raises whatever its first call into it does.
         raise ConnectionLost(
-            f"bus '{name}': cannot open {spec.interface} channel '{spec.channel}': {error}{hint}"
+            f"bus '{name}': cannot open {spec.interface} channel '{spec.channel}': "
+            f"{_cause(spec, error)}"
         ) from error
     return _Library(bus, spec.interface in _STAMPED)
+
+
+def _cause(spec: BusSpec, error: Exception) -> str:
+    """Why an interface could not be opened, and what to install or to give."""
+    if spec.interface == "udp_multicast" and isinstance(error, OSError):
+        return f"{error}; a machine with only `lo` needs: ip route add 239.0.0.0/8 dev lo"
+    if spec.interface == "socketcand" and (spec.host is None or spec.port is None):
+        return "it needs `host` and `port` of the daemon, in a bench file"
+    needed = _LIBRARIES.get(spec.interface or "")
+    if needed is not None and _says_missing(error):
+        return f"it needs {needed}"
+    if isinstance(error, can.CanError | OSError | ValueError | ImportError | NotImplementedError):
+        return str(error)
+    return f"{type(error).__name__}: {error}; look into its keys, and what python-can needs for it"
+
+
+def _says_missing(error: Exception) -> bool:
+    """Whether an error comes of a library that is not there, and not of a port or its number."""
+    if isinstance(
+        error, NotImplementedError | ImportError | NameError | AttributeError | TypeError
+    ):
+        return True
+    return isinstance(error, OSError) and error.errno is None

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import ClassVar
 
 __all__ = [
     "NMT_STATES",
@@ -58,6 +59,8 @@ class HeartbeatConsumer:
 
     timeout: float
     """s."""
+    missing: ClassVar[str] = "the drive's heartbeat is gone; check its power and the bus"
+    """Cause and remedy where it is lost."""
     state: int | None = None
     boot_ups: int = 0
     last: float | None = None

@@ -17,7 +17,7 @@ from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.canopen.pdo import MappedObject
 from winchkit.drivers.can.canopen.sdo_client import sdo_client
 from winchkit.drivers.scheduling import lock_of
-from winchkit.errors import DeviceRefused, FileError, NoReply, NotPermitted
+from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NoReply, NotPermitted
 
 __all__ = [
     "ABSENT",
@@ -120,9 +120,9 @@ def object_name(index: int, sub: int = 0) -> str:
 
 ABSENT = frozenset({0x06020000, 0x06090011, 0x08000024})
 """SDO abort codes of an object or sub-index that does not exist, or has no data (CiA 301)."""
-_TIMEOUT = 0.5
-"""s: drives answer within some ms, and within some tenths while they write a flash memory; tenfold,
-a dead drive would delay every opening of a bench by 5 s a request (rule of thumb)."""
+_TWICE = 3
+"""Requests with two answers that are evidence of a second node: single ones are late answers."""
+_SDO_REQUEST = 0x600
 _FULL_TRIES, _FULL_PAUSE = 20, 0.005
 """How often, and after which pause (s), a full queue of the interface is tried again."""
 
@@ -143,8 +143,11 @@ class SdoNode:
         remote = canopen.RemoteNode(node, self.dictionary)
         bus.network.add_node(remote)
         self._sdo = sdo_client(remote, bus.clock)
-        self._sdo.RESPONSE_TIMEOUT = _TIMEOUT
+        self._sdo.RESPONSE_TIMEOUT = bus.sdo_timeout
         self._lock = lock_of(bus.clock)
+        self._other_client = False
+        """Whether somebody else has sent this node an SDO request."""
+        bus.on_foreign(_SDO_REQUEST + node, self._hear_other_client)
 
     def place(self, index: int, sub: int = 0) -> str:
         """How messages name an object."""
@@ -216,10 +219,16 @@ class SdoNode:
         """Read a written value back; raises DeviceRefused when the device kept another value."""
         kept = self.read(index, sub)
         if kept != value:
+            self.require_alone()
             raise DeviceRefused(
                 f"{self.place(index, sub)}: wrote {value}, reads back {kept}; "
                 "the device does not take this value"
             )
+
+    def require_alone(self) -> None:
+        """Raise DeviceRefused where requests so far were answered by two nodes of this number."""
+        if error := self._duplicate():
+            raise error
 
     def writes(self, index: int, sub: int) -> bool:
         """Whether the EDS lets the object be written; True where it does not know it."""
@@ -253,11 +262,29 @@ class SdoNode:
             return MappedObject(index, sub, 8 * size, False)
         return MappedObject(index, sub, len(variable), is_signed(variable))
 
-    def _refused(self, what: str, index: int, sub: int, error: Exception) -> DeviceRefused:
-        return DeviceRefused(f"{self.place(index, sub)}: the device refused to {what} it: {error}")
+    def _hear_other_client(self, _data: bytes, _now: float) -> None:
+        self._other_client = True
 
-    def _silent(self, index: int, sub: int, error: Exception) -> NoReply:
-        if self.bus.nmt_state(self.node) == NmtState.STOPPED:
+    def _duplicate(self) -> DeviceRefused | None:
+        twice = self._sdo.answered_twice
+        if twice < _TWICE or self._other_client:
+            return None
+        return DeviceRefused(
+            f"bus '{self.bus.name}' node {self.node}: two nodes have this number: {twice} requests "
+            "had two answers; switch one off and give it another"
+        )
+
+    def _refused(self, what: str, index: int, sub: int, error: Exception) -> DeviceRefused:
+        return self._duplicate() or DeviceRefused(
+            f"{self.place(index, sub)}: the device refused to {what} it: {error}"
+        )
+
+    def _silent(self, index: int, sub: int, error: Exception) -> ConnectionLost:
+        if (duplicate := self._duplicate()) is not None:
+            return duplicate
+        if self._other_client and self._sdo.answered_twice:
+            action = "another program asks this node by SDO at the same time; end it"
+        elif self.bus.nmt_state(self.node) == NmtState.STOPPED:
             action = (
                 "by its heartbeat it is NMT stopped, which ends SDO; look for another NMT master, "
                 "then open the bench (winchkit monitor), which makes it pre-operational"
@@ -265,5 +292,6 @@ class SdoNode:
         else:
             action = "check power, wiring, bit rate and node id"
         return NoReply(
-            f"{self.place(index, sub)}: no answer within {_TIMEOUT:g} s ({error}); {action}"
+            f"{self.place(index, sub)}: no answer within {self.bus.sdo_timeout:g} s ({error}); "
+            f"{action}"
         )

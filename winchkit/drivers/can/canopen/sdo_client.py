@@ -30,12 +30,19 @@ class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
     def __init__(self, request: int, reply: int, dictionary: Any, clock: Clock) -> None:
         super().__init__(request, reply, dictionary)
         self._arrived = event_of(clock)
+        self._replies = 0
+        self.answered_twice = 0
+        """Requests with more than one reply: of a second node, of another client's request, or
+        late."""
 
     def send_request(self, request: Any) -> None:
         self._arrived.clear()
+        self._replies = 0
         super().send_request(request)
 
     def on_response(self, can_id: int, data: Any, timestamp: float) -> None:
+        self._replies += 1
+        self.answered_twice += self._replies > 1
         super().on_response(can_id, data, timestamp)
         self._arrived.set()
 

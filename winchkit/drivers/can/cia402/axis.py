@@ -19,7 +19,7 @@ from winchkit.drivers.can.cia402.feedback import (
     Gathering,
     check_feedback,
 )
-from winchkit.drivers.can.cia402.mode_change import change_mode
+from winchkit.drivers.can.cia402.mode_change import change_mode, require_mode
 from winchkit.drivers.can.cia402.modes import MODES, Homing, Target, homing_state, status_words
 from winchkit.drivers.can.cia402.motor_position import MotorPosition
 from winchkit.drivers.can.cia402.profile_parameters import (
@@ -417,10 +417,7 @@ class Cia402Axis:
         file maps no target for it, NoReply, DeviceRefused; it then keeps the mode that it had.
         """
         drive = self._disabled_drive(f"change to {mode}")
-        if mode not in drive.modes:
-            raise NotPermitted(
-                f"{self.name}: the drive has no mode {mode}; it has {', '.join(drive.modes)}"
-            )
+        require_mode(self._node, drive.modes, mode)
         homed = self.homing is Homing.DONE
         commander = Commander(self.name, drive, self._node.node, mode, self._position.counter)
         before, previous = self._commander, self._mode.name

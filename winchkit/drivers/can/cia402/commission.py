@@ -133,6 +133,7 @@ def commission(
     if watch.acceleration and not MODES[mode].cyclic:
         # The drive's own ramps must not come in the way of those that the host makes.
         set_profile(node, servo, scale, acceleration=watch.acceleration)
+    node.require_alone()
     node.bus.nmt(_START, node.node)
     loss = host.reaction(None, options, seen=watch.seen_stopping)
     stops = watch.stops_on_nmt

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.modes import MODES, Target, mode_named, modes_of
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["change_mode", "rest_targets", "supported_modes"]
+__all__ = ["change_mode", "require_mode", "rest_targets", "supported_modes"]
 
 _MODE_TIME = 0.5
 """s: a drive changes its mode within some cycles of its control; as long as an SDO request may take
@@ -26,12 +28,24 @@ def supported_modes(node: SdoNode, servo: ServoSpec, wanted: str) -> tuple[str, 
     """
     supported = node.read_if_there(0x6502)
     there: tuple[str, ...] = modes_of(supported) if supported else servo.modes
-    if wanted not in there:
-        raise NotPermitted(
-            f"{node.place(0x6502)}: the drive has no mode {wanted}; it has "
-            f"{', '.join(there) or 'none'}; set motion_mode in the device file"
-        )
+    require_mode(node, there, wanted)
     return there
+
+
+def require_mode(node: SdoNode, there: Sequence[str], wanted: str) -> None:
+    """Raise NotPermitted for a mode that is not among a drive's, and say whose list that is."""
+    if wanted in there:
+        return
+    has = ", ".join(there) or "none"
+    if node.read_if_there(0x6502):
+        raise NotPermitted(
+            f"{node.place(0x6502)}: the drive has no mode {wanted}; it has {has}; choose one of "
+            "these (motion_mode in the device file)"
+        )
+    raise NotPermitted(
+        f"{node.place(0x6502)} does not say which modes the drive has, and its device file does "
+        f"not list {wanted}: modes = {has}; add it there if the manual has it"
+    )
 
 
 def rest_targets(node: SdoNode, mode: str) -> None:

@@ -7,6 +7,7 @@ Life guarding is the same exchange seen from the drive: where no poll comes for 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, MS, Mechanism, Silence
@@ -30,6 +31,10 @@ def guard_time(limit: float) -> float:
 class GuardingWatch(HeartbeatConsumer):
     """Supervises a node by its guarding replies, in place of its heartbeat."""
 
+    missing: ClassVar[str] = (
+        "the drive does not answer node guarding any more; check its power and the bus, and that "
+        "every adapter passes remote frames"
+    )
     replies: int = 0
     """Accepted so far."""
     stuck: int = 0
