@@ -16,6 +16,7 @@ from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.realtime import Request
 from winchkit.bench.control.release import NotReleased, ReleaseGuard
 from winchkit.bench.control.snapshot import Direction, Trip
+from winchkit.bench.drives.set_up_progress import Tell, to_stderr
 from winchkit.bench.homing import homing
 from winchkit.bench.lifecycle import (
     await_cycles,
@@ -86,6 +87,8 @@ class Bench(BenchConnection):
         Real-time settings: False, ``"try"`` or True.
     commissioning
         Whether the opening thread, and no other, may move it without a commissioning record.
+    tell
+        Takes lines on a set-up of drives that takes long; by default standard error.
     """
 
     def __init__(
@@ -98,6 +101,7 @@ class Bench(BenchConnection):
         serve: Callable[[Bench], Stations],
         realtime: Request = False,
         commissioning: bool = False,
+        tell: Tell = to_stderr,
     ) -> None:
         """Open it; raises every error of opening, with nothing left open."""
         super().__init__(
@@ -105,6 +109,7 @@ class Bench(BenchConnection):
             clock,
             ownership or own(spec, name or client_name()),
             separate=bool(realtime),
+            tell=tell,
         )
         self.not_commissioned = ""
         """Why nothing may move before it is commissioned; empty where it is."""

@@ -14,6 +14,7 @@ from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import Callback, ControlLoop
 from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
 from winchkit.bench.control.snapshot import BenchSnapshot
+from winchkit.bench.drives.set_up_progress import Tell, to_stderr
 from winchkit.bench.hardware import Wired, wire
 from winchkit.bench.lifecycle import await_feedback, await_sensors
 from winchkit.bench.ownership import Ownership
@@ -57,10 +58,18 @@ class BenchConnection(ABC):
         Of the bench, by this process; released at the close.
     separate
         Whether a process of its own reads the instruments that are not on CAN.
+    tell
+        Takes lines on a set-up of drives that takes long; by default standard error.
     """
 
     def __init__(
-        self, spec: BenchSpec, clock: Clock, ownership: Ownership, *, separate: bool = False
+        self,
+        spec: BenchSpec,
+        clock: Clock,
+        ownership: Ownership,
+        *,
+        separate: bool = False,
+        tell: Tell = to_stderr,
     ) -> None:
         """Open buses and devices; nothing is left open by an error. No cycle runs yet."""
         self.spec = spec
@@ -73,7 +82,7 @@ class BenchConnection(ABC):
             latch = LatchFile(spec.latch_file)
             stack.callback(latch.close)
             trips = latch.open()
-            self._wired: Wired = wire(spec, clock, stack, latch, separate=separate)
+            self._wired: Wired = wire(spec, clock, stack, latch, separate=separate, tell=tell)
             self.loop: ControlLoop = self._wired.loop
             self.loop.restore(trips)
             self.axes: Mapping[str, Cia402Axis] = self._wired.axes

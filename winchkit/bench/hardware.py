@@ -24,6 +24,7 @@ from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.snapshot import Direction, Phase, Trip
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
+from winchkit.bench.drives.set_up_progress import SetUpProgress, Tell, to_stderr
 from winchkit.bench.robot.wiring import line_profiles, robot_of_bench
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
@@ -93,9 +94,15 @@ class Wired:
 
 
 def wire(
-    spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile, *, separate: bool = False
+    spec: BenchSpec,
+    clock: Clock,
+    stack: ExitStack,
+    latch: LatchFile,
+    *,
+    separate: bool = False,
+    tell: Tell = to_stderr,
 ) -> Wired:
-    """Open all buses and lines; ``stack`` closes them.
+    """Open all buses and lines; ``stack`` closes them. ``tell`` takes lines on a long set-up.
 
     ``separate`` has the lines that are not CAN served by a process of their own, where the clock is
     the machine's.
@@ -127,7 +134,7 @@ def wire(
     stack.callback(slow.close)
     for name in latch.lost & axes.keys():
         axes[name].lose_position()
-    _commission(axes)
+    _commission(axes, clock, tell)
     tell_hardware(spec)
     _tell_notes(spec, axes, buses)
     winches = _winches(spec, axes, cables, sensors, profiles)
@@ -216,10 +223,11 @@ def _safe_length(profile: WinchProfile) -> float:
     return longest if math.isfinite(longest) else math.inf
 
 
-def _commission(axes: Mapping[str, Cia402Axis]) -> None:
+def _commission(axes: Mapping[str, Cia402Axis], clock: Clock, tell: Tell) -> None:
     """Set every drive up; undo what some did while the host was silent to all, to prove one."""
-    for axis in axes.values():
-        axis.commission()
+    progress = SetUpProgress(clock, len(axes), tell)
+    for name, axis in axes.items():
+        progress.set_up(name, axis)
     if any(axis.host.disturbs for axis in axes.values()):
         for axis in axes.values():
             axis.host.settle()

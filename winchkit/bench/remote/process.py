@@ -1,8 +1,9 @@
 """The bench process: owns a bench for the commands that attach to it, and ends after the last.
 
 ``python -m winchkit.bench.remote.process BENCH [EFFECTS ...]``, started by :func:`spawn`. It runs
-in a session of its own, without a terminal, and does nothing but the bench. Its first line on
-stdout says whether the bench is open, or the error that kept it from opening.
+in a session of its own, without a terminal, and does nothing but the bench. Its last line on
+stdout says whether the bench is open, or the error that kept it from opening; lines before it are
+the progress of an opening that takes long.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TextIO
 
+from winchkit.bench.drives.set_up_progress import to_stderr
 from winchkit.bench.ownership import log_path
 from winchkit.bench.remote.handover import own_or_find
 from winchkit.bench.remote.identity import client_name
@@ -36,7 +38,9 @@ _FIRST = 10.0
 _POLL = 0.02
 """s: the process ends that much later than it could."""
 _OWNED = "owned"
-"""In the first line: somebody else owns the bench; attach there."""
+"""In the last line: somebody else owns the bench; attach there."""
+_PROGRESS = "progress"
+"""In the lines before it."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +78,14 @@ def spawn(spec: BenchSpec, effects: Sequence[str] = ()) -> Spawned:
     ):
         assert process.stdout is not None, "it is a pipe"
         line = process.stdout.readline()
+        while line and _PROGRESS in (reply := json.loads(line)):
+            to_stderr(reply[_PROGRESS])
+            line = process.stdout.readline()
     return _spawned(spec, line)
 
 
 def _spawned(spec: BenchSpec, line: bytes) -> Spawned:
-    """The first line of a bench process, read."""
+    """The last line of a bench process, read."""
     if not line:
         message = f"the bench process ended without opening the bench; see {log_path(spec)}"
         return Spawned(error=ConnectionLost(message))
@@ -120,7 +127,14 @@ def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:
         return
     clock = MonotonicClock()
     spec = spec.with_effects(effects)
-    with Bench(spec, clock, name, ownership, serve=StationServer, realtime="try") as bench:
+
+    def tell(line: str) -> None:
+        to_stderr(line)
+        _write(report, {_PROGRESS: line})
+
+    with Bench(
+        spec, clock, name, ownership, serve=StationServer, realtime="try", tell=tell
+    ) as bench:
         bench.stations.may_hand_over = True
         _report(report, {"ok": True})
         _serve(bench)
@@ -145,11 +159,17 @@ def _detach() -> None:
 
 
 def _report(report: TextIO, reply: dict[str, object]) -> None:
-    """Write the first line, once."""
+    """Write the last line, once."""
     if report.closed:
         return
     with suppress(OSError), report:  # the client that waited may have gone
+        _write(report, reply)
+
+
+def _write(report: TextIO, reply: dict[str, object]) -> None:
+    with suppress(OSError):
         report.write(json.dumps(reply) + "\n")
+        report.flush()
 
 
 if __name__ == "__main__":

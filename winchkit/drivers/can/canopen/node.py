@@ -145,6 +145,8 @@ class SdoNode:
         self._sdo = sdo_client(remote, bus.clock)
         self._sdo.RESPONSE_TIMEOUT = bus.sdo_timeout
         self._lock = lock_of(bus.clock)
+        self.on_transfer: Callable[[], None] | None = None
+        """Called after each transfer, answered or not."""
         self._other_client = False
         """Whether somebody else has sent this node an SDO request."""
         bus.on_foreign(_SDO_REQUEST + node, self._hear_other_client)
@@ -243,14 +245,18 @@ class SdoNode:
 
     def _insist(self, transfer: Callable[[], Any]) -> Any:
         """Run a transfer; while the interface's queue is full, again after a pause."""
-        for _ in range(_FULL_TRIES):
-            try:
-                return transfer()
-            except (can.CanError, OSError) as error:
-                if not queue_full(error):
-                    raise
-                self.bus.clock.sleep(_FULL_PAUSE)
-        return transfer()
+        try:
+            for _ in range(_FULL_TRIES):
+                try:
+                    return transfer()
+                except (can.CanError, OSError) as error:
+                    if not queue_full(error):
+                        raise
+                    self.bus.clock.sleep(_FULL_PAUSE)
+            return transfer()
+        finally:
+            if self.on_transfer is not None:
+                self.on_transfer()
 
     def _number(self, index: int, sub: int, data: bytes) -> int:
         signed = self._variable(index, sub, len(data)).signed

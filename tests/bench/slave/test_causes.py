@@ -1,0 +1,156 @@
+"""Causes as they are told, each provoked on the independent slave."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from slave import Slave
+from slave.held_key import HeldKey
+from slave.rig import Rig, bench_text
+from slave.wire import GENERIC
+from slave_bench import served, write_bench
+from winchkit.bench.bench import Bench
+from winchkit.errors import DeviceRefused, NoReply, NotPermitted
+
+
+def _first_trip(rig: Rig, bench: Bench) -> str:
+    key = HeldKey(rig, bench).press()
+    rig.until(lambda: bool(bench.snapshot.tripped), within=3.0)
+    key.release()
+    return str(bench.snapshot.tripped[0])
+
+
+@pytest.mark.parametrize("factor", [-1.0, -0.5])
+def test_a_reversed_motor_is_called_one(tmp_path: Path, factor: float) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        rig.slaves[0].inject("follows wrongly", factor)
+        said = _first_trip(rig, bench)
+    assert "the motor turns against its command" in said
+    assert "reversed" in said
+    assert "slow down" not in said
+
+
+def test_a_drive_that_keeps_its_speed_is_not_called_reversed(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    with rig.opened() as bench:
+        key = HeldKey(rig, bench).press()
+        rig.wait(1.0)
+        rig.slaves[0].inject("rpdo unheard")
+        key.release()
+        rig.until(lambda: bool(bench.snapshot.tripped), within=3.0)
+        said = str(bench.snapshot.tripped[0])
+    assert "does not slow down as commanded" in said
+    assert "reversed" not in said
+
+
+@pytest.mark.parametrize(
+    ("mechanism", "said", "not_said"),
+    [
+        ("heartbeat", "the drive's heartbeat is gone", "guarding"),
+        ("guarding", "does not answer node guarding", "heartbeat"),
+    ],
+)
+def test_what_is_missing_of_a_drive_is_what_supervises_it(
+    tmp_path: Path, mechanism: str, said: str, not_said: str
+) -> None:
+    with served(write_bench(tmp_path, host_loss=mechanism)) as bench, bench.open() as opened:
+        bench.slave.inject("heartbeat lost")
+        found = _first_trip(bench.rig, opened)
+    assert said in found
+    assert not_said not in found
+
+
+def test_two_nodes_with_one_number_do_not_open(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    rig.wait(0.3)
+    slave = rig.slaves[0]
+    slave.inject("two nodes with one number")
+    with pytest.raises(DeviceRefused, match=r"node 1: two nodes have this number: \d+ requests"):
+        rig.open()
+    assert slave.network.state.name == "PRE_OPERATIONAL", "no PDO of either is in use"
+    slave.mend_all()
+    with rig.opened() as bench:
+        bench.winch["A"].move_by(pay_out=0.01)
+
+
+def test_two_nodes_of_which_one_is_slow_are_no_missing_answer(tmp_path: Path) -> None:
+    """The second answer comes after the next request: the client takes it for that request's."""
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    rig.wait(0.3)
+    slave = rig.slaves[0]
+    slave.inject("two nodes with one number")
+    assert slave.twin is not None
+    slave.twin.inject("sdo delayed", 0.003)
+    with pytest.raises(DeviceRefused, match="two nodes have this number"):
+        rig.open()
+
+
+def test_a_dead_drive_is_no_second_node(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    rig.slaves[0].inject("sdo unheard")
+    with pytest.raises(NoReply, match="check power, wiring, bit rate and node id"):
+        rig.open()
+
+
+@pytest.mark.parametrize("known", [0, None])
+def test_a_mode_that_only_the_device_file_leaves_out(tmp_path: Path, known: int | None) -> None:
+    """6502h is absent or 0: what the drive has is not known, and the message does not say it is."""
+    path = write_bench(tmp_path)
+    with served(path) as bench:
+        text = bench.device.read_text()
+        bench.device.write_text(re.sub(r"modes = \[.*?\]", 'modes = ["CSV"]', text, flags=re.S))
+        if known is None:
+            bench.slave.objects.remove(0x6502)
+        else:
+            bench.slave.objects.set(0x6502, 0, known)
+        with bench.open() as opened, pytest.raises(NotPermitted) as refused:
+            opened.winch["A"].home(35)
+    said = str(refused.value)
+    assert "its device file does not list HM" in said
+    assert "the drive has no mode" not in said
+
+
+def test_a_mode_that_the_drive_itself_lacks(tmp_path: Path) -> None:
+    with served(write_bench(tmp_path)) as bench:
+        supported = bench.slave.objects.get(0x6502, 0)
+        bench.slave.objects.set(0x6502, 0, supported & ~(1 << 5))
+        with (
+            bench.open() as opened,
+            pytest.raises(NotPermitted, match="the drive has no mode HM"),
+        ):
+            opened.winch["A"].home(35)
+
+
+def test_a_slow_opening_says_what_it_waits_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    rig.wait(0.3)
+    rig.slaves[0].inject("sdo delayed", 0.3)
+    begun = rig.time
+    with rig.opened():
+        took = rig.time - begun
+    assert took > 20.0
+    lines = re.findall(r"winch A .*: setting up drive 1 of 1: (\d+) SDO", capsys.readouterr().err)
+    assert len(lines) >= int(took / 6.0), "a line every 5 s, and one answer later"
+    rig.slaves[0].mend_all()
+    with rig.opened():
+        pass
+    assert "setting up" not in capsys.readouterr().err, "a quick opening says nothing"
+
+
+def test_the_time_for_an_answer_is_that_of_the_bench_file(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, [Slave.from_file(GENERIC, 1)])
+    rig.wait(0.3)
+    rig.slaves[0].inject("sdo delayed", 0.7)
+    text = bench_text(rig.channel)
+    with pytest.raises(NoReply, match=r"no answer within 0\.5 s"):
+        rig.open(text)
+    rig.wait(2.0)
+    with rig.opened(text.replace("heartbeat =", 'sdo_timeout = "1 s"\nheartbeat =')) as bench:
+        rig.slaves[0].mend_all()
+        bench.winch["A"].move_by(pay_out=0.01)
