@@ -212,6 +212,13 @@ def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None
         assert bench.snapshot.at_rest
         with pytest.raises(NotPermitted, match="release it for"):
             station.jog("A", pay_out=0.2)
+        late = attach(bench.spec)
+        assert late is not None
+        late.jog("A", pay_out=0.2)
+        until(lambda: bench.winch["A"].snapshot.cable_speed > 0.1)
+        late.release("A")
+        late.close()
+        until(lambda: bench.snapshot.at_rest)
         assert other.end_log() > 5
         assert abs(station.tare(None)) < 8
         with pytest.raises(UsageError, match="no winch 'Z'"):

@@ -301,7 +301,7 @@ class Bench(BenchConnection):
         refused: NotReleased | None = None
         if held:
             try:
-                self._release.ask(winch, self.clock.now())
+                self._release.ask(winch, self.commanders.actor, self.clock.now())
             except NotReleased as error:
                 refused = error
         self.raise_trouble()

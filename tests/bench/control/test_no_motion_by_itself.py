@@ -252,11 +252,23 @@ def test_a_recorder_that_fails_is_a_warning_and_stops_nothing() -> None:
 def test_a_held_command_never_counts_again_before_it_was_released(gaps: list[float]) -> None:
     """Whatever the key's repeat rate, the delay of its first repeat (0.7 s) included."""
     guard, now = ReleaseGuard(), 10.0
-    guard.ask("A", now)
+    guard.ask("A", "key", now)
     guard.close({"A", "B"})
     for gap in gaps:
         now += gap
         with pytest.raises(NotReleased):
-            guard.ask("A", now)
-    guard.ask("A", now + 0.81)
-    guard.ask("B", now)
+            guard.ask("A", "key", now)
+        guard.ask("A", "a command that was started after the stop", now)
+    guard.ask("A", "key", now + 0.81)
+    guard.ask("B", "key", now + 0.81)
+
+
+def test_what_was_held_before_a_long_reset_is_held_after_it() -> None:
+    guard = ReleaseGuard()
+    guard.ask("A", "key", 10.0)
+    guard.close({"A"})
+    guard.resume(10.1, 15.0)
+    with pytest.raises(NotReleased):
+        guard.ask("A", "key", 15.7)
+    guard.ask("A", "another", 15.7)
+    guard.ask("A", "key", 16.6)

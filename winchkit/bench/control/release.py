@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Collection, Hashable
+
 from winchkit.bench.control.dead_man import RELEASE
 from winchkit.errors import NotPermitted
 
@@ -13,35 +16,42 @@ class NotReleased(NotPermitted):
 
 
 class ReleaseGuard:
-    """Distinguishes a new held command from one held already when everything stopped."""
+    """Distinguishes a new held command from one held already when everything stopped.
+
+    Whoever holds is a client: a command that is started anew is another one, which holds nothing.
+    """
 
     def __init__(self) -> None:
         """Begin without a stop."""
-        self._asked: dict[str, float] = {}
-        self._closed: set[str] = set()
+        self._asked: dict[tuple[str, Hashable], float] = {}
+        self._closed: set[tuple[str, Hashable]] = set()
+        self._lock = threading.RLock()
 
-    def close(self, winches: set[str]) -> None:
-        """Require a release of these winches, which were stopped or reset."""
-        self._closed |= winches
+    def close(self, winches: Collection[str]) -> None:
+        """Require a release of these winches, which were stopped or reset, by who holds them."""
+        with self._lock:
+            self._closed |= {key for key in self._asked if key[0] in winches}
 
     def resume(self, start: float, ended: float) -> None:
         """What was held when a reset began (s) is held when it has ended, unless it is released.
 
         Whoever resets may be the one who holds, and asks for nothing meanwhile.
         """
-        for winch, last in self._asked.items():
-            if start - last < RELEASE:
-                self._asked[winch] = max(last, ended)
+        with self._lock:
+            for key, last in self._asked.items():
+                if start - last < RELEASE:
+                    self._asked[key] = max(last, ended)
 
-    def ask(self, winch: str, now: float) -> None:
+    def ask(self, winch: str, client: Hashable, now: float) -> None:
         """Note a request at ``now`` (s); raises NotReleased where a release has to come first."""
-        last = self._asked.get(winch)
-        self._asked[winch] = now
-        if winch not in self._closed:
-            return
-        if last is not None and now - last < RELEASE:
+        key = (winch, client)
+        with self._lock:
+            self._asked = {one: last for one, last in self._asked.items() if now - last < RELEASE}
+            self._closed &= self._asked.keys()
+            self._asked[key] = now
+            held = key in self._closed
+        if held:
             raise NotReleased(
                 f"winch {winch} was stopped or reset while this command was held; release it for "
                 f"{RELEASE:g} s before moving the winch again"
             )
-        self._closed.discard(winch)
