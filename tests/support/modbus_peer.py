@@ -23,6 +23,16 @@ class Peer:
     """Unit, function, address, count or value."""
     written: Callable[[Peer, int, int], None] = lambda _peer, _address, _value: None
     """Called with every register that is written."""
+    transaction: Callable[[int], int] = lambda number: number
+    """Transaction of an answer, of that of its request."""
+    answers_as: int | None = None
+    """Unit in its answers; None for that of the request."""
+    copies: int = 1
+    """How often each answer is sent."""
+    apart: float = 0.0
+    """Between two copies of an answer, s."""
+    closes: bool = False
+    """Whether it closes the connection after each answer."""
     connections: int = 0
     port: int = 0
     _loop: asyncio.AbstractEventLoop = field(default_factory=asyncio.new_event_loop)
@@ -82,7 +92,14 @@ class Peer:
         self, writer: asyncio.StreamWriter, transaction: int, unit: int, delay: float, pdu: bytes
     ) -> None:
         await asyncio.sleep(delay)
-        writer.write(struct.pack(">HHHB", transaction, 0, len(pdu) + 1, unit) + pdu)
+        unit = unit if self.answers_as is None else self.answers_as
+        head = struct.pack(">HHHB", self.transaction(transaction), 0, len(pdu) + 1, unit)
+        for copy in range(self.copies):
+            if copy and self.apart:
+                await asyncio.sleep(self.apart)
+            writer.write(head + pdu)
+        if self.closes:
+            writer.close()
 
     def _answer(self, unit: int, pdu: bytes) -> bytes:
         function, address, number = struct.unpack_from(">BHH", pdu)

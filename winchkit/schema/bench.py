@@ -29,7 +29,7 @@ from winchkit.schema.robot_bench import RobotWiring
 from winchkit.schema.table import Rule, Table
 from winchkit.units import suggest
 
-__all__ = ["BenchSpec", "BusSpec", "DeviceRef", "LimitSpec", "WinchWiring"]
+__all__ = ["BenchSpec", "BusSpec", "Deviation", "DeviceRef", "LimitSpec", "WinchWiring"]
 
 NEEDED_BY_BUS: dict[str, tuple[str, ...]] = {
     "can": ("interface", "channel"),
@@ -37,6 +37,9 @@ NEEDED_BY_BUS: dict[str, tuple[str, ...]] = {
     "modbus-tcp": ("host", "port"),
     "serial": ("port",),
 }
+
+
+Deviation = Literal["other-unit", "transaction-0", "answers-twice", "closes"]
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,9 @@ class BusSpec(Table):
         float,
         Quantity("time", 1e-3, 10.0, why="a later answer is too old for control"),
     ] = 0.2
+    deviations: tuple[Deviation, ...] = ()
+    """Deviations of the only device of a modbus-tcp bus that are accepted: it answers as another
+    unit, with transaction 0, twice, or closes the connection after each answer."""
 
     def rules(self) -> Iterator[Rule]:
         """Each kind of bus needs its own keys."""
@@ -87,6 +93,14 @@ class BusSpec(Table):
                     yield key, "missing; the interface socketcand needs that of its daemon"
         if self.kind == "modbus-tcp" and isinstance(self.port, str):
             yield "port", f"'{self.port}' is not a TCP port; write a number such as 502"
+        if self.deviations and self.kind != "modbus-tcp":
+            yield "deviations", "are those of a modbus-tcp bus"
+        if {"transaction-0", "answers-twice"} <= set(self.deviations):
+            yield (
+                "deviations",
+                "transaction-0 and answers-twice exclude each other: a second answer could not be "
+                "distinguished from the answer to the next request",
+            )
 
 
 @dataclass(frozen=True)

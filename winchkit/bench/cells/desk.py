@@ -53,11 +53,11 @@ class Shared(Protocol):
 
 @runtime_checkable
 class Noting(Protocol):
-    """A line that may have a note about its port."""
+    """A line that may have a note about its port or its device."""
 
     @property
     def note(self) -> str:
-        """Remark on the port; empty where there is none."""
+        """Remark on the port or the device; empty where there is none."""
 
 
 @runtime_checkable

@@ -22,7 +22,7 @@ def to_stderr(line: str) -> None:
 
 
 class SetUpProgress:
-    """Says after 2 s, and then every 5 s, which drive is being set up, and with how many answers."""
+    """Says after 2 s, and then every 5 s, which drive is being set up, and the answers so far."""
 
     def __init__(self, clock: Clock, count: int, tell: Tell) -> None:
         """Begin with none of ``count`` drives."""

@@ -36,7 +36,6 @@ from winchkit.drivers.publisher import Publisher, Sampled
 from winchkit.drivers.reading import Quality, Reading, Sensor
 from winchkit.drivers.slow import SlowDevices
 from winchkit.drivers.stream.instrument import StreamInstrument
-from winchkit.drivers.stream.line import StreamLine
 from winchkit.errors import ConnectionLost, WinchkitError, class_name
 
 __all__ = ["main"]
@@ -239,7 +238,7 @@ class _RequestHandler:
         if operation == "time_of":
             return line.time_of(sensor)
         if operation == "note":
-            return line.note if isinstance(line, StreamLine) else ""
+            return line.note
         name, may_store = given
         if not isinstance(sensor, Instrument) or not may_store:
             return self._slow.command(sensor, name)

@@ -22,6 +22,7 @@ from pymodbus.exceptions import ModbusException
 from pymodbus.pdu import ExceptionResponse
 
 from winchkit.drivers.modbus import transactions
+from winchkit.drivers.modbus.deviations import Deviations
 from winchkit.drivers.modbus.frames import AnswerGate, Event
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
@@ -30,6 +31,8 @@ from winchkit.schema.devices.modbus import ReadBlock
 
 __all__ = ["ModbusClient"]
 
+_CLOSES = 3
+"""Connections in a row that end after one answer: a line that fails does not do so thrice."""
 _NEVER = 1 << 30
 """The library closes a connection after so many unanswered requests: here one silent unit does not
 close the line of others."""
@@ -66,6 +69,13 @@ class ModbusClient:
         self.name = name
         self._spec = spec
         self._client: AsyncModbusTcpClient | AsyncModbusSerialClient | None = None
+        self.deviations = Deviations(name, spec.deviations)
+        """What the device does otherwise than Modbus TCP has it."""
+        self._closes = "closes" in spec.deviations
+        self._reached = False
+        """Of a device that closes each connection: whether the newest could be opened."""
+        self._answers = self._closed_early = 0
+        """Good answers on this connection; connections in a row that ended after the first."""
         self._gate: AnswerGate | TcpAnswerGate = AnswerGate()
         self._known = 0
         self._lost: asyncio.Future[None] | None = None
@@ -88,11 +98,14 @@ class ModbusClient:
         if self._gate.broken and self._client is not None:
             self.replaced = True
             self.close()
-        return self._client is not None and bool(self._client.connected)
+        return self._reached if self._closes else self._is_open
 
     async def connect(self) -> None:
         """Open the line anew, so that nothing of an old one remains; raises ConnectionLost."""
+        self._look_at_end()
         self.close()
+        self._reached = False
+        self._answers = 0
         self._gate = self._new_gate()
         self._known = 0
         try:
@@ -108,6 +121,7 @@ class ModbusClient:
         # is the seed, so that a bench in simulated time repeats.
         seed = asyncio.get_running_loop().time()
         client.ctx.next_tid = Random(seed).randrange(1, transactions.LAST)
+        self._reached = True
 
     def close(self) -> None:
         """Close the line."""
@@ -127,7 +141,7 @@ class ModbusClient:
 
     async def read(self, unit: int, block: ReadBlock, count: int) -> list[int]:
         """Exactly ``count`` registers; raises NoReply, DeviceRefused, ConnectionLost."""
-        client = self._open()
+        client = await self._open()
         self._number(client)
         ask = client.read_holding_registers if block.function == 3 else client.read_input_registers
         reply = await self._exchange(unit, ask(block.start, count=count, device_id=unit))
@@ -135,7 +149,7 @@ class ModbusClient:
 
     async def write(self, unit: int, register: int, words: Sequence[int], *, many: bool) -> None:
         """Write registers, with function 16 where ``many``; raises as :meth:`read`."""
-        client = self._open()
+        client = await self._open()
         self._number(client)
         if many:
             await self._exchange(
@@ -164,6 +178,9 @@ class ModbusClient:
         finally:
             waiting.cancel()
             await asyncio.wait((waiting,))
+            if self._closes:
+                self.close()
+        self._answers += 1
         if isinstance(reply, ExceptionResponse):
             self.refusal = code = reply.exception_code
             raise DeviceRefused(
@@ -176,7 +193,8 @@ class ModbusClient:
         old = self._gate
         if self._spec.kind != "modbus-tcp":
             return AnswerGate()
-        return TcpAnswerGate(old if isinstance(old, TcpAnswerGate) else None)
+        before = old if isinstance(old, TcpAnswerGate) else None
+        return TcpAnswerGate(before, self.deviations)
 
     def _trace(self, gate: AnswerGate | TcpAnswerGate, sending: bool, data: bytes) -> bytes:
         """Stand between pymodbus and the line; it hands over all that it has not used yet."""
@@ -220,15 +238,35 @@ class ModbusClient:
             trace_packet=partial(self._trace, self._gate),
         )
 
-    def _open(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+    @property
+    def _is_open(self) -> bool:
+        return self._client is not None and bool(self._client.connected)
+
+    def _look_at_end(self) -> None:
+        """Note a device that ended its connections after the first answer, again and again."""
+        if self._client is None or self._is_open or self._spec.kind != "modbus-tcp":
+            return
+        self._closed_early = self._closed_early + 1 if self._answers == 1 else 0
+        if self._closed_early >= _CLOSES:
+            self.deviations.note("closes", "closes the connection after each answer")
+
+    async def _open(self) -> AsyncModbusTcpClient | AsyncModbusSerialClient:
+        if self._closes and not self._is_open:
+            await self.connect()
         if not self.connected or self._client is None:
-            raise ConnectionLost(f"{self.where}: the line is closed; it is opened again by itself")
+            self._look_at_end()
+            why = self.deviations.words or "the line is closed; it is opened again by itself"
+            raise ConnectionLost(f"{self.where}: {why}")
         return self._client
 
     def _failed(self, unit: int, error: Exception, came: bool) -> ConnectionLost:
         if self._client is None or not self._client.connected:
-            return ConnectionLost(f"{self.where}: connection lost: {error}")
+            self._look_at_end()
+            why = self.deviations.words
+            return ConnectionLost(f"{self.where}: {why or f'connection lost: {error}'}")
         place, time = f"{self.where} unit {unit}", f"{self._spec.timeout:g} s"
+        if came and self.deviations.words:
+            return NoReply(f"{place}: {self.deviations.words}")
         if came:
             return NoReply(
                 f"{place}: no valid answer within {time}, only what is damaged or answers "

@@ -100,6 +100,11 @@ class ModbusLine:
         """How long a reading of an instrument keeps the line busy, s."""
         return self._share.time_of(self._place(sensor))
 
+    @property
+    def note(self) -> str:
+        """What its device does otherwise than Modbus TCP has it; empty without a finding."""
+        return self._client.deviations.words
+
     def close(self) -> None:
         """Close the line and poll no more."""
         self._closing = True
@@ -148,9 +153,10 @@ class ModbusLine:
 
     def _share_out(self) -> None:
         """Give every instrument the rate that is to be expected."""
+        tagged = self._spec.kind == "modbus-tcp" and "transaction-0" not in self._spec.deviations
         for item, rate in zip(self.sensors, self._share.rates, strict=True):
             item.on_line(
                 1 / rate,
                 wire_times(item.decoder.spec, self._spec),
-                tagged=self._spec.kind == "modbus-tcp",
+                tagged=tagged,
             )

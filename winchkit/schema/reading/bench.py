@@ -60,9 +60,26 @@ def bench(
             reading.fault(at, f"no such file of effects: {file}; paths start at this file's folder")
     if spec is not None and not spec.winch:
         reading.fault(("winch",), "a bench has at least one winch, in a table [winch.NAME]")
+    if spec is not None:
+        _check_deviations(reading, spec)
     if spec is not None and spec.robot is not None:
         _check_robot(reading, spec, spec.robot, read_robot)
     return spec
+
+
+def _check_deviations(reading: Reading, spec: BenchSpec) -> None:
+    """Whose answers do not name their request is the only device on its bus."""
+    for name, bus in spec.bus.items():
+        units = {
+            ref.unit or 1
+            for winch in spec.winch.values()
+            for role in ROLES
+            if (ref := getattr(winch, role)) is not None and ref.bus == name
+        }
+        if bus.deviations and len(units) > 1:
+            listed = ", ".join(map(str, sorted(units)))
+            message = f"need a device that is alone on its bus; this one has the units {listed}"
+            reading.fault(("bus", name, "deviations"), message)
 
 
 def _check_robot(
