@@ -494,6 +494,15 @@ def _warnings(reading: Reading, value: Declared) -> tuple[Fault, ...]:
             if isinstance(line.winch, WinchProfile)
         ]
         return tuple(fault for winch, at in inline for fault in _guide_warnings(reading, winch, at))
+    if isinstance(value, DeviceSpec) and value.modbus is not None:
+        return tuple(
+            reading.source.fault(("modbus", key, "start"), message)
+            for key, block in (
+                ("read", value.modbus.read),
+                ("status_read", value.modbus.status_read),
+            )
+            if block is not None and (message := block.doubt)
+        )
     return ()
 
 

@@ -50,6 +50,43 @@ def test_every_device_that_we_ship_is_in_order(name: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("unit", "example"),
+    [
+        ("increments/s", "100 rpm are 109226.667 of 606Ch"),
+        ("0.1 counts/s", "100 rpm are 1092266.67 of 606Ch"),
+        ("counts / 65536 / 250 us", "100 rpm are 1789569.71 of 606Ch"),
+        ("1875 rpm / 512 / encoder", "100 rpm are 1789569.71 of 606Ch"),
+    ],
+)
+def test_the_units_of_a_device_file_are_told_by_an_example(
+    tmp_path: Path, unit: str, example: str
+) -> None:
+    """Of 65 536 increments a turn."""
+    path = drive(tmp_path, device=('speed_unit = "increments/s"', f'speed_unit = "{unit}"'))
+    code, output = check(path)
+    assert code == 0, output
+    assert f"a motor turn is 65536 of 6064h, {example} ({unit})" in output
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('speed_unit = "0.1 knots"', "unknown unit 'knots'"),
+        ('speed_unit = "deg"', "is no angle per time"),
+        ('position_unit = "0.1 deg"', 'needs units = "file"'),
+        ('units = "file"\nposition_unit = "turn"', "has 1 position units, too few to move by"),
+    ],
+)
+def test_a_unit_that_cannot_be_is_a_fault_of_the_device_file(
+    tmp_path: Path, line: str, said: str
+) -> None:
+    path = drive(tmp_path, device=('speed_unit = "increments/s"', line))
+    code, output = check(path)
+    assert code == 3
+    assert said in output
+
+
+@pytest.mark.parametrize(
     ("device", "eds", "place", "said"),
     [
         (('"0x6041", ', '"0x5041", '), ("", ""), "0x5041", "0x5041 is not in the EDS"),
@@ -268,7 +305,9 @@ def test_guarding_is_refused_where_the_adapter_sends_no_remote_frames(tmp_path: 
     bench = bench_of(tmp_path)
     assert check(path)[0] == 0
     assert check(bench)[0] == 0
-    text = bench.read_text(encoding="utf-8").replace('"virtual"', '"socketcand"')
+    text = bench.read_text(encoding="utf-8").replace(
+        '"virtual"', '"socketcand"\nhost = "127.0.0.1"\nport = 29536'
+    )
     bench.write_text(text, encoding="utf-8")
     code, output = check(bench)
     assert code == 3

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import pi
 from typing import TYPE_CHECKING
 
+from winchkit.errors import Fault, NotPermitted
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.simbench import SimBench
 
 if TYPE_CHECKING:
-    from winchkit.errors import Fault
+    from winchkit.schema.devices.servo import ServoSpec
 
 __all__ = ["DriveReport", "report_of"]
+
+_EXAMPLE = 100.0
+"""rpm: a speed of which the number is easily compared with the manual's."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +45,31 @@ def report_of(value: object) -> DriveReport:
         return DriveReport(instrument.faults, instrument.warnings)
     report = check_drive(value)
     ways = ", ".join(f"{one.way} ({one.reaction})" for one in report.host_loss)
-    return DriveReport(
-        report.faults, report.warnings, (f"loss of the host, by the EDS: {ways or 'no way'}",)
+    faults, details = report.faults, [f"loss of the host, by the EDS: {ways or 'no way'}"]
+    if value.servo is not None:
+        try:
+            details.append(_units_of(value.servo))
+        except NotPermitted as error:
+            faults = (*faults, Fault(str(error), value.path))
+    return DriveReport(faults, report.warnings, tuple(details))
+
+
+def _units_of(servo: ServoSpec) -> str:
+    """An example of the units of a device file, to be compared with the manual."""
+    from winchkit.drivers.can.cia402.units import Units, scale_of
+
+    scale = scale_of(Units(), servo)
+    turn, speed = 2 * pi / scale.angle, _EXAMPLE * 2 * pi / 60 / scale.velocity
+    unless = "" if servo.units == "file" else ", unless its objects 608Fh to 60A9h say otherwise"
+    return (
+        f"units: a motor turn is {turn:.9g} of 6064h, {_EXAMPLE:g} rpm are {speed:.9g} of 606Ch "
+        f"({servo.speed_unit}){unless}"
     )
 
 
 def _not_commissioned(spec: BenchSpec) -> list[Fault]:
     """Items of the commissioning record that are not valid, of a bench with real drives."""
     from winchkit.bench.commissioning.validity import is_simulated, stale_items
-    from winchkit.errors import Fault
 
     if is_simulated(spec):
         return []
@@ -67,7 +88,6 @@ def _of_bench(spec: BenchSpec) -> DriveReport:
         check_process,
         host_loss_problem,
     )
-    from winchkit.errors import Fault
     from winchkit.schema.read import load
 
     faults: dict[Fault, None] = {}

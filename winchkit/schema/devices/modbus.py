@@ -85,6 +85,10 @@ class FieldSpec(Table):
     """Counts are divided by ten to this power, which is read from the device."""
 
 
+_NUMBERED, _NUMBERS = {40_001: 3, 30_001: 4}, 9_999
+"""Number of address 0 in the notation of many manuals, by function; and how many there are."""
+
+
 @dataclass(frozen=True)
 class ReadBlock(Table):
     """Registers that are read in one query, so that they are consistent."""
@@ -100,6 +104,18 @@ class ReadBlock(Table):
     def end(self) -> int:
         """The address behind the last one."""
         return self.start + self.count
+
+    @property
+    def doubt(self) -> str:
+        """Why the start is likely a register's number of a manual; empty where it is not."""
+        for first, function in _NUMBERED.items():
+            if first <= self.start < first + _NUMBERS:
+                return (
+                    f"{self.start} looks like a register's number, of which the leading digit is "
+                    f"the kind: write start = {self.start - first}, function = {function}, and the "
+                    f"other registers less {first} too, unless the manual calls it an address"
+                )
+        return ""
 
 
 @dataclass(frozen=True)

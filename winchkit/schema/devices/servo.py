@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from winchkit.schema.devices.drive_unit import DriveUnit
 from winchkit.schema.host_loss import VendorWatchdog, unknown_mechanism
 from winchkit.schema.quantity import Duration, Flag, Quantity, Whole, WholeNumber
 from winchkit.schema.table import Rule, Table
@@ -129,8 +130,14 @@ class ServoSpec(Table):
     position_wraps: tuple[Count, Count] | None = None
     """Lowest and highest count of 6064h before it wraps around, where that is not the range of 32
     bits."""
-    speed_unit: Literal["increments/s", "rpm", "0.1 rpm"] = "increments/s"
-    """Of 606Ch, 60FFh, 6081h and, per second, of 6083h to 6085h, where 60A9h is missing."""
+    position_unit: Annotated[str, DriveUnit("position")] | None = None
+    """Of 6064h and 607Ah, with ``units = "file"``; by default ``turn / encoder``. A product such as
+    ``0.1 deg``, where ``encoder`` is ``increments_per_turn``."""
+    speed_unit: Annotated[str, DriveUnit("speed")] = "increments/s"
+    """Of 606Ch, 60FFh, 6081h and, per second, of 6083h to 6085h, where 60A9h is missing. A product
+    such as ``0.1 rpm``, ``0.1 counts/s``, ``counts / 65536 / 250 us`` or
+    ``1875 rpm / 512 / encoder``: ``increments`` (or ``counts``) are units of 6064h, ``encoder`` is
+    608Fh or ``increments_per_turn``."""
     units: Literal["drive", "file"] = "drive"
     """Source of units: the drive's 608Fh, 6091h, 6092h, 60A8h and 60A9h, or this file, for drives
     that do not use the values of these objects."""
@@ -156,5 +163,11 @@ class ServoSpec(Table):
         """The mechanism of detecting a host loss is a known one; counts wrap upwards."""
         if self.position_wraps is not None and self.position_wraps[0] >= self.position_wraps[1]:
             yield "position_wraps", "the lowest count is not below the highest"
+        if self.position_unit is not None and self.units != "file":
+            yield (
+                "position_unit",
+                'needs units = "file": with units = "drive" the unit is that of 608Fh, 6091h, 6092h'
+                " and 60A8h",
+            )
         if wrong := unknown_mechanism(self.host_loss, tuple(self.vendor_watchdog)):
             yield "host_loss", wrong

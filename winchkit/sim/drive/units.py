@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 
+from winchkit.schema.devices.drive_unit import product_of
 from winchkit.schema.devices.servo import ServoSpec
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 
@@ -47,12 +48,17 @@ def units_of(objects: ObjectDictionary, servo: ServoSpec) -> Units:
         return objects.number(index, 0, 0) if by_drive else 0
 
     gear = ratio(0x6091) or 1.0
-    per_shaft_turn = ratio(0x6092) or ratio(0x608F) or float(servo.increments_per_turn)
-    angle = _angle_of(code(0x60A8)) or _TURN / per_shaft_turn
-    declared = {"increments/s": angle * gear, "rpm": _TURN / 60, "0.1 rpm": _TURN / 600}
-    speed = _speed_of(code(0x60A9))
+    encoder = ratio(0x608F) or float(servo.increments_per_turn)
+    angle = _angle_of(code(0x60A8)) or _TURN / (ratio(0x6092) or encoder)
+    if servo.position_unit is not None:
+        said = product_of(servo.position_unit, "position")
+        angle = said.factor * encoder**said.encoder * (_TURN / encoder) ** said.increments
+    speed = gear * _speed_of(code(0x60A9))
+    if not speed:
+        said = product_of(servo.speed_unit, "speed")
+        speed = said.factor * encoder**said.encoder * (angle * gear) ** said.increments
     rated = objects.number(0x6076, 0, 0) * 1e-3 or servo.rated_torque
-    return Units(angle * gear, speed * gear if speed else declared[servo.speed_unit], rated * 1e-3)
+    return Units(angle * gear, speed, rated * 1e-3)
 
 
 def _angle_of(code: int) -> float:

@@ -100,8 +100,56 @@ def test_a_linear_unit_reports_nothing_and_the_file_counts() -> None:
     ("unit", "velocity"), [("rpm", RPM), ("0.1 rpm", RPM / 10), ("increments/s", math.pi / 5000)]
 )
 def test_speed_units_of_a_device_file(unit: str, velocity: float) -> None:
-    servo = ServoSpec("x.eds", ("CSV",), increments_per_turn=10_000, speed_unit=unit)  # type: ignore[arg-type]
+    servo = ServoSpec("x.eds", ("CSV",), increments_per_turn=10_000, speed_unit=unit)
     assert scale_of(Units(), servo).velocity == pytest.approx(velocity)
+
+
+@pytest.mark.parametrize(
+    ("unit", "counts"),
+    [
+        ("0.1 counts/s", 10_000 / 6 * 10),
+        ("0.1 increments/s", 10_000 / 6 * 10),
+        ("counts / 65536 / 250 us", 10_000 / 6 * 65536 * 250e-6),
+        ("counts/2^16/1 ms", 10_000 / 6 * 65.536),
+        ("1875 rpm / 512 / encoder", 10 * 512 * 10_000 / 1875),
+        ("rpm * 1875 / 512 / encoder", 10 * 512 * 10_000 / 1875),
+        ("1e-3 turn/s", 1000 / 6),
+        ("mrad/s", 1000 * 2 * math.pi / 6),
+        ("6 deg/s", 10.0),
+        ("turn / min", 10.0),
+    ],
+)
+def test_a_speed_unit_is_any_product(unit: str, counts: float) -> None:
+    """The number that a drive of 10 000 increments a turn shows at 10 rpm, worked by hand."""
+    servo = ServoSpec("x.eds", ("CSV",), increments_per_turn=10_000, speed_unit=unit)
+    assert 10 * RPM / scale_of(Units(), servo).velocity == pytest.approx(counts, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "counts"),
+    [
+        ("0.1 deg", 3600),
+        ("turn / 8192", 8192),
+        ("10 counts", 1000),
+        ("turn / encoder / 4", 40_000),
+        ("mrad", 2000 * math.pi),
+    ],
+)
+def test_a_position_unit_is_any_product(unit: str, counts: float) -> None:
+    servo = ServoSpec(
+        *("x.eds", ("CSV",)), increments_per_turn=10_000, units="file", position_unit=unit
+    )
+    scale = scale_of(Units(encoder=7.0, feed=3.0), servo)
+    assert 2 * math.pi / scale.angle == pytest.approx(counts)
+    assert scale.velocity == pytest.approx(scale.angle), "increments are units of 6064h"
+
+
+def test_the_encoder_of_a_speed_unit_is_the_drives_where_it_says_it() -> None:
+    servo = ServoSpec(
+        *("x.eds", ("CSV",)), increments_per_turn=10_000, speed_unit="1875 rpm / 512 / encoder"
+    )
+    found = scale_of(Units(encoder=4096.0), servo).velocity
+    assert found == pytest.approx(1875 * RPM / 512 / 4096)
 
 
 def test_objects_that_stand_at_one_are_refused_and_the_file_can_overrule_them() -> None:

@@ -7,6 +7,7 @@ from math import isfinite, nan, pi
 
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.errors import NotPermitted
+from winchkit.schema.devices.drive_unit import product_of
 from winchkit.schema.devices.servo import ServoSpec
 
 __all__ = ["Scale", "Units", "read_scale", "read_units", "scale_of"]
@@ -128,22 +129,35 @@ def scale_of(units: Units, servo: ServoSpec) -> Scale:
     """
     said = units if servo.units == "drive" else Units()
     gear = said.gear or 1.0
+    encoder = said.encoder or float(servo.increments_per_turn)
     named = _rotary(said.position, per_time=False)
     if named is not None:
         angle = named * gear
+    elif servo.position_unit is not None:
+        angle = _declared(servo.position_unit, "position", _TURN / encoder, encoder)
     else:
-        per_shaft_turn = said.feed or said.encoder or float(servo.increments_per_turn)
-        angle = _TURN * gear / per_shaft_turn
+        angle = _TURN * gear / (said.feed or encoder)
     if not 0 < angle <= _TURN / _COARSEST:
+        by, correct = "608Fh, 6091h and 6092h", 'them, or set servo.units = "file"'
+        if servo.units == "file":
+            by, correct = "its device file", "position_unit or increments_per_turn"
         raise NotPermitted(
-            f"by 608Fh, 6091h and 6092h a motor turn has {_TURN / angle:g} position units, too few "
-            'to move by; correct them, or set servo.units = "file" in the device file'
+            f"by {by} a motor turn has {_TURN / angle:g} position units, too few to move by; "
+            f"correct {correct} in the device file"
         )
-    declared = {"increments/s": angle, "rpm": _TURN / 60, "0.1 rpm": _TURN / 600}
     speed = _rotary(said.velocity, per_time=True)
-    velocity = declared[servo.speed_unit] if speed is None else speed * gear
+    if speed is not None:
+        velocity = speed * gear
+    else:
+        velocity = _declared(servo.speed_unit, "speed", angle, encoder)
     torque = (units.rated_torque or servo.rated_torque) * _PER_MILLE
     return Scale(angle, velocity, torque, (units.rated_current or nan) * _PER_MILLE)
+
+
+def _declared(text: str, of: str, increment: float, encoder: float) -> float:
+    """SI value of a unit of a device file, by the angle of an increment (rad)."""
+    unit = product_of(text, of)
+    return float(unit.factor * increment**unit.increments * encoder**unit.encoder)
 
 
 def read_scale(node: SdoNode, servo: ServoSpec) -> Scale:
