@@ -162,3 +162,65 @@ def test_what_cannot_be_saved_leaves_what_was_there(
             recover(source, target, replace=True)
     assert target.read_bytes() == b"what was there"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "saved.mcap"]
+
+
+def _joined(folder: Path, suffix: str, share: float) -> Path:
+    """Two logs in one file, of the first a share."""
+    written(folder / f"a.{suffix}", duration=1.0)
+    written(folder / f"b.{suffix}", duration=2.0)
+    first = (folder / f"a.{suffix}").read_bytes()
+    path = folder / f"both.{suffix}"
+    path.write_bytes(
+        first[: int(share * len(first))] + (folder / f"b.{suffix}").read_bytes(),
+    )
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["mcap", "csv"])
+@pytest.mark.parametrize("share", [1.0, 0.7, 0.65])
+def test_logs_that_were_joined_are_both_recovered(
+    tmp_path: Path, suffix: str, share: float
+) -> None:
+    path = _joined(tmp_path, suffix, share)
+    with pytest.raises(RunError, match=r"another log was joined to it.*winchkit log recover"):
+        read_run(path)
+    found = recover(path)
+    (other,) = found.further
+    assert other.output == str(tmp_path / f"both.recovered-2.{suffix}")
+    assert other.was_whole
+    assert found.was_whole is (share == 1.0)
+    for saved, source in ((found, "a"), (other, "b")):
+        run, whole = read_run(saved.output), read_run(tmp_path / f"{source}.{suffix}")
+        if share == 1.0 or source == "b":
+            assert len(run) == len(whole)
+        assert 20 < len(run) <= len(whole)
+        np.testing.assert_array_equal(run["tension"], whole["tension"][: len(run)])
+    with pytest.raises(UsageError, match="exists already"):
+        recover(path)
+
+
+def test_three_logs_of_which_one_has_no_sample(tmp_path: Path) -> None:
+    path = _joined(tmp_path, "mcap", 1.0)
+    empty = (tmp_path / "a.mcap").read_bytes()[:400]
+    path.write_bytes(empty + path.read_bytes())
+    found = recover(path)
+    assert [Path(one.output).name for one in (found, *found.further)] == [
+        "both.recovered.mcap",
+        "both.recovered-2.mcap",
+    ]
+
+
+@pytest.mark.parametrize("wrong", [1, -1, 300, 1 << 40])
+def test_a_chunk_with_a_wrong_length_is_damage_and_no_cut(
+    tmp_path: Path, data: bytes, wrong: int
+) -> None:
+    path = tmp_path / "length.mcap"
+    at = [n for n in range(len(data)) if data.startswith(b"\x04\0\0\0zstd", n)][3] - 37
+    length = int.from_bytes(data[at + 1 : at + 9], "little") + wrong
+    path.write_bytes(data[: at + 1] + length.to_bytes(8, "little") + data[at + 9 :])
+    with pytest.raises(RunError, match=r"is damaged: .*winchkit log recover"):
+        read_run(path)
+    found = recover(path)
+    assert found.dropped_pieces >= 1
+    assert found.dropped_bytes == 0, "nothing is cut off"
+    assert found.kept >= 250

@@ -6,24 +6,28 @@ import io
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from dataclasses import replace as replaced
 from pathlib import Path
 
 from winchkit.arguments import path_of
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.files import write_whole
 from winchkit.runs.formats.csv_read import read_bytes
-from winchkit.runs.formats.csv_write import EVENT_MARK
-from winchkit.runs.formats.mcap_file import COUNTERS, EVENTS, MARK, PROFILE, McapFile
+from winchkit.runs.formats.csv_write import CSV_MARK, EVENT_MARK
+from winchkit.runs.formats.mcap_file import COUNTERS, EVENTS, PROFILE, McapFile
 from winchkit.runs.formats.mcap_read import read_content
 from winchkit.runs.formats.mcap_records import (
+    MARK,
     Body,
     Damage,
     Messages,
     Op,
     Record,
-    chunk_content,
     is_intact,
+    joint_after,
+    next_chunk,
     records,
+    whole_chunk,
 )
 from winchkit.runs.overwriting import refuse_existing
 
@@ -31,9 +35,7 @@ __all__ = ["Recovered", "recover", "recovered_path"]
 
 _COPIED = (Op.SCHEMA, Op.CHANNEL, Op.METADATA)
 _NO_SAMPLES = (EVENTS, COUNTERS)
-_ZSTD = b"\x04\0\0\0zstd"
-_ZSTD_AT = 37
-"""Position of the name of the compression in a chunk record, by which chunks are searched."""
+_CSV_BEGIN = f"{CSV_MARK}\n".encode()
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,8 @@ class Recovered:
     dropped_bytes: int
     was_whole: bool
     """Whether there was nothing to recover."""
+    further: tuple[Recovered, ...] = ()
+    """Of the other logs in the file, where several were joined (``cat``), each in a file."""
 
 
 def recovered_path(path: Path) -> Path:
@@ -59,6 +63,9 @@ def recover(
     path: str | Path, output: str | Path | None = None, *, replace: bool = False
 ) -> Recovered:
     """Write the complete records of a file to another, complete one.
+
+    Logs that were joined in one file (``cat``) are written to a file each: ``lift.recovered.mcap``,
+    ``lift.recovered-2.mcap``.
 
     Parameters
     ----------
@@ -72,7 +79,7 @@ def recover(
     Returns
     -------
     Recovered
-        Numbers of records saved and left out.
+        Numbers of records saved and left out, of the first log and of ``further`` ones.
 
     Raises
     ------
@@ -91,24 +98,51 @@ def recover(
     refuse_existing(target, replace)
     data = read_bytes(source, may_be_empty=True)
     if suffix == ".mcap":
-        saved, found = _mcap(data, source, target)
-        samples = _samples(saved)
+        _require_mcap(data, source)
+        logs = [(saved, found) for saved, found in map(_mcap, _mcap_logs(data)) if _samples(saved)]
     elif suffix == ".csv":
-        saved, found = _csv(data, target)
-        samples = found.kept
+        logs = [(saved, found) for saved, found in map(_csv, _csv_logs(data)) if found.kept]
     else:
         raise RunError(Fault(f"'{suffix}' is no format of a log; use .mcap or .csv", str(path)))
-    if not samples:
+    if not logs:
         message = "holds no complete sample; there is nothing to recover"
         raise RunError(Fault(message, str(path)))
-    write_whole(target, saved)
-    return found
+    targets = [target, *(target.with_stem(f"{target.stem}-{n + 2}") for n in range(len(logs) - 1))]
+    for one in targets[1:]:
+        refuse_existing(one, replace)
+    for one, (saved, _) in zip(targets, logs, strict=True):
+        write_whole(one, saved)
+    first, *further = (
+        replaced(found, output=str(one)) for one, (_, found) in zip(targets, logs, strict=True)
+    )
+    return replaced(first, further=tuple(further))
 
 
-def _mcap(data: bytes, source: Path, target: Path) -> tuple[bytes, Recovered]:
+def _require_mcap(data: bytes, source: Path) -> None:
     if not data.startswith(MARK) and not MARK.startswith(data):
         message = "is not an MCAP file: it does not start with its magic bytes"
         raise RunError(Fault(message, str(source)))
+
+
+def _mcap_logs(data: bytes) -> Iterator[bytes]:
+    """The logs that were joined in one file."""
+    start, end = 0, joint_after(data, 1)
+    while end < len(data):
+        yield data[start:end]
+        start, end = end, joint_after(data, end + 1)
+    yield data[start:]
+
+
+def _csv_logs(data: bytes) -> Iterator[bytes]:
+    """The logs that were joined in one file; the last line of each but the last may be cut."""
+    first, *others = data.split(_CSV_BEGIN)
+    if first or not others:
+        yield first
+    for rest in others:
+        yield _CSV_BEGIN + rest
+
+
+def _mcap(data: bytes) -> tuple[bytes, Recovered]:
     stream = io.BytesIO()
     file = McapFile(stream, PROFILE, "winchkit recover")
     kept = damaged = end = 0
@@ -125,7 +159,7 @@ def _mcap(data: bytes, source: Path, target: Path) -> tuple[bytes, Recovered]:
             if readable:
                 file.put(item.op, bytes(item.body))
         elif item.op == Op.CHUNK:
-            content = _chunk(item)
+            content = whole_chunk(item)
             if content is None:
                 damaged += 1
             else:
@@ -137,7 +171,7 @@ def _mcap(data: bytes, source: Path, target: Path) -> tuple[bytes, Recovered]:
     file.finish()
     whole = intact and not damaged and data.endswith(MARK)
     lost = 0 if closed else len(data) - max(end, min(len(data), len(MARK)))
-    return stream.getvalue(), Recovered(str(target), kept, damaged, lost, whole)
+    return stream.getvalue(), Recovered("", kept, damaged, lost, whole)
 
 
 def _samples(saved: bytes) -> int:
@@ -158,20 +192,7 @@ def _whole(data: bytes) -> Iterator[Record | Messages]:
                     return
         except Damage:
             pass
-        at = _next_chunk(data, at + 1)
-
-
-def _next_chunk(data: bytes, start: int) -> int:
-    """Start of the next complete chunk, or the end of the data."""
-    found = data.find(_ZSTD, start)
-    while found >= 0:
-        at = found - _ZSTD_AT
-        if at >= start and data[at] == Op.CHUNK:
-            item = next(records(data, at), None)
-            if isinstance(item, Record) and _chunk(item) is not None:
-                return at
-        found = data.find(_ZSTD, found + 1)
-    return len(data)
+        at = next_chunk(data, at + 1)
 
 
 def _is_readable(item: Record) -> bool:
@@ -191,17 +212,7 @@ def _is_readable(item: Record) -> bool:
     return True
 
 
-def _chunk(item: Record) -> bytes | None:
-    """Content of a chunk; None where it is damaged."""
-    try:
-        content = chunk_content(item.body)
-        ends = [inner.end for inner in records(content)]
-    except Damage:
-        return None
-    return content if ends and ends[-1] == len(content) else None
-
-
-def _csv(data: bytes, target: Path) -> tuple[bytes, Recovered]:
+def _csv(data: bytes) -> tuple[bytes, Recovered]:
     """Complete lines: comments, header, and rows of numbers with increasing time."""
     lines = data.split(b"\n")
     # Text after the last line feed was cut off: a number there may lack digits.
@@ -233,7 +244,7 @@ def _csv(data: bytes, target: Path) -> tuple[bytes, Recovered]:
         rows += 1
         kept.append(line)
     saved = b"".join(line + b"\n" for line in kept)
-    return saved, Recovered(str(target), rows, dropped, len(cut), not cut and not dropped)
+    return saved, Recovered("", rows, dropped, len(cut), not cut and not dropped)
 
 
 def _numbers(line: bytes, width: int) -> list[float] | None:

@@ -26,7 +26,10 @@ __all__ = ["command"]
 @click.option("--replace", is_flag=True, help="Write over a file of that name.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def command(*, file: str, output: str | None, replace: bool, as_json: bool) -> None:
-    """Save everything whole of FILE (.mcap or .csv), which stays as it is."""
+    """Save everything whole of FILE (.mcap or .csv), which stays as it is.
+
+    Several logs that were joined in FILE are saved to a file each.
+    """
     from winchkit.runs.recover import recover
 
     if output is None and is_standard_input(file):
@@ -36,9 +39,11 @@ def command(*, file: str, output: str | None, replace: bool, as_json: bool) -> N
         echo_json({"schema": 1, "file": file, **vars(found)})
         return
     kind = "messages" if found.output.lower().endswith(".mcap") else "rows"
-    click.echo(
-        f"{found.output}: {found.kept} {kind} saved, {found.dropped_pieces} damaged pieces and "
-        f"{found.dropped_bytes} bytes at the end left out"
-        + ("; the file was whole" if found.was_whole else "")
-    )
+    logs = (found, *found.further)
+    whole = "; the log was whole" if len(logs) > 1 else "; the file was whole"
+    for one in logs:
+        click.echo(
+            f"{one.output}: {one.kept} {kind} saved, {one.dropped_pieces} damaged pieces and "
+            f"{one.dropped_bytes} bytes at the end left out" + (whole if one.was_whole else "")
+        )
     suggest_next("log", "info", found.output)

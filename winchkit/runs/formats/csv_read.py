@@ -109,6 +109,7 @@ def _beginning(path: Path) -> bytes:
 Rows = list[list[str]]
 _BLOCK = 4096
 """Rows whose text is in memory at a time."""
+_CSV_BEGIN = f"{CSV_MARK}\n"
 _PLAIN = re.compile(r"[-+0-9.eE,\nnaif]+")
 """Text of lines of numbers alone, which numpy or Arrow read in a part of the time."""
 _LARGE = 16 << 20
@@ -156,6 +157,8 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
     whole, width = notes.whole(lines, len(header)), len(header)
     numbers_of = _parser(Path(path))
     while block := list(islice(whole, _BLOCK)):
+        if is_own:
+            _refuse_joined(name, block, number + 1)
         if (columns := _plain(block, width, numbers_of)) is not None:
             table.add_numbers(columns, number + 1)
         else:
@@ -179,6 +182,14 @@ def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
             is_part,
         )
     )
+
+
+def _refuse_joined(path: str, block: list[str], number: int) -> None:
+    """Raise RunError where another log of winchkit begins among the rows, from line ``number``."""
+    for place, line in enumerate(block, number):
+        if line.endswith(_CSV_BEGIN):
+            message = "another log was joined to it here; `winchkit log recover` saves each"
+            raise RunError(Fault(message, path, place))
 
 
 def read_events(path: str | Path) -> tuple[Note, ...]:

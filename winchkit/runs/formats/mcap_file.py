@@ -13,7 +13,7 @@ from typing import BinaryIO
 import numpy as np
 import zstandard
 
-from winchkit.runs.formats.mcap_records import Body, Messages, Op, Record, records
+from winchkit.runs.formats.mcap_records import MARK, Body, Messages, Op, Record, records
 from winchkit.runs.layout import Signal, Source
 
 __all__ = [
@@ -35,7 +35,6 @@ __all__ = [
     "texts",
 ]
 
-MARK = b"\x89MCAP0\r\n"
 PROFILE = "winchkit"
 TOPIC = "run"
 SCHEMA = "winchkit.Row"

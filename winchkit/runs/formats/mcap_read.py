@@ -34,6 +34,8 @@ from winchkit.runs.formats.mcap_records import (
     Record,
     chunk_content,
     is_intact,
+    joint_after,
+    next_chunk,
     records,
 )
 from winchkit.runs.layout import Layout, Samples, Source, read_layout
@@ -70,6 +72,7 @@ class McapContent:
 def read_content(data: bytes) -> McapContent:
     """Read an MCAP file that starts with its magic bytes; damage is noted in the result."""
     content = McapContent()
+    end = len(MARK)
     try:
         for item in records(data, len(MARK)):
             if isinstance(item, Record) and item.op == Op.FOOTER:
@@ -79,9 +82,22 @@ def read_content(data: bytes) -> McapContent:
                 content.damage = "the checksum of its data is wrong"
                 break
             _take(content, item)
+            end = item.end
     except Damage as error:
         content.damage = str(error)
+    if not content.complete:
+        content.damage = _not_cut(data, end, content.damage)
     return content
+
+
+def _not_cut(data: bytes, end: int, damage: str) -> str:
+    """Why a file whose whole records end before its end was not cut off there; else empty."""
+    joint = joint_after(data, len(MARK))
+    if joint < len(data):
+        return f"another log was joined to it, which begins at byte {joint}"
+    if not damage and (data.endswith(MARK, end) or next_chunk(data, end + 1) < len(data)):
+        return f"the record at byte {end} has a wrong length"
+    return damage
 
 
 def _take(content: McapContent, item: Record | Messages) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "MARK",
     "Body",
     "Damage",
     "Messages",
@@ -23,15 +24,23 @@ __all__ = [
     "Record",
     "chunk_content",
     "is_intact",
+    "joint_after",
+    "next_chunk",
     "pack_messages",
     "records",
+    "whole_chunk",
 ]
 
+MARK = b"\x89MCAP0\r\n"
+"""First and last bytes of a file."""
 _HEAD = struct.Struct("<BQ")
 _MESSAGE_HEAD = 22
 """Bytes of a Message record before its data: channel (2), sequence (4), two times (8 each)."""
 _LARGEST = 1 << 30
 """Bytes of a chunk; a larger size in its header is that of a damaged file."""
+_ZSTD = b"\x04\0\0\0zstd"
+_ZSTD_AT = 37
+"""Position of the name of the compression in a chunk record, by which chunks are searched."""
 _FIRST_LOOK, _LOOK_GROWTH = 16, 16
 """Messages that are compared with the first for equal length, and growth of their number while all
 agree: few comparisons in a chunk of mixed channels, few steps in a chunk of one."""
@@ -218,6 +227,35 @@ def is_intact(end: Record, data: bytes) -> bool:
     """Whether the checksum in the record at the end of the data matches the data before it."""
     checksum = int.from_bytes(end.body, "little")
     return not checksum or checksum == zlib.crc32(memoryview(data)[: end.offset])
+
+
+def whole_chunk(item: Record) -> bytes | None:
+    """Content of a chunk; None where it is damaged."""
+    try:
+        content = chunk_content(item.body)
+        ends = [inner.end for inner in records(content)]
+    except Damage:
+        return None
+    return content if ends and ends[-1] == len(content) else None
+
+
+def next_chunk(data: bytes, start: int) -> int:
+    """Start of the next complete chunk, or the end of the data."""
+    found = data.find(_ZSTD, start)
+    while found >= 0:
+        at = found - _ZSTD_AT
+        if at >= start and data[at] == Op.CHUNK:
+            item = next(records(data, at), None)
+            if isinstance(item, Record) and whole_chunk(item) is not None:
+                return at
+        found = data.find(_ZSTD, found + 1)
+    return len(data)
+
+
+def joint_after(data: bytes, start: int) -> int:
+    """Where the next file begins that was joined to this one from ``start`` on; else the end."""
+    found = data.find(MARK + bytes((Op.HEADER,)), start)
+    return found if found >= 0 else len(data)
 
 
 def _unpacked(packed: bytes, compression: str, size: int) -> bytes:
