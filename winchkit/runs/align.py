@@ -1,8 +1,9 @@
 """Interpolation of signals with separate time stamps at common times: the rows of a run.
 
 A row is at a sample of the slowest instrument; every other signal is interpolated there between its
-two neighbouring samples, and is NaN without them. A recorder of rows and a reader of a log by
-channels use the same code.
+two neighbouring samples, and is NaN without them. While that instrument is silent rows are at the
+samples of the other sources. A recorder of rows and a reader of a log by channels use the same
+code.
 """
 
 from __future__ import annotations
@@ -11,14 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.runs.layout import Layout, RowRule, Source
+from winchkit.runs.layout import Layout, Source
 
-__all__ = ["PATIENCE", "Aligner", "Moments", "Series", "values_at"]
+__all__ = ["MAY_LACK", "PATIENCE", "Aligner", "Moments", "Series", "patience_of", "values_at"]
 
 
 PATIENCE = 0.5
 """Longest wait of a row for a source that sends no samples, s."""
-_MAY_LACK = "motor_torque"
+MAY_LACK = "motor_torque"
 """Channel that is unknown while a drive is unpowered: a run may start without it."""
 
 
@@ -57,21 +58,85 @@ def values_at(times: Array, values: Array, moments: Array, max_gap: float) -> Ar
     return found
 
 
+def patience_of(source: Source) -> float:
+    """Time without a sample after which a source counts as silent, s."""
+    return max(PATIENCE, source.max_gap)
+
+
 class Moments:
-    """Selects the times of rows from the samples of the source that determines them."""
+    """Selects the times of rows: the samples of one source, or of any other while it is silent."""
 
-    def __init__(self, rule: RowRule) -> None:
-        self._rule = rule
+    def __init__(self, layout: Layout) -> None:
+        self._rule = layout.rule
+        base = next(source for source in layout.sources if source.topic == self._rule.topic)
+        self._patience = patience_of(base)
         self._last = -np.inf
+        self._picked: Array = np.empty(0)
+        """Samples of the source that are not taken yet."""
+        self._others: Array = np.empty(0)
+        self._newest = -np.inf
+        self._since: float | None = None
+        """From when on that source is awaited, s; None before any sample of the log."""
 
-    def of(self, times: Array) -> Array:
-        """The elements of ``times`` that are times of rows, strictly increasing."""
+    def add(self, topic: str, times: Array) -> None:
+        """Take the sample times of a source."""
         times = times[np.isfinite(times) & (times >= self._rule.opened)]
-        kept = times[rising(times, self._last)]
+        if len(times) and self._since is None:
+            first = self._rule.start is None and np.isfinite(self._rule.opened)
+            self._since = self._rule.opened if first else float(times.min())
+        self._newest = max(self._newest, float(times.max(initial=-np.inf)))
+        if topic == self._rule.topic:
+            before = self._picked[-1] if len(self._picked) else self._last
+            self._picked = np.concatenate([self._picked, times[rising(times, before)]])
+        else:
+            self._others = np.concatenate([self._others, times])
+
+    def take(self, now: float, *, ends: bool = False) -> Array:
+        """Times of rows that are known at ``now`` (s), strictly increasing.
+
+        Samples arrive within :data:`PATIENCE`; where the log ``ends`` all have arrived.
+        """
+        known = self._newest if ends else now - PATIENCE
+        found: list[Array] = []
+        while len(self._picked):
+            awaited = self._awaited
+            apart = np.diff(self._picked, prepend=min(awaited, self._picked[0])) > self._patience
+            near = int(np.argmax(apart)) if apart.any() else len(apart)
+            if near:
+                found.append(self._kept(self._picked[:near]))
+                self._picked = self._picked[near:]
+            elif self._picked[0] <= known:
+                found.append(self._between(awaited, self._picked[0], inclusive=False))
+                self._since = self._last = float(self._picked[0])
+                found.append(self._picked[:1])
+                self._picked = self._picked[1:]
+            else:
+                break
+        if not len(self._picked) and known - self._awaited > self._patience:
+            found.append(self._between(self._awaited, known, inclusive=True))
+        self._others = self._others[self._others > self._awaited]
+        return np.concatenate([np.empty(0), *found])
+
+    @property
+    def _awaited(self) -> float:
+        """Newest sample of the source that was taken, or the beginning of the log, s."""
+        return np.inf if self._since is None else self._since
+
+    def _kept(self, times: Array) -> Array:
+        """Those of the source's samples that are far enough apart."""
+        self._since = float(times[-1])
         if self._rule.period > 0:
-            kept = _spaced(kept, self._rule.period, self._last)
-        self._last = kept[-1] if len(kept) else self._last
-        return kept
+            times = _spaced(times, self._rule.period, self._last)
+        self._last = float(times[-1]) if len(times) else self._last
+        return times
+
+    def _between(self, begin: float, end: float, *, inclusive: bool) -> Array:
+        """Samples of the other sources within an interval, as far apart as rows are."""
+        inner = (self._others > begin) & (self._others <= end if inclusive else self._others < end)
+        times = np.sort(self._others[inner])
+        found = _spaced(times, max(self._rule.period, self._rule.spacing), self._last)
+        self._last = float(found[-1]) if len(found) else self._last
+        return found
 
 
 def rising(times: Array, last: float) -> NDArray[np.bool_]:
@@ -135,24 +200,23 @@ class Aligner:
     def __init__(self, layout: Layout) -> None:
         self.start = layout.rule.start
         """Time of the first row, s; None before it."""
-        self._opened, self._base = layout.rule.opened, layout.rule.topic
-        self._picked = Moments(layout.rule)
+        self._opened = layout.rule.opened
+        self._picked = Moments(layout)
         self._series = {
             source.topic: Series(source.max_gap, len(_columns(source))) for source in layout.sources
         }
         self._used = {source.topic: _columns(source) for source in layout.sources}
-        gap = next(item.max_gap for item in layout.sources if item.topic == self._base)
+        gap = next(item.max_gap for item in layout.sources if item.topic == layout.rule.topic)
         self._slower = {item.topic for item in layout.sources if item.max_gap > gap}
         names = [name for name, _ in layout.columns()[1:]]
-        self._needed = np.array([not name.endswith(_MAY_LACK) for name in names], dtype=bool)
+        self._needed = np.array([not name.endswith(MAY_LACK) for name in names], dtype=bool)
         self._moments: Array = np.empty(0)
 
     def add(self, topic: str, times: Array, values: Array) -> None:
         """Take samples of a source, values (n, signals); older ones are skipped."""
         known = np.isfinite(times)
         self._series[topic].append(times[known], values[known][:, self._used[topic]])
-        if topic == self._base:
-            self._moments = np.concatenate([self._moments, self._picked.of(times)])
+        self._picked.add(topic, times)
 
     def rows(self, now: float, *, ends: bool = False) -> Array:
         """Rows that are complete by ``now``, time first, shape (n, columns).
@@ -162,6 +226,7 @@ class Aligner:
         silent for longer than is interpolated; their values are then NaN. The first row is the
         first complete one, or the first after half a second.
         """
+        self._moments = np.concatenate([self._moments, self._picked.take(now, ends=ends)])
         left = self._slower if ends else ()
         awaited = [
             item.last

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
 from winchkit.arguments import require_type
+from winchkit.runs.align import MAY_LACK, PATIENCE
 from winchkit.runs.layout import Samples, Source
 from winchkit.runs.log import Log, Note
 from winchkit.runs.run import Run
@@ -38,7 +39,7 @@ class SourceInfo:
     rate: float
     """Over the whole log, Hz; NaN with fewer than two samples."""
     gaps: int
-    """Number of intervals longer than 1.5 usual ones."""
+    """Number of intervals longer than 1.5 usual ones, those to the log's ends included."""
     longest_gap: float
     """Longest interval, s."""
     missing: Mapping[str, int]
@@ -96,7 +97,7 @@ def info_of(log: Log) -> LogInfo:
         log.closed,
         begun,
         last - first,
-        tuple(_source_info(item, log.samples[item.topic]) for item in log.layout.sources),
+        tuple(_source_info(item, log.samples[item.topic], log.span) for item in log.layout.sources),
         log.counters[-1].value if log.counters else {},
         tuple(dict.fromkeys(map(str, trips))),
         tuple(_changes(log.events, first, _tares)),
@@ -129,12 +130,18 @@ def _changes(
                 yield f"{name}{since}: {text}"
 
 
-def _source_info(source: Source, samples: Samples) -> SourceInfo:
+def _source_info(source: Source, samples: Samples, span: tuple[float, float]) -> SourceInfo:
     steps = np.diff(samples.times)
     steps = steps[steps > 0]
     # Samples that an adapter has buffered arrive in bursts: their median interval is not the rate.
     mean = float(steps.mean()) if len(steps) else float("nan")
     usual = max(float(np.median(steps)), mean) if len(steps) else mean
+    # From the beginning of the log to the first sample, and from the last to its end.
+    ends = [float(samples.times.min()), float(samples.times.max())] if len(samples) else [span[1]]
+    edges = np.array([ends[0] - span[0], span[1] - ends[-1]])
+    edges = edges[edges > max(source.max_gap, 0.0 if np.isnan(usual) else _GAP * usual)]
+    gaps = int(np.count_nonzero(steps > _GAP * usual)) + len(edges)
+    longest = float(max(np.concatenate([steps, edges]), default=np.nan))
     names = [signal.column or signal.name for signal in source.signals]
     lacks = np.isnan(samples.values).sum(axis=0).tolist()
     flags = [n for n, signal in enumerate(source.signals) if signal.name == _QUALITY]
@@ -143,8 +150,8 @@ def _source_info(source: Source, samples: Samples) -> SourceInfo:
         tuple(names),
         len(samples),
         1 / mean,
-        int(np.count_nonzero(steps > _GAP * usual)),
-        float(steps.max()) if len(steps) else float("nan"),
+        gaps,
+        longest,
         {name: count for name, count in zip(names, lacks, strict=True) if count},
         int(np.count_nonzero(samples.values[:, flags])),
     )
@@ -165,6 +172,8 @@ class RunSummary:
     """Samples without a value, by channel."""
     constant: tuple[str, ...]
     """Channels with a constant value."""
+    ended: Mapping[str, float] = field(default_factory=dict)
+    """Time from the last value to the end of the run, s, by channel that has none there."""
 
     @property
     def text(self) -> str:
@@ -177,6 +186,7 @@ class RunSummary:
             _counted(self.gaps, "gap"),
             f"NaN: {', '.join(holes)}" if holes else "no NaN",
         ]
+        parts += [f"{name} has no value in the last {t:.3g} s" for name, t in self.ended.items()]
         if self.constant:
             parts.append(f"constant: {', '.join(self.constant)}")
         return ", ".join(parts)
@@ -204,7 +214,18 @@ def summary_of(run: Run) -> RunSummary:
         gaps=run.gaps if in_time else 0,
         missing={name: channel.missing for name, channel in run.channels.items()},
         constant=constant,
+        ended=dict(_ended(run)) if in_time else {},
     )
+
+
+def _ended(run: Run) -> Iterator[tuple[str, float]]:
+    """Channels whose values cease before the run does, and how long before, s."""
+    for name, channel in run.channels.items():
+        known = np.flatnonzero(~np.isnan(channel.values))
+        if len(known) and not name.endswith(MAY_LACK):
+            left = float(run.time[-1] - run.time[known[-1]])
+            if left > PATIENCE:
+                yield name, left
 
 
 def _is_constant(run: Run, name: str) -> bool:

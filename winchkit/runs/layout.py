@@ -50,6 +50,8 @@ class RowRule:
     """Least time between two rows, s."""
     start: float | None = None
     """Time of the first row, where it is in an earlier part of the log, s."""
+    spacing: float = 0.01
+    """Least time between two rows while that source is silent, s."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +139,7 @@ def _layout(found: dict[str, Any]) -> Layout:
             float(rule["opened"]),
             float(rule["period"]),
             None if start is None else float(start),
+            float(rule.get("spacing", RowRule.spacing)),
         ),
         int(found["clock_offset"]),
     )

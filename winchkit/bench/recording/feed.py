@@ -46,6 +46,9 @@ _FAST_GAP = 0.1
 """
 _BARE_PERIOD = 0.0095
 """Rows of a bench without instruments: a hundredth of a second, less the jitter of a cycle."""
+_JITTER = 0.95
+"""Share of an instrument's period: two samples of a drive are nearly as far apart as two readings.
+"""
 _TRACKER = Source(
     "/robot/tracker",
     (
@@ -90,7 +93,7 @@ class Feed:
         rule = (
             RowRule(next(iter(self._drives.values())), opened, _BARE_PERIOD)
             if base is None
-            else RowRule(topics[id(base)], opened)
+            else RowRule(topics[id(base)], opened, spacing=_JITTER * base.period)
         )
         self._tracker, self._tracked = tracker, opened
         if tracker is not None:

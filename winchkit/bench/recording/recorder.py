@@ -2,8 +2,9 @@
 
 In rows, one stands at each reading's estimated moment of sampling of the slowest instrument; every
 other channel is interpolated there between its own two neighbouring samples, and is NaN where it
-has none. The log begins when every channel has come, or after half a second. A log by channels is
-brought to the same rows when it is read (``winchkit.runs.align``).
+has none. While that instrument is silent rows are at the samples of the others. The log begins when
+every channel has come, or after half a second. A log by channels is brought to the same rows when
+it is read (``winchkit.runs.align``).
 
 The control thread only hands over its snapshot. One thread writes, another waits for the disk; what
 goes wrong there ends the log, never the control loop.
@@ -22,6 +23,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.recording.feed import CHANNELS, TARED, Feed
+from winchkit.bench.recording.silences import Silences
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.scheduling import event_of, thread_of
@@ -76,6 +78,7 @@ class Recorder:
         self._about = {**metadata, "clock_offset": f"{self._offset / 1e9:.6f} s"}
         self._tares = tares_in_force(sensors)
         about = {**self._about, **_tare_metadata(self._tares)}
+        self._silences = Silences(layout)
         self._syncer = Syncer()
         try:
             self._log = open_log(
@@ -125,8 +128,15 @@ class Recorder:
 
     def counters(self) -> dict[str, dict[str, Any]]:
         """Counts so far, by instrument (``A.cell``) and of the log itself."""
-        log = {"rows": self.rows, "parts": len(self.parts), "drops": self._feed.lost}
-        return {**counters_of(self._sensors), "log": log}
+        return {
+            **counters_of(self._sensors),
+            "log": {
+                "rows": self.rows,
+                "parts": len(self.parts),
+                "drops": self._feed.lost,
+                "silent": self._silences.counted(),
+            },
+        }
 
     def close(self) -> None:
         """Write pending samples and finish the file; raises the error of the writing."""
@@ -166,6 +176,7 @@ class Recorder:
             raise FileError(Fault(message, str(self.parts[-1])))
         now = self._clock.now()
         pieces, snapshots = self._feed.take()
+        self._silences.note(pieces, now)
         self._note_tares()
         for snapshot in snapshots:
             self._note_changes(snapshot)

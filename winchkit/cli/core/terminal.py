@@ -328,7 +328,8 @@ def counter_table(counters: Mapping[str, Mapping[str, Any]]) -> Table:
 
     log = counters.get(_LOG, {})
     table = Table(
-        box=None, caption=", ".join(f"{key} {value}" for key, value in log.items()) or None
+        box=None,
+        caption=", ".join(f"{k} {v}" for k, v in log.items() if not isinstance(v, dict)) or None,
     )
     table.add_column("instrument")
     for head, _ in HEADS.values():

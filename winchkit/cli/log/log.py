@@ -79,6 +79,7 @@ _SHOW_PERIOD = 0.5
     help="Time between two live pictures.",
 )
 @effects_option
+@click.option("--strict", is_flag=True, help="Exit with 1 where a drive or instrument fell silent.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.pass_context
 def command(
@@ -93,13 +94,16 @@ def command(
     udp: str | None,
     period: str,
     effects: Sequence[str],
+    strict: bool,
     as_json: bool,
 ) -> None:
     """Log every winch of a bench until Ctrl-C, or for a time.
 
     MCAP holds every channel with its own time stamps. In CSV a row stands for each reading of the
-    load cell (else of the length instrument). Moves nothing, and keeps no program from owning the
-    bench; when the owner ends, the log goes on in a file of its own, FILE-2 and so on.
+    load cell (else of the length instrument); while it is silent, for samples of the others. A
+    drive or instrument that falls silent is reported at once and at the end. Moves nothing, and
+    keeps no program from owning the bench; when the owner ends, the log goes on in a file of its
+    own, FILE-2 and so on.
     """
     if context.invoked_subcommand is not None:
         return
@@ -124,6 +128,8 @@ def command(
             if as_json:
                 echo_json(log.result | {"problem": str(error)})
             raise
+    for line in log.silences.summary:
+        click.echo(f"winchkit: {line}", err=True)
     if as_json:
         echo_json(log.result)
     elif output and not jsonl:
@@ -132,6 +138,8 @@ def command(
         suggest_next("log", "info", next(iter(log.files), output))
     if log.terminated is not None:
         raise log.terminated
+    if strict and log.silences.summary:
+        context.exit(WinchkitError.exit_code)
 
 
 class _Log:
@@ -153,6 +161,7 @@ class _Log:
         self._output, self._rotate, self._replace = output, rotate, replace
         self._limit, self._pause, self._sinks = limit, pause, sinks
         self._counted: dict[str, dict[str, Any]] = {}
+        self.silences = _Silences()
         self._start = 0.0
 
     @property
@@ -191,16 +200,21 @@ class _Log:
         except WinchkitError:
             self._note_rows(station, file)
             raise
-        self._counted = station.counters()
+        self._note_counters(station)
         if file:
             self.files[file] = station.end_log()
 
     def _note_rows(self, station: Station, file: str) -> None:
         """Counters and rows of a log that has failed, where its owner still answers."""
         with suppress(WinchkitError):
-            self._counted = station.counters()
+            self._note_counters(station)
             if file:
                 self.files[file] = int(self._counted.get("log", {}).get("rows") or 0)
+
+    def _note_counters(self, station: Station) -> None:
+        """Take what has been counted, and report who fell silent or is heard again."""
+        self._counted = station.counters()
+        self.silences.note(self._counted.get("log", {}).get("silent", {}))
 
     def _watch(self, station: Station, file: str, show: Callable[[], None]) -> None:
         """Look after the log, and show every new picture, until the time is over."""
@@ -210,6 +224,7 @@ class _Log:
             rows = station.log_rows()
             if file:
                 self.files[file] = rows
+                self._note_counters(station)
             status = station.status() if self._sinks else {"cycle": seen}
             if status["cycle"] != seen:
                 seen = status["cycle"]
@@ -227,6 +242,34 @@ class _Log:
             if not _earlier(str(following)):
                 return str(following)
             number += 1
+
+
+class _Silences:
+    """Reports drives and instruments whose samples cease while a log is written."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, dict[str, Any]] = {}
+
+    def note(self, silent: dict[str, dict[str, Any]]) -> None:
+        """Report what has changed of the silences, by source (``A.cell``)."""
+        for name, found in silent.items():
+            before = self._known.get(name, {"times": 0, "now": 0.0})
+            if found["now"] and found["times"] > before["times"]:
+                said = f"{name}: no sample for {found['now']:.1f} s; the log goes on without it"
+                click.echo(f"winchkit: {said}", err=True)
+            elif before["now"] and not found["now"]:
+                click.echo(f"winchkit: {name}: samples again", err=True)
+        self._known = silent
+
+    @property
+    def summary(self) -> list[str]:
+        """A line for each that was silent at any time."""
+        return [
+            f"{name} was silent {found['times']} time{'s' * (found['times'] != 1)}, for "
+            f"{found['longest']:.1f} s at most"
+            + (f", and at the end of the log for {found['now']:.1f} s" if found["now"] else "")
+            for name, found in self._known.items()
+        ]
 
 
 def _earlier(output: str) -> list[Path]:

@@ -41,12 +41,12 @@ class ChannelLog(LogWriter):
     _file: McapFile
 
     def __init__(self, path: Path, layout: Layout, *others: Any, replace: bool) -> None:
-        self._aligner, self._moments = Aligner(layout), Moments(layout.rule)
+        self._aligner, self._moments = Aligner(layout), Moments(layout)
         self._numbers = {source.topic: n for n, source in enumerate(layout.sources, start=1)}
         self._notes = {EVENTS: len(self._numbers) + 1, COUNTERS: len(self._numbers) + 2}
         self._sequences = dict.fromkeys([*self._numbers, *self._notes], 0)
         self._waiting: list[bytes] = []
-        self._pending: list[NDArray[np.float64]] = []
+        self._newest = layout.rule.opened
         super().__init__(path, layout, *others, replace=replace)
 
     def add_event(self, time: float, event: Mapping[str, Any]) -> None:
@@ -90,13 +90,21 @@ class ChannelLog(LogWriter):
             for topic, samples in pieces.items():
                 self._aligner.add(topic, samples.times, samples.values)
             self._aligner.rows(now)
-        if self._layout.rule.topic in pieces:
-            self._pending.append(pieces[self._layout.rule.topic].times)
+        for topic, samples in pieces.items():
+            self._moments.add(topic, samples.times)
+        self._newest = now
+        self._count_rows(ends=False)
+
+    def _count_rows(self, *, ends: bool) -> None:
+        """Count the rows that the run of this log has so far."""
         start = self._aligner.start
-        if start is not None and self._pending:
-            times = np.concatenate(self._pending)
-            self._pending.clear()
-            self.rows += len(self._moments.of(times[times >= start]))
+        if start is not None:
+            self.rows += int(np.count_nonzero(self._moments.take(self._newest, ends=ends) >= start))
+
+    def close(self, end: Mapping[str, str]) -> None:
+        """Count the last rows, and finish the file."""
+        self._count_rows(ends=True)
+        super().close(end)
 
     def _close_part(self, end: Mapping[str, str]) -> None:
         if self._stream.closed:
