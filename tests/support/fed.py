@@ -50,6 +50,10 @@ class Fed:
         }
         self.phase, self.tripped, self.cycle = Phase.MOVING, (), 0
         self.commander = ""
+        self.silent: set[str] = set()
+        """Sources of which nothing comes: ``A.cell``, ``A.drive``."""
+        self._frozen: dict[str, float] = {}
+        """Times of the last samples of silent drives, s."""
 
     def run(self, recorder: Recorder, duration: float) -> None:
         """So many seconds, at once."""
@@ -60,7 +64,7 @@ class Fed:
                 recorder.feed(self.snapshot())
             for by_role in self.sensors.values():
                 for role, cell in by_role.items():
-                    if self.cycle % EVERY[role] == 0:
+                    if self.cycle % EVERY[role] == 0 and cell.name not in self.silent:
                         value = tension(self.clock.time - DELAY) if role == "cell" else 20.0
                         give(cell, value, self.clock.time)
 
@@ -85,9 +89,12 @@ class Fed:
             cable_speed=-0.1,
             commander=self.commander,
         )
-        return BenchSnapshot(
-            self.clock.time, self.cycle, dict.fromkeys(self.sensors, winch), self.tripped
-        )
+        winches = dict.fromkeys(self.sensors, winch)
+        for name in self.sensors:
+            if f"{name}.drive" in self.silent:
+                last = self._frozen.setdefault(name, now)
+                winches[name] = winch._replace(time=last)
+        return BenchSnapshot(self.clock.time, self.cycle, winches, self.tripped)
 
     def trip(self, message: str) -> None:
         self.tripped = (Trip("tension", "A", message, latches=True),)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arguments import require_type
+from winchkit.arrays import Array
 from winchkit.runs.align import MAY_LACK, PATIENCE
 from winchkit.runs.layout import Samples, Source
 from winchkit.runs.log import Log, Note
@@ -131,17 +132,23 @@ def _changes(
 
 
 def _source_info(source: Source, samples: Samples, span: tuple[float, float]) -> SourceInfo:
-    steps = np.diff(samples.times)
-    steps = steps[steps > 0]
+    times = np.unique(samples.times)
+    steps = np.diff(times)
     # Samples that an adapter has buffered arrive in bursts: their median interval is not the rate.
     mean = float(steps.mean()) if len(steps) else float("nan")
     usual = max(float(np.median(steps)), mean) if len(steps) else mean
+    lost = np.flatnonzero(steps > _GAP * usual)
     # From the beginning of the log to the first sample, and from the last to its end.
-    ends = [float(samples.times.min()), float(samples.times.max())] if len(samples) else [span[1]]
-    edges = np.array([ends[0] - span[0], span[1] - ends[-1]])
-    edges = edges[edges > max(source.max_gap, 0.0 if np.isnan(usual) else _GAP * usual)]
-    gaps = int(np.count_nonzero(steps > _GAP * usual)) + len(edges)
-    longest = float(max(np.concatenate([steps, edges]), default=np.nan))
+    ends = [(span[0], times[0]), (times[-1], span[1])] if len(times) else [span]
+    limit = max(source.max_gap, 0.0 if np.isnan(usual) else _GAP * usual)
+    columns = {item.column: samples.values[:, n] for n, item in enumerate(source.signals)}
+    gaps = _merged(
+        {
+            *zip(times[lost].tolist(), times[lost + 1].tolist(), strict=True),
+            *((float(begin), float(end)) for begin, end in ends if end - begin > limit),
+            *_holes(samples.times, columns, span),
+        }
+    )
     names = [signal.column or signal.name for signal in source.signals]
     lacks = np.isnan(samples.values).sum(axis=0).tolist()
     flags = [n for n, signal in enumerate(source.signals) if signal.name == _QUALITY]
@@ -150,8 +157,9 @@ def _source_info(source: Source, samples: Samples, span: tuple[float, float]) ->
         tuple(names),
         len(samples),
         1 / mean,
-        gaps,
-        longest,
+        len(gaps),
+        # The longest interval is told where there is no gap too.
+        float(max([*steps, *gaps], default=np.nan)),
         {name: count for name, count in zip(names, lacks, strict=True) if count},
         int(np.count_nonzero(samples.values[:, flags])),
     )
@@ -167,7 +175,8 @@ class RunSummary:
     rate: float
     """Samples a second from the median interval, Hz; NaN where rows are not samples in time."""
     gaps: int
-    """Number of intervals longer than 1.5 usual ones."""
+    """Number of intervals in which samples were lost, and of those above half a second in which a
+    channel has no value."""
     missing: Mapping[str, int]
     """Samples without a value, by channel."""
     constant: tuple[str, ...]
@@ -211,7 +220,10 @@ def summary_of(run: Run) -> RunSummary:
         rows=len(run),
         duration=float(run.time[-1] - run.time[0]),
         rate=1 / run.interval if in_time else float("nan"),
-        gaps=run.gaps if in_time else 0,
+        gaps=run.gaps
+        + len(_holes(run.time, {name: run[name] for name in run}, (run.time[0], run.time[-1])))
+        if in_time
+        else 0,
         missing={name: channel.missing for name, channel in run.channels.items()},
         constant=constant,
         ended=dict(_ended(run)) if in_time else {},
@@ -226,6 +238,36 @@ def _ended(run: Run) -> Iterator[tuple[str, float]]:
             left = float(run.time[-1] - run.time[known[-1]])
             if left > PATIENCE:
                 yield name, left
+
+
+def _holes(
+    times: Array, columns: Mapping[str, Array], span: tuple[float, float]
+) -> set[tuple[float, float]]:
+    """Stretches of more than half a second in which samples have no value, as begin and end, s.
+
+    Channels that lack their values together have one in common.
+    """
+    found: set[tuple[float, float]] = set()
+    for name, values in columns.items():
+        lacks = np.isnan(values)
+        if not name or name.endswith(MAY_LACK) or not lacks.any():
+            continue
+        marks = np.concatenate([span[:1], times[~lacks], span[1:]])
+        between = np.diff(np.searchsorted(times[lacks], marks)) > 0
+        long = np.flatnonzero(between & (np.diff(marks) > PATIENCE))
+        found |= set(zip(marks[long].tolist(), marks[long + 1].tolist(), strict=True))
+    return found
+
+
+def _merged(intervals: Iterable[tuple[float, float]]) -> list[float]:
+    """Lengths of intervals (begin, end), those that overlap joined to one."""
+    joined: list[tuple[float, float]] = []
+    for begin, end in sorted(intervals):
+        if joined and begin < joined[-1][1]:
+            joined[-1] = joined[-1][0], max(end, joined[-1][1])
+        else:
+            joined.append((begin, end))
+    return [end - begin for begin, end in joined]
 
 
 def _is_constant(run: Run, name: str) -> bool:

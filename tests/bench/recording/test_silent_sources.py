@@ -1,0 +1,148 @@
+"""A log in which a drive or an instrument falls silent: its rows, its gaps, and what is told."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fed import CYCLE, EVERY, angle, recording
+from winchkit.runs import read_run
+from winchkit.runs.info import info_of, summary_of
+from winchkit.runs.read import read_log
+
+_PERIOD = EVERY["cell"] * CYCLE
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mcap"])
+@pytest.mark.parametrize("silent", ["A.cell", "B.cell", "A.drive", "B.drive"])
+def test_rows_of_the_others_go_on_with_nan(tmp_path: Path, suffix: str, silent: str) -> None:
+    path = tmp_path / f"lift.{suffix}"
+    winch, _, role = silent.partition(".")
+    channel = "tension" if role == "cell" else "motor_angle"
+    with recording(path) as (fed, recorder):
+        fed.run(recorder, 2.0)
+        fed.silent.add(silent)
+        fed.run(recorder, 3.0)
+    run = read_run(path)
+    assert recorder.rows == pytest.approx(len(run), abs=1)
+    assert run.time[-1] > 4.8, "rows go on to the end of the log"
+    assert np.diff(run.time).max() < 0.06, "and without a gap"
+    assert np.diff(run.time[run.time > 2.5]).max() < 1.3 * _PERIOD, "as densely as before"
+    quiet = run.time > 2.1
+    assert np.isnan(run[f"{winch}.{channel}"][quiet]).all(), "no value is invented"
+    other = "B" if winch == "A" else "A"
+    start = run[f"{other}.motor_angle"][0] / 3
+    known = run[f"{other}.motor_angle"][:-5]
+    assert known == pytest.approx(angle(start + run.time[:-5]), abs=1e-6)
+    found = summary_of(run)
+    assert found.gaps == 1
+    assert found.ended[f"{winch}.{channel}"] == pytest.approx(3.0, abs=0.1)
+
+
+def test_a_silence_is_counted_while_it_lasts_and_afterwards(tmp_path: Path) -> None:
+    with recording(tmp_path / "lift.mcap") as (fed, recorder):
+        fed.run(recorder, 2.0)
+        time.sleep(0.2)
+        assert recorder.counters()["log"]["silent"] == {}
+        fed.silent.add("A.cell")
+        fed.run(recorder, 2.0)
+        time.sleep(0.3)
+        (found,) = recorder.counters()["log"]["silent"].items()
+        assert found[0] == "A.cell"
+        assert found[1]["now"] == pytest.approx(2.0, abs=0.05)
+        fed.silent.clear()
+        fed.run(recorder, 2.0)
+        time.sleep(0.3)
+        found = recorder.counters()["log"]["silent"]["A.cell"]
+        assert (found["times"], found["now"]) == (1, 0.0)
+        assert found["longest"] == pytest.approx(2.0 + _PERIOD, abs=0.05)
+
+
+@pytest.mark.parametrize(("before", "after"), [(2.0, 3.0), (0.0, 3.0), (3.0, 0.0)])
+def test_gaps_count_up_to_both_ends_of_the_log(tmp_path: Path, before: float, after: float) -> None:
+    path = tmp_path / "lift.mcap"
+    with recording(path) as (fed, recorder):
+        fed.silent.add("B.temperature")
+        if after:
+            fed.run(recorder, before)
+            fed.silent.add("A.cell")
+            fed.run(recorder, after)
+        else:
+            fed.silent.add("A.cell")
+            fed.run(recorder, before)
+            fed.silent.remove("A.cell")
+            fed.run(recorder, 2.0)
+    sources = {item.topic: item for item in info_of(read_log(path)).sources}
+    cell = sources["/A/cell"]
+    assert cell.gaps == 1
+    assert cell.longest_gap == pytest.approx(max(before if not after else 0.0, after), abs=0.1)
+    assert sources["/B/cell"].gaps == 0
+    assert (sources["/B/temperature"].samples, sources["/B/temperature"].gaps) == (0, 1)
+
+
+WINCHKIT = [sys.executable, "-c", "from winchkit.cli import main; main()"]
+
+
+@pytest.fixture
+def served(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """A simulated bench that takes lines."""
+    command = [*WINCHKIT, "sim", "serve", "spiral-bench", "--bench-file", "bench.toml"]
+    with subprocess.Popen(
+        command,
+        cwd=tmp_path,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdin is not None
+        if not process.stdout.readline():
+            assert process.stderr is not None
+            pytest.skip(f"no multicast here: {process.stderr.read()}")
+        yield process
+        process.stdin.write("quit\n")
+        process.stdin.flush()
+        process.communicate(timeout=20)
+
+
+@pytest.mark.realtime
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize(("strict", "code"), [((), 0), (("--strict",), 1)])
+def test_the_command_tells_at_once_and_at_the_end(
+    served: subprocess.Popen[str], tmp_path: Path, strict: tuple[str, ...], code: int
+) -> None:
+    path = tmp_path / "lift.csv"
+    with subprocess.Popen(
+        [*WINCHKIT, "log", "-b", "bench.toml", "-o", path, "--for", "4s", *strict],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as log:
+        deadline = time.monotonic() + 30
+        while not path.is_file() or len(path.read_text().split("\n")) < 60:
+            assert time.monotonic() < deadline, "no log began"
+            time.sleep(0.05)
+        assert served.stdin is not None
+        served.stdin.write("fault A.cell silence\n")
+        served.stdin.flush()
+        assert log.stderr is not None
+        first = log.stderr.readline()
+        assert log.poll() is None, "it is told while the log goes on"
+        assert "A.cell: no sample for" in first
+        _, told = log.communicate(timeout=30)
+    assert log.returncode == code
+    assert "A.cell was silent 1 time" in told
+    assert "at the end of the log" in told
+    run = read_run(path)
+    assert run.time[-1] > 3.5
+    assert np.isnan(run["tension"][-50:]).all()
+    assert np.isfinite(run["motor_angle"][-50:-5]).all()
