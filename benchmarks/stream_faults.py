@@ -3,7 +3,7 @@
 ``python benchmarks/stream_faults.py --cases 10000 --seed 1``: wrong numbers must be 0; prints JSON,
 exits 1 where one was published. Each case is a fault of up to a second and what comes after it; the
 sequences go on without a break, a hundred cases long. The line, its faults and the simulated
-instrument are those of tests/support.
+instrument are those of tests/support/instruments.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pathlib import Path
 from random import Random
 from time import perf_counter
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support" / "instruments"))
 
 from stream_campaign import campaign
 from stream_rig import DEVICES
