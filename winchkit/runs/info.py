@@ -14,7 +14,7 @@ from winchkit.arrays import Array
 from winchkit.runs.align import MAY_LACK, PATIENCE
 from winchkit.runs.layout import Samples, Source
 from winchkit.runs.log import Log, Note
-from winchkit.runs.run import Run
+from winchkit.runs.run import Run, lost_samples
 
 __all__ = [
     "LogInfo",
@@ -27,6 +27,8 @@ __all__ = [
 _GAP = 1.5
 """Steps beyond this many usual ones are gaps: midway between one and two, which is one sample
 lost."""
+_LOST = 2.5
+"""Shortest stretch without a value in usual intervals: two samples and jitter."""
 _QUALITY = "quality"
 
 
@@ -220,14 +222,20 @@ def summary_of(run: Run) -> RunSummary:
         rows=len(run),
         duration=float(run.time[-1] - run.time[0]),
         rate=1 / run.interval if in_time else float("nan"),
-        gaps=run.gaps
-        + len(_holes(run.time, {name: run[name] for name in run}, (run.time[0], run.time[-1])))
-        if in_time
-        else 0,
+        gaps=_gaps(run) if in_time else 0,
         missing={name: channel.missing for name, channel in run.channels.items()},
         constant=constant,
         ended=dict(_ended(run)) if in_time else {},
     )
+
+
+def _gaps(run: Run) -> int:
+    """Intervals in which samples were lost, or in which a channel has no value."""
+    lost = np.flatnonzero(lost_samples(run.time))
+    stamps = zip(run.time[lost].tolist(), run.time[lost + 1].tolist(), strict=True)
+    columns = {name: run[name] for name in run}
+    span = float(run.time[0]), float(run.time[-1])
+    return len(_merged({*stamps, *_holes(run.time, columns, span)}))
 
 
 def _ended(run: Run) -> Iterator[tuple[str, float]]:
@@ -236,25 +244,28 @@ def _ended(run: Run) -> Iterator[tuple[str, float]]:
         known = np.flatnonzero(~np.isnan(channel.values))
         if len(known) and not name.endswith(MAY_LACK):
             left = float(run.time[-1] - run.time[known[-1]])
-            if left > PATIENCE:
+            if left > max(PATIENCE, _LOST * run.interval):
                 yield name, left
 
 
 def _holes(
     times: Array, columns: Mapping[str, Array], span: tuple[float, float]
 ) -> set[tuple[float, float]]:
-    """Stretches of more than half a second in which samples have no value, as begin and end, s.
+    """Stretches in which samples have no value, as begin and end, s.
 
-    Channels that lack their values together have one in common.
+    They are longer than half a second and than two intervals; a single sample is none. Channels
+    that lack their values together have one in common.
     """
     found: set[tuple[float, float]] = set()
+    steps = np.diff(np.unique(times))
+    shortest = max(PATIENCE, _LOST * float(np.median(steps)) if len(steps) else 0.0)
     for name, values in columns.items():
         lacks = np.isnan(values)
         if not name or name.endswith(MAY_LACK) or not lacks.any():
             continue
         marks = np.concatenate([span[:1], times[~lacks], span[1:]])
         between = np.diff(np.searchsorted(times[lacks], marks)) > 0
-        long = np.flatnonzero(between & (np.diff(marks) > PATIENCE))
+        long = np.flatnonzero(between & (np.diff(marks) > shortest))
         found |= set(zip(marks[long].tolist(), marks[long + 1].tolist(), strict=True))
     return found
 

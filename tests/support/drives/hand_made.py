@@ -71,6 +71,7 @@ class Bus:
     """Keeps what is sent, delivers what the test makes up."""
 
     name = "hand"
+    sdo_timeout = 0.5
 
     def __init__(self, clock: Clock) -> None:
         self.clock = clock
@@ -83,8 +84,15 @@ class Bus:
         self.handlers[identifier] = handler
 
     def on_foreign(self, identifier: int, handler: Callable[[bytes, float], None]) -> None:
-        """Nothing that is sent comes back."""
-        self.on(identifier, handler)
+        """Nothing that is sent comes back; who listens already goes on to."""
+        before = self.handlers.get(identifier)
+
+        def both(data: bytes, now: float) -> None:
+            if before is not None:
+                before(data, now)
+            handler(data, now)
+
+        self.on(identifier, both)
 
     def send(self, identifier: int, data: bytes) -> None:
         self.sent.append((identifier, data))

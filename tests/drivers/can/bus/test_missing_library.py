@@ -38,7 +38,8 @@ def test_each_interface_of_python_can_without_its_library(name: str) -> None:
 def test_an_adapter_on_a_serial_port_without_pyserial(
     monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    module = importlib.import_module(can.interfaces.BACKENDS[name][0])
+    place, kind = can.interfaces.BACKENDS[name]
+    module = importlib.import_module(getattr(importlib.import_module(place), kind).__module__)
     monkeypatch.setattr(module, "serial", None)
     _, line = pty.openpty()
     said = _refusal(BusSpec("can", interface=name, channel=ttyname(line)))

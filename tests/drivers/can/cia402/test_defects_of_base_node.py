@@ -151,7 +151,8 @@ def test_4_a_refused_mode_is_an_error(rig: Rig, axis: Cia402Axis) -> None:
     before = len(drive.frames)
     with pytest.raises(NotPermitted, match=f"no mode {missing}; it has PP"):
         axis.switch_mode(missing)
-    assert [i for i, _ in drive.frames[before:] if i == 0x601] == []
+    sdo = [data for i, data in drive.frames[before:] if i == 0x601]
+    assert all(data[0] >> 5 == 2 for data in sdo), "6502h is read again for the message"
     assert axis.mode == "CSV"
 
 

@@ -13,6 +13,8 @@ from winchkit.drivers.scheduling import event_of
 __all__ = ["sdo_client"]
 
 _SdoClient: Any = library.SdoClient
+_OBJECT = slice(1, 4)
+"""Bytes of an SDO frame with index and sub-index (CiA 301)."""
 
 
 def sdo_client(remote: canopen.RemoteNode, clock: Clock) -> Any:
@@ -30,19 +32,22 @@ class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
     def __init__(self, request: int, reply: int, dictionary: Any, clock: Clock) -> None:
         super().__init__(request, reply, dictionary)
         self._arrived = event_of(clock)
-        self._replies = 0
+        self._open = self._answered = b""
+        """Index and sub-index of the request under way, and of the one answered last."""
         self.answered_twice = 0
-        """Requests with more than one reply: of a second node, of another client's request, or
-        late."""
+        """Answers to a request that was answered: of a second node, or to another client."""
 
     def send_request(self, request: Any) -> None:
         self._arrived.clear()
-        self._replies = 0
+        self._open = bytes(request[_OBJECT])
         super().send_request(request)
 
     def on_response(self, can_id: int, data: Any, timestamp: float) -> None:
-        self._replies += 1
-        self.answered_twice += self._replies > 1
+        answer = bytes(data[_OBJECT])
+        if answer == self._open:
+            self._open, self._answered = b"", answer
+        elif answer == self._answered:
+            self.answered_twice += 1
         super().on_response(can_id, data, timestamp)
         self._arrived.set()
 
