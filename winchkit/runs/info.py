@@ -160,7 +160,7 @@ def _source_info(source: Source, samples: Samples, span: tuple[float, float]) ->
         len(samples),
         1 / mean,
         len(gaps),
-        # The longest interval is told where there is no gap too.
+        # The longest interval is given where there is no gap too.
         float(max([*steps, *gaps], default=np.nan)),
         {name: count for name, count in zip(names, lacks, strict=True) if count},
         int(np.count_nonzero(samples.values[:, flags])),

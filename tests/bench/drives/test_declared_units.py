@@ -1,4 +1,4 @@
-"""Units of a device file on the independent slave, which is told in rad/s what its counts are."""
+"""Units of a device file on the independent slave, whose counts are given in rad/s."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _TURN = 2 * pi
         ('position_unit = "0.1 deg"\nspeed_unit = "0.1 rpm"', 3600, _TURN / 600),
     ],
 )
-def test_the_shaft_turns_as_far_as_it_is_told_to(
+def test_the_shaft_turns_as_far_as_it_is_commanded(
     tmp_path: Path, keys: str, counts: int, velocity_unit: float
 ) -> None:
     path = write_bench(tmp_path)

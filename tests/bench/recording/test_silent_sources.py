@@ -1,4 +1,4 @@
-"""A log in which a drive or an instrument falls silent: its rows, its gaps, and what is told."""
+"""A log in which a drive or an instrument falls silent: its rows, its gaps, and the reports."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def served(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
 @pytest.mark.realtime
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.mark.parametrize(("strict", "code"), [((), 0), (("--strict",), 1)])
-def test_the_command_tells_at_once_and_at_the_end(
+def test_the_command_reports_it_at_once_and_at_the_end(
     served: subprocess.Popen[str], tmp_path: Path, strict: tuple[str, ...], code: int
 ) -> None:
     path = tmp_path / "lift.csv"
@@ -136,7 +136,7 @@ def test_the_command_tells_at_once_and_at_the_end(
         served.stdin.flush()
         assert log.stderr is not None
         first = log.stderr.readline()
-        assert log.poll() is None, "it is told while the log goes on"
+        assert log.poll() is None, "it is reported while the log goes on"
         assert "A.cell: no sample for" in first
         _, told = log.communicate(timeout=30)
     assert log.returncode == code

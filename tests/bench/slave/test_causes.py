@@ -1,4 +1,4 @@
-"""Causes as they are told, each provoked on the independent slave."""
+"""Causes in messages, each provoked on the independent slave."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_every_device_that_we_ship_is_in_order(name: str) -> None:
         ("1875 rpm / 512 / encoder", "100 rpm are 1789569.71 of 606Ch"),
     ],
 )
-def test_the_units_of_a_device_file_are_told_by_an_example(
+def test_the_units_of_a_device_file_are_shown_by_an_example(
     tmp_path: Path, unit: str, example: str
 ) -> None:
     """Of 65 536 increments a turn."""
