@@ -27,6 +27,7 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -115,6 +116,7 @@ def owner(bench_file: str, disk: str = "") -> None:
         else:
             bench.on_cycle(hang)
         shown = 0
+        order = partial(bench.winch["A"].jog, pay_out=SPEED)
         while True:
             if disk and signal.SIGUSR1 in told and not (Path(disk) / "filler").exists():
                 fill(Path(disk) / "filler")
@@ -123,7 +125,8 @@ def owner(bench_file: str, disk: str = "") -> None:
                 shown += 1
             if signal.SIGUSR2 not in told and (disk or not told):
                 try:
-                    bench.winch["A"].jog(pay_out=SPEED)
+                    order()
+                    order = bench.winch["A"].refresh
                 except WinchkitError as error:
                     sys.exit(str(error))
             time.sleep(0.05)

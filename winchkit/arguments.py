@@ -6,13 +6,15 @@ deep in a computation.
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 
 from winchkit.errors import UsageError, one_line
 
-__all__ = ["path_of", "require_each", "require_type", "require_types"]
+__all__ = ["number", "path_of", "positive", "require_each", "require_type", "require_types"]
 
 _CALLS = {
     "Addition": "add(effect, runs, profile)",
@@ -140,6 +142,67 @@ def path_of(value: object, name: str = "path") -> Path:
     if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
         raise UsageError(f"{name} is {_shown(value)}; pass the path of a file or folder")
     return Path(value)
+
+
+def number(call: str, name: str, value: object) -> float:
+    """Argument that is a finite number, in SI.
+
+    Parameters
+    ----------
+    call
+        Name of the call.
+    name
+        Of the argument.
+    value
+        Argument of the call.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    UsageError
+        For text, None, True, and for what is not finite.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise UsageError(f"{call}: {name} is {_shown(value)}; pass a number in SI units")
+    if not math.isfinite(value):
+        raise UsageError(f"{call}: {name}={value} is not a finite number")
+    return float(value)
+
+
+def positive(call: str, name: str, value: object, most: float = math.inf) -> float:
+    """Argument that is a number above zero, in SI.
+
+    Parameters
+    ----------
+    call
+        Name of the call.
+    name
+        Of the argument.
+    value
+        Argument of the call.
+    most
+        Largest value.
+
+    Returns
+    -------
+    float
+        The number.
+
+    Raises
+    ------
+    UsageError
+        For anything else, and for what is larger.
+    """
+    found = number(call, name, value)
+    if found <= 0:
+        raise UsageError(f"{call}: {name}={found:g} is not a positive number")
+    if found > most:
+        raise UsageError(f"{call}: {name}={found:g} is more than {most:g}")
+    return found
 
 
 def _shown(value: object) -> str:

@@ -23,6 +23,7 @@ from can_cost.wire import PairLibrary, VirtualWire
 from winchkit import catalog
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.loop import ControlLoop, WinchParts
 from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.observation import Supervised
@@ -241,14 +242,16 @@ def bench(
         for parts in winches.values():
             # No heartbeat comes between the commissioning and the first cycle.
             parts.axis.heartbeat.last = None
-        jogs = {name: Jog(parts.cable, LIMITS) for name, parts in winches.items()}
+        jogs = {
+            name: Jog(parts.cable, LIMITS, SPEED, DeadMan(math.inf))
+            for name, parts in winches.items()
+        }
         yield Bench(clock, opened, served, loop, jogs)
 
 
 def begin(it: Bench) -> None:
     """Ask every winch to jog for good."""
     for name, jog in it.jogs.items():
-        jog.refresh(SPEED, math.inf)
         it.loop.winches[name].controller.begin(jog)
 
 

@@ -49,9 +49,10 @@ class Operator:
         direction = "pay_out" if self._case.paying_out else "wind_in"
 
         def work() -> None:
+            self._try(lambda: winch.jog(**{direction: self._case.speed}))
             while self.holds:
-                self._try(lambda: winch.jog(**{direction: self._case.speed}))
                 self._world.clock.sleep(_REPEAT)
+                self._try(winch.refresh)
 
         return work
 

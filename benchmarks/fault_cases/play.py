@@ -6,7 +6,7 @@ import logging
 import math
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -210,12 +210,14 @@ def _note_trip(record: Record, snapshot: BenchSnapshot) -> None:
 def _press(world: World, case: Case) -> None:
     """A new command, as a person gives one after a reset."""
     end = world.now + 0.4
+    winches = world.bench.winch.values()
+    speed = {"wind_in" if case.paying_out else "pay_out": 0.1}
+    orders = [partial(winch.jog, **speed) for winch in winches]
     while world.now < end:
-        for winch in world.bench.winch.values():
-            try:
-                winch.jog(**{"wind_in" if case.paying_out else "pay_out": 0.1})
-            except Exception:  # noqa: BLE001 - judged by what moves
-                continue
+        for order in orders:
+            with suppress(Exception):  # judged by what moves
+                order()
+        orders = [winch.refresh for winch in winches]
         world.clock.sleep(0.05)
     world.clock.sleep(0.4)
 

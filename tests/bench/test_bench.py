@@ -140,21 +140,21 @@ def test_what_is_refused(bench: Bench, live: LiveBench) -> None:
     winch = bench.winch["A"]
     with pytest.raises(NotPermitted, match="beyond the limits"):
         winch.move_to(7.0)
-    with pytest.raises(UsageError, match="not a positive number"):
+    with pytest.raises(UsageError, match="not a finite number"):
         winch.jog(pay_out=math.nan)
     with pytest.raises(UsageError, match=r"no winch 'B'; it has A"):
         bench.named("B")
     before = winch.cable_length
     for call in (winch.jog, winch.move_by):
         name = call.__name__
-        with pytest.raises(TypeError, match=rf"{name}\(-0.1\).*write {name}\(pay_out=...\) or"):
+        with pytest.raises(UsageError, match=rf"{name}\(-0.1\).*write {name}\(pay_out=...\) or"):
             call(-0.1)
         given: dict[str, Any]
         for given in ({}, {"pay_out": 0.1, "wind_in": 0.1}):
             with pytest.raises(UsageError, match="needs one of pay_out= and wind_in="):
                 call(**given)
         for value in (-0.1, 0.0, math.inf):
-            with pytest.raises(UsageError, match="not a positive number"):
+            with pytest.raises(UsageError, match=r"not a (positive|finite) number"):
                 call(wind_in=value)
     assert not winch.moving
     assert winch.cable_length == pytest.approx(before, abs=1e-4)
@@ -210,15 +210,8 @@ def test_stations_attach_log_tare_and_stop(bench: Bench, tmp_path: Path) -> None
         until(lambda: bench.winch["A"].snapshot.cable_speed > 0.1)
         other.stop()
         assert bench.snapshot.at_rest
-        with pytest.raises(NotPermitted, match="release it for"):
-            station.jog("A", pay_out=0.2)
-        late = attach(bench.spec)
-        assert late is not None
-        late.jog("A", pay_out=0.2)
-        until(lambda: bench.winch["A"].snapshot.cable_speed > 0.1)
-        late.release("A")
-        late.close()
-        until(lambda: bench.snapshot.at_rest)
+        with pytest.raises(MotionError, match=r"winch A was stopped by .* before the motion"):
+            station.refresh("A")
         assert other.end_log() > 5
         assert abs(station.tare(None)) < 8
         with pytest.raises(UsageError, match="no winch 'Z'"):

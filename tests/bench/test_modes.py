@@ -13,7 +13,7 @@ import pytest
 
 from winchkit import catalog, open_bench
 from winchkit.bench.bench import Bench
-from winchkit.cli.bench.keyboard_jog import HeldKey, split_keys
+from winchkit.cli.bench.keyboard_jog import HeldKey, Press, split_keys
 from winchkit.errors import NotPermitted
 from winchkit.runs import read_run
 from winchkit.schema.read import read_simbench
@@ -101,11 +101,16 @@ def test_a_drive_without_the_mode_is_not_opened(tmp_path: Path) -> None:
 
 def test_a_held_key_refreshes_shortly_and_a_single_press_lasts() -> None:
     held = HeldKey()
-    assert held.hold("up", 0.0) == 0.7
-    assert held.hold("up", 0.5) == 0.2
-    assert held.hold("up", 0.53) == 0.2
-    assert held.hold("up", 0.9) == 0.7, "released in between"
-    assert held.hold("down", 1.0) == 0.7, "another key"
+    assert held.press("up", 0.0) is Press.NEW
+    assert held.press("up", 0.5) is Press.REPEAT
+    assert held.press("up", 0.53) is Press.REPEAT
+    assert held.press("up", 0.9) is Press.NEW, "released in between"
+    assert held.press("down", 1.0) is Press.NEW, "another key"
+    held.ignore({"up", "down"}, 2.0)
+    assert held.press("down", 2.6) is Press.IGNORED
+    assert held.press("up", 3.2) is Press.IGNORED
+    assert held.press("up", 3.8) is Press.IGNORED, "it was held all the time"
+    assert held.press("up", 4.6) is Press.NEW
 
 
 def test_keys_of_a_terminal() -> None:

@@ -10,7 +10,7 @@ import pytest
 from bus_rig import Rig, Seen
 from drive_server import NODE
 from winchkit.bench.bench import Bench
-from winchkit.bench.control.motion import DEAD_MAN
+from winchkit.bench.control.dead_man import DEAD_MAN
 from winchkit.errors import DriveFault, LimitTripped
 
 pytestmark = pytest.mark.realtime
@@ -46,7 +46,7 @@ def test_a_jog_moves_and_ends_by_its_dead_man(rig: Rig, bench: Bench) -> None:
     rig.until(lambda: abs(rig.drive.see()["velocity"]) > 20)
     rig.forget()
     begin = bench.clock.now()
-    winch.jog(pay_out=0.2, hold=DEAD_MAN)
+    winch.refresh(hold=DEAD_MAN)
     winch.wait()
     frames = rig.witness.frames
     sent = targets(frames)

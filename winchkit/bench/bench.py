@@ -14,7 +14,6 @@ from winchkit.bench.connection import BenchConnection
 from winchkit.bench.control.dead_man import LIFE_SIGN
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.realtime import Request
-from winchkit.bench.control.release import NotReleased, ReleaseGuard
 from winchkit.bench.control.snapshot import Direction, Trip
 from winchkit.bench.drives.set_up_progress import Tell, to_stderr
 from winchkit.bench.homing import homing
@@ -24,7 +23,7 @@ from winchkit.bench.lifecycle import (
     reset,
 )
 from winchkit.bench.ownership import Ownership
-from winchkit.bench.remote.commander import Commanders, NotCommander
+from winchkit.bench.remote.commander import Commanders, NotCommander, NotReleased
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.life_sign import LifeSigns
@@ -113,7 +112,6 @@ class Bench(BenchConnection):
         )
         self.not_commissioned = ""
         """Why nothing may move before it is commissioned; empty where it is."""
-        self._release = ReleaseGuard()
         self._commissioner = threading.get_ident() if commissioning else None
         with self._stack:
             self._look_at_record()
@@ -203,20 +201,21 @@ class Bench(BenchConnection):
         self._run_down(others if self.spec.stop_together else names, wait=wait)
 
     def stop_now(self, *, wait: bool = True) -> None:
-        """Quick-stop every winch. A jog that is held must be released before the next one.
+        """Quick-stop every winch; what is held is ended, and nothing refreshes it any more.
+
+        An ``on_cycle`` function may call it, and returns at once.
 
         Parameters
         ----------
         wait : bool
             Return when the winches are disabled and stand still.
         """
-        self._release.close(set(self.winch))
-        self.stopped_by = self.commanders.actor.name
-        self.stops += 1
+        self._note_stop(self.winch)
+        self.stopped_by, self.stops = self.commanders.actor.name, self.stops + 1
         with self.loop.ordering:
             for parts in self.loop.winches.values():
                 parts.controller.stop()
-        if wait:
+        if wait and not self.loop.asks_here:
             self.wait_at_rest(self.winch)
 
     def move_together(
@@ -244,6 +243,8 @@ class Bench(BenchConnection):
         hold : bool
             Keep the drives enabled at the end.
         """
+        if wait:
+            self.loop.require_other_thread("move_together")
         targets = {self.named(name): length for name, length in lengths.items()}
         begin_together(self.loop, targets, speed, acceleration, hold=hold)
         if wait:
@@ -252,17 +253,17 @@ class Bench(BenchConnection):
     def reset(self) -> list[str]:
         """Clear trips and drive faults; drives that lost their set-up are commissioned again.
 
-        A bus that went down is opened again. Nothing is enabled by any of it, and a command that
-        was held before has to be released first. Returns what was cleared, in words. Raises
-        LimitTripped naming what still forbids any motion, with the latch as it was, NotPermitted,
-        ConnectionLost.
+        A bus that went down is opened again. Nothing is enabled by any of it, and what was held
+        before is ended by it. Returns what was cleared, in words. Raises LimitTripped naming what
+        still forbids any motion, with the latch as it was, NotPermitted, ConnectionLost.
         """
-        self._release.close(set(self.winch))
-        start = self.clock.now()
+        self.loop.require_other_thread("reset")
+        by = self.commanders.actor.name
+        for winch in self.winch.values():
+            winch.end_held(f"{by} reset the bench; give a new command")
         try:
             cleared = reset(self._wired, self.spec, self.clock)
         finally:
-            self._release.resume(start, self.clock.now())
             # A bus that was opened again has a new receive thread.
             self.realtime.cover(self._urgent_threads(), self._wired.companions)
         self._look_at_record()
@@ -270,6 +271,7 @@ class Bench(BenchConnection):
 
     def close(self) -> None:
         """Stop every winch in a controlled way and let the buses go. Twice does no harm."""
+        self.loop.require_other_thread("close")
         with self._stack:
             self.stations.close()
             if self.loop.alive:
@@ -280,10 +282,8 @@ class Bench(BenchConnection):
             self._close_logs()
         self._stack = ExitStack()
 
-    def permit(self, winch: str, direction: Direction, *, held: bool = False) -> None:
+    def permit(self, winch: str, direction: Direction) -> None:
         """Raise what forbids this motion to who asks now; returns when it is allowed.
-
-        ``held``: the command is repeated for as long as somebody holds on (a jog).
 
         Parameters
         ----------
@@ -291,22 +291,12 @@ class Bench(BenchConnection):
             Winch that is to move.
         direction : Direction
             Of the motion.
-        held : bool
-            Whether the command is one of a series that goes on while a key is held.
         """
         self.commanders.require(winch)
         if not direction:
             return
         self._require_commissioned()
-        refused: NotReleased | None = None
-        if held:
-            try:
-                self._release.ask(winch, self.commanders.actor, self.clock.now())
-            except NotReleased as error:
-                refused = error
         self.raise_trouble()
-        if refused is not None:
-            raise refused
         for trip in self.snapshot.blocked:
             if trip.blocks is Direction.BOTH or (trip.winch == winch and trip.blocks & direction):
                 raise NotPermitted(str(trip))
@@ -412,11 +402,19 @@ class Bench(BenchConnection):
         return self.winch[self.spec.winch_named(name)]
 
     def _run_down(self, names: Iterable[str], *, wait: bool) -> None:
+        if wait:
+            self.loop.require_other_thread("stop")
+        self._note_stop(names)
         with self.loop.ordering:
             for name in names:
                 self.winch[name].run_down()
         if wait:
             self.wait_at_rest(names)
+
+    def _note_stop(self, names: Iterable[str]) -> None:
+        """Keep who stops these winches, for the error of their clients."""
+        for name in names:
+            self.winch[name].stopped_by = self.commanders.actor.name
 
     def _require_rest(self, instrument: str) -> None:
         """Raise NotPermitted while the winch of an instrument (``A.cell``) is enabled."""
@@ -424,7 +422,7 @@ class Bench(BenchConnection):
 
     def _jog_from_callback(self, name: str, winding_speed: float) -> None:
         try:
-            self.named(name).keep_jogging(winding_speed)
+            self.named(name).follow(winding_speed)
         except (NotReleased, NotCommander):
             pass  # it goes on asking for what was stopped: nothing moves before it ceases to
         except MotionError:
@@ -440,8 +438,10 @@ class Bench(BenchConnection):
 
     def _end_silent(self, client: Client, names: Collection[str], reason: str) -> None:
         """Ramp the winches of a client without a life sign; every client gets the reason."""
-        self.stopped_by = f"the dead-man ({client.name} was silent for {LIFE_SIGN:g} s)"
-        self.stop_commanded(names, wait=False)
+        with self.commanders.acting(
+            Client(f"the dead-man ({client.name} was silent for {LIFE_SIGN:g} s)")
+        ):
+            self.stop_commanded(names, wait=False)
         self.loop.warn(Trip("client", ", ".join(names), reason, Direction.NONE))
 
     def _come_to_rest(self) -> None:

@@ -181,8 +181,12 @@ class BenchConnection(ABC):
         """Call a function with every cycle's snapshot, on the control thread.
 
         It may return a ``winding_speed`` (m/s, positive winds in) by winch, which moves it for
-        as long as it keeps returning one. Should it raise, everything stops and the exception
-        comes out of the ``with`` block. Returns a function that takes it off again.
+        as long as it keeps returning one; after a stop or a reset it has to return none for 0.2 s
+        first. The loop waits for it: it may read everything, and call ``stop_now``, which acts and
+        returns at once there, and what takes ``wait=False`` (``stop``, ``move_to``, ``move_by``).
+        What waits raises UsageError there: ``reset``, ``close``, ``home``, ``tare``, ``wait``, a
+        ``duration``, and moves and stops that wait. Should it raise, everything stops and the
+        exception comes out of the ``with`` block. Returns a function that takes it off again.
 
         Parameters
         ----------

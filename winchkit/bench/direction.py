@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TypedDict
 
+from winchkit.arguments import number
 from winchkit.errors import UsageError
 
 __all__ = ["DirectionKeyword", "directed", "no_positional", "paid_out"]
@@ -32,9 +32,9 @@ def paid_out(what: str, pay_out: float | None, wind_in: float | None) -> float:
     if (pay_out is None) == (wind_in is None):
         count = "neither" if pay_out is None else "both"
         raise UsageError(f"{what} needs one of pay_out= and wind_in=, and has {count}")
-    name, value = ("wind_in", wind_in) if pay_out is None else ("pay_out", pay_out)
-    assert value is not None, "one of them is given"
-    if not 0 < value < math.inf:
+    name, given = ("wind_in", wind_in) if pay_out is None else ("pay_out", pay_out)
+    value = number(what, name, given)
+    if value <= 0:
         raise UsageError(
             f"{what}: {name}={value:g} is not a positive number; the name gives the direction, "
             "write pay_out=0.1 or wind_in=0.1"
@@ -43,9 +43,9 @@ def paid_out(what: str, pay_out: float | None, wind_in: float | None) -> float:
 
 
 def no_positional(call: str, unit: str, given: Sequence[object]) -> None:
-    """Raise TypeError for values without a name: their sign would give the direction."""
+    """Raise UsageError for values without a name: their sign would give the direction."""
     if given:
-        raise TypeError(
+        raise UsageError(
             f"{call}({', '.join(map(repr, given))}): a number without a name does not give the "
             f"direction; write {call}(pay_out=...) or {call}(wind_in=...) with a positive number "
             f"({unit}), and every other argument by name"

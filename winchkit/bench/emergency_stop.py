@@ -5,17 +5,19 @@ from __future__ import annotations
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from winchkit import catalog
 from winchkit.arguments import require_type
 from winchkit.drivers.can.bus.bus import CanBus
-from winchkit.drivers.can.canopen.node import SdoNode
-from winchkit.drivers.can.cia402.standstill import PolledStandstill
+from winchkit.drivers.can.cia402.sdo_stop import SdoStop
 from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, state_of
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import ConnectionLost, WinchkitError
 from winchkit.schema.bench import BenchSpec, WinchWiring
-from winchkit.schema.devices.servo import ServoSpec
+
+if TYPE_CHECKING:
+    from winchkit.drivers.can.canopen.node import SdoNode
+    from winchkit.schema.devices.servo import ServoSpec
 
 __all__ = ["Stopped", "stop_on_bus"]
 
@@ -24,6 +26,8 @@ _STOP_TIME = 5.0
 stop."""
 _POLL = 0.02
 """s: each look is two SDO requests (2 ms at 1 Mbit/s) per drive."""
+_INSIST = 0.2
+"""For drives that have not taken the first command, s: ten further ones."""
 _MOVING = (State.OPERATION_ENABLED, State.QUICK_STOP_ACTIVE, State.FAULT_REACTION_ACTIVE)
 
 
@@ -40,7 +44,8 @@ class Stopped:
 def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
     """Quick-stop every drive of a bench file and wait until each confirms.
 
-    All drives get the command before any is waited for.
+    All drives get 6040h = 02h first, from frames that need no EDS, whatever the others do; only
+    then each is asked.
 
     Parameters
     ----------
@@ -52,31 +57,77 @@ def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
     Returns
     -------
     list of Stopped
-        Per drive whether it confirmed.
-
-    Raises
-    ------
-    ConnectionLost
-        Where a bus does not open.
+        Per drive whether it confirmed; one whose bus does not open has not.
     """
     require_type(spec, BenchSpec, "spec")
     clock = clock or MonotonicClock()
     with ExitStack() as stack:
-        buses = {}
+        buses: dict[str, CanBus] = {}
+        stops: dict[str, SdoStop] = {}
+        problems: dict[str, WinchkitError] = {}
         for name in dict.fromkeys(winch.servo.bus for winch in spec.winch.values()):
-            buses[name] = CanBus(spec.bus[name], name, clock)
-            stack.callback(buses[name].close)
-        nodes = {name: _node(spec, winch, buses) for name, winch in spec.winch.items()}
-        problems = {name: _tell(node) for name, (node, _) in nodes.items()}
-        return [
-            _confirm(name, node, servo, problems[name], clock)
-            for name, (node, servo) in nodes.items()
-        ]
+            wired = {key: one for key, one in spec.winch.items() if one.servo.bus == name}
+            try:
+                bus = buses[name] = CanBus(spec.bus[name], name, clock)
+            except ConnectionLost as error:
+                problems |= dict.fromkeys(wired, error)
+                continue
+            stack.callback(bus.close)
+            for key, winch in wired.items():
+                stops[key] = SdoStop(bus, winch.servo.node or 1)
+                _send(stops[key], key, problems)
+        _insist(stops, problems, clock)
+        # Those that have answered come first: a dead one takes the time-out of its request.
+        order = sorted(spec.winch, key=lambda name: name not in stops or not stops[name].taken)
+        for stop in stops.values():
+            stop.end()
+        found = {name: _confirmed(spec, name, buses, problems, clock) for name in order}
+        return [found[name] for name in spec.winch]
+
+
+def _send(stop: SdoStop, winch: str, problems: dict[str, WinchkitError]) -> None:
+    """Send the next frame of a stop; a bus that takes none is a problem of this winch."""
+    try:
+        stop.send()
+    except ConnectionLost as error:
+        problems[winch] = error
+
+
+def _insist(stops: dict[str, SdoStop], problems: dict[str, WinchkitError], clock: Clock) -> None:
+    """Repeat the command to drives that have not taken it, for a while."""
+    end = clock.now() + _INSIST
+    while waiting := [name for name, stop in stops.items() if not stop.taken]:
+        if clock.now() > end:
+            return
+        clock.sleep(_POLL)
+        for name in waiting:
+            if not stops[name].taken:
+                _send(stops[name], name, problems)
+
+
+def _confirmed(
+    spec: BenchSpec,
+    name: str,
+    buses: dict[str, CanBus],
+    problems: dict[str, WinchkitError],
+    clock: Clock,
+) -> Stopped:
+    """Whether a drive confirms; what keeps it from being asked is reported for this winch alone."""
+    problem, winch = problems.get(name), spec.winch[name]
+    if winch.servo.bus not in buses:
+        return Stopped(name, False, str(problem))
+    try:
+        node, servo = _node(spec, winch, buses)
+        return _confirm(name, node, servo, problem, clock)
+    except WinchkitError as error:
+        return Stopped(name, False, str(problem or error))
 
 
 def _node(
     spec: BenchSpec, winch: WinchWiring, buses: dict[str, CanBus]
 ) -> tuple[SdoNode, ServoSpec]:
+    from winchkit import catalog
+    from winchkit.drivers.can.canopen.node import SdoNode
     from winchkit.schema.read import read_device
 
     ref = winch.servo
@@ -98,8 +149,11 @@ def _confirm(
     winch: str, node: SdoNode, servo: ServoSpec, problem: WinchkitError | None, clock: Clock
 ) -> Stopped:
     """Ask until the drive is disabled or stands still in quick stop."""
+    from winchkit.drivers.can.cia402.standstill import PolledStandstill
+
     deadline = clock.now() + _STOP_TIME
-    state, standstill = State.UNKNOWN, None
+    state = State.UNKNOWN
+    standstill: PolledStandstill | None = None
     while clock.now() < deadline:
         try:
             state = state_of(node.read(0x6041))

@@ -25,14 +25,12 @@ class WinchHost(Protocol):
     """Drive by winch."""
     commanders: Commanders
     cells: CellDesk
-    stopped_by: str
-    """Who gave the last quick stop."""
 
     @property
     def snapshot(self) -> BenchSnapshot:
         """Newest state of the whole bench."""
 
-    def permit(self, winch: str, direction: Direction, *, held: bool = False) -> None:
+    def permit(self, winch: str, direction: Direction) -> None:
         """Raise what forbids this motion of a winch; return when it is allowed."""
 
     def raise_trouble(self) -> None:

@@ -60,6 +60,7 @@ def stopped_after(stop: Callable[[], None]) -> Iterator[None]:
 
 def await_cycles(loop: ControlLoop, clock: Clock, count: int) -> None:
     """Let the loop take notice of what was just ordered; raises WinchkitError when it hangs."""
+    loop.require_other_thread("waiting")
     start, deadline = loop.count, clock.now() + _HANGS + count * loop.cycle
     while loop.alive and loop.count < start + count:
         if clock.now() > deadline:

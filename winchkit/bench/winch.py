@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 
+from winchkit.arguments import number, positive
 from winchkit.bench.cells.device_tare import await_device_tare
 from winchkit.bench.cells.tares import host_tare
+from winchkit.bench.control.dead_man import DEAD_MAN, DeadMan
 from winchkit.bench.control.homing_motion import HomingRequest
-from winchkit.bench.control.motion import DEAD_MAN, Jog, MotionSource, Move, StartGate, Trim
+from winchkit.bench.control.motion import Jog, MotionSource, Move, StartGate, Trim
 from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.control.supervisor import direction_of
 from winchkit.bench.control.tension_control import (
@@ -17,11 +19,13 @@ from winchkit.bench.control.tension_control import (
 )
 from winchkit.bench.direction import no_positional, paid_out
 from winchkit.bench.winch_status import WinchStatus
-from winchkit.errors import NotPermitted, UsageError
+from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.units import parse
 
 __all__ = ["Winch"]
 
+_LONGEST_HOLD = 1.0
+"""s: a motion without its commander lasts no longer."""
 _POLL = 0.01
 """s: two or more cycles at the usual 4 ms."""
 _TARE_TIME = 2.0
@@ -39,12 +43,12 @@ class Winch(WinchStatus):
         duration: float | None = None,
         hold: float = DEAD_MAN,
     ) -> None:
-        """Move the cable at a speed (m/s, positive), out or in, for ``hold`` seconds.
+        """Begin to move the cable at a speed (m/s, positive), out or in, for ``hold`` seconds.
 
-        Call it again within that time to keep going; without another call it ramps to rest and
-        disables. With ``duration`` it does so itself for that many seconds and returns at rest.
-        Raises TypeError for a speed without a name, UsageError, NotPermitted, LimitTripped,
-        DriveFault.
+        :meth:`refresh` within that time keeps it going; without one it ramps to rest and disables.
+        With ``duration`` it does so itself for that many seconds and returns at rest. It is no
+        refresh of a jog that is under way, which it refuses. Raises UsageError, NotPermitted,
+        LimitTripped, DriveFault, MotionError.
 
         Parameters
         ----------
@@ -53,51 +57,166 @@ class Winch(WinchStatus):
         duration : float, optional
             Time of the jog, s.
         hold : float
-            Time of motion without another call, s, at most 1.
+            Time of motion without a refresh, s, at most 1.
         """
         no_positional("jog", "m/s", unnamed)
         winding_speed = -paid_out("jog", pay_out, wind_in)
+        hold = positive("jog", "hold", hold, _LONGEST_HOLD)
         if duration is None:
-            self.keep_jogging(winding_speed, hold)
+            self._begin_jog(winding_speed, hold)
             return
-        clock = self._bench.clock
-        end = clock.now() + duration
-        self.keep_jogging(winding_speed, hold, held=False)
-        mine = self._jog
-        while mine is self._jog and self.moving and (left := end - clock.now()) > 0:
-            self.permit(direction_of(winding_speed))
-            if mine is not None:
-                mine.refresh(winding_speed, clock.now() + min(hold, left))
-            clock.sleep(min(hold / 4, left))
-        self.wait()
+        duration = positive("jog", "duration", duration)
+        self.require_waiting("jog(duration=...)")
+        self._begin_jog(winding_speed, hold, duration)
+        self._hold_for(duration, hold)
 
-    def keep_jogging(
-        self, winding_speed: float, hold: float = DEAD_MAN, *, held: bool = True
+    def refresh(
+        self,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        hold: float = DEAD_MAN,
     ) -> None:
-        """Begin or refresh a jog at a winding speed (m/s, positive winds in), zero ends it.
+        """Keep a jog or a held tension going for ``hold`` seconds more, a jog at another speed too.
 
-        What stations and ``on_cycle`` callbacks call; for a person :meth:`jog` names the
-        direction. Raises as that does. ``held``: the call is one of those that go on while
-        somebody holds on, and has to cease for a moment after a stop.
+        It must come before the time of the command, or of the refresh before it, is over: what has
+        ended is never refreshed, and a new motion needs a new command. Raises MotionError where
+        there is nothing to refresh, with what ended it, UsageError, NotPermitted, LimitTripped.
+
+        Parameters
+        ----------
+        pay_out, wind_in : float, optional
+            Another speed of a jog, m/s, positive; at most one is given.
+        hold : float
+            Time of motion without another refresh, s, at most 1.
+        """
+        no_positional("refresh", "m/s", unnamed)
+        named = pay_out is not None or wind_in is not None
+        winding_speed = -paid_out("refresh", pay_out, wind_in) if named else None
+        self.extend(winding_speed, positive("refresh", "hold", hold, _LONGEST_HOLD))
+
+    def release(self) -> None:
+        """End a jog or a held tension by a ramp now, instead of when its time is over."""
+        self._bench.commanders.let_go(self.name)
+        if self._held is not None and self.commanded_here:
+            self._held.dead_man.end("it was released; give a new command")
+
+    def end_held(self, why: str) -> None:
+        """End what is held by a ramp, whoever holds it.
+
+        Parameters
+        ----------
+        why : str
+            What its client gets as the error of the next refresh.
+        """
+        if self._held is not None:
+            self._held.dead_man.end(why)
+
+    @property
+    def held(self) -> bool:
+        """Whether a jog or a held tension of the acting client is under way."""
+        motion = self._held
+        return (
+            motion is not None
+            and self.moving
+            and self.commanded_here
+            and motion.dead_man.live(self._bench.clock.now())
+        )
+
+    def extend(self, winding_speed: float | None, hold: float) -> None:
+        """Refresh what is held; what stations and ``on_cycle`` callbacks call.
+
+        Raises as :meth:`refresh` does, to which a person gives the direction.
+
+        Parameters
+        ----------
+        winding_speed : float or None
+            Of a jog, m/s, positive winds in; None for the one before.
+        hold : float
+            Time of motion without another refresh, s.
+        """
+        motion, now = self._held, self._bench.clock.now()
+        self.raise_trouble()
+        if motion is None or not self.commanded_here:
+            raise MotionError(
+                f"winch {self.name}: nothing is under way that could be refreshed"
+                + (f"; {self.stopped_by} stopped it" if self.stopped_by else "; begin with jog")
+            )
+        if not self.moving:
+            self.raise_end()
+        if isinstance(motion, Jog):
+            wanted = motion.requested if winding_speed is None else winding_speed
+            self.require_speed(wanted)
+            self.permit(direction_of(wanted))
+            self._refresh(motion.dead_man, now, hold)
+            motion.request(wanted)
+        else:
+            self.permit(direction_of(motion.setting.tension - self.snapshot.load_tension))
+            self._refresh(motion.dead_man, now, hold)
+
+    def _refresh(self, dead_man: DeadMan, now: float, hold: float) -> None:
+        """Extend a permission; raises MotionError naming the winch."""
+        try:
+            dead_man.refresh(now, now + hold)
+        except MotionError as error:
+            raise MotionError(f"winch {self.name}: {error}") from None
+
+    def require_speed(self, winding_speed: float) -> None:
+        """Raise UsageError for a winding speed that the winch may not have.
 
         Parameters
         ----------
         winding_speed : float
             m/s, positive winds in.
-        hold : float
-            Time of motion without another call, s, at most 1.
-        held : bool
-            Whether the call is one of a series.
         """
-        if not math.isfinite(winding_speed) or not 0 < hold <= 1:
-            raise UsageError(f"a jog at {winding_speed} m/s held for {hold} s cannot be meant")
         limit = self.wiring.limits.speed
-        if abs(winding_speed) > limit:
+        if not abs(number("jog", "winding speed", winding_speed)) <= limit:
             raise UsageError(
                 f"winch {self.name}: {abs(winding_speed):g} m/s exceeds limits.speed "
                 f"{limit:g} m/s; jog slower"
             )
-        self._refresh(winding_speed, hold, held=held)
+
+    def follow(self, winding_speed: float) -> None:
+        """Jog as long as an ``on_cycle`` function asks for it; raises as :meth:`jog` does.
+
+        Parameters
+        ----------
+        winding_speed : float
+            m/s, positive winds in; zero begins nothing.
+        """
+        self.require_speed(winding_speed)
+        if self.held:
+            self.extend(winding_speed, DEAD_MAN)
+        elif winding_speed:
+            self._begin_jog(winding_speed, DEAD_MAN)
+
+    def _begin_jog(self, winding_speed: float, hold: float, duration: float | None = None) -> None:
+        """Begin a jog; one without a duration is held, and not started by repeats."""
+        self.require_speed(winding_speed)
+        if duration is None:
+            self._require_new()
+        self.permit(direction_of(winding_speed))
+        self.require_length()
+        expires = self._bench.clock.now() + (hold if duration is None else min(hold, duration))
+        self.begin(Jog(self._parts.cable, self.wiring.limits, winding_speed, DeadMan(expires)))
+
+    def _require_new(self) -> None:
+        """Raise where a held motion is asked for again instead of refreshed."""
+        if self.held:
+            raise MotionError(
+                f"winch {self.name} is held by this client already; go on by refresh(), another "
+                "speed included, or release() it first"
+            )
+        self._bench.commanders.press(self.name)
+
+    def _hold_for(self, duration: float, hold: float) -> None:
+        """Refresh the motion that was just started for a duration (s); returns at rest."""
+        clock, mine = self._bench.clock, self._held
+        end = clock.now() + duration
+        while mine is self._held and self.moving and (left := end - clock.now()) > 0:
+            self.extend(None, min(hold, left))
+            clock.sleep(min(hold / 4, left))
+        self.wait()
 
     def move_to(
         self,
@@ -124,6 +243,8 @@ class Winch(WinchStatus):
         hold : bool
             Keep the drive enabled at the end.
         """
+        if wait:
+            self.require_waiting("move_to")
         self.begin(self.planned(length, speed, acceleration, hold=hold))
         if wait:
             self.wait()
@@ -139,7 +260,7 @@ class Winch(WinchStatus):
     ) -> None:
         """Pay out or wind in a length (m, positive) of cable; else as :meth:`move_to`.
 
-        Raises TypeError for a length without a name, UsageError unless exactly one is given.
+        Raises UsageError unless exactly one is given, by its name.
 
         Parameters
         ----------
@@ -166,9 +287,9 @@ class Winch(WinchStatus):
         stiffness: float | None = None,
         hold: float = DEAD_MAN,
     ) -> None:
-        """Keep the tension at the platform end, for ``hold`` seconds.
+        """Begin to keep the tension at the platform end, for ``hold`` seconds.
 
-        Call it again within that time to go on; without another call the winch ramps to rest and
+        :meth:`refresh` within that time keeps it going; without one the winch ramps to rest and
         disables. With ``duration`` it does so itself for that many seconds and returns at rest.
         Where the travel is used up for 0.5 s the bench trips. Without a valid reading it rests.
 
@@ -186,7 +307,7 @@ class Winch(WinchStatus):
             Upper bound of the stiffness of cable and structure, N/m; by default that of the
             profile's cable.
         hold : float
-            Time without another call, s, at most 1.
+            Time without a refresh, s, at most 1.
 
         Raises
         ------
@@ -195,29 +316,27 @@ class Winch(WinchStatus):
         NotPermitted
             Without a load cell, or beyond its limits.
         """
-        wanted = tension if isinstance(tension, float | int) else parse(tension, "force")
-        clock = self._bench.clock
-        self._keep_tension(wanted, travel, speed, stiffness, hold)
-        if duration is None:
-            return
-        mine, end = self._tension, clock.now() + duration
-        while self._tension is mine and self.moving and (left := end - clock.now()) > 0:
-            self.raise_trouble()
-            if mine is not None:
-                mine.refresh(clock.now() + min(hold, left))
-            clock.sleep(min(hold / 4, left))
-        self.wait()
+        call = "hold_tension"
+        force = parse(tension, "force") if isinstance(tension, str) else tension
+        wanted = positive(call, "tension", force)
+        hold = positive(call, "hold", hold, _LONGEST_HOLD)
+        if duration is not None:
+            duration = positive(call, "duration", duration)
+            self.require_waiting("hold_tension(duration=...)")
+        self._begin_tension(
+            wanted,
+            positive(call, "travel", travel),
+            positive(call, "speed", speed),
+            None if stiffness is None else positive(call, "stiffness", stiffness),
+            hold if duration is None else min(hold, duration),
+        )
+        if duration is not None:
+            self._hold_for(duration, hold)
 
-    def _keep_tension(
+    def _begin_tension(
         self, tension: float, travel: float, speed: float, stiffness: float | None, hold: float
     ) -> None:
-        """Begin the control of the tension, or refresh it."""
-        numbers = (tension, travel, speed, 1.0 if stiffness is None else stiffness)
-        if not all(0 < number < math.inf for number in numbers) or not 0 < hold <= 1:
-            raise UsageError(
-                f"winch {self.name}: a tension of {tension} N with {travel} m of travel at {speed} "
-                f"m/s held for {hold} s cannot be meant; all are above zero"
-            )
+        """Begin the control of the tension."""
         cell = self.load_cell
         if cell is None:
             raise NotPermitted(f"winch {self.name} has no load cell, by which to hold a tension")
@@ -229,30 +348,29 @@ class Winch(WinchStatus):
                 f"tension_high, {high:g} N"
             )
         here = self.snapshot
-        self.permit(direction_of(tension - here.load_tension), held=True)
+        self._require_new()
+        self.permit(direction_of(tension - here.load_tension))
         self.require_length()
-        expires = self._bench.clock.now() + hold
-        with self._bench.commanders.claimed(self.name):
-            control = self._tension
-            known = self._controller.source in (control, None) and self.moving
-            if control is None or not known or control.setting.tension != tension:
-                bound = greatest_stiffness(self._parts.cable_spec, here.cable_length, stiffness)
-                setting = TensionSetting(
-                    tension,
-                    travel,
-                    min(speed, limits.speed),
-                    bound,
-                    cell.max_age + limits.response_time,
-                    cell.max_age,
-                )
-                control = TensionControl(
-                    self._parts.cable, limits, setting, self.tension_reading, self.trip_tension
-                )
-                self._jog, self._tension = None, control
-                control.refresh(expires)
-                self._controller.begin(control)
-            else:
-                control.refresh(expires)
+        bound = greatest_stiffness(self._parts.cable_spec, here.cable_length, stiffness)
+        setting = TensionSetting(
+            tension,
+            travel,
+            min(speed, limits.speed),
+            bound,
+            cell.max_age + limits.response_time,
+            cell.max_age,
+        )
+        dead_man = DeadMan(self._bench.clock.now() + hold)
+        self.begin(
+            TensionControl(
+                self._parts.cable,
+                limits,
+                setting,
+                self.tension_reading,
+                self.trip_tension,
+                dead_man=dead_man,
+            )
+        )
 
     def trip_tension(self, words: str) -> None:
         """Latch a trip of the control of the tension.
@@ -282,6 +400,7 @@ class Winch(WinchStatus):
         speed : float, optional
             Speed of the search, m/s.
         """
+        self.require_waiting("home")
         for _ in self._bench.homing(self.name, HomingRequest(method, at, speed)):
             self._bench.clock.sleep(_POLL)
 
@@ -302,6 +421,7 @@ class Winch(WinchStatus):
 
         Raises LimitTripped or DriveFault for what has stopped it, MotionError where somebody did.
         """
+        self.require_waiting("wait")
         while self.moving:
             self.raise_trouble()
             self._bench.clock.sleep(_POLL)
@@ -335,6 +455,10 @@ class Winch(WinchStatus):
             The move, for :meth:`begin`.
         """
         self.require_length()
+        length = number("move_to", "length", length)
+        speed = None if speed is None else number("move_to", "speed", speed)
+        if acceleration is not None:
+            acceleration = number("move_to", "acceleration", acceleration)
         cable = self._parts.cable
         move = Move(
             cable,
@@ -362,7 +486,8 @@ class Winch(WinchStatus):
             Common start with other winches.
         """
         with self._bench.commanders.claimed(self.name):
-            self._jog = self._tension = None
+            self._held = source if isinstance(source, Jog | TensionControl) else None
+            self.stopped_by = ""
             self._controller.begin(source, gate)
 
     def ready_for(self, move: MotionSource) -> bool:
@@ -382,7 +507,7 @@ class Winch(WinchStatus):
 
     def run_down(self) -> None:
         """Order the ramp to rest, of this winch alone."""
-        self._jog = self._tension = None
+        self._held = None
         self._controller.run_down()
 
     def tare(self) -> float:
@@ -392,6 +517,7 @@ class Winch(WinchStatus):
         (:func:`~winchkit.bench.cells.tares.host_tare`). Its EEPROM is not touched. Raises
         NotPermitted, DeviceRefused.
         """
+        self.require_waiting("tare")
         cell = self.sensors.get("cell")
         if cell is None:
             raise NotPermitted(f"winch {self.name} has no load cell to tare; wire one as `cell`")
@@ -402,19 +528,3 @@ class Winch(WinchStatus):
             return float(host_tare(cells, name, _TARE_TIME)["after"])
         cells.command(name, "tare")
         return await_device_tare(self._bench.clock, self.name, cell)
-
-    def _refresh(self, winding_speed: float, hold: float, *, held: bool) -> None:
-        self.permit(direction_of(winding_speed), held=held)
-        if winding_speed:
-            self.require_length()
-        expires = self._bench.clock.now() + hold
-        with self._bench.commanders.claimed(self.name):
-            jog = self._jog
-            if jog is None or not self.moving or self._controller.source not in (jog, None):
-                jog = self._jog = Jog(self._parts.cable, self.wiring.limits)
-                self._tension = None
-                jog.refresh(winding_speed, expires)
-                if winding_speed != 0:
-                    self._controller.begin(jog)
-            else:
-                jog.refresh(winding_speed, expires)

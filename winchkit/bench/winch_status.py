@@ -34,8 +34,10 @@ class WinchStatus:
         """Instruments by role: cell, load, length, temperature."""
         self._bench, self._parts = bench, parts
         self._controller = parts.controller
-        self._jog: Jog | None = None
-        self._tension: TensionControl | None = None
+        self._held: Jog | TensionControl | None = None
+        """The newest motion, where it is one that must be refreshed."""
+        self.stopped_by = ""
+        """Who ended the last motion before its end; empty without one."""
 
     @property
     def snapshot(self) -> WinchSnapshot:
@@ -99,7 +101,7 @@ class WinchStatus:
     @property
     def goes_on(self) -> bool:
         """Whether a motion is under way that does not end by itself without a new command."""
-        return self.moving and self._jog is None and self._tension is None
+        return self.moving and self._held is None
 
     @property
     def commanded_here(self) -> bool:
@@ -132,17 +134,15 @@ class WinchStatus:
         correction = 0.0 if load is not None else self._parts.cable.correction
         return TensionReading(newest.value + correction, now - newest.t_receive)
 
-    def permit(self, direction: Direction, *, held: bool = False) -> None:
+    def permit(self, direction: Direction) -> None:
         """Raise what forbids a motion of this winch alone; its quick stop gets the declared ramp.
 
         Parameters
         ----------
         direction : Direction
             Of the motion.
-        held : bool
-            Whether the command is one of a series that goes on while a key is held.
         """
-        self._bench.permit(self.name, direction, held=held)
+        self._bench.permit(self.name, direction)
         self._bench.axes[self.name].set_quick_stop()
 
     def require_rest(self) -> None:
@@ -162,6 +162,16 @@ class WinchStatus:
                 f"{self.name} --here LENGTH` moves nothing"
             )
 
+    def require_waiting(self, call: str) -> None:
+        """Raise UsageError in an ``on_cycle`` function: the control loop waits for that.
+
+        Parameters
+        ----------
+        call : str
+            That would wait for the control loop.
+        """
+        self._bench.loop.require_other_thread(call)
+
     def raise_trouble(self) -> None:
         """Raise what has stopped the bench, or who has taken the winch over, if anybody has."""
         self._bench.raise_trouble()
@@ -177,5 +187,5 @@ class WinchStatus:
         if self._controller.stopped and self._controller.reason:
             raise DriveFault(f"winch {self.name} was stopped with {self._controller.reason}")
         if self._controller.stopped:
-            who = self._bench.stopped_by or "somebody"
-            raise MotionError(f"winch {self.name}: {who} stopped it before the motion's end")
+            who = self.stopped_by or "the control loop"
+            raise MotionError(f"winch {self.name} was stopped by {who} before the motion's end")

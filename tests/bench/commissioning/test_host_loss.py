@@ -16,9 +16,9 @@ from winchkit.errors import MotionError, NotPermitted
 
 def unheeded(bench: SlaveBench, opened: Bench) -> None:
     """Stop a winch whose drive obeys no control word: only silence is left."""
-    opened.winch["A"].keep_jogging(-0.05)
+    opened.winch["A"].jog(pay_out=0.05)
     for _ in range(40):
-        opened.winch["A"].keep_jogging(-0.05)
+        opened.winch["A"].refresh()
         bench.rig.wait(0.02)
     assert abs(bench.slave.motor.velocity) > 0.1
     bench.slave.inject("control word unheeded")

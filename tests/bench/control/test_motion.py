@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from fake_axis import CYCLE, Rig, StraightLine
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.motion import DEAD_MAN, Jog, Move, Trim
+from winchkit.bench.control.dead_man import DEAD_MAN, DeadMan
+from winchkit.bench.control.motion import Jog, Move, Trim
 from winchkit.bench.control.snapshot import Phase
 from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.errors import NotPermitted
@@ -19,8 +20,7 @@ ENERGISING = {0x06, 0x07}
 
 
 def jog(rig: Rig, speed: float, hold: float = DEAD_MAN) -> Jog:
-    source = Jog(rig.cable(), rig.limits)
-    source.refresh(speed, rig.now + hold)
+    source = Jog(rig.cable(), rig.limits, speed, DeadMan(rig.now + hold))
     rig.controller().begin(source)
     return source
 
@@ -42,7 +42,7 @@ def test_a_refreshed_jog_goes_on_and_its_speed_ramps() -> None:
     rig = Rig(LIMITS)
     source = jog(rig, 0.3)
     for _ in range(20):
-        source.refresh(0.3, rig.now + DEAD_MAN)
+        source.dead_man.refresh(rig.now, rig.now + DEAD_MAN)
         rig.run(0.1)
     assert rig.speeds[-1] == pytest.approx(0.3)
     changes = [abs(b - a) for a, b in zip(rig.speeds, rig.speeds[1:], strict=False)]
@@ -53,7 +53,7 @@ def test_a_jog_slows_down_before_a_length_limit() -> None:
     rig = Rig(LimitSpec(0.5, 1.0, (3.8, 9.0)))
     source = jog(rig, 0.5)
     for _ in range(20):
-        source.refresh(0.5, rig.now + DEAD_MAN)
+        source.dead_man.refresh(rig.now, rig.now + DEAD_MAN)
         rig.run(0.1)
     length = rig.cable().at(rig.axes["A"].angle)[0]
     assert 3.8 - 1e-3 <= length < 3.81
@@ -77,13 +77,19 @@ def test_a_jog_commands_the_plain_formula(
 ) -> None:
     """To the requested speed, within that from which it stops 2 mm before a limit, by the ramp."""
     limits = LimitSpec(0.5, 1.0, (0.5, 9.0) if limited else None)
-    source = Jog(CableMap(StraightLine()), limits)
-    time, speed, before = 1.0, 0.0, None
+    time, speed, before, over = 1.0, 0.0, None, False
+    dead_man = DeadMan(2.0)
+    source = Jog(CableMap(StraightLine()), limits, 0.0, dead_man)
     source.start(time, 0.0, 0.0)
     for wanted, step, angle, live in cycles:
         time += step
-        source.refresh(wanted, time + 1.0 if live else time)
-        requested = max(-0.5, min(0.5, wanted)) if live else 0.0
+        source.request(wanted)
+        if live and not over:
+            dead_man.refresh(time, time + 1.0)
+        else:
+            dead_man.end("released")
+        over = over or not live
+        requested = 0.0 if over else max(-0.5, min(0.5, wanted))
         if limited:
             length = 4.0 - 0.005 * angle
             room = (length - 0.5 if requested > 0 else 9.0 - length) - 0.002
@@ -96,7 +102,7 @@ def test_a_jog_commands_the_plain_formula(
         target = source.target(time, angle, time)
         assert target.winding_speed == pytest.approx(speed, abs=1e-12)
         assert target.velocity == pytest.approx(speed / 0.005, abs=1e-9)
-        assert target.done is (not live and target.winding_speed == 0.0)
+        assert target.done is (over and target.winding_speed == 0.0)
         assert not target.start
 
 
@@ -122,7 +128,7 @@ def test_a_held_jog_stays_within_its_length_whatever_lag_is_declared(
     source = jog(rig, -speed if pays_out else speed)
     lengths = []
     for _ in range(round((1.0 / speed + speed / acceleration + 1.0) / 0.1)):
-        source.refresh(-speed if pays_out else speed, rig.now + DEAD_MAN)
+        source.dead_man.refresh(rig.now, rig.now + DEAD_MAN)
         rig.run(0.1)
         lengths.append(4.0 - 0.005 * rig.axes["A"].angle)
     assert not rig.supervisor.tripped

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fake_axis import Rig
+from fake_axis import CYCLE, Rig
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.motion import Jog
-from winchkit.bench.control.release import NotReleased, ReleaseGuard
 from winchkit.bench.control.snapshot import Phase
 from winchkit.drivers.can.cia402.state_machine import State
-from winchkit.errors import NotPermitted
+from winchkit.errors import MotionError, NotPermitted
 from winchkit.schema.bench import LimitSpec
 
 LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0))
@@ -26,8 +26,7 @@ def moving_rig(speed: float = 0.2, names: str = "AB") -> Rig:
 
 
 def jog(rig: Rig, speed: float = 0.2) -> Jog:
-    source = Jog(rig.cable(), rig.limits)
-    source.refresh(speed, rig.now + 1e6)
+    source = Jog(rig.cable(), rig.limits, speed, DeadMan(rig.now + 1e6))
     rig.controller().begin(source)
     return source
 
@@ -114,7 +113,7 @@ def test_lost_targets_are_seen_once_the_dead_man_expires() -> None:
     rig.axes["A"].hears_pdos = False
     rig.run(1.0)
     assert not kinds(rig)
-    source.refresh(0.2, rig.now)
+    source.dead_man.end("released")
     released = rig.now
     while not kinds(rig):
         rig.step()
@@ -248,27 +247,49 @@ def test_a_recorder_that_fails_is_a_warning_and_stops_nothing() -> None:
 
 
 @settings(max_examples=200)
-@given(gaps=st.lists(st.floats(0.01, 0.79), min_size=1, max_size=30))
-def test_a_held_command_never_counts_again_before_it_was_released(gaps: list[float]) -> None:
-    """Whatever the key's repeat rate, the delay of its first repeat (0.7 s) included."""
-    guard, now = ReleaseGuard(), 10.0
-    guard.ask("A", "key", now)
-    guard.close({"A", "B"})
-    for gap in gaps:
+@given(
+    calls=st.lists(st.tuples(st.floats(0.0, 0.5), st.floats(0.001, 0.7)), max_size=30),
+    looks=st.lists(st.floats(0.0, 0.3), min_size=30, max_size=30),
+)
+def test_a_permission_that_was_seen_to_have_expired_is_never_extended(
+    calls: list[tuple[float, float]], looks: list[float]
+) -> None:
+    """Whatever refreshes come and whenever the loop looks: the plain rule of an unbroken chain."""
+    now, expires, over = 10.0, 10.2, False
+    dead_man = DeadMan(expires)
+    for (gap, hold), look in zip(calls, looks, strict=False):
         now += gap
-        with pytest.raises(NotReleased):
-            guard.ask("A", "key", now)
-        guard.ask("A", "a command that was started after the stop", now)
-    guard.ask("A", "key", now + 0.81)
-    guard.ask("B", "key", now + 0.81)
+        if over or now >= expires:
+            over = True
+            with pytest.raises(MotionError):
+                dead_man.refresh(now, now + hold)
+        else:
+            dead_man.refresh(now, now + hold)
+            expires = now + hold
+        now += look
+        over = over or now >= expires
+        assert dead_man.live(now) is not over
 
 
-def test_what_was_held_before_a_long_reset_is_held_after_it() -> None:
-    guard = ReleaseGuard()
-    guard.ask("A", "key", 10.0)
-    guard.close({"A"})
-    guard.resume(10.1, 15.0)
-    with pytest.raises(NotReleased):
-        guard.ask("A", "key", 15.7)
-    guard.ask("A", "another", 15.7)
-    guard.ask("A", "key", 16.6)
+def test_what_was_ended_says_why() -> None:
+    dead_man = DeadMan(10.2)
+    dead_man.end("page 3 reset the bench")
+    assert not dead_man.live(10.0)
+    with pytest.raises(MotionError, match="page 3 reset the bench"):
+        dead_man.refresh(10.0, 10.2)
+
+
+@pytest.mark.parametrize("cycles", range(8))
+def test_a_drive_is_not_enabled_for_a_permission_that_has_expired(cycles: int) -> None:
+    """In none of the steps that lead to operation enabled."""
+    rig = Rig(LIMITS, "A")
+    expires = rig.now + (cycles + 0.5) * CYCLE
+    rig.controller().begin(Jog(rig.cable(), LIMITS, 0.2, DeadMan(expires)))
+    while rig.now < expires:
+        rig.step()
+    before, enabled = len(rig.axes["A"].words), rig.axes["A"].state is State.OPERATION_ENABLED
+    rig.run(1.0)
+    assert rig.controller().phase is Phase.DISABLED
+    assert not kinds(rig)
+    if not enabled:
+        assert not {0x06, 0x07, 0x0F} & set(rig.axes["A"].words[before:])

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fake_axis import Rig
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.snapshot import Phase
 from winchkit.drivers.can.cia402.state_machine import State
@@ -19,8 +20,7 @@ LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0), tension_high=500.0, tension_slack=20.0)
 def moving_rig(speed: float = 0.2, names: str = "AB", limits: LimitSpec = LIMITS) -> Rig:
     """Two winches, A jogging for a long time."""
     rig = Rig(limits, names)
-    source = Jog(rig.cable(), rig.limits)
-    source.refresh(speed, rig.now + 1e6)
+    source = Jog(rig.cable(), rig.limits, speed, DeadMan(rig.now + 1e6))
     rig.controller().begin(source)
     rig.run(0.5)
     assert rig.speeds[-1] == pytest.approx(speed)
@@ -223,8 +223,7 @@ def test_the_host_heartbeat_is_tied_to_the_loop() -> None:
 def test_never_winds_in_above_the_high_limit(tensions: list[float], speed: float) -> None:
     """Whatever the cell says: two cycles after a reading above the limit nothing winds in."""
     rig = Rig(LIMITS)
-    source = Jog(rig.cable(), rig.limits)
-    source.refresh(speed, rig.now + 1e6)
+    source = Jog(rig.cable(), rig.limits, speed, DeadMan(rig.now + 1e6))
     rig.controller().begin(source)
     rig.run(0.4)
     for tension in tensions:

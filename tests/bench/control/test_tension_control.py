@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fake_axis import CYCLE, Rig
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.snapshot import Phase, Trip
 from winchkit.bench.control.tension_control import (
     TensionControl,
@@ -34,7 +35,10 @@ class Held:
         self.rig.axes["A"].lag = 0.02
         self.stiffness, self.present = stiffness, present
         self.read: Callable[[float], TensionReading] = self._true
-        self.control = TensionControl(self.rig.cable(), LIMITS, setting, self._reading, self._trip)
+        self.dead_man = DeadMan(math.inf)
+        self.control = TensionControl(
+            self.rig.cable(), LIMITS, setting, self._reading, self._trip, dead_man=self.dead_man
+        )
         self._past: list[float] = []
 
     @property
@@ -59,7 +63,7 @@ class Held:
 
     def run(self, duration: float) -> list[float]:
         """Hold it for so long; returns the tension of every cycle, N."""
-        self.control.refresh(self.rig.now + duration)
+        self.dead_man.refresh(self.rig.now, self.rig.now + duration)
         self.rig.controller().begin(self.control)
         seen = []
         for _ in range(round(duration / CYCLE)):
@@ -112,7 +116,8 @@ def test_whatever_the_cell_reads_the_winch_stays_within_the_travel(
 
     held.read = read
     farthest = 0.0
-    held.control.refresh(held.rig.now + 6)
+    held.dead_man = DeadMan(held.rig.now + 6)
+    held.control.dead_man = held.dead_man
     held.rig.controller().begin(held.control)
     for _ in range(round(6 / CYCLE)):
         held.rig.step()
@@ -137,7 +142,7 @@ def test_a_broken_cable_and_a_cell_that_stands_still_trip_at_the_travel(
 
 def test_silence_of_the_commander_ends_it_at_rest() -> None:
     held = Held(setting(400.0), 2e4, 100.0)
-    held.control.refresh(held.rig.now + 0.2)
+    held.control.dead_man = DeadMan(held.rig.now + 0.2)
     held.rig.controller().begin(held.control)
     held.rig.run(1.0)
     assert held.rig.controller().phase is Phase.DISABLED

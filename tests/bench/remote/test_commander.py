@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from winchkit.bench.remote.commander import Commanders, NotCommander
+from winchkit.bench.remote.commander import Commanders, NotCommander, NotReleased
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.errors import MotionError
 
@@ -87,22 +87,22 @@ def test_a_hand_over_ends_the_motion_and_is_reported_to_the_one_who_lost_it() ->
     assert rig.stopped == ["A"], "who commands it already moves on"
 
 
-def test_a_held_key_moves_nothing_when_the_other_client_leaves() -> None:
+def test_a_command_that_is_repeated_is_no_new_one_before_it_was_released() -> None:
+    """Whatever has ended the motion meanwhile: a program that forgets to refresh moves nothing."""
     rig = Rig()
-    rig.claim(FIRST)
-    for _ in range(5):
-        rig.clock.sleep(0.1)
-        with pytest.raises(NotCommander, match="commanded by first"):
-            rig.claim(SECOND)
-    rig.commanders.leave(FIRST)
-    assert rig.winches["A"].commander == ""
-    for _ in range(20):
-        rig.clock.sleep(0.1)
-        with pytest.raises(NotCommander, match="release the jog"):
-            rig.claim(SECOND)
-    rig.clock.sleep(0.85)
-    rig.claim(SECOND)
-    assert rig.winches["A"].commander == "second"
+    with rig.commanders.acting(FIRST):
+        rig.commanders.press("A")
+        for _ in range(20):
+            rig.clock.sleep(0.15)
+            with pytest.raises(NotReleased, match="go on by refresh"):
+                rig.commanders.press("A")
+        rig.commanders.press("B")
+        rig.clock.sleep(0.25)
+        rig.commanders.press("A")
+        rig.commanders.let_go("A")
+        rig.commanders.press("A")
+    with rig.commanders.acting(SECOND):
+        rig.commanders.press("A")
 
 
 def test_only_its_commander_releases_a_winch_and_leaving_releases_all() -> None:

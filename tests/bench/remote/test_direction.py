@@ -92,7 +92,7 @@ def test_the_two_directions_are_opposite(owners: dict[str, float]) -> None:
 
 
 @pytest.mark.parametrize("kind", STATIONS)
-def test_a_number_without_a_name_is_a_type_error_and_moves_nothing(rig: Rig, kind: str) -> None:
+def test_a_number_without_a_name_is_refused_and_moves_nothing(rig: Rig, kind: str) -> None:
     with rig.opened() as bench, at(kind, bench) as station:
         words = {}
         for call in (station.jog, station.step, station.move):
@@ -100,12 +100,12 @@ def test_a_number_without_a_name_is_a_type_error_and_moves_nothing(rig: Rig, kin
             for given in ((0.02,), (-0.02, 0.15), (None, 0.02)):
                 shown = r"\(" + ", ".join(map(str, given)) + r"\)"
                 text = rf"^{name}{shown}.*write {name}\(pay_out=...\) or {name}\(wind_in=...\)"
-                with pytest.raises(TypeError, match=text):
+                with pytest.raises(UsageError, match=text):
                     call("A", *given)
-            with pytest.raises(TypeError) as error:
+            with pytest.raises(UsageError) as error:
                 call("A", -0.02)
             words[name] = str(error.value)
-        with pytest.raises(TypeError) as error:
+        with pytest.raises(UsageError) as error:
             bench.winch["A"].jog(-0.02)
         assert words["jog"] == str(error.value)
         assert not bench.winch["A"].moving
@@ -127,8 +127,11 @@ def test_exactly_one_positive_number_is_given(rig: Rig, kind: str) -> None:
             station.move("A", **both)
         for call in (station.jog, station.step, station.move):
             for value in (-0.1, 0.0, math.inf, math.nan):
-                with pytest.raises(UsageError, match="not a positive number"):
+                with pytest.raises(UsageError, match=r"not a (positive|finite) number"):
                     call("A", wind_in=value)
+            for text in ("0.1", "0.1 m/s", [0.1], True):
+                with pytest.raises(UsageError, match=r"pass a number in SI units"):
+                    call("A", wind_in=text)
         assert not bench.winch["A"].moving
 
 

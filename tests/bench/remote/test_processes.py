@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import random
 import re
 import select
 import signal
@@ -20,6 +21,8 @@ from pathlib import Path
 
 import pytest
 
+from client_stalls import served as stalls_served
+from client_stalls import stall
 from winchkit import attach, open_bench
 from winchkit.bench.ownership import owner_process
 from winchkit.errors import NotPermitted
@@ -229,6 +232,13 @@ def test_a_suspended_command_moves_nothing(served: Path, order: tuple[str, ...])
     assert winchkit("reset", "-b", str(served)).returncode == 0
 
 
+@pytest.mark.parametrize("kind", ["jog", "keys", "hold-tension"])
+def test_a_client_that_was_suspended_goes_on_with_nothing(tmp_path: Path, kind: str) -> None:
+    """The loop of benchmarks/client_stalls.py, once for each kind."""
+    with stalls_served(tmp_path) as bench:
+        assert stall(bench, kind, random.Random(7)).wrong == ""
+
+
 def test_others_attach_and_one_stops_it_by_name(served: Path, tmp_path: Path) -> None:
     log = tmp_path / "beside.csv"
     with jogging(served) as jog:
@@ -246,7 +256,7 @@ def test_others_attach_and_one_stops_it_by_name(served: Path, tmp_path: Path) ->
         assert_stands_still(served)
         code, words = ended(jog)
     assert code == 5
-    assert "stop (process " in words or "was stopped" in words
+    assert "winch A was stopped by stop (process " in words
 
 
 def test_one_bench_process_serves_commands_that_start_together(served: Path) -> None:

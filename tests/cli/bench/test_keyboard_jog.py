@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -37,17 +36,31 @@ class Station:
         self.calls: list[tuple[Any, ...]] = []
         self._refusal = refusal
         self.shown = STATUS
+        self.time = 0.0
 
-    def jog(self, winch: str | None, *, hold: float, **direction: float) -> None:
+    @property
+    def clock(self) -> Station:
+        return self
+
+    def now(self) -> float:
+        return self.time
+
+    def jog(self, winch: str | None, *, hold: float, since: float, **direction: float) -> None:
+        assert since == self.time, "the time at which the key was read"
         ((name, speed),) = direction.items()
         self.calls.append(("jog", name, round(speed, 6), hold))
         if self._refusal is not None:
             raise self._refusal
 
-    def release(self, winch: str | None) -> None:
-        self.calls.append(("release",))
+    def refresh(self, winch: str | None, *, hold: float, **direction: float) -> None:
+        ((name, speed),) = direction.items()
+        self.calls.append(("refresh", name, round(speed, 6), hold))
 
-    def step(self, winch: str | None, *, speed: float, **direction: float) -> None:
+    def release(self, winch: str | None) -> None:
+        pass
+
+    def step(self, winch: str | None, *, speed: float, since: float, **direction: float) -> None:
+        assert since == self.time
         self.calls.append(("step", *direction.items()))
 
     def stop(self) -> None:
@@ -63,31 +76,31 @@ class Station:
 def press(
     monkeypatch: pytest.MonkeyPatch, station: Station, keys: list[tuple[float, list[str]]]
 ) -> None:
-    """Let keys come at times (s), then leave."""
-    now = [0.0]
+    """Let keys come at times (s), then leave; a ``stall`` is a time in which nothing is read."""
+    left = [*keys, (keys[-1][0] + 0.01, ["q"])]
 
     class Keyboard:
-        def __init__(self) -> None:
-            self._left = iter([*keys, (now[0], ["q"])])
-
         def read(self, timeout: float) -> list[str]:
-            now[0], pressed = next(self._left)
-            return pressed
+            at, pressed = left[0]
+            if at > station.time + timeout and "stall" not in pressed:
+                station.time += timeout
+                return []
+            station.time, _ = left.pop(0)
+            return [key for key in pressed if key != "stall"]
 
     @contextmanager
     def open_keys() -> Iterator[Keyboard]:
         yield Keyboard()
 
     monkeypatch.setattr("winchkit.cli.bench.keyboard_jog.open_keys", open_keys)
-    monkeypatch.setattr(jog, "time", SimpleNamespace(monotonic=lambda: now[0]))
     jog._jog_by_keys(station, "A", 0.1)  # type: ignore[arg-type]
 
 
 def test_a_first_press_lasts_and_repeats_refresh_shortly(monkeypatch: pytest.MonkeyPatch) -> None:
     station = Station()
     press(monkeypatch, station, [(0.0, ["up"]), (0.5, ["up"]), (0.53, ["up"]), (2.0, ["up"])])
-    holds = [call[3] for call in station.calls if call[0] == "jog"]
-    assert holds == [0.7, 0.2, 0.2, 0.7]
+    held = [(call[0], call[3]) for call in station.calls if call[0] != "stop"]
+    assert held == [("jog", 0.7), ("refresh", 0.2), ("refresh", 0.2), ("jog", 0.7)]
     assert station.calls[-1] == ("stop",), "q stops"
 
 
@@ -113,6 +126,31 @@ def test_what_forbids_a_motion_is_shown_and_the_hand_stays(
     press(monkeypatch, station, [(0.0, ["up"]), (0.1, ["down"])])
     assert [call[0] for call in station.calls] == ["jog", "jog", "stop"]
     assert "tension is too high" in capsys.readouterr().err
+
+
+def test_keys_of_a_gap_move_nothing_and_neither_do_their_repeats(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Typed while this program was suspended: it is not known whether the key is still down."""
+    station = Station()
+    repeats = [(9.0 + 0.03 * n, ["up"]) for n in range(30)]
+    keys = [(0.0, ["up"]), (0.5, ["up"]), (8.5, ["stall", *20 * ["up"]]), *repeats]
+    press(monkeypatch, station, [*keys, (11.0, ["up"])])
+    moved = [call[0] for call in station.calls]
+    assert moved == ["jog", "refresh", "jog", "stop"], "the last one is a press after a release"
+    assert "keys of the last 8.0 s are ignored" in capsys.readouterr().err
+
+
+def test_a_stop_that_was_typed_in_a_gap_stops(monkeypatch: pytest.MonkeyPatch) -> None:
+    station = Station()
+    press(monkeypatch, station, [(0.0, ["up"]), (8.0, ["stall", "up", " ", "i", "up"])])
+    assert [call[0] for call in station.calls] == ["jog", "stop", "stop"]
+
+
+def test_several_repeats_at_once_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    station = Station()
+    press(monkeypatch, station, [(0.0, ["up"]), (0.5, ["up", "up", "up"]), (0.55, ["up", "up"])])
+    assert [call[0] for call in station.calls] == ["jog", "refresh", "refresh", "stop"]
 
 
 def test_a_lost_owner_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:

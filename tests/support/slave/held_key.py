@@ -23,7 +23,7 @@ _RUNNING = 0.6
 
 @dataclass
 class HeldKey:
-    """Calls ``jog`` every 50 ms for as long as it is held, whatever comes of it."""
+    """Calls ``jog`` and then, every 50 ms while it is held, ``refresh``, whatever comes of it."""
 
     rig: Rig
     bench: Bench
@@ -39,12 +39,13 @@ class HeldKey:
     first: float = math.inf
     """When it was first asked for, s."""
     _next: float = 0.0
+    _pressed: bool = False
     _busy: bool = False
 
     def press(self) -> HeldKey:
         """Begin to hold."""
         if not self.held:
-            self.held, self._next = True, self.rig.time
+            self.held, self._next, self._pressed = True, self.rig.time, False
             self.rig.each.append(self._repeat)
         return self
 
@@ -71,6 +72,11 @@ class HeldKey:
 
     def _jog(self) -> None:
         winch = self.bench.winch[self.winch]
+        if self._pressed:
+            winch.refresh()
+            return
+        self._pressed = True
+        winch.release()
         if self.pay_out > 0:
             winch.jog(pay_out=self.pay_out)
         else:

@@ -47,7 +47,7 @@ def taken(inbox: Inbox) -> list[Message]:
     return asyncio.run(all_of())
 
 
-@given(st.lists(st.sampled_from(["jog", "release", "step", "alive", "leave"])))
+@given(st.lists(st.sampled_from(["jog", "refresh", "release", "step", "alive"])))
 def test_of_jogs_that_wait_only_the_newest_is_left_and_every_other_message_ends_it(
     names: list[str],
 ) -> None:
@@ -55,10 +55,14 @@ def test_of_jogs_that_wait_only_the_newest_is_left_and_every_other_message_ends_
     for number, name in enumerate(names):
         inbox.put({"do": name, "number": number})
     left = taken(inbox)
-    others = [n for n, name in enumerate(names) if name != "jog"]
-    assert [item["number"] for item in left if item["do"] != "jog"] == others
-    jogs = [item["number"] for item in left if item["do"] == "jog"]
-    assert jogs == ([len(names) - 1] if names and names[-1] == "jog" else [])
+    held = ("jog", "refresh")
+    others = [n for n, name in enumerate(names) if name not in held]
+    assert [item["number"] for item in left if item["do"] not in held] == others
+    # Of those after the last other message: the last jog, and the last refresh after it.
+    tail = names[others[-1] + 1 if others else 0 :]
+    kept = [item["do"] for item in left if item["do"] in held]
+    after = tail[len(tail) - tail[::-1].index("jog") :] if "jog" in tail else tail
+    assert kept == ["jog"] * ("jog" in tail) + ["refresh"] * ("refresh" in after)
 
 
 @pytest.mark.parametrize(
@@ -66,6 +70,7 @@ def test_of_jogs_that_wait_only_the_newest_is_left_and_every_other_message_ends_
     [
         ({"do": "jog", "speed": 0.1}, ("jog", {"wind_in": 0.1})),
         ({"do": "jog", "speed": -0.1}, ("jog", {"pay_out": 0.1})),
+        ({"do": "refresh", "speed": -0.1}, ("refresh", {"pay_out": 0.1})),
         ({"do": "release"}, ("release", {})),
         ({"do": "step", "change": 0.01, "speed": 0.1}, ("step", {"pay_out": 0.01, "speed": 0.1})),
         ({"do": "step", "change": -0.01, "speed": 0.1}, ("step", {"wind_in": 0.01, "speed": 0.1})),

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 
 from winchkit.bench.control.axis_port import AxisPort
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.motion import MotionSource, PathStop, RunDown, StartGate, Stop, Target
+from winchkit.bench.control.motion import (
+    Held,
+    MotionSource,
+    PathStop,
+    RunDown,
+    StartGate,
+    Stop,
+    Target,
+)
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
 from winchkit.drivers.can.canopen.nmt import NmtState
@@ -311,6 +319,12 @@ class Controller:
         self._stop(now, feedback)
 
     def _enable(self, now: float, feedback: AxisFeedback) -> None:
+        source: object = self.source
+        if isinstance(source, Held) and not source.dead_man.live(now):
+            # The permission has expired meanwhile: the drive is not enabled for it.
+            self._enter(Phase.STOPPING, now)
+            self._stop(now, feedback)
+            return
         enabled = feedback.state is State.OPERATION_ENABLED
         if enabled and self._begun is not None and self._begun.may_start(self._time):
             self._begun.source.start(self._time, feedback.angle, 0.0)

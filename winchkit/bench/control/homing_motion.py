@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
+from winchkit.arguments import number
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import Target
 from winchkit.drivers.can.cia402.modes import Homing
@@ -28,6 +29,13 @@ class HomingRequest:
     """Cable length (m) at the zero to be found; at the present place without a search."""
     speed: float | None = None
     """Of the cable while searching, m/s."""
+
+    def __post_init__(self) -> None:
+        """Raise UsageError for what is no number."""
+        for name in ("method", "at", "speed"):
+            value = getattr(self, name)
+            if value is not None:
+                number("home", name, value)
 
 
 class HomingAxis(Protocol):

@@ -19,7 +19,7 @@ from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler, Thread, event_of, thread_of
-from winchkit.errors import ConnectionLost, MotionError, WinchkitError
+from winchkit.errors import ConnectionLost, MotionError, UsageError, WinchkitError
 
 __all__ = ["BusPort", "Callback", "ControlLoop"]
 
@@ -123,6 +123,8 @@ class ControlLoop:
         self._broken_at = math.inf
         self._warnings: dict[str, Trip] = {}
         self._stopping = event_of(clock)
+        self._asking: int | None = None
+        """Thread that is in a function of :attr:`callbacks` just now."""
         self._thread: Thread | None = None
 
     def start(self) -> None:
@@ -135,6 +137,20 @@ class ControlLoop:
         self._stopping.set()
         if self._thread is not None:
             self._thread.join(timeout=2.0)
+
+    @property
+    def asks_here(self) -> bool:
+        """Whether this thread is in a function that the control loop has called and waits for."""
+        return self._asking == threading.get_ident()
+
+    def require_other_thread(self, call: str) -> None:
+        """Raise UsageError where this thread is in a function that the control loop waits for."""
+        if self.asks_here:
+            raise UsageError(
+                f"{call} waits for the control loop, and was called in an on_cycle function, for "
+                "which the loop waits; there return winding speeds, call stop_now() or what takes "
+                "wait=False, and call everything else from another thread"
+            )
 
     @property
     def count(self) -> int:
@@ -401,6 +417,7 @@ class ControlLoop:
 
     def _ask_callbacks(self, snapshot: BenchSnapshot) -> None:
         """Call the user's functions; the winding speeds that they return renew the dead-man."""
+        self._asking = threading.get_ident()
         for callback in list(self.callbacks):
             try:
                 for name, winding_speed in (callback(snapshot) or {}).items():
@@ -408,6 +425,7 @@ class ControlLoop:
             except BaseException as error:  # noqa: BLE001 - kept, and raised in the owner's thread
                 self.callbacks.remove(callback)
                 self.failure = error
+        self._asking = None
 
     def _picture(
         self, now: float, inputs: Mapping[str, WinchInput], blocked: tuple[Trip, ...]

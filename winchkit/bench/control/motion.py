@@ -10,18 +10,17 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
 from winchkit.bench.control.cable import CableMap, LineModel
-from winchkit.bench.control.dead_man import DEAD_MAN, FIRST_PRESS
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.errors import NotPermitted
 from winchkit.model.trajectory import Trajectory, plan
 from winchkit.schema.bench import LimitSpec
 
 __all__ = [
-    "DEAD_MAN",
-    "FIRST_PRESS",
     "GAIN",
     "JERK_TIME",
     "SETTLED",
     "SETTLE_TIME",
+    "Held",
     "Jog",
     "MotionSource",
     "Move",
@@ -156,6 +155,13 @@ class PathStop(Protocol):
         """Ramp to rest from the present motion."""
 
 
+@runtime_checkable
+class Held(Protocol):
+    """A motion source that goes on for as long as its commander refreshes the permission."""
+
+    dead_man: DeadMan
+
+
 class Ramp:
     """Speed of the cable that follows a commanded one with limited acceleration."""
 
@@ -180,18 +186,19 @@ class Jog:
     holds = False
     joins = True
 
-    def __init__(self, cable: CableMap, limits: LimitSpec) -> None:
+    def __init__(
+        self, cable: CableMap, limits: LimitSpec, winding_speed: float, dead_man: DeadMan
+    ) -> None:
+        self.dead_man = dead_man
         self._cable, self._limits = cable, limits
         self._ramp = Ramp(limits.acceleration)
-        self._requested = 0.0
         self._lag = limits.acceleration * limits.response_time
-        self._expires = -math.inf
         self._angle = self._last = 0.0
+        self.request(winding_speed)
 
-    def refresh(self, winding_speed: float, expires: float) -> None:
-        """Keep going at ``winding_speed`` (m/s) until ``expires`` (s on the bench's clock)."""
-        self._requested = max(-self._limits.speed, min(self._limits.speed, winding_speed))
-        self._expires = expires
+    def request(self, winding_speed: float) -> None:
+        """Go at ``winding_speed`` (m/s) for as long as the dead-man permits."""
+        self.requested = max(-self._limits.speed, min(self._limits.speed, winding_speed))
 
     def start(self, time: float, angle: float, winding_speed: float) -> None:
         """Begin with the speed that the cable has."""
@@ -200,9 +207,9 @@ class Jog:
 
     def target(self, time: float, angle: float, now: float) -> Target:
         """Follow the commanded speed, slow down before a length limit, end at rest once expired."""
-        live = now < self._expires
+        live = self.dead_man.live(now)
         length, arm = self._cable.at(angle)
-        requested = self._within(self._requested, length) if live else 0.0
+        requested = self._within(self.requested, length) if live else 0.0
         speed = self._ramp.follow(requested, time)
         velocity = speed / arm
         self._angle += velocity * (time - self._last)

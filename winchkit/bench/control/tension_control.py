@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from winchkit.bench.control.cable import CableMap
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.motion import Ramp, Target
 from winchkit.errors import UsageError
 from winchkit.schema.bench import LimitSpec
@@ -139,19 +140,16 @@ class TensionControl:
         setting: TensionSetting,
         reading: Callable[[float], TensionReading],
         trip: Callable[[str], None],
+        *,
+        dead_man: DeadMan,
     ) -> None:
         """``reading`` gives the tension at a time (s), ``trip`` latches a reason in words."""
-        self.setting = setting
+        self.setting, self.dead_man = setting, dead_man
         self._cable, self._limits = cable, limits
         self._reading, self._trip = reading, trip
         self._ramp = Ramp(limits.acceleration)
-        self._expires = -math.inf
         self._begin = self._angle = self._last = 0.0
         self._used_up = UsedUp()
-
-    def refresh(self, expires: float) -> None:
-        """Go on until ``expires`` (s on the bench's clock)."""
-        self._expires = expires
 
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
         """Begin at rest."""
@@ -161,7 +159,7 @@ class TensionControl:
 
     def target(self, time: float, angle: float, now: float) -> Target:
         """Speed by the tension error, within speed and travel; rest without a valid reading."""
-        live = now < self._expires
+        live = self.dead_man.live(now)
         arm = self._cable.at(angle)[1]
         travelled = (angle - self._begin) * arm
         requested = self._requested(now, travelled) if live else 0.0

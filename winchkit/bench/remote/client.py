@@ -113,10 +113,13 @@ class RemoteStation:
         pay_out: float | None = None,
         wind_in: float | None = None,
         hold: float = DEAD_MAN,
+        since: float | None = None,
     ) -> None:
-        """Move the cable at a speed (m/s, positive), out or in, for ``hold`` seconds.
+        """Begin to move the cable at a speed (m/s, positive), out or in, for ``hold`` seconds.
 
-        Raises TypeError for a speed without a name, UsageError unless exactly one is given.
+        :meth:`refresh` within that time keeps it going; one that is under way is not started again.
+
+        Raises UsageError unless exactly one is given, by its name.
 
         Parameters
         ----------
@@ -125,13 +128,41 @@ class RemoteStation:
         pay_out, wind_in : float
             Cable speed, m/s, positive; exactly one is given.
         hold : float
-            Time of motion without another call, s, at most 1.
+            Time of motion without a refresh, s, at most 1.
+        since : float, optional
+            When the operator was seen to ask for it, s on :attr:`clock`; by default now. The time
+            of motion counts from then.
         """
         no_positional("jog", "m/s", unnamed)
-        self._requests.call("jog", winch, pay_out=pay_out, wind_in=wind_in, hold=hold)
+        self._requests.call("jog", winch, since=since, pay_out=pay_out, wind_in=wind_in, hold=hold)
+
+    def refresh(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        hold: float = DEAD_MAN,
+    ) -> None:
+        """Keep a jog or a held tension going for ``hold`` seconds more, a jog at another speed too.
+
+        Raises MotionError where it has ended, which a refresh never begins again: its time was
+        over (this process was suspended, or too slow), or somebody stopped it.
+
+        Parameters
+        ----------
+        winch : str or None
+            Winch; None for the only one.
+        pay_out, wind_in : float, optional
+            Another speed of a jog, m/s, positive; at most one is given.
+        hold : float
+            Time of motion without another refresh, s, at most 1.
+        """
+        no_positional("refresh", "m/s", unnamed)
+        self._requests.call("refresh", winch, pay_out=pay_out, wind_in=wind_in, hold=hold)
 
     def release(self, winch: str | None) -> None:
-        """End a jog by a ramp now, instead of when its ``hold`` is over.
+        """End a jog or a held tension by a ramp now, instead of when its ``hold`` is over.
 
         Parameters
         ----------
@@ -147,10 +178,11 @@ class RemoteStation:
         pay_out: float | None = None,
         wind_in: float | None = None,
         speed: float | None = None,
+        since: float | None = None,
     ) -> None:
         """Start to pay out or wind in a length (m, positive) of cable.
 
-        Raises TypeError for a length without a name, UsageError unless exactly one is given.
+        Raises UsageError unless exactly one is given, by its name.
 
         Parameters
         ----------
@@ -160,9 +192,13 @@ class RemoteStation:
             Length, m, positive; exactly one is given.
         speed : float, optional
             m/s; by default the limit of the winch.
+        since : float, optional
+            When the operator was seen to ask for it, s on :attr:`clock`; by default now.
         """
         no_positional("step", "m", unnamed)
-        self._requests.call("step", winch, pay_out=pay_out, wind_in=wind_in, speed=speed)
+        self._requests.call(
+            "step", winch, since=since, pay_out=pay_out, wind_in=wind_in, speed=speed
+        )
 
     def move(
         self,
@@ -176,7 +212,7 @@ class RemoteStation:
     ) -> None:
         """Start a move to a cable length, or by a length (m, positive) paid out or wound in.
 
-        Raises TypeError for a length without a name, UsageError unless exactly one is given.
+        Raises UsageError unless exactly one is given, by its name.
 
         Parameters
         ----------
@@ -227,7 +263,7 @@ class RemoteStation:
     def hold_tension(
         self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
     ) -> None:
-        """Keep the tension of a winch for ``hold`` seconds.
+        """Begin to keep the tension of a winch for ``hold`` seconds; :meth:`refresh` goes on.
 
         Parameters
         ----------
@@ -236,12 +272,12 @@ class RemoteStation:
         tension : float
             At the platform end, N.
         hold : float
-            Time without another call, s.
+            Time without a refresh, s, at most 1.
         bounds : mapping of str to float
             ``travel`` of cable either way, m, largest ``speed``, m/s, and upper bound of the
             ``stiffness``, N/m, as of ``Winch.hold_tension``; each may be left out.
         """
-        self._requests.call("hold_tension", winch, tension, hold, dict(bounds))
+        self._requests.call("hold_tension", winch, tension, hold=hold, bounds=dict(bounds))
 
     def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
         """Bytes of an object of a drive.

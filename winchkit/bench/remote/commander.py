@@ -12,16 +12,20 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Protocol
 
-from winchkit.bench.control.dead_man import RELEASE
+from winchkit.bench.control.dead_man import DEAD_MAN
 from winchkit.bench.remote.identity import Client
 from winchkit.drivers.clock import Clock
 from winchkit.errors import MotionError, NotPermitted
 
-__all__ = ["Commanded", "Commanders", "NotCommander"]
+__all__ = ["Commanded", "Commanders", "NotCommander", "NotReleased"]
 
 
 class NotCommander(NotPermitted):
     """Another client commands the winch, or did until a moment ago."""
+
+
+class NotReleased(NotPermitted):
+    """A command that is repeated where it was refused or ended: it is no new one."""
 
 
 class Commanded(Protocol):
@@ -50,7 +54,7 @@ class Commanders:
         self._winches, self._clock, self._run_down = winches, clock, run_down
         self._holders: dict[str, Client] = {}
         self._taken: dict[tuple[Client, str], str] = {}
-        self._refused: dict[tuple[Client, str], float] = {}
+        self._pressed: dict[tuple[Client, str], float] = {}
         self._actor: ContextVar[Client] = ContextVar("actor", default=owner)
         self._lock = threading.RLock()
 
@@ -80,21 +84,33 @@ class Commanders:
     def require(self, winch: str) -> None:
         """Raise NotPermitted, naming the commander, where another client commands the winch."""
         with self._lock:
-            actor, holder, now = self.actor, self._holders.get(winch), self._clock.now()
-            key = (actor, winch)
-            if holder is not None and holder is not actor:
-                self._refused[key] = now
+            holder = self._holders.get(winch)
+            if holder is not None and holder is not self.actor:
                 raise NotCommander(
                     f"winch {winch} is commanded by {holder.name}; end that one first, or take "
                     "the winch over (--take-over)"
                 )
-            if now - self._refused.get(key, -RELEASE) < RELEASE:
-                self._refused[key] = now
-                raise NotCommander(
-                    f"winch {winch} was commanded by another client; release the jog before "
-                    "moving it"
-                )
-            self._refused.pop(key, None)
+
+    def press(self, winch: str) -> None:
+        """Note that a held motion is to begin; raises NotReleased for a repeat of the last call.
+
+        A program that repeats the command instead of refreshing the motion would move the winch
+        again after whatever has ended it.
+        """
+        with self._lock:
+            key, now = (self.actor, winch), self._clock.now()
+            before = self._pressed.get(key)
+            self._pressed[key] = now
+        if before is not None and now - before < DEAD_MAN:
+            raise NotReleased(
+                f"winch {winch}: this command repeats the one of {now - before:.2f} s ago and is "
+                "no new one: go on by refresh(), or release() the winch first"
+            )
+
+    def let_go(self, winch: str) -> None:
+        """Note that the acting client holds nothing any more."""
+        with self._lock:
+            self._pressed.pop((self.actor, winch), None)
 
     def claim(self, winch: str) -> None:
         """Command a winch from now on; raises as :meth:`require`."""
@@ -116,7 +132,6 @@ class Commanders:
             if holder is not None and holder is not actor:
                 self._taken[holder, winch] = actor.name
                 self._run_down(winch)
-            self._refused.pop((actor, winch), None)
             self._give(winch, actor)
 
     def release(self, winch: str) -> None:
@@ -131,7 +146,7 @@ class Commanders:
         with self._lock, self.acting(client):
             for winch in self.held_by(client):
                 self.release(winch)
-            for kept in (self._taken, self._refused):
+            for kept in (self._taken, self._pressed):
                 for key in [key for key in kept if key[0] is client]:
                     del kept[key]
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import socket
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from numbers import Real
 from typing import Any
 
-from winchkit.errors import ConnectionLost, error_of
+from winchkit.errors import ConnectionLost, UsageError, error_of
 
 __all__ = ["OwnerGone", "Requests"]
 
@@ -40,17 +42,26 @@ class Requests:
         """Whether the owner has ended or the station was left."""
 
     def call(
-        self, operation: str, *arguments: Any, patience: float | None = None, **named: Any
+        self,
+        operation: str,
+        *arguments: Any,
+        patience: float | None = None,
+        since: float | None = None,
+        **named: Any,
     ) -> Any:
         """The owner's answer to an operation.
 
-        Raises the owner's error, or OwnerGone; another ``patience`` (s) holds for this call.
+        Raises the owner's error, OwnerGone, or UsageError for an argument that cannot be sent;
+        another ``patience`` (s) holds for this call. The owner refuses to move anything where too
+        much time has passed since the call, or ``since`` an earlier time (s on the steady clock of
+        this computer).
         """
+        sent = time.monotonic() if since is None else since
         with self._lock:
             if self.gone:
                 raise OwnerGone("this station at the bench was left; attach again")
             self._connection.settimeout(self._patience if patience is None else patience)
-            answer = self._exchange(operation, arguments, named)
+            answer = self._exchange(operation, sent, arguments, named)
         if "error" in answer:
             raise error_of(answer["error"], answer["message"])
         return answer["ok"]
@@ -64,7 +75,7 @@ class Requests:
             self._connection.close()
 
     def _exchange(
-        self, operation: str, arguments: Sequence[Any], named: Mapping[str, Any]
+        self, operation: str, sent: float, arguments: Sequence[Any], named: Mapping[str, Any]
     ) -> dict[str, Any]:
         """Send a request, and wait for the answer with its number; raises OwnerGone.
 
@@ -73,9 +84,19 @@ class Requests:
         """
         self._number += 1
         number = self._number
-        request = {"id": number, "op": operation, "args": arguments, "named": named}
+        request = {
+            "id": number,
+            "op": operation,
+            "sent": sent,
+            "args": arguments,
+            "named": named,
+        }
         try:
-            self._stream.write(json.dumps(request).encode() + b"\n")
+            line = json.dumps(request, default=_number).encode() + b"\n"
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"{operation}: an argument cannot be sent: {error}") from None
+        try:
+            self._stream.write(line)
             self._stream.flush()
             while line := self._stream.readline():
                 answer = _answer(line)
@@ -88,6 +109,13 @@ class Requests:
             raise OwnerGone(f"the bench's owner does not answer: {error}") from error
         self.gone = True
         raise OwnerGone("the process that owned the bench has ended; its drives stop") from None
+
+
+def _number(value: object) -> float:
+    """A number of another library, as JSON has it."""
+    if isinstance(value, Real):
+        return float(value)
+    raise TypeError(f"a {type(value).__name__} is no number and no text")
 
 
 def _answer(line: bytes) -> dict[str, Any]:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import logging
 import socket
 import threading
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 from winchkit.bench.bench import Bench
-from winchkit.bench.ownership import digest_of, listen
+from winchkit.bench.control.dead_man import LIFE_SIGN, remaining
+from winchkit.bench.ownership import digest_of, listen, log_path
 from winchkit.bench.remote.identity import Client, LifeSign
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import (
@@ -32,6 +35,7 @@ OPERATIONS = (
     "names",
     "status",
     "jog",
+    "refresh",
     "release",
     "step",
     "move",
@@ -61,9 +65,61 @@ OPERATIONS = (
 )
 """Methods of a station that may be called from outside."""
 
+_BEGINS = frozenset(
+    {
+        "jog",
+        "refresh",
+        "step",
+        "move",
+        "move_pose",
+        "hold_tension",
+        "home",
+        "start_programme",
+        "answer_programme",
+    }
+)
+"""Those that begin or extend a motion: refused where they have been on their way for too long."""
 _MAX_LINE = 65_536
 """Bytes: the longest request, a programme by name with its options, has some hundreds; a longer one
 is no client."""
+
+
+@dataclass(frozen=True)
+class _Request:
+    """A request of a client, decoded."""
+
+    number: Any
+    """By which the client finds its answer."""
+    operation: str
+    age: float
+    """Since its client asked for it, s; this computer has one steady clock."""
+    arguments: tuple[Any, ...]
+    named: dict[str, Any]
+
+    @classmethod
+    def decode(cls, line: bytes) -> Self:
+        """A line of the connection; raises UsageError for one that is no request."""
+        try:
+            asked = json.loads(line)
+            return cls(
+                asked["id"],
+                str(asked["op"]),
+                max(0.0, time.monotonic() - float(asked["sent"])),
+                tuple(asked["args"]),
+                {str(name): value for name, value in asked.get("named", {}).items()},
+            )
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
+            raise UsageError(f"a request that cannot be read: {error}") from None
+
+    def permitted(self) -> dict[str, Any]:
+        """Its named arguments, a hold shortened by the age; raises NotPermitted where it is old."""
+        if self.operation not in _BEGINS:
+            return self.named
+        hold = self.named.get("hold")
+        if isinstance(hold, bool) or not isinstance(hold, float | int) or not 0 < hold <= 1:
+            remaining(LIFE_SIGN, self.age)  # and the station says what is wrong with the hold
+            return self.named
+        return {**self.named, "hold": remaining(hold, self.age)}
 
 
 @dataclass(eq=False)
@@ -72,6 +128,13 @@ class _Seat:
 
     connection: socket.socket
     station: LocalStation
+    left: bool = False
+    """Whether its client has taken its leave: what it has started was ended."""
+
+    def leave(self) -> None:
+        """End what its client has started."""
+        self.left = True
+        _end(self.station)
 
 
 class StationServer:
@@ -130,50 +193,57 @@ class StationServer:
 
     def _serve(self, seat: _Seat) -> None:
         """Answer until the other side leaves or goes away, then end what it has started."""
-        left = False
         try:
             with seat.connection as client, client.makefile("rwb") as stream:
-                while not left and (line := stream.readline(_MAX_LINE)):
-                    answer, left = self._answer(seat, line)
-                    stream.write(json.dumps(answer).encode() + b"\n")
+                while not seat.left and (line := stream.readline(_MAX_LINE)):
+                    stream.write(self._answer(seat, line) + b"\n")
                     stream.flush()
         except OSError:
             pass
         finally:
-            if not left and not self._closing:
+            if not seat.left and not self._closing:
                 with suppress(WinchkitError):
-                    _end(seat.station)
+                    seat.leave()
             self._seats.discard(seat)
 
-    def _answer(self, seat: _Seat, line: bytes) -> tuple[dict[str, Any], bool]:
-        """Execute a request; returns the reply, and whether the request was the last one."""
-        seat.station.client.heard()
-        operation, number = "", None
+    def _answer(self, seat: _Seat, line: bytes) -> bytes:
+        """Execute a request; returns the reply."""
+        request: _Request | None = None
         try:
-            request = json.loads(line)
-            operation, number = request["op"], request["id"]
-            answer = {"ok": self._do(seat, operation, request["args"], request.get("named", {}))}
+            request = _Request.decode(line)
+            if request.age < LIFE_SIGN:
+                seat.station.client.heard()
+            answer = json.dumps({"id": request.number, "ok": self._do(seat, request)})
         except WinchkitError as error:
-            answer = {"error": class_name(error), "message": str(error)}
-        except (ValueError, KeyError, TypeError) as error:
-            words = f"a request that cannot be read: {error}"
-            answer = {"error": "UsageError", "message": words}
-        return {"id": number, **answer}, operation == "leave"
+            answer = _refusal(request, class_name(error), str(error))
+        except Exception as error:
+            what = "a request" if request is None else request.operation
+            _LOGGER.exception("%s of %s failed", what, seat.station.client.name)
+            answer = _refusal(
+                request,
+                "WinchkitError",
+                f"{what} failed in the process that owns the bench: {type(error).__name__}: "
+                f"{error} (a defect of winchkit, please report it with {log_path(self._bench.spec)}"
+                "; the bench goes on)",
+            )
+        return answer.encode()
 
-    def _do(
-        self, seat: _Seat, operation: str, arguments: Sequence[Any], named: Mapping[str, Any]
-    ) -> Any:
+    def _do(self, seat: _Seat, request: _Request) -> Any:
         """Do an operation of a station, or one of those of the server; returns its result."""
-        if operation == "introduce":
-            return self._introduce(seat, *arguments)
-        if operation == "hand_over":
-            return self._hand_over(seat)
-        if operation == "leave":
-            _end(seat.station)
-            return None
-        if operation not in OPERATIONS:
+        own: dict[str, Callable[..., Any]] = {
+            "introduce": lambda name, observer: self._introduce(seat, name, observer),
+            "hand_over": lambda: self._hand_over(seat),
+            "leave": seat.leave,
+        }
+        operation = request.operation
+        if operation not in own and operation not in OPERATIONS:
             raise UsageError(f"no operation '{operation}'")
-        return getattr(seat.station, operation)(*arguments, **named)
+        call = own.get(operation) or getattr(seat.station, operation)
+        try:
+            inspect.signature(call).bind(*request.arguments, **request.named)
+        except TypeError as error:
+            raise UsageError(f"{operation}: a request that cannot be read: {error}") from None
+        return call(*request.arguments, **request.permitted())
 
     def _introduce(self, seat: _Seat, name: str, observer: bool) -> dict[str, Any]:
         """Take a client's name; returns who owns the bench, and whether it is handed over."""
@@ -203,6 +273,12 @@ class StationServer:
                 raise ConnectionLost(f"the bench is being handed over to {self.handed_to}")
             self.handed_to = asking.name
         return owner
+
+
+def _refusal(request: _Request | None, kind: str, message: str) -> str:
+    """The reply that raises an error in the client."""
+    number = None if request is None else request.number
+    return json.dumps({"id": number, "error": kind, "message": message})
 
 
 def _end(station: LocalStation) -> None:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 
 from winchkit.bench.bench import Bench
 from winchkit.bench.cells.tasks import do
-from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
+from winchkit.bench.control.dead_man import DEAD_MAN, LIFE_SIGN, DeadMan, remaining
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.snapshot import to_dict
 from winchkit.bench.direction import no_positional, paid_out
@@ -20,7 +20,7 @@ from winchkit.bench.winch import Winch
 from winchkit.drivers.can.bus.frame_tap import SeenFrame
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
-from winchkit.errors import UsageError
+from winchkit.errors import MotionError, UsageError
 from winchkit.schema.programme import ALL
 
 __all__ = ["LocalStation", "Station"]
@@ -46,14 +46,30 @@ class Station(Protocol):
         pay_out: float | None = None,
         wind_in: float | None = None,
         hold: float = DEAD_MAN,
+        since: float | None = None,
     ) -> None:
-        """Keep moving for ``hold`` seconds at a cable speed (m/s, positive), out or in.
+        """Begin to move for ``hold`` seconds at a cable speed (m/s, positive), out or in.
 
-        This, ``step`` and ``move`` raise TypeError for a number without a name.
+        The time counts from ``since`` (s on :attr:`clock`, by default now), when the operator was
+        seen to ask for it. This, ``step`` and ``move`` raise UsageError for a number without a
+        name.
+        """
+
+    def refresh(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        hold: float = DEAD_MAN,
+    ) -> None:
+        """Keep a jog or a held tension going for ``hold`` seconds more.
+
+        Raises MotionError where it has ended: a new motion needs a new command.
         """
 
     def release(self, winch: str | None) -> None:
-        """End a jog by a ramp now, as the hand that releases the key does."""
+        """End a jog or a held tension by a ramp now, as the hand that releases the key does."""
 
     def step(
         self,
@@ -62,8 +78,9 @@ class Station(Protocol):
         pay_out: float | None = None,
         wind_in: float | None = None,
         speed: float | None = None,
+        since: float | None = None,
     ) -> None:
-        """Start to pay out or wind in a length (m, positive) of cable."""
+        """Start to pay out or wind in a length (m, positive) of cable; ``since`` as of ``jog``."""
 
     def move(
         self,
@@ -99,7 +116,7 @@ class Station(Protocol):
     def hold_tension(
         self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
     ) -> None:
-        """Keep the tension (N) of a winch for ``hold`` seconds.
+        """Begin to keep the tension (N) of a winch for ``hold`` seconds.
 
         ``bounds`` may have ``travel`` (m), ``speed`` (m/s) and ``stiffness`` (N/m).
         """
@@ -181,6 +198,8 @@ class LocalStation:
         self._bench = bench
         self._recorder: Recorder | None = None
         self._homing: Generator[None] | None = None
+        self._led = DeadMan(float("-inf"))
+        """Permission of the homing to go on to its next motion."""
         self._programme: ProgrammeRun | None = None
 
     @property
@@ -222,17 +241,29 @@ class LocalStation:
         pay_out: float | None = None,
         wind_in: float | None = None,
         hold: float = DEAD_MAN,
+        since: float | None = None,
     ) -> None:
-        """Keep moving for ``hold`` seconds."""
-        no_positional("jog", "m/s", unnamed)
-        winding_speed = -paid_out("jog", pay_out, wind_in)
+        """Begin to move for ``hold`` seconds."""
+        hold = hold if since is None else remaining(hold, self.clock.now() - since)
         with self._acting():
-            self._bench.named(winch).keep_jogging(winding_speed, hold)
+            self._bench.named(winch).jog(*unnamed, pay_out=pay_out, wind_in=wind_in, hold=hold)
+
+    def refresh(
+        self,
+        winch: str | None,
+        *unnamed: object,
+        pay_out: float | None = None,
+        wind_in: float | None = None,
+        hold: float = DEAD_MAN,
+    ) -> None:
+        """Keep what is held going for ``hold`` seconds more."""
+        with self._acting():
+            self._bench.named(winch).refresh(*unnamed, pay_out=pay_out, wind_in=wind_in, hold=hold)
 
     def release(self, winch: str | None) -> None:
-        """End a jog by a ramp now."""
+        """End what is held by a ramp now."""
         with self._acting():
-            self._bench.named(winch).keep_jogging(0.0, REFRESH)
+            self._bench.named(winch).release()
 
     def step(
         self,
@@ -241,9 +272,12 @@ class LocalStation:
         pay_out: float | None = None,
         wind_in: float | None = None,
         speed: float | None = None,
+        since: float | None = None,
     ) -> None:
         """Start to pay out or wind in a length of cable."""
         no_positional("step", "m", unnamed)
+        if since is not None:
+            remaining(LIFE_SIGN, self.clock.now() - since)
         change = paid_out("step", pay_out, wind_in)
         chosen = self._bench.named(winch)
         with self._acting():
@@ -268,7 +302,7 @@ class LocalStation:
             )
         change = paid_out("move", pay_out, wind_in) if to is None else 0.0
         lengths = {
-            item.name: item.cable_length + change if to is None else float(to)
+            item.name: item.cable_length + change if to is None else to
             for item in self._chosen(winch)
         }
         with self._acting():
@@ -294,7 +328,7 @@ class LocalStation:
     def hold_tension(
         self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
     ) -> None:
-        """Keep the tension of a winch for ``hold`` seconds."""
+        """Begin to keep the tension of a winch for ``hold`` seconds."""
         with self._acting():
             self._bench.named(winch).hold_tension(tension, hold=hold, **bounds)
 
@@ -324,13 +358,22 @@ class LocalStation:
         with self._acting():
             self._homing = self._bench.homing(self._bench.named(winch).name, asked)
             next(self._homing, None)
+        self._led = DeadMan(self.clock.now() + LIFE_SIGN)
 
     def homing(self) -> bool:
         """Whether the homing is under way, and lead it on."""
         if self._homing is None:
             return False
         with self._acting():
+            try:
+                self._led.refresh(now := self.clock.now(), now + LIFE_SIGN)
+            except MotionError:
+                homing, self._homing = self._homing, None
+                homing.close()
+                raise
             for _ in self._homing:
+                # It may have waited for the drive.
+                self._led = DeadMan(self.clock.now() + LIFE_SIGN)
                 return True
         self._homing = None
         return False
@@ -342,7 +385,8 @@ class LocalStation:
 
     def reset(self) -> list[str]:
         """Clear trips and faults; returns the cleared ones, in words."""
-        return self._bench.reset()
+        with self._acting():
+            return self._bench.reset()
 
     def tare(self, winch: str | None) -> float:
         """Tare a load cell."""

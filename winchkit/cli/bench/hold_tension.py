@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import click
 
+from winchkit.cli.bench.holding import hold_on
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.options import (
     bench_option,
@@ -102,13 +103,11 @@ def command(
     ) as station:
         if take_over:
             station.take_over(winch)
-        clock = station.clock
-        end = math.inf if limit is None else clock.now() + limit
-        while (left := end - clock.now()) > 0:
-            station.hold_tension(winch, wanted, DEAD_MAN, bounds)
-            clock.sleep(min(REFRESH, left))
+        station.hold_tension(winch, wanted, DEAD_MAN, bounds)
+        hold_on(station, winch, math.inf if limit is None else limit)
+        station.release(winch)
         while station.moving(winch):
-            clock.sleep(REFRESH)
+            station.clock.sleep(REFRESH)
         status = station.status()
     if as_json and not dry_run:
         echo_json(status)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -16,6 +15,7 @@ from winchkit.cli.bench.direction_option import (
     magnitude,
     read_direction,
 )
+from winchkit.cli.bench.holding import hold_on
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import (
     bench_option,
@@ -150,13 +150,8 @@ def _read(
 
 def _jog_for(station: Station, winch: str | None, speed: DirectionKeyword, duration: float) -> None:
     """Keep a dead-man alive from here for a time."""
-    from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
-
-    clock = station.clock
-    end = clock.now() + duration
-    while (left := end - clock.now()) > 0:
-        station.jog(winch, **speed, hold=min(DEAD_MAN, left + REFRESH))
-        clock.sleep(min(REFRESH, left))
+    station.jog(winch, **speed)
+    hold_on(station, winch, duration)
     station.release(winch)
     _wait(station, winch)
 
@@ -172,4 +167,4 @@ def _jog_by_keys(station: Station, winch: str | None, speed: float) -> None:
     from winchkit.cli.bench.keyboard_jog import KeyboardJog, open_keys
 
     with open_keys() as keys:
-        KeyboardJog(station, winch, speed, time.monotonic).run(keys)
+        KeyboardJog(station, winch, speed).run(keys)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
+from enum import Enum
 from typing import TYPE_CHECKING, Protocol
 
 import click
@@ -27,13 +28,24 @@ __all__ = [
     "HeldKey",
     "KeyboardJog",
     "Keys",
+    "Press",
     "open_keys",
 ]
 
 _ARROWS = {"\x1b[A": "up", "\x1b[B": "down", "\x1bOA": "up", "\x1bOB": "down"}
 _WINDOWS_ARROWS = {"H": "up", "P": "down"}
+_QUEUE = 4096
+"""Bytes that a terminal keeps: one reading takes all that waits."""
 _POLL = 0.01
 """s, below the repetition of keys (30 ms and more)."""
+
+
+class Press(Enum):
+    """What a key that came is."""
+
+    NEW = "new"
+    REPEAT = "repeat"
+    IGNORED = "ignored"
 
 
 class Keys(Protocol):
@@ -44,22 +56,33 @@ class Keys(Protocol):
 
 
 class HeldKey:
-    """Distinguishes a key that is held, and repeats, from one that was pressed once.
+    """Distinguishes a key that is held, and repeats, from one that was pressed anew.
 
     A terminal shows no release: the first press holds for longer, since repeats start late, and
-    each repeat for as long as a dead-man may.
+    each repeat for as long as a dead-man may. Keys that were typed while this program stood still
+    are of no known time: they count as none, and so do the repeats that follow them without a pause
+    of the longest delay before the first repeat.
     """
 
     def __init__(self) -> None:
         self._key = ""
         self._until = float("-inf")
+        self._ignored: frozenset[str] = frozenset()
 
-    def hold(self, key: str, now: float) -> float:
-        """How long (s) the motion of this press may last without another."""
-        repeated = key == self._key and now < self._until
-        duration = DEAD_MAN if repeated else FIRST_PRESS
-        self._key, self._until = key, now + duration
-        return duration
+    def press(self, key: str, now: float) -> Press:
+        """What a key that came at ``now`` (s) is."""
+        going_on = now < self._until
+        if going_on and key in self._ignored:
+            self._until = now + FIRST_PRESS
+            return Press.IGNORED
+        repeated = going_on and key == self._key
+        self._ignored = frozenset()
+        self._key, self._until = key, now + (DEAD_MAN if repeated else FIRST_PRESS)
+        return Press.REPEAT if repeated else Press.NEW
+
+    def ignore(self, keys: Collection[str], now: float) -> None:
+        """Ignore these keys from ``now`` (s) until they are released."""
+        self._ignored, self._until = frozenset(keys), now + FIRST_PRESS
 
 
 @contextmanager
@@ -93,7 +116,7 @@ class _PosixKeys:
         if not ready:
             return []
         try:
-            typed = os.read(self._descriptor, 256).decode(errors="replace")
+            typed = os.read(self._descriptor, _QUEUE).decode(errors="replace")
         except OSError:  # the terminal was closed
             typed = ""
         if not typed:
@@ -141,19 +164,19 @@ _FASTER = 1.25
 _PICTURE = 0.1
 """s between two pictures of the bench; ten a second look continuous."""
 _WIND_IN, _PAY_OUT = "up", "down"
+_ARROW_KEYS, _STOPS = (_WIND_IN, _PAY_OUT), (" ", "q")
 
 
 class KeyboardJog:
     """Actions of the keys. In inch mode a tap is one step, and so is a key that is held."""
 
-    def __init__(
-        self, station: Station, winch: str | None, speed: float, now: Callable[[], float]
-    ) -> None:
-        """Begin in hold mode at ``speed`` (m/s, positive); ``now`` is the time in s."""
+    def __init__(self, station: Station, winch: str | None, speed: float) -> None:
+        """Begin in hold mode at ``speed`` (m/s, positive)."""
         self._station, self._winch = station, winch
-        self._speed, self._now = speed, now
+        self._speed = speed
         self._modes: tuple[float | None, ...] = (None, *INCHES)
         self._held = HeldKey()
+        self._read = station.clock.now()
 
     @property
     def inch(self) -> float | None:
@@ -172,7 +195,7 @@ class KeyboardJog:
         click.echo(HELP, err=True)
         while True:
             try:
-                for key in keys.read(_PICTURE):
+                for key in self.current(keys.read(_PICTURE)):
                     if key == "q":
                         self._station.stop()
                         click.echo("\nstopped", err=True)
@@ -186,6 +209,27 @@ class KeyboardJog:
             except OSError:  # the terminal was closed, and shows nothing any more
                 raise Terminated from None
 
+    def current(self, keys: list[str]) -> list[str]:
+        """Those of the keys just read that are pressed now; several repeats at once are one.
+
+        Where this program stood still for longer than the dead-man only a stop counts.
+        """
+        before, self._read = self._read, self._station.clock.now()
+        if self._read - before <= DEAD_MAN:
+            return [
+                key
+                for key, last in zip(keys, ["", *keys], strict=False)
+                if key != last or key not in _ARROW_KEYS
+            ]
+        if any(key in _ARROW_KEYS for key in keys):
+            self._held.ignore(_ARROW_KEYS, self._read)
+            click.echo(
+                f"\nkeys of the last {self._read - before:.1f} s are ignored: this program stood "
+                "still or waited meanwhile; release the key, then press it again",
+                err=True,
+            )
+        return [key for key in keys if key in _STOPS]
+
     def press(self, key: str) -> None:
         """Execute the action of a key; a refusal is shown, and the operator decides."""
         try:
@@ -193,15 +237,12 @@ class KeyboardJog:
         except ConnectionLost:
             raise
         except WinchkitError as error:
+            self._held.ignore({key}, self._read)
             click.echo(f"\n{error}", err=True)
 
     def _act(self, key: str) -> None:
-        if key in (_WIND_IN, _PAY_OUT):
-            hold = self._held.hold(key, self._now())
-            if self.inch is None:
-                self._station.jog(self._winch, **_directed(key, self._speed), hold=hold)
-            elif hold == FIRST_PRESS:
-                self._step(_directed(key, self.inch))
+        if key in _ARROW_KEYS:
+            self._move(key, self._held.press(key, self._read))
         elif key == "i":
             self._modes = (*self._modes[1:], self._modes[0])
             self._station.release(self._winch)
@@ -212,6 +253,18 @@ class KeyboardJog:
         elif key == "r":
             self._station.reset()
 
+    def _move(self, key: str, press: Press) -> None:
+        """Begin a jog or a step at a new press of an arrow, go on with the jog at a repeat."""
+        if press is Press.NEW and self.inch is not None:
+            self._step(_directed(key, self.inch))
+        elif press is Press.NEW:
+            self._station.release(self._winch)
+            self._station.jog(
+                self._winch, **_directed(key, self._speed), hold=FIRST_PRESS, since=self._read
+            )
+        elif press is Press.REPEAT and self.inch is None:
+            self._station.refresh(self._winch, **_directed(key, self._speed), hold=DEAD_MAN)
+
     def _step(self, change: DirectionKeyword) -> None:
         """Change the cable length from rest, so that a tap is exactly one step."""
         winches = self._station.status()["winch"]
@@ -219,7 +272,7 @@ class KeyboardJog:
         phase = winches.get(name, {}).get("phase", Phase.DISABLED.value)
         if phase != Phase.DISABLED.value:
             raise MotionError(f"winch {name} is still {phase}; this tap was ignored")
-        self._station.step(self._winch, **change, speed=self._speed)
+        self._station.step(self._winch, **change, speed=self._speed, since=self._read)
 
 
 def _directed(key: str, value: float) -> DirectionKeyword:

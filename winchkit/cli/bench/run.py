@@ -20,7 +20,7 @@ from winchkit.cli.core.options import (
     output_option,
 )
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.standard_input import is_standard_input
+from winchkit.cli.core.standard_input import forget_typed, is_standard_input
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -190,6 +190,7 @@ def _rehearse(bench: str, programme: Programme, effects: Sequence[str], *, as_js
 
 
 def _ask(step: Step) -> None:
+    forget_typed()
     click.confirm(f"{step.ask}; done?", default=True, abort=True, err=True)
 
 

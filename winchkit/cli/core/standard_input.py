@@ -19,7 +19,7 @@ from click.shell_completion import CompletionItem
 from winchkit.cli.core.messages import COPY_OF_INPUT, note
 from winchkit.cli.core.terminal import EscapedStream
 
-__all__ = ["Completer", "Readable", "is_standard_input"]
+__all__ = ["Completer", "Readable", "forget_typed", "is_standard_input"]
 
 Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
@@ -40,6 +40,21 @@ _TEXT = (
 )
 _HEAD = 4000
 """Bytes by which the format is recognised; the header of every format is shorter."""
+
+
+def forget_typed() -> None:
+    """Drop what was typed on the terminal before a question is shown: it is no answer to it."""
+    if not sys.stdin.isatty():
+        return
+    if sys.platform == "win32":
+        import msvcrt
+
+        while msvcrt.kbhit():
+            msvcrt.getwch()
+        return
+    import termios
+
+    termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
 
 
 class Readable(click.ParamType):  # type: ignore[type-arg]

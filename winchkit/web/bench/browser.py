@@ -36,7 +36,10 @@ _AXES = ("x", "y", "z")
 
 
 class Inbox:
-    """Messages in their order; a jog replaces one that waits, and every other message ends it."""
+    """Messages in their order; a jog that waits is ended by every other message.
+
+    A refresh replaces one that waits.
+    """
 
     def __init__(self) -> None:
         self._waiting: deque[Message] = deque()
@@ -44,7 +47,8 @@ class Inbox:
 
     def put(self, asked: Message) -> None:
         """Take a message."""
-        kept = [item for item in self._waiting if item.get("do") != "jog"]
+        over = {"refresh"} if asked.get("do") == "refresh" else {"jog", "refresh"}
+        kept = [item for item in self._waiting if item.get("do") not in over]
         self._waiting = deque([*kept, asked])
         self._filled.set()
 
@@ -145,6 +149,9 @@ class Browser:
             # In a message a jog's speed is positive winding in, a step's change paying out.
             "jog": lambda: partial(
                 station.jog, self._winch(asked), **directed(-messages.signed_speed(asked))
+            ),
+            "refresh": lambda: partial(
+                station.refresh, self._winch(asked), **directed(-messages.signed_speed(asked))
             ),
             "release": lambda: partial(station.release, self._winch(asked)),
             "alive": lambda: partial(

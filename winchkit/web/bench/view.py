@@ -378,22 +378,22 @@ class BenchView:
         refused = False
         while True:
             asked = await browser.inbox.next()
-            jogs = asked.get("do") == "jog"
-            if jogs and refused:
+            held = asked.get("do") in ("jog", "refresh")
+            if refused and asked.get("do") == "refresh":
                 continue  # until it is released and pressed again
             try:
                 await self._obey(asked, browser)
             except WinchkitError as error:
                 browser.say(str(error))
-                refused = jogs
+                refused = held
                 continue
             except Exception as error:
                 _LOGGER.exception("the order %s failed", asked)
                 browser.say(f"defect of winchkit: {type(error).__name__}: {error}")
-                refused = jogs
+                refused = held
                 continue
             refused = False
-            if jogs or asked.get("do") not in BEGINS_NOTHING:
+            if held or asked.get("do") not in BEGINS_NOTHING:
                 browser.say("")
 
     async def _obey(self, asked: Message, browser: Browser) -> None:
@@ -414,7 +414,7 @@ class BenchView:
                 return  # a sign of life that crossed the end of its command
             raise UsageError("this page only watches; request command first")
         action = browser.action(asked)
-        if order == "jog":
+        if order in ("jog", "refresh"):
             if not self._has_seen(asked, _LATEST_PICTURE):
                 raise UsageError("Jog ended: the browser was too slow. Release and press again.")
         elif order not in BEGINS_NOTHING and not self._has_seen(asked, _OLD):

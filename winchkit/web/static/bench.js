@@ -258,11 +258,12 @@ const tabs = () => [...(lastTrip ? ["Trip"] : []), "Charts", "Bus frames", "Driv
 function hold(sign) {
   if (refused()) return;
   alarm("", "bench");
+  release();
   held = sign;
   beaten = performance.now();
   clearInterval(timer);
-  beat();
-  timer = setInterval(beat, PERIOD);
+  beat("jog");
+  timer = setInterval(() => beat("refresh"), PERIOD);
   mark();
 }
 
@@ -274,12 +275,13 @@ const platform = {
 };
 
 // A browser that was too slow for the dead-man ends its jog: the key may be up meanwhile.
-function beat() {
+// The press begins a jog, and what follows only refreshes it.
+function beat(what) {
   if (!held) return;
   const at = performance.now();
   if (at - beaten > 1000 * declared.dead_man) { release(); alarm("Jog ended: the browser was too slow. Release and press again.", "bench"); return; }
   beaten = at;
-  send("jog", { winch, speed: held * speed });
+  send(what, { winch, speed: held * speed });
 }
 
 function release() {

@@ -1,0 +1,21 @@
+"""Refreshes a held motion for a time, as long as this process runs without a gap."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from winchkit.bench.remote.station import Station
+
+__all__ = ["hold_on"]
+
+
+def hold_on(station: Station, winch: str | None, duration: float) -> None:
+    """Refresh what was just started for ``duration`` s; raises MotionError where it has ended."""
+    from winchkit.bench.control.dead_man import DEAD_MAN, REFRESH
+
+    clock = station.clock
+    end = clock.now() + duration
+    while (left := end - clock.now()) > 0:
+        clock.sleep(min(REFRESH, left))
+        station.refresh(winch, hold=DEAD_MAN)
