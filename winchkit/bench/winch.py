@@ -170,7 +170,9 @@ class Winch(WinchStatus):
 
         Call it again within that time to go on; without another call the winch ramps to rest and
         disables. With ``duration`` it does so itself for that many seconds and returns at rest.
-        Where the travel is used up for 0.5 s the bench trips. Without a valid reading it rests.
+        Where the travel is used up for 0.5 s the bench trips, and where the cable is slack for 0.2
+        s (below ``tension_slack``, without one below half of the tension) although it was taut
+        before, or was wound in by what the stiffness explains. Without a valid reading it rests.
 
         Parameters
         ----------
@@ -193,7 +195,8 @@ class Winch(WinchStatus):
         UsageError
             For numbers that cannot be meant.
         NotPermitted
-            Without a load cell, or beyond its limits.
+            Without a load cell, beyond its limits, or for more cables of a robot than its platform
+            leaves free.
         """
         wanted = tension if isinstance(tension, float | int) else parse(tension, "force")
         clock = self._bench.clock
@@ -231,6 +234,7 @@ class Winch(WinchStatus):
         here = self.snapshot
         self.permit(direction_of(tension - here.load_tension), held=True)
         self.require_length()
+        self._bench.permit_tension(self.name)
         expires = self._bench.clock.now() + hold
         with self._bench.commanders.claimed(self.name):
             control = self._tension
@@ -244,6 +248,7 @@ class Winch(WinchStatus):
                     bound,
                     cell.max_age + limits.response_time,
                     cell.max_age,
+                    tension / 2 if limits.tension_slack is None else limits.tension_slack,
                 )
                 control = TensionControl(
                     self._parts.cable, limits, setting, self.tension_reading, self.trip_tension

@@ -102,6 +102,11 @@ class WinchStatus:
         return self.moving and self._jog is None and self._tension is None
 
     @property
+    def holds_tension(self) -> bool:
+        """Whether its motion is the control of its cable's tension."""
+        return self.moving and self._tension is not None
+
+    @property
     def commanded_here(self) -> bool:
         """Whether the client for whom this thread acts commands it."""
         commanders = self._bench.commanders

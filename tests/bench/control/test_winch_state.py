@@ -35,6 +35,7 @@ def parts(*, faulty: bool) -> Any:
         nmt_text="NMT text",
         second_master="second master",
         position_jump="position jump",
+        position_disagreement="disagreement",
         alarms=(0x4210,),
         alarm_text="alarm text",
     )
@@ -87,6 +88,7 @@ def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
         "frozen": "frozen",
         "turns_known": True,
         "position_jump": "position jump",
+        "position_disagreement": "disagreement",
         "sensors": SENSORS,
         "now": NOW,
         "feedback": winch.axis.feedback,

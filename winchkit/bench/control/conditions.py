@@ -220,6 +220,20 @@ CONDITIONS: tuple[Condition, ...] = (
         by_facts=True,
     ),
     Condition(
+        "counter",
+        "change of 6064h against the integral of 606Ch, within 0.25 s and within 4 s",
+        "5 %, one step of 606Ch, its range times limits.response_time, and "
+        "limits.acceleration x response_time² / 2",
+        lambda item, _own, _memory: bool(item.position_disagreement),
+        lambda item, *_: (
+            f"{item.position_disagreement}: the counter stands still, was set or lost its encoder, "
+            "606Ch is wrong, or the device file's increments_per_turn or speed_unit; the cable "
+            "length is not known; mend it, reset, then home the winch"
+        ),
+        latches=True,
+        by_facts=True,
+    ),
+    Condition(
         "motion at rest",
         "cable speed by the motor while the drive is commanded to be disabled",
         "3 steps of 606Ch, at least 1 % of limits.speed",

@@ -39,6 +39,9 @@ somebody else enables is stopped well within 0.15 s, the longest a first stop ma
 _TRANSFER_PAUSE = 1.0
 """Longest time between two requests of one SDO transfer, s: the usual time-out of a client. A frame
 from here in between would abort the transfer, which may be that of a firmware."""
+_LEAST_WAY = 1e-3
+"""Commanded way (m of cable) of which the motor has to turn half: static friction in a velocity
+loop, and a position loop's last error, are below."""
 _MOVING = Phase.MOVING
 _FOLLOWING = (_MOVING, Phase.RUN_DOWN)
 _OPERATION_ENABLED = State.OPERATION_ENABLED
@@ -92,6 +95,8 @@ class Controller:
         self._down: Stop = RunDown(cable, limits)
         self._angle = 0.0
         self._held: float | None = None
+        self._origin = 0.0
+        """Motor angle at which the source began, rad."""
         self._reported = True
         self._since = self._time = 0.0
         self._word = 0
@@ -240,6 +245,7 @@ class Controller:
                 if not wanted.may_start(self._time):
                     return False
                 wanted.source.start(self._time, feedback.angle, self.commanded)
+                self._origin = feedback.angle
                 self.source, self.done = wanted.source, False
                 self.phase, self._since = Phase.MOVING, now
                 return True
@@ -314,7 +320,7 @@ class Controller:
         enabled = feedback.state is State.OPERATION_ENABLED
         if enabled and self._begun is not None and self._begun.may_start(self._time):
             self._begun.source.start(self._time, feedback.angle, 0.0)
-            self._angle = feedback.angle
+            self._angle = self._origin = feedback.angle
             self._enter(Phase.MOVING, now)
             self._move(now, feedback)
             return
@@ -337,9 +343,25 @@ class Controller:
         target = source.target(self._time, feedback.angle, now)
         self._follow(target, feedback)
         if target.done:
+            self._compare_way(target, feedback)
             self.done = True
             if not source.holds:
                 self._begin_run_down(now)
+
+    def _compare_way(self, target: Target, feedback: AxisFeedback) -> None:
+        """Note the failure of a motor that has not turned as it was told, however slowly."""
+        if target.angle is None or not self.follows:
+            return
+        arm = self.cable.at(feedback.angle)[1]
+        asked = (target.angle - self._origin) * arm
+        made = math.copysign(1.0, asked) * (feedback.angle - self._origin) * arm
+        if abs(asked) > _LEAST_WAY and made < abs(asked) / 2:
+            way = "wind in" if asked > 0 else "pay out"
+            self._reported = False
+            self.failure = (
+                f"it was commanded to {way} {abs(asked):.3f} m and moved {round(made, 3) + 0.0:.3f}"
+                " m; check brake, load and drive limits"
+            )
 
     def _follow(self, target: Target, feedback: AxisFeedback) -> None:
         velocity, angle, winding_speed, _, start = target

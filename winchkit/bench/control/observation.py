@@ -43,6 +43,11 @@ _SLIP_SHARE = 0.05
 """... share of the moved length: a length sensor's filter and a profile's error are below."""
 
 
+_RUN_TIME, _RUN_WAY = 0.05, 2e-3
+"""A motion is one in a direction when it has gone on for so long (s) and so far (m): an elastic
+load that bounces turns the motor back for less."""
+
+
 class Instrumented(NamedTuple):
     """Newest reading of a sensor; the same object until the next one."""
 
@@ -116,6 +121,8 @@ class WinchInput(NamedTuple):
     """Whether the motor angle counts every turn; if not, the cable length is NaN."""
     position_jump: str = ""
     """Change of 6064h that no motion explains, in words; empty without one."""
+    position_disagreement: str = ""
+    """Change of 6064h that 606Ch contradicts, in words; empty without one."""
     sensors: Mapping[str, Instrumented] = MappingProxyType({})
     """Newest reading of each instrument by its role; ``tension`` is that of the cell."""
     now: float = 0.0
@@ -137,6 +144,7 @@ FACTS = (
     "frozen",
     "turns_known",
     "position_jump",
+    "position_disagreement",
 )
 """What of a :class:`WinchInput` is no measured number and seldom changes."""
 facts_of = itemgetter(*map(WinchInput._fields.index, FACTS))
@@ -245,6 +253,8 @@ class Memory:
     """Change of the length sensor less that by the motor since the motion began, m."""
     moved: float = 0.0
     """Path of the cable since then, m."""
+    run: float = 0.0
+    """Cable wound in since the motor last turned the other way, m; negative paid out."""
     quantities: tuple[float, ...] = _NOTHING
     """Quantities of the newest observations: a plain tuple in the order of :class:`Quantities`,
     which takes less time to make."""
@@ -255,6 +265,11 @@ class Memory:
     _track: deque[float] = field(default_factory=deque)
     _began: tuple[float, float] | None = None
     _last: float = math.nan
+    _observed: float = math.nan
+    _turned: float = math.nan
+    """When the motor began to turn this way, s."""
+    _ran: float = math.nan
+    """When it last did, s."""
 
     def observe(self, item: WinchInput) -> None:
         """Take the observations of a cycle."""
@@ -279,6 +294,7 @@ class Memory:
         self.gross = gross
         speed, commanded, length = item.winding_speed, item.commanded, item.cable_length
         self._follow_slowing(item.target_speed, speed)
+        self._follow_direction(item.now, speed)
         if item.length == item.length:
             self._follow_length(item)
         size = abs(speed)
@@ -298,6 +314,23 @@ class Memory:
             -gross,
             rate,
         )
+
+    @property
+    def winds(self) -> float:
+        """Cable wound in by a motion that has gone on long enough to be one, m; else zero."""
+        lasts = self._observed - self._turned >= _RUN_TIME
+        return self.run if lasts and abs(self.run) > _RUN_WAY else 0.0
+
+    def _follow_direction(self, now: float, speed: float) -> None:
+        """Follow the cable that runs one way; it ends with the way back, or a standstill."""
+        before, self._observed = self._observed, now
+        way = speed * (now - before)
+        if way * self.run > 0:
+            self.run += way
+            self._ran = now
+        elif way or not now - self._ran <= _RUN_TIME:
+            # A speed that is rounded to zero now and then is no standstill.
+            self.run, self._turned, self._ran = way, before, now
 
     def _follow_tension(self, cell: Instrumented) -> None:
         before = self._tension

@@ -136,6 +136,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             "" if frozen is None else _frozen(parts, frozen, now, winding_speed),
             turns_known,
             axis.position_jump,
+            axis.position_disagreement,
             sensors,
             now,
             feedback,

@@ -61,6 +61,28 @@ class Platform:
         )
         """Plans its motions within the limits."""
 
+    def permit_tension(self, winch: str) -> None:
+        """Raise NotPermitted where a winch may not control its tension beside those that do.
+
+        The others hold the platform, which more cables than it has degrees of freedom can do.
+
+        Parameters
+        ----------
+        winch : str
+            One of the robot's.
+        """
+        if winch not in self.robot.names:
+            return
+        count, free = len(self._winches), null_space(self.robot.structure(self.robot.home)[0])
+        held = [one.name for one in self._winches if one.holds_tension and one.name != winch]
+        if len(held) + 1 > free.shape[1]:
+            beside = f" beside {', '.join(held)}" if held else ""
+            raise NotPermitted(
+                f"winch {winch} may not hold its tension{beside}: of the {count} cables of robot "
+                f"'{self.robot.profile.name}' the platform leaves {free.shape[1]} free, the others "
+                "hold it; use tension_trim of [robot] to correct the tensions of all"
+            )
+
     @property
     def pose(self) -> Pose:
         """Pose by the motor angles, one; raises NotPermitted where they fit no pose."""
