@@ -1,0 +1,36 @@
+"""A motor that does not turn ends its motion with an error, however slow the motion was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from slave.rig import Rig
+from winchkit.bench.winch import Winch
+from winchkit.errors import DriveFault
+
+_MOTIONS: dict[str, Callable[[Winch], None]] = {
+    "jog by 0.3 m at a sixth of the limit": lambda w: w.jog(pay_out=0.05, duration=6.0),
+    "jog by 10 mm": lambda w: w.jog(wind_in=0.02, duration=0.5),
+    "move by 5 mm": lambda w: w.move_by(wind_in=0.005, speed=0.01),
+}
+
+
+@pytest.mark.parametrize("motion", _MOTIONS)
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_a_motion_that_is_not_made_is_an_error(tmp_path: Path, motion: str, share: float) -> None:
+    """``share`` of what it is told is what the motor does."""
+    rig = Rig(tmp_path)
+    with rig.opened() as bench:
+        rig.wait(0.3)
+        rig.slaves[0].inject("follows wrongly", share)
+        if share and "move" in motion:
+            _MOTIONS[motion](bench.winch["A"])  # the position loop makes up for it
+            return
+        with pytest.raises(DriveFault, match=r"was commanded to .* and moved 0\.0"):
+            _MOTIONS[motion](bench.winch["A"])
+        rig.slaves[0].mend_all()
+        _MOTIONS[motion](bench.winch["A"])
+        assert not bench.snapshot.tripped
