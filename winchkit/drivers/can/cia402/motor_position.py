@@ -82,7 +82,11 @@ class MotorPosition:
         self.counter, self._boot_ups = counter, boot_ups
         self._standstill = Standstill(drive.scale)
         self.agreement = PositionAgreement(
-            drive.scale.angle, drive.scale.velocity, self._response, self._late
+            drive.scale.angle,
+            drive.scale.velocity,
+            self._response,
+            self._late,
+            self._fastest,
         )
         return counter
 

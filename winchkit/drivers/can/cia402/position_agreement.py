@@ -9,7 +9,8 @@ whose way within the short one is too short. The tolerance is that of the measur
 
 - a share of the way (a rounded scale, a ratio);
 - one step of 606Ch for the length of the window (a speed that is rounded down). The step is the
-  smallest change of 606Ch so far, since a drive may round more coarsely than its unit;
+  smallest change of 606Ch so far, since a drive may round more coarsely than its unit, and before
+  its first change a hundredth of the greatest speed;
 - the response time times the range of the speeds in the window: a filter of first order with a
   time constant T makes the integral late by exactly T times the change of its output;
 - what an acceleration within the response time turns before a late 606Ch shows any of it.
@@ -33,6 +34,8 @@ _SHARE = 0.05
 """Of the way: declared scales differ by factors that a wrong gear or encoder makes."""
 _STEPS = 2
 """Counts of 6064h by which the ends of a window are rounded."""
+_COARSEST = 0.01
+"""Share of the greatest speed: no drive that follows a speed measures it more coarsely."""
 _GAP = 0.12
 """After so long without feedback the comparison begins anew, s: longer than the longest cycle, and
 than the age at which feedback is stale at the usual heartbeat."""
@@ -134,11 +137,14 @@ class PositionAgreement:
         velocity_step: float = 0.0,
         response: float = 0.0,
         late: float = 0.0,
+        fastest: float = 0.0,
     ) -> None:
-        """Take a count of 6064h (rad) and 606Ch (rad/s), the response time (s), and what the motor
-        turns from rest within that (rad). Without a response time nothing is compared.
+        """Take a count of 6064h (rad) and 606Ch (rad/s), the response time (s), what the motor
+        turns from rest within that (rad), and its greatest speed (rad/s). Without a response time
+        nothing is compared.
         """
-        self._tolerance = _Tolerance(_STEPS * angle_step + late, velocity_step, response)
+        step = max(velocity_step, _COARSEST * fastest)
+        self._tolerance = _Tolerance(_STEPS * angle_step + late, step, response)
         self._finest, self._smallest = velocity_step, inf
         self._active = response > 0
         self.found: Disagreement | None = None
