@@ -31,6 +31,8 @@ def test_a_motion_that_is_not_made_is_an_error(tmp_path: Path, motion: str, shar
             return
         with pytest.raises(DriveFault, match=r"was commanded to .* and moved 0\.0"):
             _MOTIONS[motion](bench.winch["A"])
+        rig.wait(0.05)
+        assert [warning.kind for warning in bench.snapshot.warnings] == ["motion"]
         rig.slaves[0].mend_all()
         _MOTIONS[motion](bench.winch["A"])
         assert not bench.snapshot.tripped

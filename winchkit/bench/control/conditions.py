@@ -497,6 +497,14 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
         "cable that a held tension, or a trim of a robot, has moved, while it asks for more",
         "the declared travel, by default 100 mm (trim: 10 mm), for 0.5 s",
     ),
+    BenchCondition(
+        "motion",
+        "a drive that cannot be enabled; cable that the motor has moved at the end of a motion",
+        "half of the commanded length, from 1 mm on",
+        "the command ends with exit code 5, quick stop of all unless stop_together = false; a "
+        "warning",
+        latches=False,
+    ),
     BenchCondition("latch file", "reading and writing of the latch file", "possible"),
     BenchCondition(
         "sync", "SYNC frames that were not sent here", "none", "a warning", latches=False

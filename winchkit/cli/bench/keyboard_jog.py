@@ -154,6 +154,7 @@ class KeyboardJog:
         self._speed, self._now = speed, now
         self._modes: tuple[float | None, ...] = (None, *INCHES)
         self._held = HeldKey()
+        self._told: list[str] = []
 
     @property
     def inch(self) -> float | None:
@@ -178,13 +179,22 @@ class KeyboardJog:
                         click.echo("\nstopped", err=True)
                         return
                     self.press(key)
-                line = printable(status_line(self._station.status()))
+                status = self._station.status()
+                self._warn(status.get("warnings", []))
+                line = printable(status_line(status))
                 click.echo(f"\r{line}  [{self.mode}]\x1b[K", nl=False, file=screen())
             except ConnectionLost:
                 click.echo("\r\x1b[K", nl=False, file=screen())
                 raise
             except OSError:  # the terminal was closed, and shows nothing any more
                 raise Terminated from None
+
+    def _warn(self, warnings: list[str]) -> None:
+        """Print each new warning, such as a motor that has not turned."""
+        for words in warnings:
+            if words not in self._told:
+                click.echo(f"\n{printable(words)}", err=True)
+        self._told = warnings
 
     def press(self, key: str) -> None:
         """Execute the action of a key; a refusal is shown, and the operator decides."""
