@@ -44,6 +44,7 @@ def parts(*, faulty: bool) -> Any:
         follows=True,
         commanded=0.25,
         tracking=lambda angle, arm: (10 * angle, 10 * arm),
+        way=lambda angle, arm: ("way", angle, arm),
         take_uncommanded=lambda: "uncommanded",
     )
     return Made(
@@ -81,6 +82,7 @@ def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
         "follows": True,
         "target_speed": 30.0,
         "following_error": 5.0,
+        "way": ("way", 3.0, 0.5),
         "length": 4.5,
         "emergencies": () if faulty else (0x4210,),
         "emergency_text": "" if faulty else "alarm text",

@@ -168,6 +168,16 @@ CASES = (
         after=0.05,
     ),
     Case(
+        "missing motion",
+        "",
+        always(way=(0.1, 0.043)),
+        always(way=(0.1, 0.045)),
+        after=0.25,
+    ),
+    Case(
+        "missing motion", "", always(way=(-0.03, -0.003)), always(way=(-0.03, -0.005)), after=0.25
+    ),
+    Case(
         "speed",
         "",
         always(winding_speed=-0.361, **_SLOW),

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from winchkit.bench.control.motion import commanded_and_moved
 from winchkit.bench.control.observation import (
     Instrumented,
     Memory,
@@ -295,6 +296,18 @@ CONDITIONS: tuple[Condition, ...] = (
             f"{_following_limit(own) * 1e3:.0f} mm); check load, brake and drive limits"
         ),
         debounce=_FOLLOWING_DEBOUNCE,
+        when="follows",
+    ),
+    Condition(
+        "missing motion",
+        "cable commanded less cable moved by the motor, since the motion began",
+        "half of the commanded, at least 20 mm, and limits.response_time at the commanded speed",
+        Exceeds("missing", lambda _own: 0.0),
+        lambda item, *_: (
+            f"{commanded_and_moved(*item.way)}: the motor does "
+            "not turn or its encoder does not count; check brake, load, encoder and drive limits"
+        ),
+        debounce=_DEVIATION_TIME,
         when="follows",
     ),
     Condition(

@@ -8,7 +8,15 @@ from dataclasses import dataclass
 
 from winchkit.bench.control.axis_port import AxisPort
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.motion import MotionSource, PathStop, RunDown, StartGate, Stop, Target
+from winchkit.bench.control.motion import (
+    MotionSource,
+    PathStop,
+    RunDown,
+    StartGate,
+    Stop,
+    Target,
+    commanded_and_moved,
+)
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
 from winchkit.drivers.can.canopen.nmt import NmtState
@@ -157,6 +165,13 @@ class Controller:
     def follows(self) -> bool:
         """Whether the drive is to follow the commanded speed in this cycle."""
         return self.phase in _FOLLOWING and not self.axis.moves_alone
+
+    def way(self, angle: float, arm: float) -> tuple[float, float]:
+        """Cable commanded and moved since the source began, in m, positive wound in.
+
+        ``angle`` is that of the motor (rad), ``arm`` in m/rad.
+        """
+        return (self._angle - self._origin) * arm, (angle - self._origin) * arm
 
     def tracking(self, angle: float, arm: float) -> tuple[float, float]:
         """Value that the drive, at a motor angle (rad), is compared with while it :attr:`follows`.
@@ -352,15 +367,11 @@ class Controller:
         """Note the failure of a motor that has not turned as it was told, however slowly."""
         if target.angle is None or not self.follows:
             return
-        arm = self.cable.at(feedback.angle)[1]
-        asked = (target.angle - self._origin) * arm
-        made = math.copysign(1.0, asked) * (feedback.angle - self._origin) * arm
-        if abs(asked) > _LEAST_WAY and made < abs(asked) / 2:
-            way = "wind in" if asked > 0 else "pay out"
+        asked, moved = self.way(feedback.angle, self.cable.at(feedback.angle)[1])
+        if abs(asked) > _LEAST_WAY and math.copysign(1.0, asked) * moved < abs(asked) / 2:
             self._reported = False
             self.failure = (
-                f"it was commanded to {way} {abs(asked):.3f} m and moved {round(made, 3) + 0.0:.3f}"
-                " m; check brake, load and drive limits"
+                f"{commanded_and_moved(asked, moved)}; check brake, load and drive limits"
             )
 
     def _follow(self, target: Target, feedback: AxisFeedback) -> None:

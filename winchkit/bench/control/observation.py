@@ -37,6 +37,9 @@ _STEPS, _REST_STEPS = 4, 3
 """Resolution steps of 606Ch below which a difference, or a speed at rest, is noise."""
 _MISSED_SYNCS = 5
 """A late cycle of the host makes feedback old; a drive that is silent also misses SYNCs."""
+_MISSING = 0.02
+"""Commanded cable that a motor has to move half of, m: a brake that opens, a position loop that
+catches up, and friction at the lowest speeds are below."""
 _SLIP = 0.05
 """Least tolerance of the cable slip, m, and ..."""
 _SLIP_SHARE = 0.05
@@ -108,6 +111,8 @@ class WinchInput(NamedTuple):
     """Winding speed of the velocity target that was sent last, m/s; NaN in a position mode."""
     following_error: float = 0.0
     """Target less actual position in cable, of a position-controlled drive, m."""
+    way: tuple[float, float] = (0.0, 0.0)
+    """Cable commanded and moved since the motion began, m, positive wound in."""
     length: float = math.nan
     """Reading of the length instrument, m."""
     emergencies: tuple[int, ...] = ()
@@ -165,6 +170,8 @@ class Quantities(NamedTuple):
     """Excess of the speed over the commanded one, or speed against its direction, m/s."""
     following_error: float = 0.0
     """Absolute following error, m."""
+    missing: float = 0.0
+    """Excess of the commanded cable over the moved one beyond what a drive may be late, m."""
     paid_out: float = 0.0
     """Cable length, m."""
     wound_in: float = 0.0
@@ -298,6 +305,7 @@ class Memory:
         if item.length == item.length:
             self._follow_length(item)
         size = abs(speed)
+        asked, moved = item.way
         self.quantities = (
             item.feedback_age if item.missed_syncs >= _MISSED_SYNCS else 0.0,
             size,
@@ -305,6 +313,9 @@ class Memory:
             abs(speed - commanded),
             size if speed * commanded < 0 else size - abs(commanded),
             abs(item.following_error),
+            abs(asked - moved)
+            - max(_MISSING, abs(asked) / 2)
+            - self.own.limits.response_time * abs(commanded),
             length,
             -length,
             abs(self.slip) - (_SLIP + _SLIP_SHARE * self.moved),
