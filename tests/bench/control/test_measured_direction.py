@@ -26,7 +26,7 @@ def jogging(winding_speed: float) -> Rig:
 
 
 def turned(rig: Rig, winding_speed: float) -> None:
-    """From now on the motor turns at this speed whatever it is told."""
+    """From now on the motor turns at this speed whatever is commanded."""
     axis = rig.axes["A"]
     send = axis.send
 

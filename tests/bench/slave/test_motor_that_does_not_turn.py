@@ -21,7 +21,7 @@ _MOTIONS: dict[str, Callable[[Winch], None]] = {
 @pytest.mark.parametrize("motion", _MOTIONS)
 @pytest.mark.parametrize("share", [0.0, 0.3])
 def test_a_motion_that_is_not_made_is_an_error(tmp_path: Path, motion: str, share: float) -> None:
-    """``share`` of what it is told is what the motor does."""
+    """``share`` of what is commanded is what the motor does."""
     rig = Rig(tmp_path)
     with rig.opened() as bench:
         rig.wait(0.3)
@@ -45,7 +45,7 @@ def test_a_motion_that_is_not_made_is_an_error(tmp_path: Path, motion: str, shar
 def test_an_encoder_that_stands_still_with_the_speed_derived_from_it_is_seen_after_20_mm(
     tmp_path: Path,
 ) -> None:
-    """The motor turns as it is told, 6064h and 606Ch stand still: the lag is all that shows."""
+    """The motor turns as commanded, 6064h and 606Ch stand still: the lag is all that shows."""
     rig = Rig(tmp_path)
     slave = rig.slaves[0]
     with rig.opened() as bench:

@@ -364,7 +364,7 @@ class Controller:
                 self._begin_run_down(now)
 
     def _compare_way(self, target: Target, feedback: AxisFeedback) -> None:
-        """Note the failure of a motor that has not turned as it was told, however slowly."""
+        """Note the failure of a motor that has not turned as commanded, however slowly."""
         if target.angle is None or not self.follows:
             return
         asked, moved = self.way(feedback.angle, self.cable.at(feedback.angle)[1])

@@ -39,7 +39,7 @@ _SLACK_TIME = 0.2
 """A load that swings relieves its cable for less, s."""
 _SOFTER = 10.0
 """Times by which a cable with its structure may be softer than the bound of its stiffness: of a
-fibre rope on a frame against its own elasticity by the data sheet."""
+fibre cable on a frame against its own elasticity by the data sheet."""
 _STEEL = 210e9
 """Modulus of elasticity of steel, Pa: no cable is stiffer than a steel bar of its diameter."""
 
