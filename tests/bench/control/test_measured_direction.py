@@ -15,9 +15,11 @@ LIMITS = LimitSpec(0.5, 1.0, (0.5, 9.0), tension_high=500.0, tension_slack=20.0)
 ARM = 0.005
 
 
-def jogging(winding_speed: float) -> Rig:
-    """A winch that jogs for a long time at a steady speed."""
+def jogging(winding_speed: float, length: float = 4.0) -> Rig:
+    """A winch that jogs for a long time at a steady speed, from a cable length (m)."""
     rig = Rig(LIMITS)
+    rig.axes["A"].angle = (4.0 - length) / ARM
+    rig.step(2)
     source = Jog(rig.cable(), rig.limits)
     source.refresh(winding_speed, rig.now + 1e6)
     rig.controller().begin(source)
@@ -41,8 +43,8 @@ def turned(rig: Rig, winding_speed: float) -> None:
 @pytest.mark.parametrize(
     ("commanded", "kind", "tension", "length"),
     [
-        (-0.02, "length", 100.0, 0.49),
-        (0.02, "length", 100.0, 9.01),
+        (-0.02, "length", 100.0, 0.48),
+        (0.02, "length", 100.0, 9.02),
         (-0.02, "tension high", 510.0, 4.0),
         (0.02, "slack", 10.0, 4.0),
     ],
@@ -50,9 +52,8 @@ def turned(rig: Rig, winding_speed: float) -> None:
 def test_the_measured_direction_counts(
     commanded: float, kind: str, tension: float, length: float
 ) -> None:
-    rig = jogging(commanded)
+    rig = jogging(commanded, length)
     axis = rig.axes["A"]
-    axis.angle = (4.0 - length) / ARM
     rig.tension["A"] = tension
     rig.run(0.25)
     assert not rig.supervisor.tripped, "the commanded direction is allowed"
