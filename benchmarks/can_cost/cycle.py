@@ -208,7 +208,9 @@ def bench(
     clock = Clock()
     device = read_device(catalog.find("devices", "generic-cia402"))
     profile = read_profile(catalog.find("profiles", "bench-spiral"))
-    watch = WatchSpec(127, heartbeat, cycle, True, prove=False)
+    watch = WatchSpec(
+        127, heartbeat, cycle, True, prove=False, speed=30.0, response=0.06, late=0.06
+    )
     winches, opened, served = {}, [], []
     with ExitStack() as stack:
         for number in range(buses):

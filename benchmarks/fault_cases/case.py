@@ -99,6 +99,7 @@ def _case(seed: str, name: str, *, real_time: bool) -> Case:
         tuple(sorted(faults, key=lambda fault: fault.at)),
         random.random() < 0.3,
         real_time,
-        not real_time and random.random() < _INDEPENDENT,
+        not real_time
+        and (random.random() < _INDEPENDENT or any(KINDS[one.kind].independent for one in faults)),
         random.choices((0.2, NOISE_KNOWN), (3, 1))[0],
     )

@@ -42,7 +42,9 @@ class Kind:
     crosses: str = ""
     """``high`` or ``slack`` where the time counts from the moment the true tension crosses that."""
     moving: str = ""
-    """``in`` or ``out`` where it can only happen in that direction."""
+    """``in`` or ``out`` where it can happen in that direction only, ``any`` in motion only."""
+    independent: bool = False
+    """Whether only the independent drive can make it."""
     real_time: bool = True
     """Whether it can be made in real time."""
     lasts: bool = False
@@ -61,6 +63,18 @@ def _drive(kind: str) -> Begin:
     def begin(world: World, winch: str) -> Callable[[], None]:
         world.live.inject(f"{winch}.servo", kind)
         return partial(world.live.inject, f"{winch}.servo", "recover")
+
+    return begin
+
+
+def _slave(kind: str, value: Any = None) -> Begin:
+    """A row of ``tests/support/slave/faults.py``."""
+
+    def begin(world: World, winch: str) -> Callable[[], None]:
+        with world.live.up_to_date():
+            slave = world.live.winches[winch].drive.slave  # type: ignore[attr-defined]
+            slave.inject(kind, value)
+        return partial(slave.mend, kind)
 
     return begin
 
@@ -223,7 +237,64 @@ _LOST = (
     "unresponsive",
 )
 
+_SEEN = 0.5
+"""From a counter that stands still to the stop: window, response time, and a stop, s."""
+_MEASURED = ("counter", "slowing down", "deviation", "runaway", "speed")
+
+
+def _measurement(name: str, begin: Begin, *, stops: bool = True) -> Kind:
+    """6064h or 606Ch is wrong; nothing but a motion shows it."""
+    causes = (*_MEASURED, "motion at rest", "state", "position")
+    return Kind(
+        name,
+        begin,
+        causes,
+        _SEEN,
+        stops=stops,
+        least=_SEEN,
+        moving="any",
+        real_time=False,
+        independent=True,
+        part="servo",
+    )
+
+
+_LYING_DRIVE = (
+    _measurement("counter frozen", _slave("position stuck")),
+    _measurement("counter reversed", _slave("position scaled", -1.0)),
+    _measurement("counter counts double", _slave("position scaled", 2.0)),
+    _measurement("velocity frozen", _slave("velocity stuck"), stops=False),
+    _measurement("velocity halved", _slave("velocity scaled", 0.5)),
+    _measurement("velocity reversed", _slave("velocity scaled", -1.0)),
+    _measurement("TPDOs stale", _slave("tpdo stale")),
+    _measurement("motor driven by its load", _slave("driven by its load")),
+    Kind(
+        "status lies",
+        _slave("status lies"),
+        ("state", "unresponsive", *_LOST),
+        stops=False,
+        real_time=False,
+        independent=True,
+        part="servo",
+    ),
+    Kind("mode lies", _slave("mode lies"), ("mode",), real_time=False, independent=True),
+    Kind(
+        "duplicate node",
+        _slave("two nodes with one number"),
+        (*_WIRES, "second master", "mode", *_MEASURED),
+        least=_COMMUNICATION,
+        real_time=False,
+        independent=True,
+    ),
+    *(
+        Kind(name, _slave(name), (), stops=False, real_time=False, independent=True)
+        for name in ("tpdo repeated", "rpdo repeated", "sdo refused", "sdo delayed")
+    ),
+)
+"""From CiA 301 and 402: drives that answer, and say what is not true."""
+
 _ROWS = (
+    *_LYING_DRIVE,
     Kind("enable input open", _drive("enable input open"), ("state",), least=0.0, part="servo"),
     Kind("second master: 6040h = 00h", _write(0x6040, 2, 0x00), _MASTER, least=0.0),
     Kind("second master: 6040h = 06h", _write(0x6040, 2, 0x06), _MASTER, least=0.0),

@@ -301,6 +301,17 @@ class Bench(BenchConnection):
             if trip.blocks is Direction.BOTH or (trip.winch == winch and trip.blocks & direction):
                 raise NotPermitted(str(trip))
 
+    def permit_tension(self, winch: str) -> None:
+        """Raise NotPermitted for more cables of a robot than its platform leaves free.
+
+        Parameters
+        ----------
+        winch : str
+            Winch that is to control its tension.
+        """
+        if self._platform is not None:
+            self._platform.permit_tension(winch)
+
     def require_motion(self) -> None:
         """Raise what forbids every motion: no valid commissioning record, a trip, an ended loop.
 

@@ -320,6 +320,8 @@ def _axis(
         quick_stop=quick / arm,
         limits=_at_shaft(cable, winch.limits),
         speed=_FASTEST * winch.limits.speed / arm,
+        response=winch.limits.response_time,
+        late=winch.limits.acceleration * winch.limits.response_time**2 / 2 / arm,
         options=winch.options,
         hardware=winch.host_loss_description if winch.host_loss else "",
     )

@@ -33,6 +33,9 @@ class WinchHost(Protocol):
     def permit(self, winch: str, direction: Direction) -> None:
         """Raise what forbids this motion of a winch; return when it is allowed."""
 
+    def permit_tension(self, winch: str) -> None:
+        """Raise where a winch may not control its tension beside those that do."""
+
     def raise_trouble(self) -> None:
         """Raise the error that has stopped the bench, if there is one."""
 

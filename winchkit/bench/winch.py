@@ -291,7 +291,9 @@ class Winch(WinchStatus):
 
         :meth:`refresh` within that time keeps it going; without one the winch ramps to rest and
         disables. With ``duration`` it does so itself for that many seconds and returns at rest.
-        Where the travel is used up for 0.5 s the bench trips. Without a valid reading it rests.
+        Where the travel is used up for 0.5 s the bench trips, and where the cable is slack for 0.2
+        s (below ``tension_slack``, without one below half of the tension) although it was taut
+        before, or was wound in by what the stiffness explains. Without a valid reading it rests.
 
         Parameters
         ----------
@@ -314,7 +316,8 @@ class Winch(WinchStatus):
         UsageError
             For numbers that cannot be meant.
         NotPermitted
-            Without a load cell, or beyond its limits.
+            Without a load cell, beyond its limits, or for more cables of a robot than its platform
+            leaves free.
         """
         call = "hold_tension"
         force = parse(tension, "force") if isinstance(tension, str) else tension
@@ -351,6 +354,7 @@ class Winch(WinchStatus):
         self._require_new()
         self.permit(direction_of(tension - here.load_tension))
         self.require_length()
+        self._bench.permit_tension(self.name)
         bound = greatest_stiffness(self._parts.cable_spec, here.cable_length, stiffness)
         setting = TensionSetting(
             tension,
@@ -359,6 +363,7 @@ class Winch(WinchStatus):
             bound,
             cell.max_age + limits.response_time,
             cell.max_age,
+            tension / 2 if limits.tension_slack is None else limits.tension_slack,
         )
         dead_man = DeadMan(self._bench.clock.now() + hold)
         self.begin(

@@ -104,6 +104,11 @@ class WinchStatus:
         return self.moving and self._held is None
 
     @property
+    def holds_tension(self) -> bool:
+        """Whether its motion is the control of its cable's tension."""
+        return self.moving and isinstance(self._held, TensionControl)
+
+    @property
     def commanded_here(self) -> bool:
         """Whether the client for whom this thread acts commands it."""
         commanders = self._bench.commanders

@@ -62,6 +62,7 @@ OTHERWISE = {
     "frozen": ("", "stands still"),
     "turns_known": (True, False),
     "position_jump": ("", "6064h changed by 9.00 turns"),
+    "position_disagreement": ("", "6064h changed by 0.000 turns"),
     "cable_length": (5.0, 0.5, 9.5),
     "tension": (GOOD.tension, None, Instrumented(600.0, NOW - 0.01, 0.1, "good", 0.0, gross=600.0)),
 }

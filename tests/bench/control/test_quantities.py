@@ -72,6 +72,12 @@ FORMULAS: dict[tuple[str, str], Formula] = {
     ("following error", ""): lambda item, own, _: (
         abs(item.following_error) > (own.limits.following_error or 0.25 * own.limits.speed)
     ),
+    ("missing motion", ""): lambda item, own, _: (
+        abs(item.way[0] - item.way[1])
+        - max(0.02, abs(item.way[0]) / 2)
+        - own.limits.response_time * abs(item.commanded)
+        > 0
+    ),
     ("speed", ""): lambda item, own, _: abs(item.winding_speed) > own.limits.speed * 1.2,
     ("length", "lower"): lambda item, own, _: item.cable_length < own.shortest - 5e-3,
     ("length", "upper"): lambda item, own, _: item.cable_length > own.longest + 5e-3,
@@ -136,6 +142,7 @@ INPUTS = st.fixed_dictionaries(
         "follows": st.booleans(),
         "target_speed": SPEEDS,
         "following_error": near(-0.1, -0.02, 0.02, 0.1),
+        "way": st.sampled_from([(0.0, 0.0), (0.1, 0.0), (-0.1, -0.049), (0.03, 0.011)]),
         "length": near(1.0, 1.05, 9.0),
         "now": st.just(2.0),
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -157,3 +158,72 @@ def test_the_stiffness_is_bounded_by_what_is_known_of_the_cable() -> None:
     assert greatest_stiffness(known, 1.0, 7.0) == 7.0
     with pytest.raises(UsageError, match="neither axial_stiffness nor diameter"):
         greatest_stiffness(CableSpec(), 2.0, None)
+
+
+class Breaking(Held):
+    """Its cable breaks at a time: nothing pulls any more."""
+
+    breaks = math.inf
+
+    @property
+    def tension(self) -> float:
+        return 0.4 if self.rig.now >= self.breaks else super().tension
+
+
+def half(tension: float = 200.0, **kwargs: float) -> TensionSetting:
+    """Without a declared ``tension_slack``."""
+    return replace(setting(tension, **kwargs), slack=tension / 2)
+
+
+@pytest.mark.parametrize("after", [0.5, 4.0])
+@pytest.mark.parametrize("present", [120.0, 400.0])
+def test_a_cable_that_breaks_under_control_trips_within_a_third_of_a_second(
+    after: float, present: float
+) -> None:
+    held = Breaking(half(travel=0.1), 2e4, present)
+    held.breaks = held.rig.now + after
+    held.control.refresh(held.rig.now + 30.0)
+    held.rig.controller().begin(held.control)
+    while not held.rig.supervisor.tripped:
+        held.rig.step()
+        assert held.rig.now < held.breaks + 0.3
+    assert held.rig.now >= held.breaks
+    (trip,) = held.rig.supervisor.tripped
+    assert trip.kind == "tension control"
+    assert "0.4 N, below 100.0 N" in str(trip)
+    held.rig.run(0.5)
+    assert held.rig.controller().phase is Phase.DISABLED
+
+
+def test_a_cable_that_is_slack_at_first_is_wound_in_by_what_its_stiffness_explains() -> None:
+    """200 N at 20 kN/m are 10 mm; the winch takes 0.2 s more to trip."""
+    held = Held(half(travel=0.1), 0.0, 0.0)
+    held.run(6.0)
+    (trip,) = held.rig.supervisor.tripped
+    assert "below 100.0 N" in str(trip)
+    assert 0.01 < held.wound < 0.01 + 0.02 * 0.3
+
+
+@settings(max_examples=6, deadline=None)
+@given(softer=st.floats(1.0, 10.0), present=st.floats(1.0, 60.0), slack=st.floats(0.0, 8e-3))
+def test_a_cable_softer_than_its_bound_and_a_little_slack_comes_to_the_tension(
+    softer: float, present: float, slack: float
+) -> None:
+    held = Held(half(120.0, travel=0.1), 2e4 / softer, present - slack * 2e4 / softer)
+    held.control.refresh(held.rig.now + 60.0)
+    held.run(40.0)
+    assert not held.rig.supervisor.tripped
+    assert held.tension == pytest.approx(120.0, abs=20.0)
+
+
+def test_a_load_that_swings_is_no_broken_cable() -> None:
+    held = Held(half(), 2e4, 200.0)
+    begin = held.rig.now
+
+    def swinging(now: float) -> TensionReading:
+        relieved = (now - begin) % 1.0 > 0.85
+        return TensionReading(20.0 if relieved else 200.0, 0.01)
+
+    held.read = swinging
+    held.run(5.0)
+    assert not held.rig.supervisor.tripped

@@ -37,6 +37,7 @@ def parts(*, faulty: bool) -> Any:
         nmt_text="NMT text",
         second_master="second master",
         position_jump="position jump",
+        position_disagreement="disagreement",
         alarms=(0x4210,),
         alarm_text="alarm text",
     )
@@ -45,6 +46,7 @@ def parts(*, faulty: bool) -> Any:
         follows=True,
         commanded=0.25,
         tracking=lambda angle, arm: (10 * angle, 10 * arm),
+        way=lambda angle, arm: ("way", angle, arm),
         take_uncommanded=lambda: "uncommanded",
     )
     return Made(
@@ -82,6 +84,7 @@ def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
         "follows": True,
         "target_speed": 30.0,
         "following_error": 5.0,
+        "way": ("way", 3.0, 0.5),
         "length": 4.5,
         "emergencies": () if faulty else (0x4210,),
         "emergency_text": "" if faulty else "alarm text",
@@ -89,6 +92,7 @@ def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
         "frozen": "frozen",
         "turns_known": True,
         "position_jump": "position jump",
+        "position_disagreement": "disagreement",
         "sensors": SENSORS,
         "now": NOW,
         "feedback": winch.axis.feedback,

@@ -123,6 +123,7 @@ _STANDS = {"commanded": 0.0, "target_speed": math.nan}
 CASES = (
     Case("second master", "", always(second_master="an SDO write of 6040h"), always()),
     Case("position", "", always(position_jump="6064h changed by 9.00 turns"), always()),
+    Case("counter", "", always(position_disagreement="6064h changed by 0.000 turns"), always()),
     Case("boot-up", "", always(boot_ups=2), always(boot_ups=1)),
     Case("heartbeat", "", always(heartbeat_lost="gone"), always()),
     Case("nmt", "", always(operational=False, nmt="pre-operational"), always()),
@@ -165,6 +166,16 @@ CASES = (
         always(following_error=-0.021),
         always(following_error=0.019),
         after=0.05,
+    ),
+    Case(
+        "missing motion",
+        "",
+        always(way=(0.1, 0.043)),
+        always(way=(0.1, 0.045)),
+        after=0.25,
+    ),
+    Case(
+        "missing motion", "", always(way=(-0.03, -0.003)), always(way=(-0.03, -0.005)), after=0.25
     ),
     Case(
         "speed",

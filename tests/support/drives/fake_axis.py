@@ -63,6 +63,7 @@ class FakeAxis:
     stops_on_nmt: bool = False
     second_master: str = ""
     position_jump: str = ""
+    position_disagreement: str = ""
     nmt_text: str = "operational"
     alarms: tuple[int, ...] = ()
     alarm_text: str = ""

@@ -93,6 +93,22 @@ def _near_wrap(slave: Slave, value: Any) -> None:
     slave.motion.offset += top - int(value) - slave.motion.counts()
 
 
+def _scale_position(slave: Slave, value: Any) -> None:
+    """From here on 6064h changes by ``value`` times what the motor turns."""
+    slave.motion.scaled = (slave.motor.angle, float(value))
+
+
+def _unscale_position(slave: Slave) -> None:
+    """The counts that the scale has made stay."""
+    kept = slave.motion.counts()
+    slave.motion.scaled = (0.0, 1.0)
+    slave.motion.offset += kept - slave.motion.counts()
+
+
+def _repeat_content(slave: Slave, _value: Any) -> None:
+    slave.stale = {}
+
+
 def _twin(slave: Slave, _value: Any) -> None:
     slave.begin_twin()
 
@@ -150,6 +166,9 @@ _ROWS = (
     Fault("nmt unheard", "NMT commands are lost", unheard=frozenset({"nmt"})),
     Fault("sdo unheard", "SDO requests are lost", unheard=frozenset({"sdo"})),
     Fault("tpdo lost", "TPDOs are lost", unsent=frozenset({"tpdo"})),
+    Fault("tpdo repeated", "every TPDO is sent twice"),
+    Fault("tpdo stale", "TPDOs come with what they had first", begin=_repeat_content),
+    Fault("rpdo repeated", "every RPDO is received twice"),
     Fault("heartbeat lost", "the slave's heartbeat is lost", unsent=frozenset({"heartbeat"})),
     Fault("silent", "nothing goes out", unsent=_EVERYTHING | {"tpdo", "emergency"}),
     Fault(
@@ -170,6 +189,17 @@ _ROWS = (
     Fault("two nodes with one number", "a second node answers too", begin=_twin, end=_end_twin),
     # Motion and feedback
     Fault("follows wrongly", "the motor does this multiple of what it is told", -1.0),
+    Fault("driven by its load", "the enabled motor turns at this speed whatever it is told", 7.0),
+    Fault(
+        "position scaled",
+        "6064h changes by this multiple of the motor's turns",
+        2.0,
+        begin=_scale_position,
+        end=_unscale_position,
+    ),
+    Fault("velocity scaled", "606Ch is this multiple of the motor's speed", 2.0),
+    Fault("status lies", "6041h shows these state bits whatever the state is", 0x27),
+    Fault("mode lies", "6061h shows this mode, another one acts", 3),
     Fault("velocity stuck", "606Ch no longer changes"),
     Fault("position stuck", "6064h no longer changes"),
     Fault("status frozen", "6041h no longer changes"),

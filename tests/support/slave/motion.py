@@ -54,6 +54,8 @@ class Motion:
         """Velocity that the motor follows, rad/s."""
         self.offset = 0
         """Added to the counts of the motor angle: home offset, or a fault's."""
+        self.scaled = (0.0, 1.0)
+        """Motor angle (rad) beyond which the counter changes by a multiple, and that multiple."""
         self._unit: float | None = None
         self._profile = _Profile()
         self._from = self._to = 0.0
@@ -96,7 +98,9 @@ class Motion:
     def counts(self) -> int:
         """6064h: the counter has a declared number of bits."""
         span = 1 << self.declared.counter_bits
-        raw = round(self.motor.angle / self.unit) + self.offset
+        start, multiple = self.scaled
+        angle = start + (self.motor.angle - start) * multiple
+        raw = round(angle / self.unit) + self.offset
         return (raw + span // 2) % span - span // 2
 
     def select(self, mode: int) -> None:
@@ -160,6 +164,10 @@ class Motion:
             self._ramp(0.0, 0x6085 if self.objects.get(0x605D, 0, 1) == 2 else 0x6084, dt)
         else:
             self._follow(dt)
+            driven = self.faults.get("driven by its load")
+            if driven is not None:
+                self.motor.advance(dt, float(driven))
+                return
             wrong = self.faults.get("follows wrongly")
             if wrong is not None:
                 self.motor.advance(dt, self.reference * float(wrong))
@@ -185,7 +193,7 @@ class Motion:
     def publish(self) -> None:
         """Write what the slave measures into its objects."""
         objects, unit = self.objects, self.velocity_unit
-        velocity = self.motor.velocity
+        velocity = self.motor.velocity * float(self.faults.get("velocity scaled", 1.0))
         if self.declared.velocity_resolution:
             step = self.declared.velocity_resolution
             velocity = round(velocity / step) * step
@@ -195,7 +203,7 @@ class Motion:
             objects.set(0x6064, 0, self.counts())
         objects.set(0x606B, 0, round(self.reference / unit))
         objects.set(0x6062, 0, self.objects.get(0x607A))
-        objects.set(0x6061, 0, self.mode)
+        objects.set(0x6061, 0, self.faults.get("mode lies", self.mode))
 
     def _hold(self) -> None:
         """Nothing is aimed at but the place where the motor is."""

@@ -67,6 +67,8 @@ class Slave:
         self.emergency = Emergencies(self.node, self.objects, self._send)
         self._out: list[Frame] = []
         self._delayed: list[tuple[float, Frame]] = []
+        self.stale: dict[int, Frame] = {}
+        """TPDOs that are sent again and again, by their identifier."""
         self._status = 0
         self._synced: float | None = None
         self._sync_period, self._awaits_sync = 0.0, False
@@ -172,7 +174,8 @@ class Slave:
         elif kind == "sdo" and state in (Nmt.PRE_OPERATIONAL, Nmt.OPERATIONAL):
             self._serve(frame.data)
         elif state is Nmt.OPERATIONAL and kind == "rpdo":
-            self.pdos.receive(number, frame.data, self.time)
+            for _ in range(2 if "rpdo repeated" in self.faults else 1):
+                self.pdos.receive(number, frame.data, self.time)
         elif state is Nmt.OPERATIONAL and kind == "sync":
             self._on_sync()
 
@@ -253,7 +256,9 @@ class Slave:
             remote = 0x200 if self.network.state is Nmt.OPERATIONAL else 0
             warning = 0x80 if self.emergency.standing and not self.power.error else 0
             self._status = self.power.status() | self.motion.status() | remote | warning
-        self.objects.set(0x6041, 0, self._status)
+        lies = self.faults.get("status lies")
+        shown = self._status if lies is None else self._status & ~0x6F | int(lies)
+        self.objects.set(0x6041, 0, shown)
 
     def _on_state(self, old: Nmt, new: Nmt) -> None:
         if old is not Nmt.OPERATIONAL:
@@ -299,5 +304,7 @@ class Slave:
 
     def _send(self, frame: Frame) -> None:
         kind, number = kind_from_slave(frame, self.node, self.pdos.identifiers(0x1800))
+        if kind == "tpdo" and "tpdo stale" in self.faults:
+            frame = self.stale.setdefault(frame.identifier, frame)
         if not self._loses("unsent", kind, number):
-            self._out.append(frame)
+            self._out += [frame] * (2 if kind == "tpdo" and "tpdo repeated" in self.faults else 1)

@@ -57,6 +57,10 @@ class AxisPort(Protocol):
         """Change of 6064h that no motion explains, in words; empty without one."""
 
     @property
+    def position_disagreement(self) -> str:
+        """Change of 6064h that 606Ch contradicts, in words; empty without one."""
+
+    @property
     def alarms(self) -> tuple[int, ...]:
         """Emergency codes in force without a fault."""
 

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from winchkit.bench.control.motion import commanded_and_moved
 from winchkit.bench.control.observation import (
     Instrumented,
     Memory,
@@ -234,6 +235,20 @@ CONDITIONS: tuple[Condition, ...] = (
         by_facts=True,
     ),
     Condition(
+        "counter",
+        "change of 6064h against the integral of 606Ch, within 0.25 s and within 4 s",
+        "5 %, one step of 606Ch, its range times limits.response_time, and "
+        "limits.acceleration x response_time² / 2",
+        lambda item, _own, _memory: bool(item.position_disagreement),
+        lambda item, *_: (
+            f"{item.position_disagreement}: the counter stands still, was set or lost its encoder, "
+            "606Ch is wrong, or the device file's increments_per_turn or speed_unit; the cable "
+            "length is not known; mend it, reset, then home the winch"
+        ),
+        latches=True,
+        by_facts=True,
+    ),
+    Condition(
         "motion at rest",
         "cable speed by the motor while the drive is commanded to be disabled",
         "3 steps of 606Ch, at least 1 % of limits.speed",
@@ -291,6 +306,18 @@ CONDITIONS: tuple[Condition, ...] = (
             f"{_following_limit(own) * 1e3:.0f} mm); check load, brake and drive limits"
         ),
         debounce=_FOLLOWING_DEBOUNCE,
+        when="follows",
+    ),
+    Condition(
+        "missing motion",
+        "cable commanded less cable moved by the motor, since the motion began",
+        "half of the commanded, at least 20 mm, and limits.response_time at the commanded speed",
+        Exceeds("missing", lambda _own: 0.0),
+        lambda item, *_: (
+            f"{commanded_and_moved(*item.way)}: the motor does "
+            "not turn or its encoder does not count; check brake, load, encoder and drive limits"
+        ),
+        debounce=_DEVIATION_TIME,
         when="follows",
     ),
     Condition(
@@ -492,6 +519,14 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
         "tension control",
         "cable that a held tension, or a trim of a robot, has moved, while it asks for more",
         "the declared travel, by default 100 mm (trim: 10 mm), for 0.5 s",
+    ),
+    BenchCondition(
+        "motion",
+        "a drive that cannot be enabled; cable that the motor has moved at the end of a motion",
+        "half of the commanded length, from 1 mm on",
+        "the command ends with exit code 5, quick stop of all unless stop_together = false; a "
+        "warning",
+        latches=False,
     ),
     BenchCondition("latch file", "reading and writing of the latch file", "possible"),
     BenchCondition(

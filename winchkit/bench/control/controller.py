@@ -16,6 +16,7 @@ from winchkit.bench.control.motion import (
     StartGate,
     Stop,
     Target,
+    commanded_and_moved,
 )
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
@@ -47,6 +48,9 @@ somebody else enables is stopped well within 0.15 s, the longest a first stop ma
 _TRANSFER_PAUSE = 1.0
 """Longest time between two requests of one SDO transfer, s: the usual time-out of a client. A frame
 from here in between would abort the transfer, which may be that of a firmware."""
+_LEAST_WAY = 1e-3
+"""Commanded way (m of cable) of which the motor has to turn half: static friction in a velocity
+loop, and a position loop's last error, are below."""
 _MOVING = Phase.MOVING
 _FOLLOWING = (_MOVING, Phase.RUN_DOWN)
 _OPERATION_ENABLED = State.OPERATION_ENABLED
@@ -100,6 +104,8 @@ class Controller:
         self._down: Stop = RunDown(cable, limits)
         self._angle = 0.0
         self._held: float | None = None
+        self._origin = 0.0
+        """Motor angle at which the source began, rad."""
         self._reported = True
         self._since = self._time = 0.0
         self._word = 0
@@ -160,6 +166,13 @@ class Controller:
     def follows(self) -> bool:
         """Whether the drive is to follow the commanded speed in this cycle."""
         return self.phase in _FOLLOWING and not self.axis.moves_alone
+
+    def way(self, angle: float, arm: float) -> tuple[float, float]:
+        """Cable commanded and moved since the source began, in m, positive wound in.
+
+        ``angle`` is that of the motor (rad), ``arm`` in m/rad.
+        """
+        return (self._angle - self._origin) * arm, (angle - self._origin) * arm
 
     def tracking(self, angle: float, arm: float) -> tuple[float, float]:
         """Value that the drive, at a motor angle (rad), is compared with while it :attr:`follows`.
@@ -248,6 +261,7 @@ class Controller:
                 if not wanted.may_start(self._time):
                     return False
                 wanted.source.start(self._time, feedback.angle, self.commanded)
+                self._origin = feedback.angle
                 self.source, self.done = wanted.source, False
                 self.phase, self._since = Phase.MOVING, now
                 return True
@@ -328,7 +342,7 @@ class Controller:
         enabled = feedback.state is State.OPERATION_ENABLED
         if enabled and self._begun is not None and self._begun.may_start(self._time):
             self._begun.source.start(self._time, feedback.angle, 0.0)
-            self._angle = feedback.angle
+            self._angle = self._origin = feedback.angle
             self._enter(Phase.MOVING, now)
             self._move(now, feedback)
             return
@@ -351,9 +365,21 @@ class Controller:
         target = source.target(self._time, feedback.angle, now)
         self._follow(target, feedback)
         if target.done:
+            self._compare_way(target, feedback)
             self.done = True
             if not source.holds:
                 self._begin_run_down(now)
+
+    def _compare_way(self, target: Target, feedback: AxisFeedback) -> None:
+        """Note the failure of a motor that has not turned as commanded, however slowly."""
+        if target.angle is None or not self.follows:
+            return
+        asked, moved = self.way(feedback.angle, self.cable.at(feedback.angle)[1])
+        if abs(asked) > _LEAST_WAY and math.copysign(1.0, asked) * moved < abs(asked) / 2:
+            self._reported = False
+            self.failure = (
+                f"{commanded_and_moved(asked, moved)}; check brake, load and drive limits"
+            )
 
     def _follow(self, target: Target, feedback: AxisFeedback) -> None:
         velocity, angle, winding_speed, _, start = target

@@ -286,11 +286,13 @@ class ControlLoop:
     def _failing(self) -> str:
         """Winches to stop because a drive could not continue, with the reason in words."""
         new = [
-            f"winch {name}: {failure}"
+            Trip("motion", name, failure, Direction.NONE)
             for name, parts in self.winches.items()
             if (failure := parts.controller.new_failure())
         ]
-        return "; ".join(new) if self._stop_together else ""
+        for each in new:
+            self.warn(each)
+        return "; ".join(map(str, new)) if self._stop_together else ""
 
     def _run(self) -> None:
         self.thread_id = threading.get_native_id()

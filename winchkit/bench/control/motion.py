@@ -31,6 +31,7 @@ __all__ = [
     "Stop",
     "Target",
     "Trim",
+    "commanded_and_moved",
     "within_limits",
 ]
 
@@ -350,6 +351,13 @@ class Move:
         index = min(int(position / span), len(knots) - 2)
         slope = (knots[index + 1] - knots[index]) / span
         return knots[index] + slope * (position - index * span), slope
+
+
+def commanded_and_moved(asked: float, moved: float) -> str:
+    """What was commanded, and what the motor moved (m of cable, positive wound in), in words."""
+    way = "wind in" if asked > 0 else "pay out"
+    made = round(math.copysign(1.0, asked) * moved, 3) + 0.0
+    return f"it was commanded to {way} {abs(asked):.3f} m and moved {made:.3f} m"
 
 
 def within_limits(

@@ -37,10 +37,18 @@ _STEPS, _REST_STEPS = 4, 3
 """Resolution steps of 606Ch below which a difference, or a speed at rest, is noise."""
 _MISSED_SYNCS = 5
 """A late cycle of the host makes feedback old; a drive that is silent also misses SYNCs."""
+_MISSING = 0.02
+"""Commanded cable that a motor has to move half of, m: a brake that opens, a position loop that
+catches up, and friction at the lowest speeds are below."""
 _SLIP = 0.05
 """Least tolerance of the cable slip, m, and ..."""
 _SLIP_SHARE = 0.05
 """... share of the moved length: a length sensor's filter and a profile's error are below."""
+
+
+_RUN_TIME, _RUN_WAY = 0.05, 2e-3
+"""A motion is one in a direction when it has gone on for so long (s) and so far (m): an elastic
+load that bounces turns the motor back for less."""
 
 
 class Instrumented(NamedTuple):
@@ -105,6 +113,8 @@ class WinchInput(NamedTuple):
     """Winding speed of the velocity target that was sent last, m/s; NaN in a position mode."""
     following_error: float = 0.0
     """Target less actual position in cable, of a position-controlled drive, m."""
+    way: tuple[float, float] = (0.0, 0.0)
+    """Cable commanded and moved since the motion began, m, positive wound in."""
     length: float = math.nan
     """Reading of the length instrument, m."""
     emergencies: tuple[int, ...] = ()
@@ -118,6 +128,8 @@ class WinchInput(NamedTuple):
     """Whether the motor angle counts every turn; if not, the cable length is NaN."""
     position_jump: str = ""
     """Change of 6064h that no motion explains, in words; empty without one."""
+    position_disagreement: str = ""
+    """Change of 6064h that 606Ch contradicts, in words; empty without one."""
     sensors: Mapping[str, Instrumented] = MappingProxyType({})
     """Newest reading of each instrument by its role; ``tension`` is that of the cell."""
     now: float = 0.0
@@ -139,6 +151,7 @@ FACTS = (
     "frozen",
     "turns_known",
     "position_jump",
+    "position_disagreement",
 )
 """What of a :class:`WinchInput` is no measured number and seldom changes."""
 facts_of = itemgetter(*map(WinchInput._fields.index, FACTS))
@@ -159,6 +172,8 @@ class Quantities(NamedTuple):
     """Excess of the speed over the commanded one, or speed against its direction, m/s."""
     following_error: float = 0.0
     """Absolute following error, m."""
+    missing: float = 0.0
+    """Excess of the commanded cable over the moved one beyond what a drive may be late, m."""
     paid_out: float = 0.0
     """Cable length, m."""
     wound_in: float = 0.0
@@ -249,6 +264,8 @@ class Memory:
     """Change of the length sensor less that by the motor since the motion began, m."""
     moved: float = 0.0
     """Path of the cable since then, m."""
+    run: float = 0.0
+    """Cable wound in since the motor last turned the other way, m; negative paid out."""
     quantities: tuple[float, ...] = _NOTHING
     """Quantities of the newest observations: a plain tuple in the order of :class:`Quantities`,
     which takes less time to make."""
@@ -259,6 +276,11 @@ class Memory:
     _track: deque[float] = field(default_factory=deque)
     _began: tuple[float, float] | None = None
     _last: float = math.nan
+    _observed: float = math.nan
+    _turned: float = math.nan
+    """When the motor began to turn this way, s."""
+    _ran: float = math.nan
+    """When it last did, s."""
 
     def observe(self, item: WinchInput) -> None:
         """Take the observations of a cycle."""
@@ -283,9 +305,11 @@ class Memory:
         self.gross = gross
         speed, commanded, length = item.winding_speed, item.commanded, item.cable_length
         self._follow_slowing(item.target_speed, speed)
+        self._follow_direction(item.now, speed)
         if item.length == item.length:
             self._follow_length(item)
         size = abs(speed)
+        asked, moved = item.way
         self.quantities = (
             item.feedback_age if item.missed_syncs >= _MISSED_SYNCS else 0.0,
             size,
@@ -293,6 +317,9 @@ class Memory:
             abs(speed - commanded),
             size if speed * commanded < 0 else size - abs(commanded),
             abs(item.following_error),
+            abs(asked - moved)
+            - max(_MISSING, abs(asked) / 2)
+            - self.own.limits.response_time * abs(commanded),
             length,
             -length,
             abs(self.slip) - (_SLIP + _SLIP_SHARE * self.moved),
@@ -302,6 +329,23 @@ class Memory:
             -gross,
             rate,
         )
+
+    @property
+    def winds(self) -> float:
+        """Cable wound in by a motion that has gone on long enough to be one, m; else zero."""
+        lasts = self._observed - self._turned >= _RUN_TIME
+        return self.run if lasts and abs(self.run) > _RUN_WAY else 0.0
+
+    def _follow_direction(self, now: float, speed: float) -> None:
+        """Follow the cable that runs one way; it ends with the way back, or a standstill."""
+        before, self._observed = self._observed, now
+        way = speed * (now - before)
+        if way * self.run > 0:
+            self.run += way
+            self._ran = now
+        elif way or not now - self._ran <= _RUN_TIME:
+            # A speed that is rounded to zero now and then is no standstill.
+            self.run, self._turned, self._ran = way, before, now
 
     def _follow_tension(self, cell: Instrumented) -> None:
         before = self._tension

@@ -131,7 +131,8 @@ class Supervisor:
                 continue
             if name != trip.winch or trip.blocks is Direction.BOTH:
                 return True
-            if direction_of(item.commanded) & trip.blocks:
+            measured = direction_of(self._memory[name].winds)
+            if (direction_of(item.commanded) | measured) & trip.blocks:
                 return True
         return False
 

@@ -36,6 +36,11 @@ _MARGIN = 2e-3
 """Distance that is kept from the end of the declared travel, m."""
 _STUCK = 0.5
 """Time for which the travel may be used up before the winch trips, s."""
+_SLACK_TIME = 0.2
+"""A load that swings relieves its cable for less, s."""
+_SOFTER = 10.0
+"""Times by which a cable with its structure may be softer than the bound of its stiffness: of a
+fibre cable on a frame against its own elasticity by the data sheet."""
 _STEEL = 210e9
 """Modulus of elasticity of steel, Pa: no cable is stiffer than a steel bar of its diameter."""
 
@@ -65,6 +70,8 @@ class TensionSetting:
     """Delay of reading and drive together, s."""
     max_age: float
     """Older readings are not used, s."""
+    slack: float = -math.inf
+    """A cable whose tension is below is slack or broken, N."""
 
     @property
     def gain(self) -> float:
@@ -115,6 +122,33 @@ def fastest_within(room: float, limits: LimitSpec) -> float:
     return math.sqrt(lag * lag + 2 * limits.acceleration * max(0.0, room)) - lag
 
 
+class BrokenCable:
+    """Whether a cable stays slack although it has been wound in: it is broken or its load gone.
+
+    A cable that has been taut is slack for no reason of the winding. One that is slack from the
+    beginning is wound in by what stretches it to the set tension by the bound of its stiffness,
+    and further as long as its tension rises by a tenth of what that bound says.
+    """
+
+    def __init__(self, setting: TensionSetting) -> None:
+        self._setting = setting
+        self._first: float | None = None
+        self._taut = False
+        self._since = math.inf
+
+    def at(self, now: float, tension: float, wound: float) -> bool:
+        """Take a tension (N) and the cable wound in since the beginning (m), once a cycle."""
+        setting = self._setting
+        if self._first is None:
+            self._first = tension
+        self._taut = self._taut or tension >= setting.slack
+        rise = _SOFTER * max(0.0, tension - self._first)
+        explained = (setting.tension + rise) / setting.stiffness
+        slack = tension < setting.slack and (self._taut or wound > explained)
+        self._since = min(self._since, now) if slack else math.inf
+        return now - self._since >= _SLACK_TIME
+
+
 class UsedUp:
     """Whether the travel of a control has been used up for 0.5 s, while it asks for more."""
 
@@ -150,6 +184,7 @@ class TensionControl:
         self._ramp = Ramp(limits.acceleration)
         self._begin = self._angle = self._last = 0.0
         self._used_up = UsedUp()
+        self._broken = BrokenCable(setting)
 
     def start(self, time: float, angle: float, _winding_speed: float) -> None:
         """Begin at rest."""
@@ -173,6 +208,14 @@ class TensionControl:
         setting = self.setting
         reading = self._reading(now)
         if not math.isfinite(reading.value) or reading.age > setting.max_age:
+            return 0.0
+        if self._broken.at(now, reading.value, travelled):
+            self._trip(
+                f"the tension is {reading.value:.1f} N, below {setting.slack:.1f} N, after "
+                f"{travelled * 1e3:.1f} mm of winding in (negative: paid out), set is "
+                f"{setting.tension:.1f} N; look for a broken or slack cable and a wrong load cell, "
+                "reset, wind in by hand until it is taut"
+            )
             return 0.0
         requested = setting.gain * (setting.tension - reading.value)
         fastest = min(setting.speed, self._limits.speed)

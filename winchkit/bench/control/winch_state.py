@@ -27,6 +27,7 @@ _ANSWERED = 2
 """SYNC messages that a drive may leave without a TPDO before it counts as silent."""
 _FAULTS = (State.FAULT, State.FAULT_REACTION_ACTIVE)
 _new = tuple.__new__
+_NO_WAY = (0.0, 0.0)
 _NOTHING = AxisFeedback(math.nan, 0, State.UNKNOWN, 0, math.nan, math.nan, math.nan)
 """Feedback of a drive that has sent nothing yet."""
 
@@ -87,6 +88,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     phase, frozen = controller.phase, parts.frozen
     cable_length = winding_speed = arm = target_speed = math.nan
     following_error, feedback_age, missed_syncs = 0.0, math.inf, sync
+    way = _NO_WAY
     fault, turns_known = False, True
     if feedback is not None:
         if parts.cable.has_effects:
@@ -102,6 +104,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     follows = controller.follows and missed_syncs <= _ANSWERED
     if follows and feedback is not None:
         target_speed, following_error = controller.tracking(feedback.angle, arm)
+        way = controller.way(feedback.angle, arm)
     sensors = parts.instruments(resumed)
     heartbeat, operational = axis.heartbeat, axis.operational
     emergencies = () if fault else axis.alarms
@@ -129,6 +132,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             follows,
             target_speed,
             following_error,
+            way,
             math.nan if length is None else _fresh(length, now),
             emergencies,
             axis.alarm_text if emergencies else "",
@@ -136,6 +140,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             "" if frozen is None else _frozen(parts, frozen, now, winding_speed),
             turns_known,
             axis.position_jump,
+            axis.position_disagreement,
             sensors,
             now,
             feedback,

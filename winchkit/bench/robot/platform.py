@@ -26,6 +26,7 @@ from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.model.robot import Pose, Robot, quadratic
 from winchkit.model.robot.force_distribution import null_space
+from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.schema.robot_bench import RobotWiring
 
 if TYPE_CHECKING:
@@ -60,6 +61,29 @@ class Platform:
             robot, wiring, {one.name: one.wiring.limits for one in self._winches}
         )
         """Plans its motions within the limits."""
+
+    def permit_tension(self, winch: str) -> None:
+        """Raise NotPermitted where a winch may not control its tension beside those that do.
+
+        The others hold its six degrees of freedom, one cable each at least.
+
+        Parameters
+        ----------
+        winch : str
+            One of the robot's.
+        """
+        if winch not in self.robot.names:
+            return
+        count = len(self._winches)
+        free = max(0, count - PLATFORM_DOF)
+        held = [one.name for one in self._winches if one.holds_tension and one.name != winch]
+        if len(held) + 1 > free:
+            beside = f" beside {', '.join(held)}" if held else ""
+            raise NotPermitted(
+                f"winch {winch} may not hold its tension{beside}: of the {count} cables of robot "
+                f"'{self.robot.profile.name}' the platform leaves {free} free, the others "
+                "hold it; use tension_trim of [robot] to correct the tensions of all"
+            )
 
     @property
     def pose(self) -> Pose:

@@ -177,6 +177,7 @@ class KeyboardJog:
         self._modes: tuple[float | None, ...] = (None, *INCHES)
         self._held = HeldKey()
         self._read = station.clock.now()
+        self._told: list[str] = []
 
     @property
     def inch(self) -> float | None:
@@ -201,7 +202,9 @@ class KeyboardJog:
                         click.echo("\nstopped", err=True)
                         return
                     self.press(key)
-                line = printable(status_line(self._station.status()))
+                status = self._station.status()
+                self._warn(status.get("warnings", []))
+                line = printable(status_line(status))
                 click.echo(f"\r{line}  [{self.mode}]\x1b[K", nl=False, file=screen())
             except ConnectionLost:
                 click.echo("\r\x1b[K", nl=False, file=screen())
@@ -229,6 +232,12 @@ class KeyboardJog:
                 err=True,
             )
         return [key for key in keys if key in _STOPS]
+    def _warn(self, warnings: list[str]) -> None:
+        """Print each new warning, such as a motor that has not turned."""
+        for words in warnings:
+            if words not in self._told:
+                click.echo(f"\n{printable(words)}", err=True)
+        self._told = warnings
 
     def press(self, key: str) -> None:
         """Execute the action of a key; a refusal is shown, and the operator decides."""

@@ -84,7 +84,9 @@ class Cia402Axis:
         self.host = HostWatch(self._node, device.servo, terms, clock, watch.hardware)
         """Host-loss mechanism of the drive; its ``silent`` ends the life signs, to stop it."""
         self.heartbeat = self.host.heartbeat
-        self._position = MotorPosition(device.servo, watch.speed)
+        self._position = MotorPosition(
+            device.servo, watch.speed, response=watch.response, late=watch.late
+        )
         self._gathering: Gathering | None = None
         self._commander: Commander | None = None
         self._cycle = (0, -math.inf)
@@ -248,6 +250,11 @@ class Cia402Axis:
     def position_jump(self) -> str:
         """Change of 6064h that no motion explains, in words; empty without one."""
         return self._position.jump
+
+    @property
+    def position_disagreement(self) -> str:
+        """Change of 6064h that 606Ch contradicts, in words; empty without one."""
+        return self._position.disagreement
 
     def forget_position_jump(self) -> None:
         """A reset begins; the position stays unknown until the drive is homed."""
@@ -486,7 +493,13 @@ class Cia402Axis:
     def _listen(self, drive: Commissioned) -> Gathering:
         """Receive the drive's TPDOs with a new decoder."""
         check_feedback(self.name, drive.tpdo)
-        gathering = Gathering(drive.tpdo, drive.scale, self._watch.cycle, self._position.counter)
+        gathering = Gathering(
+            drive.tpdo,
+            drive.scale,
+            self._watch.cycle,
+            self._position.counter,
+            self._position.agreement,
+        )
         for codec in drive.tpdo:
             identifier = cob_id("tpdo", codec.spec.number, self._node.node)
             self._bus.on(identifier, gathering.receiver(codec))

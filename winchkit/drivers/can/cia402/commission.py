@@ -61,6 +61,10 @@ class WatchSpec:
     """Written to the drive and read back."""
     speed: float = 0.0
     """Greatest of the motor, rad/s: how far it can turn while it is not heard; 0: not known."""
+    response: float = 0.0
+    """Longest lag of the motor's speed, s, with which 6064h and 606Ch are compared; 0: not."""
+    late: float = 0.0
+    """What the motor turns from rest within that, rad."""
     options: OptionSpec = field(default_factory=OptionSpec)
     """Option codes that count before those of the device file."""
     hardware: str = ""

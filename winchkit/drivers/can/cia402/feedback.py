@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from winchkit.drivers.can.bus.bus import Handler
 from winchkit.drivers.can.canopen.pdo import PdoCodec, joint_layout
+from winchkit.drivers.can.cia402.position_agreement import PositionAgreement
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
 from winchkit.drivers.can.cia402.state_machine import STATE_BITS, STATES, State, StatusBit
 from winchkit.drivers.can.cia402.units import Scale
@@ -117,9 +118,11 @@ class Gathering:
         scale: Scale,
         cycle: float,
         counter: PositionCounter | None = None,
+        agreement: PositionAgreement | None = None,
     ) -> None:
         """Without a ``counter`` one of the mapped position's own size is made."""
         self.feedback: AxisFeedback | None = None
+        self._agreement = agreement or PositionAgreement()
         self._counter = counter or PositionCounter(*counter_range(codecs))
         self._cycle = cycle
         members = [codec for codec in codecs if codec.spec.every_sync]
@@ -170,6 +173,7 @@ class Gathering:
         place = sorted(self._order).index(number)
         unpack, cycle, join = self._unpack, self._cycle, b"".join
         slower, lacking, counter = self._slower, self._lacking, self._counter
+        compare = self._agreement.take
         status_at, position_at, velocity_at, torque_at, mode_at, error_at, current_at = self._at
         angle, speed, torque, current = self._units
 
@@ -196,6 +200,9 @@ class Gathering:
             delay = self._came - sent
             time = sent + delay / 2 if 0 <= delay < cycle else sent
             position, status = values[position_at], values[status_at]
+            turned, velocity = counter.take(position, time) * angle, values[velocity_at] * speed
+            if not counter.jump and compare(time, turned, velocity):
+                counter.known = False
             self._complete += 1
             # What AxisFeedback(...) makes, without the call of its constructor.
             self.feedback = _new(
@@ -205,8 +212,8 @@ class Gathering:
                     self._sync,
                     STATES[status & STATE_BITS],
                     status,
-                    counter.take(position, time) * angle,
-                    values[velocity_at] * speed,
+                    turned,
+                    velocity,
                     values[torque_at] * torque,
                     values[mode_at],
                     values[error_at],

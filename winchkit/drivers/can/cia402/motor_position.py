@@ -6,6 +6,7 @@ import math
 
 from winchkit.drivers.can.cia402.commission import Commissioned
 from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
+from winchkit.drivers.can.cia402.position_agreement import PositionAgreement
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
 from winchkit.drivers.can.cia402.standstill import Standstill
 from winchkit.schema.devices.servo import ServoSpec
@@ -16,9 +17,22 @@ __all__ = ["MotorPosition"]
 class MotorPosition:
     """One axis's; it outlives every commissioning, so that crossings of the counter's end count."""
 
-    def __init__(self, servo: ServoSpec, fastest: float = 0.0) -> None:
-        """Take the greatest speed of the motor, rad/s; 0 where it is not known."""
+    def __init__(
+        self,
+        servo: ServoSpec,
+        fastest: float = 0.0,
+        *,
+        response: float = 0.0,
+        late: float = 0.0,
+    ) -> None:
+        """Take the greatest speed of the motor, rad/s; 0 where it is not known.
+
+        ``response`` (s) is the longest lag of its speed, ``late`` what it turns within that, rad.
+        """
         self._wraps, self._fastest = servo.position_wraps, fastest
+        self._response, self._late = response, late
+        self.agreement = PositionAgreement()
+        """Of its 6064h with 606Ch."""
         self.counter: PositionCounter | None = None
         """Of its 6064h; None before it is commissioned."""
         self._standstill: Standstill | None = None
@@ -40,8 +54,15 @@ class MotorPosition:
         turns = counter.jump * self._angle / math.tau
         return f"6064h changed by {turns:.2f} turns of the motor from one answer to the next"
 
+    @property
+    def disagreement(self) -> str:
+        """Change of 6064h that 606Ch contradicts, in words; empty without one."""
+        found = self.agreement.found
+        return "" if found is None else str(found)
+
     def forget_jump(self) -> None:
         """A reset has shown it; the position stays unknown."""
+        self.agreement.forget()
         if self.counter is not None:
             self.counter.jump = 0.0
 
@@ -60,6 +81,13 @@ class MotorPosition:
         counter.restart(forgotten=boot_ups != self._boot_ups)
         self.counter, self._boot_ups = counter, boot_ups
         self._standstill = Standstill(drive.scale)
+        self.agreement = PositionAgreement(
+            drive.scale.angle,
+            drive.scale.velocity,
+            self._response,
+            self._late,
+            self._fastest,
+        )
         return counter
 
     def at_rest(self, seen: AxisFeedback | None) -> bool:
@@ -74,5 +102,7 @@ class MotorPosition:
             return
         if mode == "HM":
             self.counter.suspend()
+            self.agreement.suspend()
         elif before == "HM":
             self.counter.resume(homed=homed)
+            self.agreement.resume()
