@@ -58,7 +58,7 @@ def test_the_cable_length_goes_on_where_the_counter_wraps(
         steps = [after - before for before, after in itertools.pairwise(lengths)]
         assert max(map(abs, steps)) < 0.01, "the length never jumps"
         assert (lengths[-1] - length) * sign > 0.5
-        assert winch.snapshot.turns_known
+        assert winch.snapshot.length_known
 
 
 def test_a_move_past_the_end_of_the_counter_is_refused_before_it_begins(tmp_path: Path) -> None:
@@ -86,13 +86,13 @@ def test_a_length_that_is_not_known_is_reported_and_no_move_goes_by_it(tmp_path:
     rig = Rig(tmp_path, [slave])
     with rig.opened(bench_text(rig.channel, device=str(wrapping(tmp_path)))) as bench:
         winch = bench.winch["A"]
-        assert winch.snapshot.turns_known
+        assert winch.snapshot.length_known
         slave.inject("tpdo lost")
         rig.wait(2.0)
         slave.mend("tpdo lost")
         rig.wait(0.1)
         assert math.isnan(winch.cable_length)
-        assert not winch.snapshot.turns_known
+        assert not winch.snapshot.length_known
         assert any("length is not known" in str(item) for item in bench.snapshot.warnings)
         if bench.snapshot.tripped:
             bench.reset()
@@ -107,7 +107,7 @@ def test_a_length_that_is_not_known_is_reported_and_no_move_goes_by_it(tmp_path:
         rig.wait(0.3)
         assert slave.motor.angle == begun
         winch.home(at=3.9)
-        assert winch.snapshot.turns_known
+        assert winch.snapshot.length_known
         assert winch.cable_length == pytest.approx(3.9, abs=2e-3)
         winch.jog(wind_in=0.05, duration=0.2)
         winch.move_to(3.88)
@@ -127,7 +127,7 @@ def test_turns_that_an_earlier_process_counted_are_unknown_to_the_next_one(
     rig.wait(4.0)
     key.release()
     rig.wait(1.0)
-    assert bench.winch["A"].snapshot.turns_known
+    assert bench.winch["A"].snapshot.length_known
     if ends == "closed":
         bench.close()
     else:
@@ -135,7 +135,7 @@ def test_turns_that_an_earlier_process_counted_are_unknown_to_the_next_one(
         rig.wait(1.0)
     with rig.opened() as again:
         winch = again.winch["A"]
-        assert not winch.snapshot.turns_known
+        assert not winch.snapshot.length_known
         assert math.isnan(winch.cable_length)
         if again.snapshot.tripped:
             again.reset()
@@ -144,7 +144,7 @@ def test_turns_that_an_earlier_process_counted_are_unknown_to_the_next_one(
         winch.home(at=3.9)
         assert winch.cable_length == pytest.approx(3.9, abs=2e-3)
     with rig.opened() as last:
-        assert last.winch["A"].snapshot.turns_known
+        assert last.winch["A"].snapshot.length_known
         latch = Path(last.spec.latch_file)
     assert not latch.exists()
 

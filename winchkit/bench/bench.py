@@ -271,6 +271,7 @@ class Bench(BenchConnection):
                 # A function that still asks for motion is no longer heard.
                 self.loop.on_jog = lambda _name, _speed: None
                 self._come_to_rest()
+                self.loop.close_positions()
                 self._wired.disarm()
             self._close_logs()
         self._stack = ExitStack()
@@ -289,9 +290,27 @@ class Bench(BenchConnection):
         held : bool
             Whether the command is one of a series that goes on while a key is held.
         """
-        self.commanders.require(winch)
         if not direction:
+            self.commanders.require(winch)
             return
+        self.permit_at_rest(winch, held=held)
+        for trip in self.snapshot.blocked:
+            if trip.winch == winch and trip.blocks & direction:
+                raise NotPermitted(str(trip))
+
+    def permit_at_rest(self, winch: str, *, held: bool = False) -> None:
+        """Raise what forbids to enable a drive even where the cable is not to move (homing here).
+
+        Conditions that forbid one direction, as of length and tension, do not.
+
+        Parameters
+        ----------
+        winch : str
+            Winch.
+        held : bool
+            Whether the command is one of a series that goes on while a key is held.
+        """
+        self.commanders.require(winch)
         self._require_commissioned()
         refused: NotReleased | None = None
         if held:
@@ -303,7 +322,7 @@ class Bench(BenchConnection):
         if refused is not None:
             raise refused
         for trip in self.snapshot.blocked:
-            if trip.blocks is Direction.BOTH or (trip.winch == winch and trip.blocks & direction):
+            if trip.blocks is Direction.BOTH:
                 raise NotPermitted(str(trip))
 
     def require_motion(self) -> None:

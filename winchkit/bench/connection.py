@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Self
 
 from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import Callback, ControlLoop
+from winchkit.bench.control.position_file import PositionFile
 from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.hardware import Wired, wire
@@ -70,12 +71,13 @@ class BenchConnection(ABC):
         self._tracker_lock = threading.Lock()
         with ExitStack() as stack:
             stack.callback(ownership.close)
-            latch = LatchFile(spec.latch_file)
+            latch, positions = LatchFile(spec.latch_file), PositionFile(spec.position_file)
             stack.callback(latch.close)
-            trips = latch.open()
-            self._wired: Wired = wire(spec, clock, stack, latch, separate=separate)
+            stack.callback(positions.close)
+            trips, ended_in_motion = latch.open(), positions.open()
+            self._wired: Wired = wire(spec, clock, stack, latch, positions, separate=separate)
             self.loop: ControlLoop = self._wired.loop
-            self.loop.restore(trips)
+            self.loop.restore(trips, ended_in_motion)
             self.axes: Mapping[str, Cia402Axis] = self._wired.axes
             self.trip_history = TripHistory(self.loop.cycle)
             """The cycles around the newest trip."""

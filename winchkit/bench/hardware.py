@@ -21,6 +21,7 @@ from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
 from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.observation import Supervised
+from winchkit.bench.control.position_file import PositionFile
 from winchkit.bench.control.snapshot import Direction, Phase, Trip
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
@@ -57,6 +58,12 @@ _FASTEST = 1.5
 """Motor speed over that of ``limits.speed`` at which a drive may be missed turning."""
 _HEADROOM = 4.0
 """Of a drive's own ramps in a profile mode over those that the host makes."""
+_QUICK = 2.0
+"""Of a quick stop over the winch's own ramp: it ends sooner; at 2 m/s² 10 kg add 20 N."""
+_PLAY = 2e-3
+"""Of cable, by which a winch at rest moves between two processes, m: play of the brake."""
+_ELASTIC = 0.05
+"""Of cable, m: elongation and temperature by which a length may be beyond what the drum holds."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +100,13 @@ class Wired:
 
 
 def wire(
-    spec: BenchSpec, clock: Clock, stack: ExitStack, latch: LatchFile, *, separate: bool = False
+    spec: BenchSpec,
+    clock: Clock,
+    stack: ExitStack,
+    latch: LatchFile,
+    positions: PositionFile,
+    *,
+    separate: bool = False,
 ) -> Wired:
     """Open all buses and lines; ``stack`` closes them.
 
@@ -125,8 +138,8 @@ def wire(
         process.start()
     slow = SlowDevices(lines, clock)
     stack.callback(slow.close)
-    for name in latch.lost & axes.keys():
-        axes[name].lose_position()
+    for name, axis in axes.items():
+        axis.recall_position(positions.found.get(name))
     _commission(axes)
     tell_hardware(spec)
     _tell_notes(spec, axes, buses)
@@ -142,6 +155,7 @@ def wire(
         spec.cycle,
         stop_together=spec.stop_together,
         latch=latch,
+        positions=positions,
         longest_gap=max(stale, _LEAST_GAP * spec.cycle),
     )
     _warn_of_sync(buses, loop)
@@ -198,6 +212,7 @@ def _winches(
             _frozen_cell(spec, winch),
             HangingLoad(math.nan if winch.load_mass is None else winch.load_mass),
             cable_spec=profiles[name].cable,
+            capacity=_capacity(profiles[name]),
         )
         for name, winch in spec.winch.items()
     }
@@ -214,6 +229,16 @@ def _safe_length(profile: WinchProfile) -> float:
 
     longest = safe_lengths(profile)[1] if profile.reference.wound_turns else math.inf
     return longest if math.isfinite(longest) else math.inf
+
+
+def _capacity(profile: WinchProfile) -> tuple[float, float]:
+    """Least and greatest cable length (m) that the drum can have paid out, by the profile."""
+    from winchkit.model.capacity import length_at
+
+    whole = length_at(profile, 0.0) if profile.reference.wound_turns else math.nan
+    if not math.isfinite(whole):
+        return -math.inf, math.inf
+    return -_ELASTIC, whole + _ELASTIC
 
 
 def _commission(axes: Mapping[str, Cia402Axis]) -> None:
@@ -302,7 +327,8 @@ def _axis(
         raise FileError(Fault(f"servo '{ref.device}' needs its node number", spec.path))
     arm = abs(cable.arm(0.0))
     acceleration = _HEADROOM * winch.limits.acceleration / arm
-    quick = 0.0 if spec.robot is None else spec.robot.quick_stop or 0.0
+    declared = (spec.robot and spec.robot.quick_stop) or winch.limits.quick_stop
+    quick = declared or _QUICK * winch.limits.acceleration
     watch = WatchSpec(
         bus.node,
         bus.heartbeat,
@@ -310,8 +336,10 @@ def _axis(
         winch.brake,
         acceleration,
         quick_stop=quick / arm,
+        quick_stop_declared=declared is not None,
         limits=_at_shaft(cable, winch.limits),
         speed=_FASTEST * winch.limits.speed / arm,
+        play=_PLAY / arm,
         options=winch.options,
         hardware=winch.host_loss_description if winch.host_loss else "",
     )

@@ -35,7 +35,10 @@ def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[No
     axis = bench.axes[winch.name]
     _check(winch, asked)
     _check_drive(axis, asked)
-    winch.permit(Direction.BOTH)
+    if asked.method is None:
+        winch.permit_at_rest()
+    else:
+        winch.permit(Direction.BOTH)
     try:
         zero = 0.0
         if asked.method is not None:

@@ -35,6 +35,9 @@ class WinchHost(Protocol):
     def permit(self, winch: str, direction: Direction, *, held: bool = False) -> None:
         """Raise what forbids this motion of a winch; return when it is allowed."""
 
+    def permit_at_rest(self, winch: str, *, held: bool = False) -> None:
+        """Raise what forbids to enable a winch's drive, even at rest."""
+
     def raise_trouble(self) -> None:
         """Raise the error that has stopped the bench, if there is one."""
 

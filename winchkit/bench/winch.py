@@ -403,15 +403,21 @@ class Winch(WinchStatus):
         cells.command(name, "tare")
         return await_device_tare(self._bench.clock, self.name, cell)
 
+    def _permits_unhomed(self, winding_speed: float) -> bool:
+        """Whether a held jog may be this fast while the cable length is not known."""
+        return abs(winding_speed) <= self.wiring.limits.speed_unhomed
+
     def _refresh(self, winding_speed: float, hold: float, *, held: bool) -> None:
         self.permit(direction_of(winding_speed), held=held)
-        if winding_speed:
+        if winding_speed and not (held and self._permits_unhomed(winding_speed)):
             self.require_length()
         expires = self._bench.clock.now() + hold
         with self._bench.commanders.claimed(self.name):
             jog = self._jog
             if jog is None or not self.moving or self._controller.source not in (jog, None):
-                jog = self._jog = Jog(self._parts.cable, self.wiring.limits)
+                limits = self.wiring.limits
+                known = self.snapshot.length_known
+                jog = self._jog = Jog(self._parts.cable, limits if known else limits.without_length)
                 self._tension = None
                 jog.refresh(winding_speed, expires)
                 if winding_speed != 0:

@@ -145,6 +145,10 @@ class WinchStatus:
         self._bench.permit(self.name, direction, held=held)
         self._bench.axes[self.name].set_quick_stop()
 
+    def permit_at_rest(self) -> None:
+        """Raise what forbids to enable the drive where the cable is not to move."""
+        self._bench.permit_at_rest(self.name)
+
     def require_rest(self) -> None:
         """Raise NotPermitted while the drive is enabled: no moment to change a cell's zero."""
         if self._controller.phase is not Phase.DISABLED:
@@ -154,12 +158,17 @@ class WinchStatus:
 
     def require_length(self) -> None:
         """Raise NotPermitted where the cable length is not known: no limit of it can be kept."""
-        if not self.snapshot.turns_known:
+        if not self.snapshot.length_known:
+            speed = self.wiring.limits.speed_unhomed
+            jogs = (
+                f"only a jog that is held is permitted, up to {speed:g} m/s (limits.unhomed)"
+                if speed
+                else 'limits.unhomed = "none" forbids jogs too'
+            )
             raise NotPermitted(
-                f"winch {self.name}: its cable length is not known, the drive's position counter "
-                "(6064h) has jumped, may have wrapped without feedback, or has in an earlier "
-                "process; home first: `winchkit home "
-                f"{self.name} --here LENGTH` moves nothing"
+                f"winch {self.name}: its cable length is not known: "
+                f"{self._parts.axis.position_doubt}; home first: `winchkit home {self.name} --here "
+                f"LENGTH` moves nothing; {jogs}"
             )
 
     def raise_trouble(self) -> None:

@@ -432,13 +432,13 @@ CONDITIONS: tuple[Condition, ...] = (
         by_facts=True,
     ),
     Condition(
-        "turns",
-        "time without feedback against half the range of 6064h at 1.5 × limits.speed",
-        "shorter",
-        lambda item, _own, _memory: not item.turns_known,
-        lambda *_: (
-            "the cable length is not known: 6064h has jumped, may have wrapped without feedback, "
-            "or has wrapped in an earlier process; home the winch"
+        "length unknown",
+        "record of positions, boot-up messages, volatile objects and range of 6064h, drum capacity",
+        "every turn counted since the zero was found (see When the cable length is not known)",
+        lambda item, _own, _memory: bool(item.length_doubt),
+        lambda item, *_: (
+            f"the cable length is not known: {item.length_doubt}; limits.length is not kept, home "
+            "the winch"
         ),
         blocks=Direction.NONE,
         by_facts=True,

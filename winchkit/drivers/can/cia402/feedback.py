@@ -70,8 +70,6 @@ class AxisFeedback(NamedTuple):
     """A; NaN where the drive does not send it."""
     shown: int | None = None
     """6064h in counts as the drive shows it; ``angle`` counts on where it wraps."""
-    turns_known: bool = True
-    """Whether ``angle`` counts every turn: not after a gap in which 6064h may have wrapped."""
 
     @property
     def limited(self) -> bool:
@@ -212,7 +210,6 @@ class Gathering:
                     values[error_at],
                     values[current_at] * current,
                     position,
-                    counter.known,
                 ),
             )
 
