@@ -152,8 +152,9 @@ def _beyond_the_drum(parts: WinchParts, length: float) -> str:
     if least <= length <= greatest or math.isnan(length):
         return ""
     limit = "below zero" if length < least else f"more than the {greatest:.3f} m that its drum has"
-    parts.axis.lose_position(f"6064h would mean {length:.3f} m, which is {limit}")
-    return parts.axis.position_doubt
+    doubt = f"6064h would mean {length:.3f} m, which is {limit}"
+    parts.axis.lose_position(doubt)
+    return doubt
 
 
 def _frozen(parts: WinchParts, test: FrozenCell, now: float, speed: float) -> str:

@@ -108,8 +108,8 @@ class MotorPosition:
             self.counter.jump = 0.0
 
     def lose(self, doubt: str) -> None:
-        """The position is not known, until a homing."""
-        if self.counter is not None:
+        """The position is not known, until a homing; one that is under way decides itself."""
+        if self.counter is not None and self.counter.settled:
             self.counter.lose(doubt)
 
     def recall(self, kept: KeptPosition | None) -> None:
@@ -149,7 +149,9 @@ class MotorPosition:
             counter = PositionCounter(low, high, self._fastest / drive.scale.angle)
             self._resume(counter, found, drive.scale.angle, booted=booted)
         elif booted or found.restarted:
-            counter.restart((found.restarted or _RESTARTED) if self._incremental else "")
+            counter.restart(
+                (_RESTARTED if booted else found.restarted) if self._incremental else ""
+            )
         self._angle = drive.scale.angle
         self.counter, self._boot_ups = counter, boot_ups
         self._serial, self._objects = found.serial, dict(_written(drive))
