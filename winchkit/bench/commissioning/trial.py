@@ -237,8 +237,9 @@ class Trials:
     def _require_room(self, name: str, axis: Cia402Axis, speed: float) -> None:
         """Raise NotPermitted where winding in at ``speed`` may pass the lower length limit.
 
-        Where the length is not known, the operator has seen to it. The way: the move, the drive's time limit without a host (for hardware that stops it the
-        patience of the trial), and the ramp v²/(2a).
+        Where the length is not known, the operator has seen to it. The way: the move, the drive's
+        time limit without a host (for hardware that stops it the patience of the trial), and the
+        ramp v²/(2a).
         """
         limits = self.spec.winch[name].limits
         if limits.length is None or axis.position_doubt:

@@ -149,9 +149,8 @@ class MotorPosition:
             counter = PositionCounter(low, high, self._fastest / drive.scale.angle)
             self._resume(counter, found, drive.scale.angle, booted=booted)
         elif booted or found.restarted:
-            counter.restart(
-                (_RESTARTED if booted else found.restarted) if self._incremental else ""
-            )
+            evidence = _RESTARTED if booted else found.restarted
+            counter.restart(evidence if self._incremental else "")
         self._angle = drive.scale.angle
         self.counter, self._boot_ups = counter, boot_ups
         self._serial, self._objects = found.serial, dict(_written(drive))
