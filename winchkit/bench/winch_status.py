@@ -57,6 +57,11 @@ class WinchStatus:
         return self.snapshot.load_tension
 
     @property
+    def capacity(self) -> tuple[float, float]:
+        """Least and greatest cable length that its drum can have paid out, m."""
+        return self._parts.capacity
+
+    @property
     def cable(self) -> CableMap:
         """Between its motor and its cable."""
         return self._parts.cable

@@ -274,6 +274,18 @@ def test_homing_here_is_permitted_beyond_the_length_limits(rig: Rig, here: float
         winch.move_to(3.98)
 
 
+@pytest.mark.parametrize("here", [5.7, 298.0, -0.1])
+def test_a_length_that_no_drum_has_is_refused_before_the_zero_is_moved(
+    rig: Rig, here: float
+) -> None:
+    with opened(rig) as bench:
+        winch = bench.winch["A"]
+        winch.home(at=4.0)
+        with pytest.raises(NotPermitted, match="its drum cannot have paid out"):
+            winch.home(at=here)
+        assert winch.cable_length == pytest.approx(4.0, abs=2e-3)
+
+
 def test_every_bench_has_its_quick_stop_ramp(rig: Rig) -> None:
     """6085h of twice limits.acceleration, 1 m/s² here, at the motor; 65536 counts a turn."""
     with opened(rig) as bench:

@@ -484,6 +484,8 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
         "the declared travel, by default 100 mm (trim: 10 mm), for 0.5 s",
     ),
     BenchCondition("latch file", "reading and writing of the latch file", "possible"),
+    BenchCondition("position record", "reading and writing of the record of positions", "possible"),
+    BenchCondition("owner", "records of positions at opening", "closed at rest by their process"),
     BenchCondition(
         "sync", "SYNC frames that were not sent here", "none", "a warning", latches=False
     ),

@@ -166,6 +166,8 @@ def _require_length(station: Station, winch: str | None) -> None:
     """Refuse a jog that nobody holds while the cable length, and so no limit of it, is known."""
     status = station.status()
     name = next(iter(status["winch"])) if winch is None else winch
+    if status["tripped"]:
+        return  # which the jog itself says
     if name in status["winch"] and not status["winch"][name]["length_known"]:
         raise NotPermitted(
             f"{unknown_length(status, name)}; until then only a jog by keys that are held is "
