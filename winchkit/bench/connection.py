@@ -10,9 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import Callback, ControlLoop
-from winchkit.bench.control.position_file import PositionFile
 from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.hardware import Wired, wire
@@ -21,6 +19,8 @@ from winchkit.bench.ownership import Ownership
 from winchkit.bench.recording.provenance import origin
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.bench.recording.trip_history import TripHistory
+from winchkit.bench.records.latch import LatchFile
+from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.bus.frame_tap import FrameTap
 from winchkit.drivers.can.bus.health import BusHealth
 from winchkit.drivers.can.cia402.axis import Cia402Axis

@@ -18,13 +18,13 @@ from winchkit.bench.commissioning.hardware import tell_hardware
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
-from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.observation import Supervised
-from winchkit.bench.control.position_file import PositionFile
 from winchkit.bench.control.snapshot import Direction, Phase, Trip
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
+from winchkit.bench.records.latch import LatchFile
+from winchkit.bench.records.position_file import PositionFile
 from winchkit.bench.robot.wiring import line_profiles, robot_of_bench
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from typing import Self
 
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.latch import LatchFile
-from winchkit.bench.control.position_file import PositionFile
 from winchkit.bench.hardware import Wired, wire
+from winchkit.bench.records.latch import LatchFile
+from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.state_machine import (

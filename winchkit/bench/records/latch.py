@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 
-from winchkit.bench.control.record_file import RecordFile
 from winchkit.bench.control.snapshot import Trip
+from winchkit.bench.records.record_file import RecordFile
 from winchkit.errors import NotPermitted
 
 __all__ = ["LatchFile"]

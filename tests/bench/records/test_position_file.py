@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.bench.control.position_file import PositionFile
+from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 
 KEPT = KeptPosition(-705_799, 1 << 32, "", True, 77, {(0x1A00, 1): 0x60410010, (0x1017, 0): 50})

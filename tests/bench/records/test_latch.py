@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.snapshot import Trip
+from winchkit.bench.records.latch import LatchFile
 from winchkit.errors import NotPermitted
 
 TRIP = Trip("state", "A", "the drive left operation enabled", latches=True)

@@ -12,13 +12,12 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any
 
-from winchkit.bench.control.record_file import RecordFile
 from winchkit.bench.control.snapshot import Trip
+from winchkit.bench.records.record_file import RecordFile
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 
 __all__ = ["PositionFile"]
 
-_KIND = "position record"
 _MOVE_ON = "look at the winches, make the file and its folder writable, then reset"
 
 
@@ -90,7 +89,7 @@ class PositionFile:
 
     def _unusable(self, reason: str) -> Trip:
         message = f"{self.path}: {reason}; no position can be kept for the next opening; {_MOVE_ON}"
-        return Trip(_KIND, "", message, latches=True)
+        return Trip("position record", "", message, latches=True)
 
 
 def _record(positions: Mapping[str, KeptPosition]) -> str:
