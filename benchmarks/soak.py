@@ -137,7 +137,8 @@ def bench_file(folder: Path, cells: int | None) -> Path:
         lines += [
             f"[winch.{name}]",
             'profile = "bench-spiral"',
-            f'servo = {{ device = "generic-cia402", bus = "can", node = {number} }}',
+            f'servo = {{ device = "generic-cia402", bus = "can", node = {number}, '
+            'encoder = "absolute" }',
             f'cell = {{ device = "laumas-tlb", bus = "cells", unit = {number}, rate = "25 Hz" }}'
             if cells is not None
             else "",

@@ -108,7 +108,7 @@ interface = "virtual"
 channel = "c"
 [winch.A]
 profile = "bench-spiral"
-servo = { device = "generic-cia402", bus = "c", node = 1 }
+servo = { device = "generic-cia402", bus = "c", node = 1, encoder = "absolute" }
 [winch.A.limits]
 speed = "0.5 m/s"
 """

@@ -58,7 +58,7 @@ def test_the_cable_length_goes_on_where_the_counter_wraps(
         steps = [after - before for before, after in itertools.pairwise(lengths)]
         assert max(map(abs, steps)) < 0.01, "the length never jumps"
         assert (lengths[-1] - length) * sign > 0.5
-        assert winch.snapshot.turns_known
+        assert winch.snapshot.length_known
 
 
 def test_a_move_past_the_end_of_the_counter_is_refused_before_it_begins(tmp_path: Path) -> None:
@@ -86,13 +86,13 @@ def test_a_length_that_is_not_known_is_reported_and_no_move_goes_by_it(tmp_path:
     rig = Rig(tmp_path, [slave])
     with rig.opened(bench_text(rig.channel, device=str(wrapping(tmp_path)))) as bench:
         winch = bench.winch["A"]
-        assert winch.snapshot.turns_known
+        assert winch.snapshot.length_known
         slave.inject("tpdo lost")
         rig.wait(2.0)
         slave.mend("tpdo lost")
         rig.wait(0.1)
         assert math.isnan(winch.cable_length)
-        assert not winch.snapshot.turns_known
+        assert not winch.snapshot.length_known
         assert any("length is not known" in str(item) for item in bench.snapshot.warnings)
         if bench.snapshot.tripped:
             bench.reset()
@@ -107,46 +107,55 @@ def test_a_length_that_is_not_known_is_reported_and_no_move_goes_by_it(tmp_path:
         rig.wait(0.3)
         assert slave.motor.angle == begun
         winch.home(at=3.9)
-        assert winch.snapshot.turns_known
+        assert winch.snapshot.length_known
         assert winch.cable_length == pytest.approx(3.9, abs=2e-3)
         winch.jog(wind_in=0.05, duration=0.2)
         winch.move_to(3.88)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ends", ["closed", "killed"])
-def test_turns_that_an_earlier_process_counted_are_unknown_to_the_next_one(
+@pytest.mark.parametrize("ends", ["closed", "killed at rest", "killed in motion", "switched off"])
+def test_turns_that_an_earlier_process_counted_are_known_to_the_next_one_or_unknown(
     tmp_path: Path, ends: str
 ) -> None:
-    """The drive's count is then off by a whole range, which nothing in it shows."""
+    """The drive's count is off by a whole range; the record has it while the count goes on."""
     slave = Slave.from_file(GENERIC, 1, declared=Declared(counter_bits=20))
     rig = Rig(tmp_path, [slave])
     home = wrapping(tmp_path)
     bench = rig.open(bench_text(rig.channel, device=str(home)))
+    length, angle = bench.winch["A"].cable_length, slave.motor.angle
     key = HeldKey(rig, bench, pay_out=0.15).press()
     rig.wait(4.0)
+    if ends == "killed in motion":
+        rig.kill(bench)
     key.release()
     rig.wait(1.0)
-    assert bench.winch["A"].snapshot.turns_known
-    if ends == "closed":
-        bench.close()
-    else:
+    if ends == "killed at rest":
         rig.kill(bench)
-        rig.wait(1.0)
+    elif ends != "killed in motion":
+        assert bench.winch["A"].snapshot.length_known
+        bench.close()
+    if ends == "switched off":
+        slave.inject("switched off")
+        slave.mend("switched off")
+    rig.wait(1.0)
+    assert abs(slave.motor.angle - angle) > 16 * 2 * math.pi
     with rig.opened() as again:
         winch = again.winch["A"]
-        assert not winch.snapshot.turns_known
-        assert math.isnan(winch.cable_length)
         if again.snapshot.tripped:
             again.reset()
+        if ends in ("closed", "killed at rest"):
+            way = winch.length_at(slave.motor.angle) - winch.length_at(angle)
+            assert winch.cable_length - length == pytest.approx(way, abs=2e-3)
+            return
+        assert not winch.snapshot.length_known
+        assert math.isnan(winch.cable_length)
         with pytest.raises(NotPermitted, match="home first"):
             winch.move_by(pay_out=0.01)
         winch.home(at=3.9)
         assert winch.cable_length == pytest.approx(3.9, abs=2e-3)
     with rig.opened() as last:
-        assert last.winch["A"].snapshot.turns_known
-        latch = Path(last.spec.latch_file)
-    assert not latch.exists()
+        assert last.winch["A"].snapshot.length_known
 
 
 def test_a_counter_within_its_range_is_known_to_the_next_process(tmp_path: Path) -> None:
@@ -155,8 +164,6 @@ def test_a_counter_within_its_range_is_known_to_the_next_process(tmp_path: Path)
     with rig.opened(bench_text(rig.channel, device=str(wrapping(tmp_path)))) as bench:
         bench.winch["A"].jog(pay_out=0.05, duration=0.5)
         length = bench.winch["A"].cable_length
-        latch = Path(bench.spec.latch_file)
-    assert not latch.exists()
     with rig.opened() as again:
         assert again.winch["A"].cable_length == pytest.approx(length, abs=1e-3)
 

@@ -16,10 +16,13 @@ def test_the_tables_are_what_the_code_declares() -> None:
     assert there == written(there), "run: python docs/make_safety.py"
 
 
+_RECORDS = ("records/latch.py", "records/position_file.py")
+
+
 def test_every_trip_of_the_control_loop_stands_in_the_table() -> None:
     source = "".join(
         (ROOT / "winchkit/bench" / name).read_text(encoding="utf-8")
-        for name in ("control/loop.py", "hardware.py", "control/latch.py", "winch.py")
+        for name in ("control/loop.py", "hardware.py", *_RECORDS, "winch.py")
     )
     raised = set(re.findall(r'Trip\(\s*"([a-z ]+)"', source))
     assert raised == {row.kind for row in BENCH_CONDITIONS}

@@ -29,7 +29,7 @@ channel = "robot"
 WINCH = """\
 [winch.{name}]
 profile = "winding-device-winch"
-servo = {{ device = "generic-cia402", bus = "can", node = {name} }}
+servo = {{ device = "generic-cia402", bus = "can", node = {name}, encoder = "absolute" }}
 limits = {{ speed = "0.5 m/s", tension_high = "900 N", tension_slack = "20 N" }}
 """
 

@@ -39,7 +39,7 @@ host = "127.0.0.1"
 port = 502
 [winch.A]
 profile = "w"
-servo = { device = "generic-cia402", bus = "can", node = 1 }
+servo = { device = "generic-cia402", bus = "can", node = 1, encoder = "absolute" }
 cell = { device = "laumas-tlb", bus = "cells", unit = 1 }
 limits = { speed = "0.5 m/s" }
 """

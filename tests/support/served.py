@@ -30,7 +30,7 @@ channel = "nobody"
 
 [winch.A]
 profile = "bench-spiral"
-servo = {{ device = "generic-cia402", bus = "can", node = 1 }}
+servo = {{ device = "generic-cia402", bus = "can", node = 1, encoder = "absolute" }}
 cell = {{ device = "{device}", bus = "cells", unit = 1{more} }}
 
 [winch.A.limits]

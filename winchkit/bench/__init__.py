@@ -1,7 +1,8 @@
 """An open bench: winches, control loop, supervision, logs, and motion programmes.
 
 ``control`` is the control loop, ``drives``, ``cells`` and ``recording`` the devices and logs around
-it, ``commissioning`` the record that permits motion, ``remote`` the processes that share a bench,
+it, ``records`` what outlives the process, ``commissioning`` the record that permits motion,
+``remote`` the processes that share a bench,
 ``robot`` the motion of a platform that the winches move together.
 The public functions are :func:`winchkit.open_bench` and :func:`winchkit.attach`.
 """

@@ -278,6 +278,7 @@ class Bench(BenchConnection):
                 # A function that still asks for motion is no longer heard.
                 self.loop.on_jog = lambda _name, _speed: None
                 self._come_to_rest()
+                self.loop.close_positions()
                 self._wired.disarm()
             self._close_logs()
         self._stack = ExitStack()
@@ -292,13 +293,29 @@ class Bench(BenchConnection):
         direction : Direction
             Of the motion.
         """
-        self.commanders.require(winch)
         if not direction:
+            self.commanders.require(winch)
             return
+        self.permit_at_rest(winch)
+        for trip in self.snapshot.blocked:
+            if trip.winch == winch and trip.blocks & direction:
+                raise NotPermitted(str(trip))
+
+    def permit_at_rest(self, winch: str) -> None:
+        """Raise what forbids to enable a drive even where the cable is not to move (homing here).
+
+        Conditions that forbid one direction, as of length and tension, do not.
+
+        Parameters
+        ----------
+        winch : str
+            Winch.
+        """
+        self.commanders.require(winch)
         self._require_commissioned()
         self.raise_trouble()
         for trip in self.snapshot.blocked:
-            if trip.blocks is Direction.BOTH or (trip.winch == winch and trip.blocks & direction):
+            if trip.blocks is Direction.BOTH:
                 raise NotPermitted(str(trip))
 
     def permit_tension(self, winch: str) -> None:

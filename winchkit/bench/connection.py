@@ -10,7 +10,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
-from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import Callback, ControlLoop
 from winchkit.bench.control.realtime import RealTime, Request, RestCollector, acquire
 from winchkit.bench.control.snapshot import BenchSnapshot
@@ -21,6 +20,8 @@ from winchkit.bench.ownership import Ownership
 from winchkit.bench.recording.provenance import origin
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.bench.recording.trip_history import TripHistory
+from winchkit.bench.records.latch import LatchFile
+from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.bus.frame_tap import FrameTap
 from winchkit.drivers.can.bus.health import BusHealth
 from winchkit.drivers.can.cia402.axis import Cia402Axis
@@ -79,12 +80,15 @@ class BenchConnection(ABC):
         self._tracker_lock = threading.Lock()
         with ExitStack() as stack:
             stack.callback(ownership.close)
-            latch = LatchFile(spec.latch_file)
+            latch, positions = LatchFile(spec.latch_file), PositionFile(spec.position_file)
             stack.callback(latch.close)
-            trips = latch.open()
-            self._wired: Wired = wire(spec, clock, stack, latch, separate=separate, tell=tell)
+            stack.callback(positions.close)
+            trips, ended_in_motion = latch.open(), positions.open()
+            self._wired: Wired = wire(
+                spec, clock, stack, latch, positions, separate=separate, tell=tell
+            )
             self.loop: ControlLoop = self._wired.loop
-            self.loop.restore(trips)
+            self.loop.restore(trips, ended_in_motion)
             self.axes: Mapping[str, Cia402Axis] = self._wired.axes
             self.trip_history = TripHistory(self.loop.cycle)
             """The cycles around the newest trip."""

@@ -18,13 +18,14 @@ from winchkit.bench.commissioning.hardware import tell_hardware
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
-from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.snapshot import Direction, Phase, Trip
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
 from winchkit.bench.drives.set_up_progress import SetUpProgress, Tell, to_stderr
+from winchkit.bench.records.latch import LatchFile
+from winchkit.bench.records.position_file import PositionFile
 from winchkit.bench.robot.wiring import line_profiles, robot_of_bench
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
@@ -58,6 +59,12 @@ _FASTEST = 1.5
 """Motor speed over that of ``limits.speed`` at which a drive may be missed turning."""
 _HEADROOM = 4.0
 """Of a drive's own ramps in a profile mode over those that the host makes."""
+_QUICK = 2.0
+"""Of a quick stop over the winch's own ramp: it ends sooner; at 2 m/s² 10 kg add 20 N."""
+_PLAY = 2e-3
+"""Of cable, by which a winch at rest moves between two processes, m: play of the brake."""
+_ELASTIC = 0.05
+"""Of cable, m: elongation and temperature by which a length may be beyond what the drum holds."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +105,7 @@ def wire(
     clock: Clock,
     stack: ExitStack,
     latch: LatchFile,
+    positions: PositionFile,
     *,
     separate: bool = False,
     tell: Tell = to_stderr,
@@ -132,8 +140,8 @@ def wire(
         process.start()
     slow = SlowDevices(lines, clock)
     stack.callback(slow.close)
-    for name in latch.lost & axes.keys():
-        axes[name].lose_position()
+    for name, axis in axes.items():
+        axis.recall_position(positions.found.get(name))
     _commission(axes, clock, tell)
     tell_hardware(spec)
     _tell_notes(spec, axes, buses)
@@ -149,6 +157,7 @@ def wire(
         spec.cycle,
         stop_together=spec.stop_together,
         latch=latch,
+        positions=positions,
         longest_gap=max(stale, _LEAST_GAP * spec.cycle),
     )
     _warn_of_sync(buses, loop)
@@ -205,6 +214,7 @@ def _winches(
             _frozen_cell(spec, winch),
             HangingLoad(math.nan if winch.load_mass is None else winch.load_mass),
             cable_spec=profiles[name].cable,
+            capacity=_capacity(profiles[name]),
         )
         for name, winch in spec.winch.items()
     }
@@ -221,6 +231,16 @@ def _safe_length(profile: WinchProfile) -> float:
 
     longest = safe_lengths(profile)[1] if profile.reference.wound_turns else math.inf
     return longest if math.isfinite(longest) else math.inf
+
+
+def _capacity(profile: WinchProfile) -> tuple[float, float]:
+    """Least and greatest cable length (m) that the drum can have paid out, by the profile."""
+    from winchkit.model.capacity import length_at
+
+    whole = length_at(profile, 0.0) if profile.reference.wound_turns else math.nan
+    if not math.isfinite(whole):
+        return -math.inf, math.inf
+    return -_ELASTIC, whole + _ELASTIC
 
 
 def _commission(axes: Mapping[str, Cia402Axis], clock: Clock, tell: Tell) -> None:
@@ -310,7 +330,8 @@ def _axis(
         raise FileError(Fault(f"servo '{ref.device}' needs its node number", spec.path))
     arm = abs(cable.arm(0.0))
     acceleration = _HEADROOM * winch.limits.acceleration / arm
-    quick = 0.0 if spec.robot is None else spec.robot.quick_stop or 0.0
+    declared = (spec.robot and spec.robot.quick_stop) or winch.limits.quick_stop
+    quick = declared or _QUICK * winch.limits.acceleration
     watch = WatchSpec(
         bus.node,
         bus.heartbeat,
@@ -318,10 +339,12 @@ def _axis(
         winch.brake,
         acceleration,
         quick_stop=quick / arm,
+        quick_stop_declared=declared is not None,
         limits=_at_shaft(cable, winch.limits),
         speed=_FASTEST * winch.limits.speed / arm,
         response=winch.limits.response_time,
         late=winch.limits.acceleration * winch.limits.response_time**2 / 2 / arm,
+        play=_PLAY / arm,
         options=winch.options,
         hardware=winch.host_loss_description if winch.host_loss else "",
     )

@@ -35,7 +35,10 @@ def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[No
     axis = bench.axes[winch.name]
     _check(winch, asked)
     _check_drive(axis, asked)
-    winch.permit(Direction.BOTH)
+    if asked.method is None:
+        winch.permit_at_rest()
+    else:
+        winch.permit(Direction.BOTH)
     try:
         zero = 0.0
         if asked.method is not None:
@@ -64,6 +67,13 @@ def _check(winch: Winch, asked: HomingRequest) -> None:
         )
     if asked.at is not None and not math.isfinite(asked.at):
         raise UsageError("a cable length must be a finite number of metres")
+    least, greatest = winch.capacity
+    if asked.at is not None and not least <= asked.at <= greatest:
+        raise NotPermitted(
+            f"winch {winch.name}: its drum cannot have paid out {asked.at:g} m: by the profile "
+            f"{max(0.0, least):g} to {greatest:.3f} m; give the present length, or mend "
+            "wound_turns and cable_length in [reference] of the profile"
+        )
 
 
 def _check_drive(axis: Cia402Axis, asked: HomingRequest) -> None:

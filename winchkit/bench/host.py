@@ -36,6 +36,9 @@ class WinchHost(Protocol):
     def permit_tension(self, winch: str) -> None:
         """Raise where a winch may not control its tension beside those that do."""
 
+    def permit_at_rest(self, winch: str) -> None:
+        """Raise what forbids to enable a winch's drive, even at rest."""
+
     def raise_trouble(self) -> None:
         """Raise the error that has stopped the bench, if there is one."""
 

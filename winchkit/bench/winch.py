@@ -148,6 +148,8 @@ class Winch(WinchStatus):
             wanted = motion.requested if winding_speed is None else winding_speed
             self.require_speed(wanted)
             self.permit(direction_of(wanted))
+            if not self._permits_unhomed(wanted):
+                self.require_length()
             self._refresh(motion.dead_man, now, hold)
             motion.request(wanted)
         else:
@@ -185,6 +187,8 @@ class Winch(WinchStatus):
             m/s, positive winds in; zero begins nothing.
         """
         self.require_speed(winding_speed)
+        if winding_speed:
+            self.require_length()
         if self.held:
             self.extend(winding_speed, DEAD_MAN)
         elif winding_speed:
@@ -196,9 +200,12 @@ class Winch(WinchStatus):
         if duration is None:
             self._require_new()
         self.permit(direction_of(winding_speed))
-        self.require_length()
+        if duration is not None or not self._permits_unhomed(winding_speed):
+            self.require_length()
         expires = self._bench.clock.now() + (hold if duration is None else min(hold, duration))
-        self.begin(Jog(self._parts.cable, self.wiring.limits, winding_speed, DeadMan(expires)))
+        limits = self.wiring.limits
+        known = limits if self.snapshot.length_known else limits.without_length
+        self.begin(Jog(self._parts.cable, known, winding_speed, DeadMan(expires)))
 
     def _require_new(self) -> None:
         """Raise where a held motion is asked for again instead of refreshed."""
@@ -533,3 +540,7 @@ class Winch(WinchStatus):
             return float(host_tare(cells, name, _TARE_TIME)["after"])
         cells.command(name, "tare")
         return await_device_tare(self._bench.clock, self.name, cell)
+
+    def _permits_unhomed(self, winding_speed: float) -> bool:
+        """Whether a held jog may be this fast while the cable length is not known."""
+        return abs(winding_speed) <= self.wiring.limits.speed_unhomed

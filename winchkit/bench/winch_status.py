@@ -59,6 +59,11 @@ class WinchStatus:
         return self.snapshot.load_tension
 
     @property
+    def capacity(self) -> tuple[float, float]:
+        """Least and greatest cable length that its drum can have paid out, m."""
+        return self._parts.capacity
+
+    @property
     def cable(self) -> CableMap:
         """Between its motor and its cable."""
         return self._parts.cable
@@ -150,6 +155,10 @@ class WinchStatus:
         self._bench.permit(self.name, direction)
         self._bench.axes[self.name].set_quick_stop()
 
+    def permit_at_rest(self) -> None:
+        """Raise what forbids to enable the drive where the cable is not to move."""
+        self._bench.permit_at_rest(self.name)
+
     def require_rest(self) -> None:
         """Raise NotPermitted while the drive is enabled: no moment to change a cell's zero."""
         if self._controller.phase is not Phase.DISABLED:
@@ -159,12 +168,17 @@ class WinchStatus:
 
     def require_length(self) -> None:
         """Raise NotPermitted where the cable length is not known: no limit of it can be kept."""
-        if not self.snapshot.turns_known:
+        if not self.snapshot.length_known:
+            speed = self.wiring.limits.speed_unhomed
+            jogs = (
+                f"only a jog that is held is permitted, up to {speed:g} m/s (limits.unhomed)"
+                if speed
+                else 'limits.unhomed = "none" forbids jogs too'
+            )
             raise NotPermitted(
-                f"winch {self.name}: its cable length is not known, the drive's position counter "
-                "(6064h) has jumped, may have wrapped without feedback, or has in an earlier "
-                "process; home first: `winchkit home "
-                f"{self.name} --here LENGTH` moves nothing"
+                f"winch {self.name}: its cable length is not known: "
+                f"{self._parts.axis.position_doubt}; home first: `winchkit home {self.name} --here "
+                f"LENGTH` moves nothing; {jogs}"
             )
 
     def require_waiting(self, call: str) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from winchkit.errors import UsageError
-from winchkit.schema.devices.servo import OptionSpec
+from winchkit.schema.devices.servo import Encoder, OptionSpec
 from winchkit.schema.quantity import (
     Flag,
     Force,
@@ -22,6 +22,7 @@ from winchkit.schema.quantity import (
     PositiveMass,
     PositiveSpeed,
     Quantity,
+    QuantityOrNone,
     Whole,
     WholeNumber,
 )
@@ -30,6 +31,10 @@ from winchkit.schema.table import Rule, Table
 from winchkit.units import suggest
 
 __all__ = ["BenchSpec", "BusSpec", "Deviation", "DeviceRef", "LimitSpec", "WinchWiring"]
+
+_LATCH = ".trip.json"
+_UNHOMED_SHARE, _UNHOMED = 0.1, 0.02
+"""Of ``limits.speed``, and m/s: at 20 mm/s an operator who sees a mark ends within 10 mm of it."""
 
 NEEDED_BY_BUS: dict[str, tuple[str, ...]] = {
     "can": ("interface", "channel"),
@@ -113,6 +118,8 @@ class DeviceRef(Table):
     unit: Annotated[int, Whole(0, 255)] | None = None
     calibration: str | None = None
     """A file of kind ``calibration`` beside the bench, applied by the host."""
+    encoder: Encoder | None = None
+    """Of a servo's motor, where it is not the one of the device file."""
     rate: Frequency | None = None
     """Limit of the reading rate, Hz; by default the device's conversion rate or the line's."""
 
@@ -142,9 +149,34 @@ class LimitSpec(Table):
     constant of the drive's velocity loop."""
     emergency_trips: tuple[str, ...] = ()
     """Emergency codes that trip although the drive reports no fault: ``4210``, ``42xx``."""
+    quick_stop: PositiveAcceleration | None = None
+    """Ramp of a quick stop in the drive (6085h), m/s^2; by default twice ``acceleration``."""
+    unhomed: Annotated[float, QuantityOrNone("speed")] | None = None
+    """Speed of a held jog while the cable length is not known, m/s; ``none`` forbids it. By default
+    a tenth of ``speed``, at most 20 mm/s."""
+
+    @property
+    def speed_unhomed(self) -> float:
+        """Speed of a held jog while the cable length is not known, m/s; 0 forbids it."""
+        if self.unhomed is not None:
+            return self.unhomed
+        return min(_UNHOMED_SHARE * self.speed, _UNHOMED)
+
+    @property
+    def without_length(self) -> LimitSpec:
+        """The limits while the cable length is not known: no limit of it can be kept."""
+        return replace(self, speed=self.speed_unhomed, length=None)
 
     def rules(self) -> Iterator[Rule]:
         """Lower limits lie below upper ones."""
+        if self.unhomed is not None and self.unhomed > self.speed:
+            yield "unhomed", f"{self.unhomed:g} m/s is above `speed`, {self.speed:g} m/s"
+        if self.quick_stop is not None and self.quick_stop < self.acceleration:
+            yield (
+                "quick_stop",
+                f"{self.quick_stop:g} m/s^2 is below `acceleration`, {self.acceleration:g} m/s^2: "
+                "a quick stop would take longer than a stop",
+            )
         if self.in_drive and self.length is None:
             yield "in_drive", "needs `length`, the limits that the drive is to enforce"
         if self.length is not None and self.length[0] < 0:
@@ -217,6 +249,11 @@ class BenchSpec(Table):
     """File in which latched trips are saved; empty for a simulation in this process."""
 
     @property
+    def position_file(self) -> str:
+        """File in which positions are saved, beside that of the trips; empty as that is."""
+        return f"{self.latch_file.removesuffix(_LATCH)}.position.json" if self.latch_file else ""
+
+    @property
     def record_file(self) -> str:
         """The commissioning record beside the bench file; empty for a bench without a file."""
         return f"{Path(self.path).with_suffix('')}.commissioned.json" if self.path else ""
@@ -243,4 +280,4 @@ class BenchSpec(Table):
 
 def latch_path(bench_path: str) -> str:
     """File of a bench's latched trips, beside its bench file."""
-    return f"{Path(bench_path).resolve().with_suffix('')}.trip.json"
+    return f"{Path(bench_path).resolve().with_suffix('')}{_LATCH}"

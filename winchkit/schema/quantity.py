@@ -41,6 +41,7 @@ __all__ = [
     "PositiveNumber",
     "PositiveSpeed",
     "Quantity",
+    "QuantityOrNone",
     "Speed",
     "Temperature",
     "Torque",
@@ -104,6 +105,22 @@ class Quantity(Marker):
             return "a number"
         unit = next(iter(UNITS[self.dimension]))
         return f'{article(self.dimension)} with its unit, such as "1 {unit}"'
+
+
+@dataclass(frozen=True)
+class QuantityOrNone(Quantity):
+    """A quantity of at least zero; ``"none"`` is zero."""
+
+    low: float = 0.0
+
+    def read(self, raw: object) -> float:
+        """Convert a value of a file to SI; raises UsageError with the reason."""
+        return 0.0 if raw == "none" else super().read(raw)
+
+    @property
+    def wanted(self) -> str:
+        """Description of the expected value."""
+        return f'{super().wanted}, or "none"'
 
 
 @dataclass(frozen=True)

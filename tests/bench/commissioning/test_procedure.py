@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -256,3 +257,27 @@ def test_an_answer_of_a_file_counts_in_any_case_as_a_typed_one(tmp_path: Path) -
     assert answers.ask("A.by", "?") == "Ann"
     with pytest.raises(UsageError, match="not one of pulled, right"):
         answers.ask("A.brake", "?", ("pulled", "right"))
+
+
+@pytest.mark.parametrize("homed", [False, True])
+def test_a_winch_with_an_incremental_encoder_is_commissioned_before_its_first_homing(
+    tmp_path: Path, homed: bool
+) -> None:
+    """By short motions without a length; a length that is known outlives a commissioning."""
+    path = write_bench(tmp_path)
+    path.write_text(path.read_text().replace('encoder = "absolute"\n', ""))
+    with served(path) as bench:
+        if homed:
+            with bench.open() as opened:
+                opened.winch["A"].home(at=3.5)
+        angle = bench.slave.motor.angle
+        record = commissioned(bench)
+        moved = {item.item: item.measured for item in record.winch["A"].confirmed}
+        turned = (bench.slave.motor.angle - angle) / math.tau
+        assert moved["units"]["turns"] == pytest.approx(-1.0 if turned < 0 else 1.0, abs=0.05)
+        with bench.open() as opened:
+            snapshot = opened.winch["A"].snapshot
+            assert snapshot.length_known is homed
+            if homed:
+                way = (bench.slave.motor.angle - angle) * 2.96e-3
+                assert snapshot.cable_length == pytest.approx(3.5 - way, abs=2e-3)

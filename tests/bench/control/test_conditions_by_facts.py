@@ -60,7 +60,7 @@ OTHERWISE = {
     "emergencies": ((), (0x4210,), (0x5530,)),
     "unstable": ("", "noise"),
     "frozen": ("", "stands still"),
-    "turns_known": (True, False),
+    "length_doubt": ("", "its record was not closed"),
     "position_jump": ("", "6064h changed by 9.00 turns"),
     "position_disagreement": ("", "6064h changed by 0.000 turns"),
     "cable_length": (5.0, 0.5, 9.5),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace as Made
 from typing import Any
 
@@ -25,7 +26,7 @@ SENSORS = {"cell": CELL, "length": LENGTH}
 def parts(*, faulty: bool) -> Any:
     """A winch whose parts answer with values that no other part has."""
     state = State.FAULT if faulty else State.OPERATION_ENABLED
-    feedback = Made(angle=3.0, velocity=2.0, time=99.5, sync=8, state=state, turns_known=True)
+    feedback = Made(angle=3.0, velocity=2.0, time=99.5, sync=8, state=state)
     axis = Made(
         feedback=feedback,
         heartbeat=Made(
@@ -36,6 +37,7 @@ def parts(*, faulty: bool) -> Any:
         fault_text="fault text",
         nmt_text="NMT text",
         second_master="second master",
+        position_doubt="",
         position_jump="position jump",
         position_disagreement="disagreement",
         alarms=(0x4210,),
@@ -53,6 +55,7 @@ def parts(*, faulty: bool) -> Any:
         axis=axis,
         controller=controller,
         cable=Made(has_effects=False, at=lambda angle: (angle + 1.0, 0.5)),
+        capacity=(-math.inf, math.inf),
         frozen=Made(unstable="unstable", update=lambda *_, **__: "frozen"),
         sensors={"cell": Made(latest=None)},
         load=Made(tension=lambda *_: 0.0),
@@ -90,7 +93,7 @@ def test_every_value_stands_in_the_field_of_its_name(faulty: bool) -> None:
         "emergency_text": "" if faulty else "alarm text",
         "unstable": "unstable",
         "frozen": "frozen",
-        "turns_known": True,
+        "length_doubt": "",
         "position_jump": "position jump",
         "position_disagreement": "disagreement",
         "sensors": SENSORS,

@@ -71,10 +71,10 @@ def test_settings_are_saved_compared_and_loaded(bench: Served, tmp_path: Path) -
 def test_settings_are_not_written_beside_an_owner(bench: Served, tmp_path: Path) -> None:
     path = tmp_path / "a.json"
     winchkit.config_save(bench.file, path, "A")
-    bench.live.winches["A"].drive.objects.put(0x6085, 0, 5_000)
+    bench.live.winches["A"].drive.objects.put(0x6084, 0, 5_000)
     with winchkit.open_bench(bench.file), pytest.raises(NotPermitted, match="another process"):
         winchkit.config_load(bench.file, path, "A")
-    assert bench.number(0x6085) == 5_000
+    assert bench.number(0x6084) == 5_000
 
 
 @pytest.mark.slow

@@ -219,9 +219,9 @@ CASES = (
         latched=False,
     ),
     Case(
-        "turns",
+        "length unknown",
         "",
-        always(turns_known=False),
+        always(length_doubt="its record was not closed"),
         always(),
         blocks=Direction.NONE,
         latched=False,

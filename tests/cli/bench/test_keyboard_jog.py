@@ -15,6 +15,7 @@ STATUS = {
     "winch": {
         "A": {
             "cable_length": 4.0,
+            "length_known": True,
             "cable_speed": None,
             "load_tension": 98.1,
             "length": None,

@@ -257,7 +257,7 @@ def test_a_wrong_winch_is_refused_before_its_bus_is_opened(
         'schema = 1\nkind = "bench"\nname = "away"\n'
         '[bus.can]\nkind = "can"\ninterface = "socketcan"\nchannel = "absent0"\n'
         '[winch.A]\nprofile = "bench-spiral"\n'
-        'servo = { device = "generic-cia402", bus = "can", node = 1 }\n'
+        'servo = { device = "generic-cia402", bus = "can", node = 1, encoder = "absolute" }\n'
         'limits = { speed = "0.1 m/s", acceleration = "0.1 m/s^2" }\n',
         encoding="utf-8",
     )

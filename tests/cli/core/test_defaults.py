@@ -18,7 +18,7 @@ interface = "virtual"
 channel = "defaults"
 [winch.A]
 profile = "bench-spiral"
-servo = { device = "generic-cia402", bus = "can", node = 1 }
+servo = { device = "generic-cia402", bus = "can", node = 1, encoder = "absolute" }
 [winch.A.limits]
 speed = "0.5 m/s"
 acceleration = "1 m/s^2"

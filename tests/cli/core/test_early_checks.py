@@ -22,7 +22,7 @@ host = "127.0.0.1"
 port = 9
 [winch.A]
 profile = "bench-spiral"
-servo = { device = "generic-cia402", bus = "can", node = 1 }
+servo = { device = "generic-cia402", bus = "can", node = 1, encoder = "absolute" }
 cell = { device = "laumas-tlb", bus = "cells", unit = 1 }
 [winch.A.limits]
 speed = "0.5 m/s"

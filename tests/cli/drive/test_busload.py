@@ -27,7 +27,7 @@ heartbeat = "1 s"
 WINCH = """\
 [winch.{name}]
 profile = "bench-spiral"
-servo = {{ device = "generic-cia402", bus = "can", node = {node} }}
+servo = {{ device = "generic-cia402", bus = "can", node = {node}, encoder = "absolute" }}
 [winch.{name}.limits]
 speed = "0.5 m/s"
 """

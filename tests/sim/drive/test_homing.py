@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import inf, pi
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drive_rig import COUNT, Flywheel, Rig, with_quirks
-from winchkit.schema.devices.servo import QuirkSpec
+from drive_rig import COUNT, SERVO, Flywheel, Rig, with_quirks
+from winchkit.schema.devices.servo import Encoder, QuirkSpec, ServoSpec
 
 HM, PP, CSV = 6, 1, 9
 REACHED, ATTAINED, ERROR = 0x400, 0x1000, 0x2000
@@ -18,8 +19,8 @@ EDGE = 12.3
 """rad, of whichever switch is looked for."""
 
 
-def homing(method: int, start: float, *, offset: int = 0) -> Rig:
-    rig = Rig(Flywheel(motor_angle=start))
+def homing(method: int, start: float, *, offset: int = 0, servo: ServoSpec = SERVO) -> Rig:
+    rig = Rig(Flywheel(motor_angle=start), servo=servo)
     switches = rig.drive.switches
     if method in (17, 1):
         switches.negative = EDGE
@@ -206,14 +207,16 @@ def test_a_disabled_drive_does_not_home() -> None:
     assert rig.read(0x6064) == round(2.0 / COUNT)
 
 
-def test_a_reboot_forgets_the_zero() -> None:
-    rig = homing(35, 2.0)
+@pytest.mark.parametrize("encoder", ["absolute", "incremental"])
+def test_a_reboot_keeps_the_zero_of_an_absolute_encoder_only(encoder: Encoder) -> None:
+    rig = homing(35, 2.0, servo=replace(SERVO, encoder=encoder))
     rig.control(0x1F)
     rig.run(0.05)
     assert rig.read(0x6064) == 0
+    rig.shaft.motor_angle += 1.0
     rig.drive.inject("reboot")
     rig.run(1.5)
-    assert rig.read(0x6064) == round(rig.shaft.motor_angle / COUNT)
+    assert rig.read(0x6064) == (round(1.0 / COUNT) if encoder == "absolute" else 0)
 
 
 def test_digital_inputs_show_the_switches() -> None:

@@ -216,7 +216,7 @@ class Rig:
     def bench_spec(self) -> BenchSpec:
         wiring = WinchWiring(
             profile="bench-spiral",
-            servo=DeviceRef("generic-cia402", "can", node=NODE),
+            servo=DeviceRef("generic-cia402", "can", node=NODE, encoder="absolute"),
             limits=self.limits,
             brake=True,
         )

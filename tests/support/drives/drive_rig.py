@@ -25,7 +25,7 @@ DICTIONARY = canopen.import_od(str(EDS), NODE)
 ENTRIES = read_eds(EDS, NODE)
 _DEVICE = read_device(find("devices", "generic-cia402"))
 assert _DEVICE.servo is not None
-SERVO = _DEVICE.servo
+SERVO = replace(_DEVICE.servo, encoder="absolute")
 
 
 def with_quirks(quirks: QuirkSpec) -> ServoSpec:

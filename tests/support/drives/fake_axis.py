@@ -13,6 +13,7 @@ from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
 from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import RequestedState, State, control_word
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import ConnectionLost
@@ -85,7 +86,20 @@ class FakeAxis:
         return abs(self.velocity) < 0.05
 
     silent: bool = False
-    position_absolute: bool = True
+    position_doubt: str = ""
+
+    @property
+    def position_mark(self) -> tuple[int, str, bool]:
+        return 0, self.position_doubt, True
+
+    def keep_position(self, *, closed: bool) -> KeptPosition | None:
+        feedback = self.feedback
+        if feedback is None:
+            return None
+        return KeptPosition(round(1e4 * feedback.angle), 0, self.position_doubt, closed)
+
+    def lose_position(self, doubt: str) -> None:
+        self.position_doubt = self.position_doubt or doubt
 
     def fall_silent(self) -> bool:
         self.silent = True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import struct
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -118,7 +118,9 @@ RPDO = (
 
 @cache
 def _device() -> DeviceSpec:
-    return device()
+    found = device()
+    assert found.servo is not None
+    return replace(found, servo=replace(found.servo, encoder="absolute"))
 
 
 @cache
@@ -150,6 +152,8 @@ class HandMade:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(axis_module, "await_booted", lambda *_: None)
             patch.setattr(axis_module, "commission", lambda *_: drive)
+            patch.setattr(self.axis.objects, "read", lambda *_: 0)
+            patch.setattr(self.axis.objects, "read_if_there", lambda *_: None)
             self.axis.commission()
         self.bus.beats[127] += 1
 

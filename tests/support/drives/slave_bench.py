@@ -44,6 +44,7 @@ brake = true
 device = "drive/device.toml"
 bus = "can"
 node = 1
+encoder = "absolute"
 
 [winch.A.limits]
 speed = "0.5 m/s"

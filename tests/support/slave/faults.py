@@ -87,6 +87,16 @@ def _cause_ends(slave: Slave) -> None:
     slave.power.cause_stands = False
 
 
+def _switch_off(slave: Slave, _value: Any) -> None:
+    slave.power.drop()
+
+
+def _lose_mapping(slave: Slave, _value: Any) -> None:
+    """The communication profile area has its values of power-on, and nothing was said of it."""
+    slave.objects.restart(0x1000, 0x1FFF)
+    slave.pdos.reset()
+
+
 def _near_wrap(slave: Slave, value: Any) -> None:
     """Shift the counter so that it wraps ``value`` position units ahead of the motor."""
     top = (1 << slave.motion.declared.counter_bits) // 2 - 1
@@ -150,6 +160,20 @@ _ROWS = (
     Fault(
         "reboots", "power lost for a moment", begin=lambda slave, _v: slave.power_on(), lasts=False
     ),
+    Fault(
+        "switched off",
+        "no supply: no torque, nothing heard or sent; mended, it boots up",
+        unheard=_EVERYTHING,
+        unsent=_EVERYTHING | {"tpdo", "emergency"},
+        begin=_switch_off,
+        end=lambda slave: slave.power_on(),
+    ),
+    Fault(
+        "mapping lost",
+        "PDO mapping, 1016h and 1017h have their values of power-on, without a boot-up message",
+        begin=_lose_mapping,
+        lasts=False,
+    ),
     Fault("reset by a stranger", "NMT reset node", begin=_nmt(0x81), lasts=False),
     Fault("stopped by a stranger", "NMT stopped", begin=_nmt(0x02), lasts=False),
     Fault("pre-operational by a stranger", "NMT pre-operational", begin=_nmt(0x80), lasts=False),
@@ -200,6 +224,11 @@ _ROWS = (
     Fault("velocity scaled", "606Ch is this multiple of the motor's speed", 2.0),
     Fault("status lies", "6041h shows these state bits whatever the state is", 0x27),
     Fault("mode lies", "6061h shows this mode, another one acts", 3),
+    Fault(
+        "counter begins anew",
+        "an incremental encoder: after power-on or a reset of the node 6064h has this value",
+        0,
+    ),
     Fault("velocity stuck", "606Ch no longer changes"),
     Fault("position stuck", "6064h no longer changes"),
     Fault("status frozen", "6041h no longer changes"),

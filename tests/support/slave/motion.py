@@ -90,9 +90,12 @@ class Motion:
         return self.declared.velocity_unit or self.unit
 
     def restart(self) -> None:
-        """As after power-on; an incremental encoder has lost its zero, this one has not."""
+        """As after power-on; an absolute encoder, unless a fault makes its counter begin anew."""
         self.mode, self.reference = self.objects.get(0x6060), 0.0
         self.rescale()
+        begins = self.faults.get("counter begins anew")
+        if begins is not None:
+            self.offset = int(begins) - round(self.motor.angle / self.unit)
         self._hold()
 
     def counts(self) -> int:

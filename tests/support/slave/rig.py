@@ -145,13 +145,13 @@ class Rig:
         """End the process of a bench as SIGKILL does: it says nothing and closes nothing."""
         for port in self.ports:
             port.dead = True
-        latch = Path(bench.spec.latch_file)
-        before = latch.read_bytes() if latch.is_file() else None
+        kept = [Path(bench.spec.latch_file), Path(bench.spec.position_file)]
+        before = {path: path.read_bytes() for path in kept if path.is_file()}
         bench.loop.close()
         bench.stations.close()
         bench._stack.close()
-        if before is not None:
-            latch.write_bytes(before)
+        for path, data in before.items():
+            path.write_bytes(data)
 
     def write_bench(self, text: str) -> Path:
         """Write a bench file whose bus is the rig's."""
@@ -202,6 +202,7 @@ def bench_text(
     winches: int = 1,
     *,
     device: str = "generic-cia402",
+    encoder: str = "absolute",
     heartbeat: str = "50 ms",
     limits: Mapping[str, str] | None = None,
     extra: Sequence[str] = (),
@@ -222,7 +223,8 @@ def bench_text(
     given = {"speed": "0.3 m/s", "acceleration": "1 m/s^2", **(limits or {})}
     for number in range(winches):
         name = "ABCDEFGH"[number]
-        servo = f'{{ device = "{device}", bus = "can", node = {number + 1} }}'
+        on = f'bus = "can", node = {number + 1}, encoder = "{encoder}"'
+        servo = f'{{ device = "{device}", {on} }}'
         lines += [f"[winch.{name}]", 'profile = "bench-spiral"', f"servo = {servo}", "brake = true"]
         lines += [f"[winch.{name}.limits]", *(f'{k} = "{v}"' for k, v in given.items())]
     return "\n".join(lines) + "\n"

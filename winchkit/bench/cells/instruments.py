@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -53,10 +53,13 @@ class _Wired:
 
 
 def device_of(spec: BenchSpec, ref: DeviceRef) -> DeviceSpec:
-    """The device file that a bench file refers to."""
+    """The device file that a bench file refers to, with the encoder that the bench file names."""
     from winchkit.schema.read import read_device
 
-    return read_device(catalog.find("devices", ref.device, spec.path or None))
+    device = read_device(catalog.find("devices", ref.device, spec.path or None))
+    if ref.encoder is None or device.servo is None:
+        return device
+    return replace(device, servo=replace(device.servo, encoder=ref.encoder))
 
 
 def eds_of(device: DeviceSpec) -> Path:

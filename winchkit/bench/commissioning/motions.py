@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import statistics
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from winchkit.bench.bench import Bench
+from winchkit.bench.control.motion import Move
+from winchkit.bench.control.snapshot import Direction
 from winchkit.bench.direction import directed
 from winchkit.errors import NotPermitted
 
@@ -58,17 +60,22 @@ class Motions:
         limits = self._winch.wiring.limits.length
         if limits is None:
             return True
-        target = self._bench.snapshot.winch[self._name].cable_length + change
-        return limits[0] <= target <= limits[1]
+        here = self._bench.snapshot.winch[self._name]
+        # Before the first homing nobody but the operator can say.
+        return not here.length_known or limits[0] <= here.cable_length + change <= limits[1]
 
     def go(self, change: float) -> Moved:
         """Pay out, or with a negative length wind in; returns at rest and disabled."""
         before = self._bench.snapshot.winch[self._name]
-        self._winch.move_by(**directed(change), speed=self._speed)
+        if before.length_known:
+            self._winch.move_by(**directed(change), speed=self._speed)
+        else:
+            self._move_unhomed(before.motor_angle, change)
         self._bench.clock.sleep(_LOOK)
         after = self._bench.snapshot.winch[self._name]
+        cable = self._winch.cable
         moved = Moved(
-            after.cable_length - before.cable_length,
+            cable.cable_length(after.motor_angle) - cable.cable_length(before.motor_angle),
             (after.motor_angle - before.motor_angle) / _TURN,
             after.length - before.length,
         )
@@ -78,6 +85,18 @@ class Motions:
                 f"moved {moved.cable * 1e3:.1f} mm; check its units and what holds it"
             )
         return moved
+
+    def _move_unhomed(self, angle: float, change: float) -> None:
+        """Move by a length while no cable length is known, as slowly as a jog then may."""
+        winch = self._winch
+        limits = winch.wiring.limits
+        speed = min(self._speed, limits.speed_unhomed) or self._speed
+        target = winch.cable.cable_length(angle) + change
+        move = Move(winch.cable, replace(limits, length=None), target, speed=speed)
+        winch.permit(Direction.PAY_OUT if change > 0 else Direction.WIND_IN)
+        move.prepare(angle)
+        winch.begin(move)
+        winch.wait()
 
     def check_sensor(self, moved: Moved) -> None:
         """Raise NotPermitted where the length sensor and the profile disagree."""

@@ -237,6 +237,7 @@ class _Steps:
         question = (
             f"winch {self._name}: try the loss of the host in a slow move, winding in at "
             f"{speed:g} m/s for 0.8 s ('yes' moves it, 'no' leaves it out)?"
+            f"{trials.room(self._name)}"
         )
         answer = self._dialogue.ask(f"{self._name}.try_in_motion", question, YES_OR_NO)
         return self._host_silent(trials, speed) if agreed(answer) else None

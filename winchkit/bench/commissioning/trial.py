@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from typing import Self
 
 from winchkit.bench.control.cable import CableMap
-from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.hardware import Wired, wire
+from winchkit.bench.records.latch import LatchFile
+from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.state_machine import (
@@ -50,6 +51,8 @@ _BRAKE_TIME = 2.0
 _REST_TIME = 3.0
 """s, as in :mod:`winchkit.drivers.can.cia402.commission`: three times the quick stop from 1 m/s
 with 1 m/s²."""
+_FRESH = 5
+"""Cycles after which every drive has answered with where it stands."""
 _POLL = 0.002
 """s: resolution of a measured reaction, 2 % of the shortest limit."""
 _REPLY_TIME = 0.1
@@ -88,7 +91,11 @@ class Trials:
             stack.callback(latch.close)
             if trips := latch.open():
                 raise NotPermitted(f"{trips[0]}; run `winchkit reset` before commissioning")
-            self._wired: Wired = wire(spec, clock, stack, latch)
+            self._positions = PositionFile(spec.position_file)
+            stack.callback(self._positions.close)
+            if trips := self._positions.open():
+                raise NotPermitted(f"{trips[0]}; run `winchkit reset` before commissioning")
+            self._wired: Wired = wire(spec, clock, stack, latch, self._positions)
             self.axes = self._wired.axes
             self._stack = stack.pop_all()
         self._sync, self._hold = 0, 0.0
@@ -100,11 +107,21 @@ class Trials:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
         with self._stack:
+            if kind is None:
+                self._keep_positions()
             for axis in self.axes.values():
                 with _frames_lost():
                     axis.disarm()
+
+    def _keep_positions(self) -> None:
+        """Close the record of positions with where the drives are now, disabled and at rest."""
+        axes = self.axes
+        for _ in range(_FRESH):
+            self._cycle(next(iter(axes.values())), RequestedState.DISABLE)
+        found = {name: axis.keep_position(closed=axis.at_rest) for name, axis in axes.items()}
+        self._positions.close_with({name: kept for name, kept in found.items() if kept is not None})
 
     def host_loss(self, name: str, speed: float = 0.0) -> Trial:
         """Fall silent with the drive enabled, at rest or winding in at ``speed`` (m/s)."""
@@ -124,6 +141,12 @@ class Trials:
                 self._await_rest(axis)
             travel = self._travel(name, axis, angle)
         return Trial(stopped, after, str(state), travel)
+
+    def room(self, name: str) -> str:
+        """Warning that no length limit is kept in a trial in motion; empty where it is."""
+        if not self.axes[name].position_doubt:
+            return ""
+        return " The cable length is not known, and limits.length not kept: look for room yourself."
 
     def nmt_stopped(self, name: str) -> Trial:
         """NMT stopped with the drive enabled at rest; every other life sign goes on."""
@@ -214,11 +237,12 @@ class Trials:
     def _require_room(self, name: str, axis: Cia402Axis, speed: float) -> None:
         """Raise NotPermitted where winding in at ``speed`` may pass the lower length limit.
 
-        The way: the move, the drive's time limit without a host (for hardware that stops it the
-        patience of the trial), and the ramp v²/(2a).
+        Where the length is not known, the operator has seen to it. The way: the move, the drive's
+        time limit without a host (for hardware that stops it the patience of the trial), and the
+        ramp v²/(2a).
         """
         limits = self.spec.winch[name].limits
-        if limits.length is None:
+        if limits.length is None or axis.position_doubt:
             return
         moving = _MOVE_TIME + _patience(axis.host.mechanism)
         way = speed * moving + speed**2 / (2 * limits.acceleration)

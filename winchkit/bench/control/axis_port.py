@@ -6,6 +6,7 @@ from typing import Protocol
 
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
 from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 
 __all__ = ["AxisPort"]
@@ -29,8 +30,12 @@ class AxisPort(Protocol):
         """Whether the drive is in NMT state operational."""
 
     @property
-    def position_absolute(self) -> bool:
-        """Whether the drive's position count is absolute, so that a later process may use it."""
+    def position_doubt(self) -> str:
+        """Why the motor angle is not known, in words; empty where it is."""
+
+    @property
+    def position_mark(self) -> tuple[int, str, bool]:
+        """What of the position's record changes besides the count; the same while it stays."""
 
     @property
     def mode_kept(self) -> bool:
@@ -91,6 +96,12 @@ class AxisPort(Protocol):
     @property
     def sdo_state(self) -> State | None:
         """Power state read by SDO since that stop began."""
+
+    def keep_position(self, *, closed: bool) -> KeptPosition | None:
+        """The position for the record, ``closed`` at rest; None before the first feedback."""
+
+    def lose_position(self, doubt: str) -> None:
+        """Take the position as unknown until the drive is homed, for a reason in words."""
 
     def stop_by_sdo(self) -> None:
         """Quick stop by SDO; without waiting."""

@@ -469,13 +469,13 @@ CONDITIONS: tuple[Condition, ...] = (
         by_facts=True,
     ),
     Condition(
-        "turns",
-        "time without feedback against half the range of 6064h at 1.5 × limits.speed",
-        "shorter",
-        lambda item, _own, _memory: not item.turns_known,
-        lambda *_: (
-            "the cable length is not known: 6064h has jumped, may have wrapped without feedback, "
-            "or has wrapped in an earlier process; home the winch"
+        "length unknown",
+        "record of positions, boot-up messages, volatile objects and range of 6064h, drum capacity",
+        "every turn counted since the zero was found (see When the cable length is not known)",
+        lambda item, _own, _memory: bool(item.length_doubt),
+        lambda item, *_: (
+            f"the cable length is not known: {item.length_doubt}; limits.length is not kept, home "
+            "the winch"
         ),
         blocks=Direction.NONE,
         by_facts=True,
@@ -529,6 +529,8 @@ BENCH_CONDITIONS: tuple[BenchCondition, ...] = (
         latches=False,
     ),
     BenchCondition("latch file", "reading and writing of the latch file", "possible"),
+    BenchCondition("position record", "reading and writing of the record of positions", "possible"),
+    BenchCondition("owner", "records of positions at opening", "closed at rest by their process"),
     BenchCondition(
         "sync", "SYNC frames that were not sent here", "none", "a warning", latches=False
     ),

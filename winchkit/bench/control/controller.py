@@ -191,7 +191,7 @@ class Controller:
         return words
 
     def step(self, now: float, time: float, sync: int = 0) -> None:
-        """Send this cycle's command; ``time`` is that of motion, one cycle a cycle.
+        """Send this cycle's command; ``time`` is that of motion, in whole periods.
 
         ``sync`` is the number of the SYNC that was just sent.
         """

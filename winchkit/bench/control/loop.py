@@ -5,17 +5,19 @@ from __future__ import annotations
 import logging
 import math
 import threading
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
-from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.observation import WinchInput
 from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Phase, Trip, WinchSnapshots
 from winchkit.bench.control.standstill import StandstillCause
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts, known, pictures
+from winchkit.bench.records.latch import LatchFile
+from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
+from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler, Thread, event_of, thread_of
@@ -77,12 +79,14 @@ class ControlLoop:
         *,
         stop_together: bool = True,
         latch: LatchFile | None = None,
+        positions: PositionFile | None = None,
         longest_gap: float = math.inf,
     ) -> None:
         """Take buses with the host's node id and heartbeat period, and winches by name.
 
         With ``stop_together`` all winches stop where the drive of one cannot go on. ``latch`` keeps
-        trips for later processes. Between two cycles at most ``longest_gap`` (s) may pass.
+        trips and ``positions`` where the drives stand, for later processes. Between two cycles at
+        most ``longest_gap`` (s) may pass.
         """
         self.winches = winches
         self.supervisor = supervisor
@@ -115,6 +119,10 @@ class ControlLoop:
         """Period of control, s."""
         self._clock, self._count = clock, 0
         self._latch = latch or LatchFile("")
+        self._positions = positions or PositionFile("")
+        self._marks: list[tuple[bool, tuple[int, str, bool]]] = []
+        """What of the record of positions was written last."""
+        self._motion_time = 0.0
         self._kept: tuple[Trip, ...] = supervisor.tripped
         self._longest_gap = longest_gap
         self._before = self._ended = math.nan
@@ -162,9 +170,10 @@ class ControlLoop:
         """Whether the thread runs."""
         return self._thread is not None and self._thread.is_alive()
 
-    def step(self, now: float) -> BenchSnapshot:
-        """One control cycle at ``now`` (s)."""
+    def step(self, now: float, missed: int = 0) -> BenchSnapshot:
+        """One control cycle at ``now`` (s), after ``missed`` periods in which none began."""
         self._count += 1
+        self._motion_time += self.cycle * (1 + self._made_up(missed))
         self._watch_clock(now)
         self._listen_for_stops()
         self._send_sync(now)
@@ -181,17 +190,19 @@ class ControlLoop:
             if self.supervisor.tripped or self.failure is not None or reason:
                 self._stop_all(reason)
             self._command(now)
-        lost = [name for name, p in self.winches.items() if not p.axis.position_absolute]
-        if self.supervisor.tripped is not self._kept or self._latch.lost.symmetric_difference(lost):
-            self._keep(frozenset(lost))
+        if self.supervisor.tripped is not self._kept:
+            self._keep()
+        self._keep_positions()
         self._sample(snapshot)
         return snapshot
 
-    def restore(self, trips: Sequence[Trip]) -> None:
-        """Latch the trips of the latch file."""
+    def restore(self, trips: Sequence[Trip], further: Sequence[Trip] = ()) -> None:
+        """Latch the trips of the latch file, and ``further`` ones that are not in it yet."""
         for trip in trips:
             self.supervisor.latch(trip)
         self._kept = self.supervisor.tripped
+        for trip in further:
+            self.supervisor.latch(trip)
 
     def clear_latch(self) -> None:
         """Clear the acknowledged trips here and on disk; others are written in the next cycle.
@@ -235,10 +246,45 @@ class ControlLoop:
                 )
             )
 
-    def _keep(self, lost: Collection[str]) -> None:
-        """Write the latch and the lost positions to its file."""
+    def _made_up(self, missed: int) -> int:
+        """Missed periods in which the motion went on: braking is not later because of them.
+
+        A drive that follows positions has waited at its last one, and the motion waits with it.
+        """
+        if missed and any(parts.axis.position_mode for parts in self.winches.values()):
+            return 0
+        return missed
+
+    def close_positions(self) -> None:
+        """Have the positions of the drives that are at rest on the disk, before they are let go."""
+        self._positions.close_with(self._at_rest_or_open())
+
+    def _at_rest_or_open(self) -> dict[str, KeptPosition]:
+        found = {
+            name: parts.axis.keep_position(closed=parts.controller.phase is Phase.DISABLED)
+            for name, parts in self.winches.items()
+        }
+        return {name: kept for name, kept in found.items() if kept is not None}
+
+    def _keep_positions(self) -> None:
+        """Write the record of positions where a drive begins to be enabled, rests, or is lost."""
+        marks = [
+            (parts.controller.phase is Phase.DISABLED, parts.axis.position_mark)
+            for parts in self.winches.values()
+        ]
+        if marks == self._marks:
+            return
+        positions = self._at_rest_or_open()
+        problem = self._positions.keep(positions)
+        if problem is not None:
+            self.supervisor.latch(problem)
+        if len(positions) == len(marks):  # else some have not answered yet
+            self._marks = marks
+
+    def _keep(self) -> None:
+        """Write the latch to its file."""
         trips = self.supervisor.tripped
-        problem = self._latch.keep(trips, lost)
+        problem = self._latch.keep(trips)
         if problem is not None:
             self.supervisor.latch(problem)
             trips = self.supervisor.tripped
@@ -299,14 +345,14 @@ class ControlLoop:
         due = self._clock.now()
         while not self._stopping.is_set():
             now = self._clock.now()
-            missed = int((now - due) / self.cycle)
-            if missed > 0:
+            missed = max(0, int((now - due) / self.cycle))
+            if missed:
                 # They are left out and not made up for: no period has two SYNCs.
                 self.overruns += missed
                 due += missed * self.cycle
             if self.broken is None:
                 try:
-                    self.step(now)
+                    self.step(now, missed)
                 except BaseException as error:  # noqa: BLE001 - named in a trip, everything stops
                     self.fail(error, now)
             else:
@@ -334,7 +380,7 @@ class ControlLoop:
                 latches=True,
             )
         )
-        _attempt(lambda: self._keep(self._latch.lost))
+        _attempt(self._keep)
         self._show_trips()
 
     def stop_step(self, now: float) -> None:
@@ -400,7 +446,7 @@ class ControlLoop:
             bus.gather()
         for name, parts in self.winches.items():
             try:
-                parts.controller.step(now, self._count * self.cycle, self._count)
+                parts.controller.step(now, self._motion_time, self._count)
             except ConnectionLost as error:
                 self._latch_bus(error)
             except MotionError as error:

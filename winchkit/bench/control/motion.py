@@ -135,8 +135,9 @@ class MotionSource(Protocol):
     def target(self, time: float, angle: float, now: float) -> Target:
         """Target at ``time`` (s), the motor being at ``angle`` (rad).
 
-        Time of motion advances by exactly one cycle a cycle, so that a late cycle makes no jump;
-        ``now`` (s) is the true time, for whatever expires.
+        Time of motion advances by whole periods of control, those in which no cycle began included
+        (of drives that follow positions: left out, since they waited); ``now`` (s) is the true
+        time, for whatever expires.
         """
 
 

@@ -124,8 +124,8 @@ class WinchInput(NamedTuple):
     """Finding that the load cell's readings at rest are unsteady; empty without one."""
     frozen: str = ""
     """Evidence that the load cell is frozen; empty without it."""
-    turns_known: bool = True
-    """Whether the motor angle counts every turn; if not, the cable length is NaN."""
+    length_doubt: str = ""
+    """Why the cable length is not known, and NaN, in words; empty where it is."""
     position_jump: str = ""
     """Change of 6064h that no motion explains, in words; empty without one."""
     position_disagreement: str = ""
@@ -149,7 +149,7 @@ FACTS = (
     "emergencies",
     "unstable",
     "frozen",
-    "turns_known",
+    "length_doubt",
     "position_jump",
     "position_disagreement",
 )

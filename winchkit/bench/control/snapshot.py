@@ -79,8 +79,8 @@ class WinchSnapshot(NamedTuple):
     temperature: float = math.nan
     quality: Mapping[str, str] | None = None
     """Flags of each sensor's newest reading, ``stale`` included."""
-    turns_known: bool = True
-    """Whether the motor angle counts every turn; if not, the cable length is NaN until homed."""
+    length_known: bool = True
+    """Whether the cable length is known; if not, it is NaN until the winch is homed."""
     commander: str = ""
     """Name of its commander; empty where it has none."""
     commanded_speed: float = math.nan
@@ -98,7 +98,7 @@ class WinchSnapshot(NamedTuple):
             motor_torque=nan,
             cable_length=nan,
             cable_speed=nan,
-            turns_known=self.turns_known,
+            length_known=self.length_known,
             commander=self.commander,
         )
 

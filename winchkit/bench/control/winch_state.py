@@ -64,6 +64,8 @@ class WinchParts:
     """Name of the client that commands it."""
     cable_spec: CableSpec = field(default_factory=CableSpec)
     """The cable as the profile declares it."""
+    capacity: tuple[float, float] = (-math.inf, math.inf)
+    """Least and greatest cable length that its drum can have paid out, m."""
     _read: tuple[Any, ...] = ()
     _instruments: Mapping[str, Instrumented] = field(default_factory=dict)
 
@@ -89,14 +91,15 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
     cable_length = winding_speed = arm = target_speed = math.nan
     following_error, feedback_age, missed_syncs = 0.0, math.inf, sync
     way = _NO_WAY
-    fault, turns_known = False, True
+    fault, doubt = False, axis.position_doubt
     if feedback is not None:
         if parts.cable.has_effects:
             parts.cable.update(_sample(parts, feedback, now))
         cable_length, arm = parts.cable.at(feedback.angle)
         winding_speed = feedback.velocity * arm
-        fault, turns_known = feedback.state in _FAULTS, feedback.turns_known
-        if not turns_known:
+        fault = feedback.state in _FAULTS
+        doubt = doubt or _beyond_the_drum(parts, cable_length)
+        if doubt:
             cable_length = math.nan
         feedback_age = now - (feedback.time if feedback.time > resumed else resumed)
         missed_syncs = sync - 1 - feedback.sync
@@ -138,7 +141,7 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             axis.alarm_text if emergencies else "",
             "" if frozen is None else frozen.unstable,
             "" if frozen is None else _frozen(parts, frozen, now, winding_speed),
-            turns_known,
+            doubt,
             axis.position_jump,
             axis.position_disagreement,
             sensors,
@@ -146,6 +149,17 @@ def known(parts: WinchParts, now: float, sync: int, resumed: float = -math.inf) 
             feedback,
         ),
     )
+
+
+def _beyond_the_drum(parts: WinchParts, length: float) -> str:
+    """Doubt of a length that no drum of the profile can have paid out; empty for any other."""
+    least, greatest = parts.capacity
+    if least <= length <= greatest or math.isnan(length):
+        return ""
+    limit = "below zero" if length < least else f"more than the {greatest:.3f} m that its drum has"
+    doubt = f"6064h would mean {length:.3f} m, which is {limit}"
+    parts.axis.lose_position(doubt)
+    return doubt
 
 
 def _frozen(parts: WinchParts, test: FrozenCell, now: float, speed: float) -> str:
@@ -240,7 +254,7 @@ def _picture(seen: WinchInput, taken: Captured, now: float) -> WinchSnapshot:
             role: item.quality if now - item.received <= item.max_age else "stale"
             for role, item in seen.sensors.items()
         },
-        turns_known=feedback.turns_known,
+        length_known=not seen.length_doubt,
         commander=commander,
         commanded_speed=0.0 - seen.commanded,
     )

@@ -32,8 +32,9 @@ TARED = ("cell", "load", "length")
 """Roles whose instruments can be tared; a row holds the gross value beside the net one."""
 
 _DRIVE = {"motor_angle": "rad", "motor_velocity": "rad/s", "motor_torque": "N m"}
-_OF_PROFILE = {"cable_length": "m", "cable_speed": "m/s"}
-"""Of the cable, from the motor angle; a log keeps what the bench showed, a run does not."""
+_OF_PROFILE = {"cable_length": "m", "cable_speed": "m/s", "length_known": "1"}
+"""Of the cable, from the motor angle; a log keeps what the bench showed, a run does not. Where the
+length is not known (0) it is NaN."""
 _of_drive = attrgetter("time", *_DRIVE, *_OF_PROFILE, "phase")
 _TORQUE = 1 + list(_DRIVE).index("motor_torque")
 _TIMES = ("t_request", "t_receive", "t_sample", "t_uncertainty")

@@ -22,7 +22,7 @@ __all__ = ["Replay", "open_replay"]
 _LEAST_WAIT = 2e-3
 """s: shorter waits are longer than ordered on most systems, and the next one makes up for them."""
 _MEASURED = ("motor_angle", "motor_velocity", "motor_torque", "tension", "load", "temperature")
-_SHOWN = ("cable_length", "cable_speed")
+_SHOWN = ("cable_length", "cable_speed", "length_known")
 _PHASES = {phase.value: phase for phase in Phase}
 _UNTOLD: Mapping[str, Any] = {}
 
@@ -167,5 +167,6 @@ def _picture(moment: float, values: Mapping[str, float], told: Mapping[str, Any]
         load_tension=known["load"] if math.isfinite(known["load"]) else known["tension"],
         length=known["length"],
         temperature=known["temperature"],
+        length_known=known["length_known"] != 0.0,
         commander=str(told.get("commander", "")),
     )

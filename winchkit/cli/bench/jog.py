@@ -26,8 +26,8 @@ from winchkit.cli.core.options import (
 )
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
-from winchkit.cli.core.terminal import status_line
-from winchkit.errors import UsageError
+from winchkit.cli.core.terminal import status_line, unknown_length
+from winchkit.errors import NotPermitted, UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
@@ -150,10 +150,24 @@ def _read(
 
 def _jog_for(station: Station, winch: str | None, speed: DirectionKeyword, duration: float) -> None:
     """Keep a dead-man alive from here for a time."""
+    _require_length(station, winch)
     station.jog(winch, **speed)
     hold_on(station, winch, duration)
     station.release(winch)
     _wait(station, winch)
+
+
+def _require_length(station: Station, winch: str | None) -> None:
+    """Refuse a jog that nobody holds while the cable length, and so no limit of it, is known."""
+    status = station.status()
+    name = next(iter(status["winch"])) if winch is None else winch
+    if status["tripped"]:
+        return  # which the jog itself says
+    if name in status["winch"] and not status["winch"][name]["length_known"]:
+        raise NotPermitted(
+            f"{unknown_length(status, name)}; until then only a jog by keys that are held is "
+            "permitted: `winchkit jog` without --for"
+        )
 
 
 def _wait(station: Station, winch: str | None) -> None:

@@ -232,6 +232,7 @@ class KeyboardJog:
                 err=True,
             )
         return [key for key in keys if key in _STOPS]
+
     def _warn(self, warnings: list[str]) -> None:
         """Print each new warning, such as a motor that has not turned."""
         for words in warnings:

@@ -110,6 +110,7 @@ def status_table(status: Mapping[str, Any]) -> Table:
             *status["tripped"],
             *status["blocked"],
             *filter(None, [status.get("not_commissioned")]),
+            *status.get("warnings", ()),
             *(f"bus {n}: {t}" for n, b in buses if (t := _lost(b))),
             *_refused(status),
         ]
@@ -128,7 +129,7 @@ def status_table(status: Mapping[str, Any]) -> Table:
         table.add_row(
             cell(name),
             cell(winch["phase"]),
-            _number(winch["cable_length"], 4, "m"),
+            _number(winch["cable_length"], 4, "m") if winch["length_known"] else cell("unknown"),
             _number(winch["cable_speed"], 3, "m/s"),
             _number(winch["motor_torque"], 3, "N m"),
             _number(winch["load_tension"], 1, "N"),

@@ -205,6 +205,10 @@ def _escaped(stream: object) -> TextIO:
     return cast("TextIO", escaped)
 
 
+UNKNOWN_LENGTH = "length unknown (home it)"
+"""In place of a cable length that is not known."""
+
+
 def status_line(status: dict[str, Any]) -> str:
     """Length, cable speed (positive pays out), tension and phase of each winch of a status.
 
@@ -212,7 +216,8 @@ def status_line(status: dict[str, Any]) -> str:
     """
     parts = []
     for name, winch in status["winch"].items():
-        text = f"{name}: {_decimals(winch['cable_length'])} m"
+        known = winch["length_known"]
+        text = f"{name}: " + (f"{_decimals(winch['cable_length'])} m" if known else UNKNOWN_LENGTH)
         if winch["length"] is not None:
             text += f" (measured {_decimals(winch['length'], 4)} m)"
         text += f" {_decimals(winch['cable_speed'])} m/s"
@@ -220,6 +225,13 @@ def status_line(status: dict[str, Any]) -> str:
             text += f" {_decimals(winch['load_tension'], 1)} N"
         parts.append(f"{text} {winch['phase']}")
     return "  ".join(parts)
+
+
+def unknown_length(status: dict[str, Any], winch: str) -> str:
+    """Why the cable length of a winch is not known, by its warnings."""
+    about = f"winch {winch}: the cable length is not known"
+    found = [text for text in status["warnings"] if text.startswith(about)]
+    return found[0] if found else f"{about}; home the winch"
 
 
 def _decimals(value: float | None, digits: int = 3) -> str:

@@ -12,6 +12,7 @@ from winchkit.schema.quantity import Duration, Flag, Quantity, Whole, WholeNumbe
 from winchkit.schema.table import Rule, Table
 
 __all__ = [
+    "Encoder",
     "Mode",
     "OptionSpec",
     "PdoSpec",
@@ -48,6 +49,7 @@ class QuirkSpec(Table):
 
 Mode = Literal["PP", "PV", "PT", "HM", "IP", "CSP", "CSV", "CST"]
 MotionMode = Literal["CSP", "CSV", "PV", "IP"]
+Encoder = Literal["absolute", "incremental"]
 
 _ON_REQUEST = (252, 253)
 _RESERVED = range(241, 252)
@@ -127,6 +129,9 @@ class ServoSpec(Table):
     home_offset: str = "0x607C"
     """Object of the home position, as ``index`` or ``index:sub``; a maker-specific one where the
     drive lacks 607Ch."""
+    encoder: Encoder = "incremental"
+    """Whether 6064h is the same after a power cycle (``absolute``), with the zero of a homing, or
+    begins anew (``incremental``)."""
     position_wraps: tuple[Count, Count] | None = None
     """Lowest and highest count of 6064h before it wraps around, where that is not the range of 32
     bits."""

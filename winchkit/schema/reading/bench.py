@@ -244,6 +244,8 @@ def _check_device(
     _check_measured(reading, device, at)
     fitting = _FITTING[device.kind]
     address, other = ("node", "unit") if fitting == ("can",) else ("unit", "node")
+    if "encoder" in raw and not servo:
+        reading.fault((*at, "encoder"), f"'{device.name}' has no encoder; it is of a servo")
     if address not in raw and _is_addressed(device):
         reading.fault((*at, address), f"missing; '{device.name}' is reached by its {address}")
     if other in raw:

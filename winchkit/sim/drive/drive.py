@@ -154,7 +154,8 @@ class SimDrive:
         self._show_modes()
         self._motion.set_mode(Mode.NONE, self._shaft.motor_angle)
         self._motion.halted = False
-        self._motion.settings.zero = 0.0
+        if self._servo.encoder == "incremental":
+            self._motion.settings.zero = self._shaft.motor_angle
         self._motion.settings.read_units()
         self._error = 0
         self._sdo.reset()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -187,4 +188,5 @@ def _servo(ref: DeviceRef, beside: str) -> tuple[ServoSpec, Path]:
     path, device = device_of(ref, beside)
     if device.servo is None:
         raise FileError(f"{path}: '{ref.device}' is not a servo drive; it has no [servo] table")
-    return device.servo, path.parent / device.servo.eds
+    servo = device.servo if ref.encoder is None else replace(device.servo, encoder=ref.encoder)
+    return servo, path.parent / device.servo.eds

@@ -79,6 +79,7 @@ class LiveModel:
             "load_mass": wiring.load_mass,
             "limits": {
                 "speed": limits.speed,
+                "unhomed": limits.speed_unhomed,
                 "length": limits.length,
                 "tension": [limits.tension_slack, limits.tension_high],
             },

@@ -8,7 +8,7 @@ import { choose, progress } from "./programme.js";
 import { live } from "./robot.js";
 import * as strips from "./strips.js";
 import { consequences, together, trip } from "./trip.js";
-import { card, picture as drawn, words as said } from "./winch.js";
+import { card, lengthOf, picture as drawn, words as said } from "./winch.js";
 
 // Values that are older than `OLD` ms, twenty pictures, are grey, and nothing is offered.
 const PERIOD = 50, OLD = 1000, LOOK = 250, ANSWER = 3000, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
@@ -163,7 +163,7 @@ function header() {
   const box = document.getElementById("station");
   if (!box.firstChild) { box.append(el("span", { id: "where" }), el("span", { id: "tripped", class: "chip trip" }, icon("trip"), "Tripped"), el("span", { id: "role" }), stopButton()); if (!root) fill(document.getElementById("stopbar"), stopButton()); }
   const state = now();
-  box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${number(state.cable_length)} m` : ""}${old() && picture ? ` · ${ago()}` : ""}`;
+  box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${lengthOf(state)}` : ""}${old() && picture ? ` · ${ago()}` : ""}`;
   box.querySelector("#tripped").hidden = !tripped().length;
   const role = box.querySelector("#role"), kind = old() ? "unknown" : commands() ? "command" : "watch";
   if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, icon(kind), { unknown: "No values", command: "You command", watch: "Watching" }[kind])); }
@@ -274,6 +274,11 @@ const platform = {
   step: (axis, change, speed) => { if (refused()) return; send("move_pose", { axis, change, speed }); watchMotion("all"); },
 };
 
+// Faster jogs are refused while the cable length is unknown (limits.unhomed).
+function jogSpeed() {
+  const state = now();
+  return state && state.length_known === false ? Math.min(speed, declared.winch[winch].limits.unhomed) : speed;
+}
 // A browser that was too slow for the dead-man ends its jog: the key may be up meanwhile.
 // The press begins a jog, and what follows only refreshes it.
 function beat(what) {
@@ -281,7 +286,7 @@ function beat(what) {
   const at = performance.now();
   if (at - beaten > 1000 * declared.dead_man) { release(); alarm("Jog ended: the browser was too slow. Release and press again.", "bench"); return; }
   beaten = at;
-  send(what, { winch, speed: held * speed });
+  send(what, { winch, speed: held * jogSpeed() });
 }
 
 function release() {
@@ -375,7 +380,7 @@ function refresh() {
   const cell = (name, value, digits, unit, low, high, limits) => el("div", {}, el("span", { class: "note" }, name, aged), el("div", { class: "value" }, value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, unit)), gauge(value, low, high, limits, unit));
   const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, net = Boolean(tensions().gross !== null && picture.status.tare[winch]), winding = state.cable_speed === null ? null : -state.cable_speed;
   const kind = tripped().length ? "tripped" : MOVING.has(state.phase) ? "moving" : state.phase === "stopping" ? "stopping" : "";
-  renew(values, cell("Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell(net ? `Tension, net; gross ${tensions().gross.toFixed(1).replace("-", "−")} N` : "Tension", state.tension, 1, "N", 0, top * 1.05, tension),
+  renew(values, cell(state.length_known === false ? "Cable length unknown: home the winch; held jogs only" : "Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell(net ? `Tension, net; gross ${tensions().gross.toFixed(1).replace("-", "−")} N` : "Tension", state.tension, 1, "N", 0, top * 1.05, tension),
     cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
     el("div", {}, el("span", { class: "note" }, "State", aged), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
   renew(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));

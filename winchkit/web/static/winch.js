@@ -64,8 +64,11 @@ export function picture(name, own, state, drum, tripped) {
   for (const limit of limits) parts.push(text(narrow ? 458 : gx + 48, y(limit) + 4, `limit ${number(limit, 3)}`, { fill: "var(--ink2)", "text-anchor": narrow ? "end" : "start" }));
   parts.push(svg("path", { d: `M${gx - 12} ${at - 6}l9 6l-9 6z`, fill: "var(--ink)" }), svg("line", { x1: gx - 3, x2: gx + 14, y1: at, y2: at, stroke: "var(--ink)", "stroke-width": 2 }));
   parts.push(svg("path", { d: `M20 450v-5m0 2.5h${0.1 * scale}m0 -2.5v5`, stroke: "var(--ink2)", fill: "none" }), text(28 + 0.1 * scale, 452, narrow ? "100 mm at drum and pulleys" : "100 mm, drum and pulleys; distances schematic"));
-  return svg("svg", { viewBox: "0 0 460 460", width: "100%", "font-size": size, role: "img", "aria-label": `Winch ${name}: ${words(state, tripped)}, ${number(state.cable_length)} m, ${state.tension === null ? "no tension" : `${number(state.tension, 4)} N`}` }, parts.filter(Boolean));
+  return svg("svg", { viewBox: "0 0 460 460", width: "100%", "font-size": size, role: "img", "aria-label": `Winch ${name}: ${words(state, tripped)}, ${lengthOf(state)}, ${state.tension === null ? "no tension" : `${number(state.tension, 4)} N`}` }, parts.filter(Boolean));
 }
+
+// Cable length in words.
+export const lengthOf = (state) => state.length_known === false ? "length unknown" : `${number(state.cable_length)} m`;
 
 // A card of one winch among several: a small picture, state and values; a click enlarges it.
 export function card(name, own, state, drum, tripped, chosen, choose) {
@@ -78,5 +81,5 @@ export function card(name, own, state, drum, tripped, chosen, choose) {
     svg("svg", { viewBox: "0 0 40 40", width: 40, height: 40, "aria-hidden": "true" }, svg("circle", { cx: 20, cy: 20, r: 18, fill: "var(--sunk)", stroke: "var(--edge)" }), svg("circle", { cx: 20, cy: 20, r: 10 + 7 * share, fill: "none", stroke: "var(--with)", "stroke-width": 2 }),
       svg("line", { x1: 20, y1: 20, x2: 20 + 10 * Math.cos((state.motor_angle || 0) / (own.ratio || 1)), y2: 20 - 10 * Math.sin((state.motor_angle || 0) / (own.ratio || 1)), stroke: "var(--ink2)", "stroke-width": 3 })),
     el("span", { class: "name" }, el("b", {}, name), el("span", { class: tripped ? "state tripped" : arrow(state.cable_speed) ? "state moving" : "state" }, words(state, tripped)), state.commander ? el("small", {}, `by ${state.commander}`) : null),
-    el("span", { class: "bars" }, bar(state.cable_length, most, limits, "m", 3), bar(state.tension, high * 1.05, own.limits.tension, "N", 0), el("small", {}, `${state.cable_speed === null ? "–" : (-state.cable_speed).toFixed(3).replace("-", "−")} m/s`)));
+    el("span", { class: "bars" }, state.length_known === false ? el("small", {}, lengthOf(state)) : bar(state.cable_length, most, limits, "m", 3), bar(state.tension, high * 1.05, own.limits.tension, "N", 0), el("small", {}, `${state.cable_speed === null ? "–" : (-state.cable_speed).toFixed(3).replace("-", "−")} m/s`)));
 }

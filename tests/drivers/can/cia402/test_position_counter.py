@@ -43,7 +43,7 @@ def test_any_way_shorter_than_half_the_range_a_step_is_counted(
     for number, step in enumerate(steps, 1):
         true += int(step * (high - low + 1))
         assert counter.take(shown(true, low, high), 0.004 * number) - first == true - start
-        assert counter.known
+        assert not counter.doubt
 
 
 def test_a_long_gap_makes_the_turns_unknown() -> None:
@@ -51,16 +51,16 @@ def test_a_long_gap_makes_the_turns_unknown() -> None:
     counter = PositionCounter(0, 4095, fastest=1000.0)
     counter.take(100, 0.0)
     counter.take(100, 2.0)
-    assert counter.known
+    assert not counter.doubt
     counter.take(100, 4.1)
-    assert not counter.known
+    assert counter.doubt
     counter.suspend()
     assert counter.take(5, 4.2) == 5
     counter.resume(homed=False)
-    assert not counter.known, "a homing that found nothing changes nothing"
+    assert counter.doubt, "a homing that found nothing changes nothing"
     counter.suspend()
     counter.resume(homed=True)
-    assert counter.known
+    assert not counter.doubt
 
 
 @given(
@@ -76,7 +76,7 @@ def test_a_motion_up_to_the_greatest_speed_is_no_jump(
         true, time = true + round(share * 1000.0 * span), time + span
         counter.take(shown(true, 0, 4095), time)
     assert counter.jump == 0.0
-    assert counter.known
+    assert not counter.doubt
 
 
 @pytest.mark.parametrize("after", [0.004, 0.5])
@@ -88,7 +88,7 @@ def test_a_change_faster_than_the_motor_can_turn_is_a_jump(after: float, jump: i
         counter = PositionCounter(-(2**31), 2**31 - 1, fastest=1000.0)
         counter.take(7, 0.0)
         counter.take(7 + jump * size, after)
-        assert (counter.jump != 0.0, counter.known) == (jumped, not jumped)
+        assert (counter.jump != 0.0, bool(counter.doubt)) == (jumped, jumped)
         if jumped:
             assert counter.jump == jump * size
 
@@ -108,22 +108,21 @@ def test_the_zero_that_a_homing_sets_is_no_jump() -> None:
     counter.resume(homed=True)
     counter.take(1, 0.008)
     assert counter.jump == 0.0
-    assert counter.known
+    assert not counter.doubt
 
 
 def test_a_drive_that_restarts_after_a_crossing_has_lost_its_turns() -> None:
     counter = PositionCounter(0, 4095)
     counter.take(4000, 0.0)
-    counter.restart(forgotten=True)
+    counter.restart("")
     counter.take(3, 0.1)
-    assert (counter.known, counter.offset) == (True, 0)
+    assert (counter.doubt, counter.offset) == ("", 0)
     counter.take(4000, 0.2)
     assert counter.offset == -4096
-    counter.restart(forgotten=False)
     assert counter.take(4001, 0.3) == -95
-    counter.restart(forgotten=True)
+    counter.restart("")
     assert counter.take(7, 0.4) == 7
-    assert not counter.known
+    assert "wrapped" in counter.doubt
 
 
 def frames_of(made: HandMade, count: int, velocity: int = 0) -> None:
@@ -144,7 +143,7 @@ def test_an_axis_counts_on_over_three_ends_of_32_bits(way: int) -> None:
         assert feedback is not None
         assert feedback.angle == pytest.approx(number * step * SCALE.angle, rel=1e-12)
         assert feedback.shown == shown(number * step, *I32)
-        assert feedback.turns_known
+        assert made.axis.position_doubt == ""
 
 
 def test_a_velocity_mode_goes_on_beyond_the_end() -> None:

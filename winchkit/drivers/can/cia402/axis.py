@@ -21,7 +21,7 @@ from winchkit.drivers.can.cia402.feedback import (
 )
 from winchkit.drivers.can.cia402.mode_change import change_mode, require_mode
 from winchkit.drivers.can.cia402.modes import MODES, Homing, Target, homing_state, status_words
-from winchkit.drivers.can.cia402.motor_position import MotorPosition
+from winchkit.drivers.can.cia402.motor_position import KeptPosition, MotorPosition
 from winchkit.drivers.can.cia402.profile_parameters import (
     HomingSpec,
     set_homing,
@@ -85,7 +85,7 @@ class Cia402Axis:
         """Host-loss mechanism of the drive; its ``silent`` ends the life signs, to stop it."""
         self.heartbeat = self.host.heartbeat
         self._position = MotorPosition(
-            device.servo, watch.speed, response=watch.response, late=watch.late
+            device.servo, watch.speed, watch.play, response=watch.response, late=watch.late
         )
         self._gathering: Gathering | None = None
         self._commander: Commander | None = None
@@ -125,6 +125,7 @@ class Cia402Axis:
         # Only a boot-up after this one takes away what is set up now.
         self._boot_ups = self.heartbeat.boot_ups
         self._beats, self._watched = self._bus.beats[self._watch.host], False
+        self._position.look(self._node)
         drive = commission(self._node, self.servo, self._watch, self._clock, self.host)
         self.host.await_operational()
         if self._watch.prove:
@@ -242,9 +243,27 @@ class Cia402Axis:
         self._others.forget()
 
     @property
-    def position_absolute(self) -> bool:
-        """Whether the drive's count alone is its position: no range of 6064h was left or missed."""
-        return self._position.absolute
+    def position_doubt(self) -> str:
+        """Why the motor angle is not known, in words; empty where it is."""
+        position = self._position
+        return position.after_boot_up() if self.mapping_lost else position.doubt
+
+    @property
+    def position_mark(self) -> tuple[int, str, bool]:
+        """What of the position's record changes besides the count."""
+        return self._position.mark
+
+    def keep_position(self, *, closed: bool) -> KeptPosition | None:
+        """The position for the record, ``closed`` at rest; None before the first feedback."""
+        return self._position.keep(closed=closed)
+
+    def recall_position(self, kept: KeptPosition | None) -> None:
+        """Take what the record says of the position; before it is commissioned."""
+        self._position.recall(kept)
+
+    def lose_position(self, doubt: str) -> None:
+        """Take the position as unknown until the drive is homed, for a reason in words."""
+        self._position.lose(doubt)
 
     @property
     def position_jump(self) -> str:
@@ -259,10 +278,6 @@ class Cia402Axis:
     def forget_position_jump(self) -> None:
         """A reset begins; the position stays unknown until the drive is homed."""
         self._position.forget_jump()
-
-    def lose_position(self) -> None:
-        """Take the position as unknown until the drive is homed; before it is commissioned."""
-        self._position.lose()
 
     def disarm(self) -> None:
         """Switch the host-loss mechanism of the drive, at rest, off; raises ConnectionLost."""

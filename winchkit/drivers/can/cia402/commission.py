@@ -22,7 +22,7 @@ from winchkit.drivers.can.cia402.units import Scale, read_scale
 from winchkit.drivers.can.host_loss.proof import HostLoss, Proof
 from winchkit.drivers.can.host_loss.watch import HostWatch
 from winchkit.drivers.clock import Clock
-from winchkit.errors import NoReply, NotPermitted
+from winchkit.errors import DeviceRefused, NoReply, NotPermitted
 from winchkit.schema.devices.servo import OptionSpec, ServoSpec
 
 __all__ = ["Commissioned", "WatchSpec", "await_booted", "commission"]
@@ -55,6 +55,8 @@ class WatchSpec:
     """Of the motor, that a profile mode may use, rad/s^2; 0 leaves the drive's own."""
     quick_stop: float = 0.0
     """Of the motor in a quick stop, rad/s^2 (6085h); 0 leaves the drive's own."""
+    quick_stop_declared: bool = True
+    """Whether a drive that does not take it is refused; else its own ramp is a note."""
     prove: bool = True
     """Whether every commissioning proves that the drive notices a withheld heartbeat."""
     limits: LimitsAtShaft = field(default_factory=LimitsAtShaft)
@@ -65,6 +67,8 @@ class WatchSpec:
     """Longest lag of the motor's speed, s, with which 6064h and 606Ch are compared; 0: not."""
     late: float = 0.0
     """What the motor turns from rest within that, rad."""
+    play: float = 0.0
+    """Of the motor at rest, from one process to the next, rad."""
     options: OptionSpec = field(default_factory=OptionSpec)
     """Option codes that count before those of the device file."""
     hardware: str = ""
@@ -105,6 +109,8 @@ class Commissioned:
     """Host-loss mechanism, and the known reaction of the enabled drive."""
     stops_on_nmt: bool = False
     """Whether it was seen to leave operation enabled on NMT stopped; False where unknown."""
+    heartbeat: int | None = None
+    """1017h, ms; None where it has none."""
     notes: tuple[str, ...] = ()
     """Findings and changes, for the user who opens the bench."""
 
@@ -131,8 +137,7 @@ def commission(
     host.set_up()
     on_error = _set_error_behaviour(node)
     limits = set_limits(node, scale, watch.limits)
-    if watch.quick_stop:
-        set_quick_stop(node, servo, scale, watch.quick_stop)
+    notes = (*notes, *_set_quick_stop(node, servo, scale, watch))
     change_mode(node, mode, clock)
     if watch.acceleration and not MODES[mode].cyclic:
         # The drive's own ramps must not come in the way of those that the host makes.
@@ -145,8 +150,24 @@ def commission(
         *(mode, modes, scale, tpdo, rpdo, options, limits, cycle, on_error),
         host_loss=loss,
         stops_on_nmt=stops,
+        heartbeat=node.read_if_there(0x1017),
         notes=notes,
     )
+
+
+def _set_quick_stop(
+    node: SdoNode, servo: ServoSpec, scale: Scale, watch: WatchSpec
+) -> tuple[str, ...]:
+    """Write 6085h and read it back; a note where a drive keeps a ramp that nobody declared."""
+    if not watch.quick_stop:
+        return ()
+    try:
+        set_quick_stop(node, servo, scale, watch.quick_stop)
+    except (NotPermitted, DeviceRefused) as error:
+        if watch.quick_stop_declared:
+            raise
+        return (f"{error}; until then its quick stops have the drive's own ramp",)
+    return ()
 
 
 def await_booted(

@@ -38,6 +38,7 @@ _QUANTITIES = (POSITION, VELOCITY, TORQUE, CURRENT)
 _WITHOUT: Mapping[Key, int | None] = {MODE: None, ERROR: 0}
 """What is shown where a drive does not send it."""
 _new = tuple.__new__
+_CONTRADICTED = "606Ch has contradicted 6064h"
 _NONE = 0
 """No TPDO has this number."""
 _KEPT = 3
@@ -71,8 +72,6 @@ class AxisFeedback(NamedTuple):
     """A; NaN where the drive does not send it."""
     shown: int | None = None
     """6064h in counts as the drive shows it; ``angle`` counts on where it wraps."""
-    turns_known: bool = True
-    """Whether ``angle`` counts every turn: not after a gap in which 6064h may have wrapped."""
 
     @property
     def limited(self) -> bool:
@@ -202,7 +201,7 @@ class Gathering:
             position, status = values[position_at], values[status_at]
             turned, velocity = counter.take(position, time) * angle, values[velocity_at] * speed
             if not counter.jump and compare(time, turned, velocity):
-                counter.known = False
+                counter.lose(_CONTRADICTED)
             self._complete += 1
             # What AxisFeedback(...) makes, without the call of its constructor.
             self.feedback = _new(
@@ -219,7 +218,6 @@ class Gathering:
                     values[error_at],
                     values[current_at] * current,
                     position,
-                    counter.known,
                 ),
             )
 

@@ -1,35 +1,87 @@
-"""Position of a motor over many turns of its counter, and its standstill."""
+"""Position of a motor over many turns of its counter and over power cycles, and its standstill.
+
+6064h of an absolute encoder is the same after a power cycle. That of an incremental one begins
+anew, which nothing in the count shows where it begins at the value that it had. A power cycle shows
+in the objects that the set-up wrote: they are volatile, and have their defaults again.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
+from winchkit.drivers.can.canopen.node import SdoNode, object_name
 from winchkit.drivers.can.cia402.commission import Commissioned
 from winchkit.drivers.can.cia402.feedback import AxisFeedback, counter_range
 from winchkit.drivers.can.cia402.position_agreement import PositionAgreement
 from winchkit.drivers.can.cia402.position_counter import PositionCounter
 from winchkit.drivers.can.cia402.standstill import Standstill
+from winchkit.errors import DeviceRefused
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["MotorPosition"]
+__all__ = ["KeptPosition", "MotorPosition"]
+
+Key = tuple[int, int]
+"""Index and sub-index of an object."""
+
+_POSITION, _HEARTBEAT, _SERIAL = (0x6064, 0), (0x1017, 0), (0x1018, 4)
+_MAPPING, _RECORD = 0x1A00, 0x1800
+"""Of TPDO 1: its mapping and its communication record."""
+_RESTARTED = "the drive has restarted, and the count of its incremental encoder began anew"
+
+
+@dataclass(frozen=True)
+class KeptPosition:
+    """A drive's position as a later process finds it in the record."""
+
+    count: int
+    """6064h as the drive showed it."""
+    offset: int = 0
+    """Whole ranges of the counter that were crossed, in counts."""
+    doubt: str = ""
+    """Why the position was not known, in words; empty where it was."""
+    closed: bool = False
+    """Whether the drive was disabled, at rest; else a process was about to move it."""
+    serial: int = 0
+    """1018h:4; 0 where the drive has none."""
+    objects: Mapping[Key, int] = field(default_factory=dict)
+    """Volatile objects as the set-up had written them."""
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What a drive shows before anything is written to it."""
+
+    count: int
+    serial: int
+    """0 where it has none."""
+    restarted: str
+    """Evidence that it was switched off since the set-up before, in words."""
 
 
 class MotorPosition:
-    """One axis's; it outlives every commissioning, so that crossings of the counter's end count."""
+    """One axis's; it outlives every commissioning, so that crossings of the counter's end count.
+
+    The one place where it is decided whether the motor angle is known: :attr:`doubt`.
+    """
 
     def __init__(
         self,
         servo: ServoSpec,
         fastest: float = 0.0,
+        play: float = 0.0,
         *,
         response: float = 0.0,
         late: float = 0.0,
     ) -> None:
-        """Take the greatest speed of the motor, rad/s; 0 where it is not known.
+        """Take the greatest speed of the motor, rad/s (0: not known), and how far it moves while
+        it is at rest, rad.
 
         ``response`` (s) is the longest lag of its speed, ``late`` what it turns within that, rad.
         """
-        self._wraps, self._fastest = servo.position_wraps, fastest
+        self._wraps, self._fastest, self._play = servo.position_wraps, fastest, play
+        self._incremental = servo.encoder == "incremental"
         self._response, self._late = response, late
         self.agreement = PositionAgreement()
         """Of its 6064h with 606Ch."""
@@ -38,12 +90,23 @@ class MotorPosition:
         self._standstill: Standstill | None = None
         self._boot_ups = 0
         self._angle = math.nan
-        self._lost = False
+        self._kept: KeptPosition | None = None
+        self._serial = 0
+        self._objects: Mapping[Key, int] = {}
+        self._found: _Found | None = None
 
     @property
-    def absolute(self) -> bool:
-        """Whether the drive's count alone is the position, for a later process too."""
-        return not self._lost if self.counter is None else self.counter.absolute
+    def doubt(self) -> str:
+        """Why the position is not known, in words; empty where it is."""
+        return "" if self.counter is None else self.counter.doubt
+
+    @property
+    def mark(self) -> tuple[int, str, bool]:
+        """What of the record changes besides the count: ranges crossed, doubt, no homing runs."""
+        counter = self.counter
+        if counter is None:
+            return 0, "", False
+        return counter.offset, counter.doubt, counter.settled
 
     @property
     def jump(self) -> str:
@@ -66,20 +129,53 @@ class MotorPosition:
         if self.counter is not None:
             self.counter.jump = 0.0
 
-    def lose(self) -> None:
-        """An earlier process has lost count of the ranges, or has counted some."""
-        self._lost = True
+    def lose(self, doubt: str) -> None:
+        """The position is not known, until a homing; one that is under way decides itself."""
+        if self.counter is not None and self.counter.settled:
+            self.counter.lose(doubt)
+
+    def recall(self, kept: KeptPosition | None) -> None:
+        """Take what the record says, before the first commissioning; None without one."""
+        self._kept = kept
+
+    def keep(self, *, closed: bool) -> KeptPosition | None:
+        """The position for the record; None before the first feedback."""
+        counter = self.counter
+        if counter is None or not math.isfinite(counter.last):
+            return None
+        closed = closed and counter.settled
+        last = int(counter.last)
+        return KeptPosition(
+            last, counter.offset, counter.doubt, closed, self._serial, self._objects
+        )
+
+    def look(self, node: SdoNode) -> None:
+        """Look for signs of a power cycle; before the set-up writes anything.
+
+        Raises NoReply, DeviceRefused.
+        """
+        before = self._objects
+        if self.counter is None:
+            before = {} if self._kept is None else self._kept.objects
+        restarted = _evidence(node, before) if before else ""
+        serial = node.read_if_there(*_SERIAL) or 0
+        self._found = _Found(node.read(*_POSITION), serial, restarted)
 
     def begin(self, drive: Commissioned, boot_ups: int) -> PositionCounter:
         """The counter of a drive that has been set up; a boot-up has reset it."""
-        counter = self.counter
+        counter, found = self.counter, self._found
+        assert found is not None, "the axis has looked before the set-up"
+        booted = boot_ups != self._boot_ups
         if counter is None:
             low, high = self._wraps or counter_range(drive.tpdo)
             counter = PositionCounter(low, high, self._fastest / drive.scale.angle)
-            counter.known = not self._lost
+            self._resume(counter, found, drive.scale.angle, booted=booted)
+        elif booted or found.restarted:
+            evidence = _RESTARTED if booted else found.restarted
+            counter.restart(evidence if self._incremental else "")
         self._angle = drive.scale.angle
-        counter.restart(forgotten=boot_ups != self._boot_ups)
         self.counter, self._boot_ups = counter, boot_ups
+        self._serial, self._objects = found.serial, dict(_written(drive))
         self._standstill = Standstill(drive.scale)
         self.agreement = PositionAgreement(
             drive.scale.angle,
@@ -106,3 +202,97 @@ class MotorPosition:
         elif before == "HM":
             self.counter.resume(homed=homed)
             self.agreement.resume()
+
+    def after_boot_up(self) -> str:
+        """Why the position is not known once a boot-up message has come; empty where it is."""
+        return self.doubt or (_RESTARTED if self._incremental else "")
+
+    def _resume(
+        self, counter: PositionCounter, found: _Found, unit: float, *, booted: bool
+    ) -> None:
+        """Go on from the record where the drive's counter has gone on since.
+
+        Without it the count of an absolute encoder is the position, unless it had left its range.
+        """
+        kept = self._kept
+        if kept is not None and kept.serial != found.serial:
+            counter.doubt = (
+                f"it is another drive: its serial number (1018h:4) is {found.serial} and was "
+                f"{kept.serial}"
+            )
+            return
+        doubt = self._break(kept, found, counter.span, unit, booted=booted)
+        if kept is not None and (kept.doubt or not doubt):
+            counter.offset, counter.doubt = kept.offset, kept.doubt
+        elif self._incremental:
+            counter.doubt = doubt
+        elif kept is not None and kept.offset:
+            counter.doubt = f"6064h had wrapped in an earlier process, and {doubt}"
+
+    def _break(
+        self, kept: KeptPosition | None, found: _Found, span: int, unit: float, *, booted: bool
+    ) -> str:
+        """Why the counter may not have gone on since the record, in words; empty where it has."""
+        if kept is None:
+            return "there is no record of where its incremental encoder stood"
+        if booted:
+            return _RESTARTED
+        if found.restarted:
+            return found.restarted
+        if not kept.closed:
+            return "the process that moved it last ended without closing its record"
+        moved = (found.count - kept.count + span // 2) % span - span // 2
+        if abs(moved * unit) > self._play:
+            return (
+                f"6064h is {found.count} and was {kept.count} when it was closed: the drive was "
+                "switched off, set, or turned since"
+            )
+        return ""
+
+
+def _written(drive: Commissioned) -> Iterator[tuple[Key, int]]:
+    """Volatile objects that the set-up has written and verified."""
+    if drive.heartbeat is not None:
+        yield _HEARTBEAT, drive.heartbeat
+    for codec in drive.tpdo:
+        mapping, record = (first + codec.spec.number - 1 for first in (_MAPPING, _RECORD))
+        yield (record, 2), codec.spec.transmission
+        yield (mapping, 0), len(codec.objects)
+        for position, item in enumerate(codec.objects, start=1):
+            yield (mapping, position), item.entry
+
+
+def _evidence(node: SdoNode, written: Mapping[Key, int]) -> str:
+    """Evidence that a drive was switched off since these objects were written, in words.
+
+    One that has another value has its default again. Where all that was written is the default
+    a power cycle would not show, and counts as one.
+    """
+    tells = False
+    for (index, sub), value in written.items():
+        try:
+            now = node.read_if_there(index, sub)
+        except DeviceRefused:
+            now = None
+        if now != value:
+            shown = "absent" if now is None else f"{now:X}h"
+            return (
+                f"the drive was switched off since, or set up by another program: "
+                f"{object_name(index, sub)} is {shown}, and {value:X}h was written"
+            )
+        tells = tells or _default(node, index, sub) not in (None, value)
+    if tells:
+        return ""
+    return (
+        "nothing in the drive would show that it was switched off: its TPDO mapping and 1017h are "
+        "those after power-on"
+    )
+
+
+def _default(node: SdoNode, index: int, sub: int) -> int | None:
+    """Value after power-on by the EDS, else by CiA 301; None where it is unknown."""
+    variable = node.dictionary.get_variable(index, sub)
+    default = None if variable is None else variable.default
+    if isinstance(default, int):
+        return default
+    return 0 if (index, sub) == _HEARTBEAT else None

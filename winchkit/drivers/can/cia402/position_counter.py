@@ -23,7 +23,7 @@ class PositionCounter:
     """One drive's counter; ``low`` to ``high`` are the counts that it can show."""
 
     __slots__ = (
-        "_fastest", "_kept", "_step", "gap", "half", "high", "jump", "known", "last", "low",
+        "_fastest", "_kept", "_step", "doubt", "gap", "half", "high", "jump", "last", "low",
         "offset", "span", "time",
     )  # fmt: skip
 
@@ -41,19 +41,19 @@ class PositionCounter:
         self.time = -inf
         self.offset = 0
         """Whole ranges that were crossed, in counts: to be added to what the drive shows."""
-        self.known = True
-        """Whether no crossing can have been missed."""
+        self.doubt = ""
+        """Why the position is not known, in words; empty while it is."""
         self.jump = 0.0
         """Change between two successive values that no motion explains, in counts; 0 for none."""
-        self._kept = (0, True)
+        self._kept: tuple[int, str] | None = None
 
     def take(self, count: int, time: float) -> int:
         """Take a count of the drive and the time of its sampling (s); returns it unwrapped."""
         change = count - self.last
         if abs(change) > self._step:
             self._far(change, time)
-        if time - self.time > self.gap:
-            self.miss()
+        if time - self.time > self.gap and self.time > -inf:
+            self.lose("6064h may have wrapped while nothing was heard of the drive")
         self.last, self.time = count, time
         return count + self.offset
 
@@ -66,42 +66,39 @@ class PositionCounter:
             self.offset += turned
             change += turned
         if abs(change) > self._fastest * (time - self.time + _DELAY):
-            self.jump, self.known = change, False
+            self.jump = change
+            self.lose("6064h has jumped")
 
-    def miss(self) -> None:
-        """Note a gap that is too long; one before the first value is none."""
-        if self.time > -inf:
-            self.known = False
+    def lose(self, doubt: str) -> None:
+        """The position is not known from now on, until a homing; the first reason stands."""
+        self.doubt = self.doubt or doubt
 
     @property
-    def absolute(self) -> bool:
-        """Whether the drive's count alone is the position, for a later process too.
+    def settled(self) -> bool:
+        """Whether no homing is under way, which may move the zero or fail."""
+        return self._kept is None
 
-        A homing under way may fail, and then counts as none.
+    def restart(self, doubt: str) -> None:
+        """Begin anew with a drive that has restarted; ``doubt`` says what became of its count.
+
+        A count that had crossed the end says nothing any more in any case.
         """
-        return self.known and self.offset == 0 and self._kept == (0, True)
-
-    def restart(self, *, forgotten: bool) -> None:
-        """Begin anew, with a drive that has forgotten its count or kept it.
-
-        A count that had crossed the end says nothing any more once the drive has restarted.
-        """
-        if forgotten:
-            self.known = self.known and self.offset == 0
-            self.offset, self.last, self.time = 0, inf, -inf
+        if doubt or self.offset:
+            self.lose(doubt or "6064h had wrapped before the drive restarted")
+        self.offset, self.last, self.time = 0, inf, -inf
 
     def suspend(self) -> None:
         """Take the drive's counts as they are: while it homes, they jump to the new zero."""
-        self._kept = (self.offset, self.known)
-        self.offset, self.half, self.known = 0, inf, True
+        self._kept = (self.offset, self.doubt)
+        self.offset, self.half, self.doubt = 0, inf, ""
         self._step = inf
 
     def resume(self, *, homed: bool) -> None:
         """Unwrap again: from the new zero where one was found, else from where it was."""
         self.half = self.span // 2
         self._step = min(self.half, self._fastest * _DELAY)
-        self.offset, self.known = (0, True) if homed else self._kept
-        self._kept = (0, True)
+        self.offset, self.doubt = (0, "") if homed or self._kept is None else self._kept
+        self._kept = None
 
     def target(self, counts: int, name: str) -> int:
         """Counter value for an unwrapped target; raises NotPermitted beyond its end.

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.bench.control.latch import LatchFile
 from winchkit.bench.control.snapshot import Trip
+from winchkit.bench.records.latch import LatchFile
 from winchkit.errors import NotPermitted
 
 TRIP = Trip("state", "A", "the drive left operation enabled", latches=True)
@@ -46,28 +46,6 @@ def test_a_trip_that_was_not_closed_stands_too(tmp_path: Path) -> None:
     latch, _ = opened(path)
     latch.keep([TRIP])
     assert [trip.kind for trip in opened(path)[1]] == ["state"]
-
-
-def test_a_lost_position_outlives_the_process_and_a_reset(tmp_path: Path) -> None:
-    path = tmp_path / "bench.trip.json"
-    latch, _ = opened(path)
-    latch.keep([TRIP], {"B"})
-    latch.clear()
-    latch.close()
-    again, trips = opened(path)
-    assert trips == ()
-    assert again.lost == {"B"}
-    again.keep([], ())
-    again.close()
-    assert not path.exists()
-
-
-@pytest.mark.parametrize("lost", ["null", '"A"', "7", "{}"])
-def test_a_record_with_other_lost_positions_counts_as_latched(tmp_path: Path, lost: str) -> None:
-    path = tmp_path / "bench.trip.json"
-    text = f'{{"schema": 1, "tripped": [], "positions_lost": {lost}}}'
-    path.write_text(text.ljust(8191) + "\n", encoding="utf-8")
-    assert opened(path)[1][0].kind == "latch file"
 
 
 @given(content=st.binary(max_size=200) | st.text(max_size=100).map(str.encode))

@@ -1,0 +1,112 @@
+"""The record of positions, by its bytes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from winchkit.bench.records.position_file import PositionFile
+from winchkit.drivers.can.cia402.motor_position import KeptPosition
+
+KEPT = KeptPosition(-705_799, 1 << 32, "", True, 77, {(0x1A00, 1): 0x60410010, (0x1017, 0): 50})
+_positions = st.builds(
+    KeptPosition,
+    count=st.integers(-(2**31), 2**32 - 1),
+    offset=st.integers(-(2**40), 2**40),
+    doubt=st.text(max_size=300),
+    closed=st.booleans(),
+    serial=st.integers(0, 2**32 - 1),
+    objects=st.dictionaries(
+        st.tuples(st.integers(0, 0xFFFF), st.integers(0, 255)),
+        st.integers(-(2**31), 2**32 - 1),
+        max_size=40,
+    ),
+)
+
+
+def opened(path: Path) -> tuple[PositionFile, list[str]]:
+    file = PositionFile(str(path))
+    return file, [trip.kind for trip in file.open()]
+
+
+@given(st.dictionaries(st.text("ABCDEFGH", min_size=1, max_size=3), _positions, max_size=8))
+def test_what_is_kept_is_found(
+    tmp_path_factory: pytest.TempPathFactory, positions: dict[str, KeptPosition]
+) -> None:
+    """In place, and by a new file at the close; one that is open is a trip."""
+    path = tmp_path_factory.mktemp("record") / "bench.position.json"
+    for closing in (False, True):
+        first, _ = opened(path)
+        (first.close_with if closing else first.keep)(positions)
+        first.close()
+        again, trips = opened(path)
+        assert again.found == positions
+        assert trips == ["owner"] * sum(not kept.closed for kept in positions.values())
+        again.close()
+        path.unlink()
+
+
+def test_a_shorter_record_leaves_nothing_of_a_longer_one(tmp_path: Path) -> None:
+    path = tmp_path / "bench.position.json"
+    file, _ = opened(path)
+    long = {f"W{number}": KEPT for number in range(60)}
+    assert file.keep(long) is None
+    assert path.stat().st_size > 8192
+    assert file.keep({"W0": KeptPosition(1)}) is None
+    file.close()
+    assert opened(path)[0].found == long | {"W0": KeptPosition(1)}
+
+
+@given(content=st.binary(max_size=200) | st.text(max_size=100).map(str.encode))
+def test_what_cannot_be_read_is_a_trip_and_no_position(
+    tmp_path_factory: pytest.TempPathFactory, content: bytes
+) -> None:
+    path = tmp_path_factory.mktemp("record") / "bench.position.json"
+    path.write_bytes(content)
+    file, trips = opened(path)
+    assert trips == ["position record"]
+    assert file.found == {}
+
+
+def test_a_record_cut_anywhere_is_no_position(tmp_path: Path) -> None:
+    """As after a power failure while it was written."""
+    path = tmp_path / "bench.position.json"
+    file, _ = opened(path)
+    file.keep({"A": KEPT})
+    data = path.read_bytes()
+    for size in (0, 1, 100, len(data.rstrip()) - 1):
+        path.write_bytes(data[:size])
+        assert opened(path)[0].found == {}, size
+
+
+def test_a_record_that_somebody_removed_is_written_anew(tmp_path: Path) -> None:
+    path = tmp_path / "bench.position.json"
+    file, _ = opened(path)
+    os.unlink(path)
+    assert file.keep({"A": KEPT}) is None
+    assert opened(path)[0].found == {"A": KEPT}
+
+
+@pytest.mark.parametrize("kind", ["folder", "fifo", "link", "missing"])
+def test_what_is_no_file_of_ours_is_a_trip(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "bench.position.json"
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "fifo":
+        os.mkfifo(path)
+    elif kind == "link":
+        path.symlink_to(tmp_path / "elsewhere")
+    else:
+        path = tmp_path / "missing" / "bench.position.json"
+    assert opened(path)[1] == ["position record"]
+
+
+def test_without_a_path_nothing_is_kept() -> None:
+    file = PositionFile("")
+    assert file.open() == ()
+    assert file.keep({"A": KEPT}) is None
+    assert file.found == {}
