@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fake_axis import CYCLE, Rig
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.motion import Jog
 from winchkit.schema.bench import LimitSpec
 
@@ -20,8 +21,7 @@ def step(rig: Rig, missed: int = 0) -> None:
 
 
 def jogging(rig: Rig, speed: float) -> Jog:
-    jog = Jog(rig.cable(), _LIMITS)
-    jog.refresh(speed, rig.now + 1e3)
+    jog = Jog(rig.cable(), _LIMITS, speed, DeadMan(rig.now + 1e3))
     rig.controller().begin(jog)
     return jog
 

@@ -244,7 +244,7 @@ def test_limits_unhomed_forbids_or_limits_the_jogs(rig: Rig) -> None:
     with opened(rig, unhomed="50 mm/s") as bench:
         bench.winch["A"].jog(wind_in=0.05)
         with pytest.raises(NotPermitted, match=r"up to 0\.05 m/s"):
-            bench.winch["A"].jog(wind_in=0.051)
+            bench.winch["A"].refresh(wind_in=0.051)
         rig.wait(1.0)
 
 
