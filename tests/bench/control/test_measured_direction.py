@@ -7,6 +7,7 @@ import math
 import pytest
 
 from fake_axis import CYCLE, Rig
+from winchkit.bench.control.dead_man import DeadMan
 from winchkit.bench.control.motion import Jog
 from winchkit.bench.control.snapshot import Phase
 from winchkit.schema.bench import LimitSpec
@@ -20,9 +21,8 @@ def jogging(winding_speed: float, length: float = 4.0) -> Rig:
     rig = Rig(LIMITS)
     rig.axes["A"].angle = (4.0 - length) / ARM
     rig.step(2)
-    source = Jog(rig.cable(), rig.limits)
-    source.refresh(winding_speed, rig.now + 1e6)
-    rig.controller().begin(source)
+    jog = Jog(rig.cable(), rig.limits, winding_speed, DeadMan(math.inf))
+    rig.controller().begin(jog)
     rig.run(0.3)
     return rig
 

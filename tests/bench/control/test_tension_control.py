@@ -182,7 +182,6 @@ def test_a_cable_that_breaks_under_control_trips_within_a_third_of_a_second(
 ) -> None:
     held = Breaking(half(travel=0.1), 2e4, present)
     held.breaks = held.rig.now + after
-    held.control.refresh(held.rig.now + 30.0)
     held.rig.controller().begin(held.control)
     while not held.rig.supervisor.tripped:
         held.rig.step()
@@ -210,7 +209,6 @@ def test_a_cable_softer_than_its_bound_and_a_little_slack_comes_to_the_tension(
     softer: float, present: float, slack: float
 ) -> None:
     held = Held(half(120.0, travel=0.1), 2e4 / softer, present - slack * 2e4 / softer)
-    held.control.refresh(held.rig.now + 60.0)
     held.run(40.0)
     assert not held.rig.supervisor.tripped
     assert held.tension == pytest.approx(120.0, abs=20.0)
