@@ -70,7 +70,7 @@ def test_a_drive_that_missed_the_first_command_gets_further_ones(rig: Rig) -> No
 def test_a_bus_that_does_not_open_is_reported_for_its_winches_alone(rig: Rig) -> None:
     text = rig.bench_file.read_text()
     text += '[bus.gone]\nkind = "can"\ninterface = "socketcan"\nchannel = "no-such-can"\n'
-    path = rig.write_bench(text.replace('bus = "can", node = 1 ', 'bus = "gone", node = 1 '))
+    path = rig.write_bench(text.replace('bus = "can", node = 1,', 'bus = "gone", node = 1,'))
     results = stop_on_bus(read_bench(path), rig.clock)
     assert [one.winch for one in results if not one.confirmed] == ["A"]
     assert "bus 'gone': cannot open" in results[0].message

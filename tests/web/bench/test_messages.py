@@ -263,12 +263,12 @@ def test_what_ended_a_motion_is_reported_once_and_only_to_the_page_that_ordered_
 def test_a_refused_jog_is_not_taken_up_before_it_is_released(page: Page) -> None:
     page.station.error = NotPermitted("winch A: only winding in is allowed")
     jog = {"do": "jog", "winch": "A", "speed": -0.05}
-    assert page.send({**jog, "seen": now()}, {**jog, "seen": now()}) == (
-        "winch A: only winding in is allowed"
-    )
+    held = {**jog, "do": "refresh"}
+    said = page.send({**jog, "seen": now()}, {**held, "seen": now()}, {**held, "seen": now()})
+    assert said == "winch A: only winding in is allowed"
     assert page.station.calls == []
-    page.send({"do": "release", "winch": "A"}, {**jog, "seen": now()})
-    assert [call[0] for call in page.station.calls] == ["release", "jog"]
+    page.send({"do": "release", "winch": "A"}, {**jog, "seen": now()}, {**held, "seen": now()})
+    assert [call[0] for call in page.station.calls] == ["release", "jog", "refresh"]
 
 
 def test_a_message_that_repeats_is_said_again_and_one_that_is_over_goes(page: Page) -> None:

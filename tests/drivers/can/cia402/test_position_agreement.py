@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from counter_agreement import (
@@ -48,7 +48,11 @@ def test_the_smallest_jump_and_the_slowest_motion_are_those_of_the_safety_page(n
 def test_a_counter_that_counts_another_multiple_is_seen(
     speed: float, multiple: float, before: float
 ) -> None:
-    """Within 4 s, and within 20 mm where it is wrong by a factor of two or more."""
+    """Within 4 s, and within 20 mm where it is wrong by a factor of two or more.
+
+    The tolerance of a speed that never changed is 0.15 rad/s for 4 s, and 0.06 rad of a late one.
+    """
+    assume(4.0 * abs(speed) / RADIUS * (abs(multiple - 1.0) - 0.05) > 0.7)
     compare = agreement_of(DRIVES["generic-cia402"])
     velocity, angle, now = speed / RADIUS, 0.0, 0.0
     while now < before:
