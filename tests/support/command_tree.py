@@ -15,7 +15,7 @@ __all__ = ["commands", "examples"]
 def commands() -> Iterator[tuple[str, click.Command]]:
     """Each command and group with its words; the root has none."""
     yield "", main
-    root = click.Context(main, info_name="winchkit", auto_envvar_prefix="WINCHKIT")
+    root = click.Context(main, info_name="winchkit", **main.context_settings)
     for name in COMMANDS:
         yield from _below(root, main, name, name)
 

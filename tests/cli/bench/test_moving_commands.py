@@ -80,6 +80,7 @@ def test_moves_that_cannot_be_meant(
         (("--wind-in", "0.1 m/s"), "--wind-in SPEED needs --for TIME"),
         (("--wind-in", "50 mm", "--for", "1s"), "is a length here and must be a speed"),
         (("--pay-out", "-0.1 m/s", "--for", "1s"), "must be above zero"),
+        (("--pay-out", "0.1 m/s", "--for", "0s"), "no time to move in"),
         (("--pay-out", "50mm", "--speed", "-0.1m/s"), "--speed -0.1m/s: must be above zero"),
         (("--pay-out", "0.1m/s", "--for", "1s", "--speed", "1m/s"), "does not belong to --for"),
         (("--pay-out", "0.1m/s", "--wind-in", "0.1m/s", "--for", "1s"), "opposite directions"),

@@ -121,7 +121,7 @@ def test_an_unknown_shell() -> None:
 
 def every_option() -> Iterator[tuple[str, click.Option]]:
     """Each option of each command, with the command's words."""
-    context = click.Context(main, info_name="winchkit", auto_envvar_prefix="WINCHKIT")
+    context = click.Context(main, info_name="winchkit", **main.context_settings)
     for name in COMMANDS:
         command = main.get_command(context, name)
         assert command is not None

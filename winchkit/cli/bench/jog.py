@@ -142,6 +142,8 @@ def _read(
             )
         if speed is not None:
             raise UsageError(f"--speed does not belong to --for: {_HOW}")
+        if not limit > 0:
+            raise UsageError(f"--for: '{duration}' is no time to move in; write such as '2 s'")
         _ = direction.speed
     elif direction is not None and direction.dimension == "speed":
         raise UsageError(f"no time is given: {direction.option} SPEED needs --for TIME: {_HOW}")
