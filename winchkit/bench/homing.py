@@ -24,6 +24,7 @@ _SHOWN = 3
 """Cycles until a change of mode is seen in feedback and judged."""
 _SAME = 2e-3
 """Of cable, within which a length counts as defined, m."""
+_UNFINISHED = "a homing has set another zero, and ended before the length by it was known"
 
 
 def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[None]:
@@ -46,6 +47,7 @@ def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[No
             zero = winch.snapshot.motor_angle
         if asked.at is not None:
             yield from _define(bench, winch, winch.motor_angle_at(asked.at) + zero)
+        axis.note_zero()
     finally:
         if winch.moving:
             winch.stop()
@@ -126,6 +128,7 @@ def _run(
     bench.wait_at_rest((winch.name,))
     if motion.failure:
         raise DriveFault(f"winch {winch.name}: homing failed: {motion.failure} ({axis.fault_text})")
+    axis.note_zero(_UNFINISHED)
 
 
 def _prepare(axis: Cia402Axis, specs: list[HomingSpec]) -> None:

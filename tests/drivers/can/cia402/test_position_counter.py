@@ -56,10 +56,10 @@ def test_a_long_gap_makes_the_turns_unknown() -> None:
     assert counter.doubt
     counter.suspend()
     assert counter.take(5, 4.2) == 5
-    counter.resume(homed=False)
+    counter.resume(None)
     assert counter.doubt, "a homing that found nothing changes nothing"
     counter.suspend()
-    counter.resume(homed=True)
+    counter.resume("")
     assert not counter.doubt
 
 
@@ -105,7 +105,7 @@ def test_the_zero_that_a_homing_sets_is_no_jump() -> None:
     counter.take(100_000, 0.0)
     counter.suspend()
     counter.take(0, 0.004)
-    counter.resume(homed=True)
+    counter.resume("")
     counter.take(1, 0.008)
     assert counter.jump == 0.0
     assert not counter.doubt

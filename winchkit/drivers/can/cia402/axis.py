@@ -265,6 +265,13 @@ class Cia402Axis:
         """Take the position as unknown until the drive is homed, for a reason in words."""
         self._position.lose(doubt)
 
+    def note_zero(self, doubt: str = "") -> None:
+        """A homing has set the drive's zero; ``doubt`` says why the position is not known yet.
+
+        The status word does not say it later: some drives clear bits 10 and 12 when disabled.
+        """
+        self._position.note_zero(doubt)
+
     @property
     def position_jump(self) -> str:
         """Change of 6064h that no motion explains, in words; empty without one."""
@@ -440,7 +447,6 @@ class Cia402Axis:
         """
         drive = self._disabled_drive(f"change to {mode}")
         require_mode(self._node, drive.modes, mode)
-        homed = self.homing is Homing.DONE
         commander = Commander(self.name, drive, self._node.node, mode, self._position.counter)
         before, previous = self._commander, self._mode.name
         # From here on cyclic PDOs must carry the new mode, lest they set the old one again.
@@ -455,7 +461,7 @@ class Cia402Axis:
             if self._commander is not None:
                 self._stop_frames = self._commander.stop_frames()
             raise
-        self._position.changed_mode(previous, mode, homed=homed)
+        self._position.changed_mode(previous, mode)
 
     def prepare_homing(self, homing: HomingSpec) -> None:
         """Set a homing up and change to HM, disabled; ``send`` with ENABLE and ``start`` runs it.

@@ -94,6 +94,8 @@ class MotorPosition:
         self._serial = 0
         self._objects: Mapping[Key, int] = {}
         self._found: _Found | None = None
+        self._zero: str | None = None
+        """Doubt of the zero that the drive has set since it homes; None where it has set none."""
 
     @property
     def doubt(self) -> str:
@@ -192,15 +194,20 @@ class MotorPosition:
             return False
         return self._standstill.take(seen.time, seen.angle, seen.velocity)
 
-    def changed_mode(self, before: str, mode: str, *, homed: bool) -> None:
+    def note_zero(self, doubt: str) -> None:
+        """The drive has set its zero; ``doubt`` says why the position by it is not known yet."""
+        self._zero = doubt
+
+    def changed_mode(self, before: str, mode: str) -> None:
         """While it homes, the drive's count jumps to the new zero: it is taken as it is."""
         if self.counter is None or before == mode:
             return
         if mode == "HM":
+            self._zero = None
             self.counter.suspend()
             self.agreement.suspend()
         elif before == "HM":
-            self.counter.resume(homed=homed)
+            self.counter.resume(self._zero)
             self.agreement.resume()
 
     def after_boot_up(self) -> str:

@@ -93,11 +93,14 @@ class PositionCounter:
         self.offset, self.half, self.doubt = 0, inf, ""
         self._step = inf
 
-    def resume(self, *, homed: bool) -> None:
-        """Unwrap again: from the new zero where one was found, else from where it was."""
+    def resume(self, zero: str | None) -> None:
+        """Unwrap again: from where it was, or from a new zero with a doubt of it, empty for none."""
         self.half = self.span // 2
         self._step = min(self.half, self._fastest * _DELAY)
-        self.offset, self.doubt = (0, "") if homed or self._kept is None else self._kept
+        if zero is not None:
+            self.doubt = zero
+        elif self._kept is not None:
+            self.offset, self.doubt = self._kept
         self._kept = None
 
     def target(self, counts: int, name: str) -> int:
