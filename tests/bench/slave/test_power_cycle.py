@@ -13,7 +13,7 @@ from slave.held_key import HeldKey
 from slave.rig import Rig, bench_text
 from slave.wire import GENERIC
 from winchkit.bench.bench import Bench
-from winchkit.errors import LimitTripped, NotPermitted
+from winchkit.errors import DriveFault, LimitTripped, NotPermitted
 
 _LENGTH = 3.9
 _ARM = 2.957e-3
@@ -296,3 +296,30 @@ def test_every_bench_has_its_quick_stop_ramp(rig: Rig) -> None:
         assert bench.axes["A"].objects.read(0x6085) * math.tau / 65536 * _ARM == pytest.approx(
             3.0, rel=0.01
         )
+
+
+@pytest.mark.parametrize("encoder", ["incremental", "absolute"])
+def test_a_homing_counts_where_the_disabled_drive_does_not_say_so(rig: Rig, encoder: str) -> None:
+    rig.slaves[0].inject("homing forgotten")
+    with opened(rig, encoder) as bench:
+        bench.winch["A"].home(at=4.0)
+        assert bench.winch["A"].cable_length == pytest.approx(4.0, abs=2e-3)
+        assert not bench.snapshot.warnings
+        bench.winch["A"].move_to(3.98)
+
+
+@pytest.mark.parametrize("encoder", ["incremental", "absolute"])
+def test_a_zero_that_is_not_what_was_asked_for_makes_the_length_unknown(
+    rig: Rig, encoder: str
+) -> None:
+    """Whatever was known before: the drive attained its homing, and its zero has moved."""
+    with opened(rig, encoder) as bench:
+        winch = bench.winch["A"]
+        winch.home(at=4.0)
+        rig.slaves[0].inject("home offset ignored")
+        with pytest.raises(DriveFault, match="may not add its home offset"):
+            winch.home(at=3.0)
+        rig.wait(0.1)
+        require_unknown(bench, "before the length by it was known")
+    with opened(rig, encoder) as bench:
+        require_unknown(bench, "before the length by it was known")

@@ -229,6 +229,8 @@ _ROWS = (
         "an incremental encoder: after power-on or a reset of the node 6064h has this value",
         0,
     ),
+    Fault("homing forgotten", "bits 10 and 12 of 6041h are clear once it is disabled"),
+    Fault("home offset ignored", "a homing sets 6064h to zero whatever 607Ch is"),
     Fault("velocity stuck", "606Ch no longer changes"),
     Fault("position stuck", "6064h no longer changes"),
     Fault("status frozen", "6041h no longer changes"),

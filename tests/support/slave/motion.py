@@ -187,6 +187,8 @@ class Motion:
             reached = abs(self.motor.velocity - target) < 0.05
             return (0x400 if reached else 0) | (0x1000 if self.motor.at_rest else 0)
         if self.mode == HM:
+            if not enabled and "homing forgotten" in self.faults:
+                return 0
             idle = not profile.searching
             return (0x400 if idle else 0) | (0x1000 if profile.homed else 0)
         if self.mode == IP:
@@ -286,6 +288,7 @@ class Motion:
         if not self.motor.at_rest:
             self._ramp(0.0, 0x6084, dt)
             return
-        self.offset = self.objects.get(0x607C) - round(self.motor.angle / self.unit)
+        zero = 0 if "home offset ignored" in self.faults else self.objects.get(0x607C)
+        self.offset = zero - round(self.motor.angle / self.unit)
         profile.searching, profile.homed, profile.reached = False, True, True
         self.reference = 0.0

@@ -94,7 +94,7 @@ class PositionCounter:
         self._step = inf
 
     def resume(self, zero: str | None) -> None:
-        """Unwrap again: from where it was, or from a new zero with a doubt of it, empty for none."""
+        """Unwrap again: from where it was, or from a new zero and a doubt of it (empty: none)."""
         self.half = self.span // 2
         self._step = min(self.half, self._fastest * _DELAY)
         if zero is not None:
