@@ -27,6 +27,7 @@ __all__ = [
     "extrapolation",
     "held_out",
     "held_out_rms",
+    "held_out_samples",
     "left_out_steps",
     "signed_rank_p_value",
 ]
@@ -107,8 +108,8 @@ def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds)
     return _steps(residual, columns, np.concatenate(folds.of), folds.count)
 
 
-def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
-    """Held-out rms error per output, SI."""
+def held_out_samples(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> list[Array]:
+    """Held-out error of every sample, one array per segment, SI."""
     inverse_sigma = noise.inverse_sigma(regression)
     white = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
     shared = _shared(regression, fit)
@@ -118,10 +119,15 @@ def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -
     plain_columns = _in_time(regression, shared)
     fold = np.concatenate(folds.of)
     left = plain - np.einsum("ij,ij->i", plain_columns, steps[fold])
-    squares, at = dict.fromkeys(regression.outputs, 0.0), 0
-    for segment in regression.segments:
-        part = left[at : at + segment.band.count]
-        at += segment.band.count
+    ends = np.cumsum([segment.band.count for segment in regression.segments])
+    return np.split(left, ends[:-1])
+
+
+def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> dict[str, float]:
+    """Held-out rms error per output, SI."""
+    squares = dict.fromkeys(regression.outputs, 0.0)
+    parts = held_out_samples(regression, fit, noise, folds)
+    for segment, part in zip(regression.segments, parts, strict=True):
         squares[segment.output] += float(part @ part)
     return {o: float(np.sqrt(total / regression.n_samples(o))) for o, total in squares.items()}
 

@@ -8,7 +8,7 @@ first missing part of the model.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,7 +26,14 @@ from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.residuals.attribution import MOST_PLACES, Attribution
 from winchkit.diagnosis.residuals.traces import PoseTrace, pose_traces
-from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, plain_step
+from winchkit.diagnosis.results import (
+    Estimate,
+    OutputFit,
+    RobotDiagnosis,
+    Step,
+    Verdict,
+    plain_step,
+)
 from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.candidates import GEOMETRY
 from winchkit.diagnosis.robot.engine import PoseSelection
@@ -46,10 +53,11 @@ from winchkit.diagnosis.robot.prior import GeometryPrior
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.robot.trajectory_regression import regression_at
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
-from winchkit.diagnosis.steps import candidates_of, steps_of
-from winchkit.diagnosis.verdict.decision import Judgement, judge
+from winchkit.diagnosis.steps import candidates_of, standing_of, steps_of, with_standing
+from winchkit.diagnosis.verdict.decision import remaining_share, verdict_of
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
+from winchkit.diagnosis.verdict.laws import simplified
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.model.stages import Stage
@@ -86,7 +94,7 @@ class RobotAnswer(Answer):
     def __init__(
         self, selection: RobotSelection, sets: Sequence[EquivalenceSet], diagnosis: RobotDiagnosis
     ) -> None:
-        super().__init__(selection.engine, selection.judgement.reported, diagnosis, sets)
+        super().__init__(selection.engine, selection.result, diagnosis, sets)
         self.selection = selection
 
     @property
@@ -97,7 +105,7 @@ class RobotAnswer(Answer):
 
 @dataclass(frozen=True)
 class RobotSelection:
-    """A selection on poses and its judgement.
+    """A selection on poses and its verdict.
 
     Attributes
     ----------
@@ -108,16 +116,45 @@ class RobotSelection:
     file_engine : PoseSelection
         Engine with the geometry of the file; the same object where the geometry was not free.
     result : SelectionResult
-        Result of the selection.
-    judgement : Judgement
-        Verdict and named effects.
+        Result of the selection, with the simplest laws.
     """
 
     preparation: Preparation
     engine: PoseSelection
     file_engine: PoseSelection
     result: SelectionResult
-    judgement: Judgement
+
+    @classmethod
+    def of(
+        cls, preparation: Preparation, engine: PoseSelection, file_engine: PoseSelection
+    ) -> RobotSelection:
+        """Search with an engine."""
+        result = stepwise_selection(engine)
+        final, noise = simplified(engine, result.final, result.noise)
+        return cls(preparation, engine, file_engine, replace(result, final=final, noise=noise))
+
+    @cached_property
+    def outputs(self) -> dict[str, OutputFit]:
+        """Errors of every output before and after."""
+        return output_fits_of(self.initial_model, self.final, self.preparation.noise)
+
+    @property
+    def n_added(self) -> int:
+        """Number of effects that the selection added."""
+        return len(self.result.final.hypothesis.terms) - self.engine.n_initial_terms
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on the errors; the noise is that of repeats or of the instruments."""
+        refitted = self.geometry_is_free or bool(self.preparation.found)
+        return verdict_of(
+            self.outputs,
+            steps=self.n_added + refitted,
+            noise_known=True,
+            deciding=self.outputs,
+            refuted=(),
+            predictable=lambda: True,
+        )
 
     @property
     def geometry_is_free(self) -> bool:
@@ -138,10 +175,8 @@ class RobotSelection:
     @cached_property
     def final(self) -> FittedModel:
         """The model with all named effects."""
-        reported, engine = self.judgement.reported, self.engine
-        return FittedModel(
-            engine.regression, reported.final, reported.noise, engine.regression.groups
-        )
+        result, engine = self.result, self.engine
+        return FittedModel(engine.regression, result.final, result.noise, engine.regression.groups)
 
     @cached_property
     def errors(self) -> tuple[Errors, Errors]:
@@ -176,47 +211,56 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     geometry
         How the geometry was taken: ``file`` or ``refitted``.
     """
-    engine, judgement, preparation = selection.engine, selection.judgement, selection.preparation
-    reported, verdict = judgement.reported, judgement.verdict
-    added = range(engine.n_initial_terms, len(reported.final.hypothesis.terms))
-    sets = [equivalence_set(engine, reported.final, reported.noise, index) for index in added]
-    steps = tuple(map(plain_step, steps_of(engine, reported, sets))) if sets else ()
-    outputs = output_fits_of(selection.initial_model, selection.final, preparation.noise)
-    if selection.geometry_is_free and verdict in ("adequate", "explained"):
-        verdict = "explained"
-        steps = (_geometry_step(engine, reported, outputs["cable_length"]), *steps)
+    engine, preparation = selection.engine, selection.preparation
+    result, outputs = selection.result, selection.outputs
+    added = range(engine.n_initial_terms, len(result.final.hypothesis.terms))
+    sets = [equivalence_set(engine, result.final, result.noise, index) for index in added]
+    steps = tuple(_steps(selection, sets)) if sets else ()
+    if selection.geometry_is_free and selection.verdict in ("adequate", "explained"):
+        steps = (_geometry_step(engine, result, outputs["cable_length"]), *steps)
     if preparation.found:
-        verdict = "explained" if verdict == "adequate" else verdict
         steps = (*_registered_steps(selection, outputs), *steps)
     diagnosis = RobotDiagnosis(
-        verdict=verdict,
+        verdict=selection.verdict,
         outputs=outputs,
         steps=steps,
-        candidates=candidates_of(engine, selection.result),
+        candidates=candidates_of(engine, result),
         detectable=detectable(
-            selection.result.scores,
-            DetectionThreshold(engine.penalty_per_parameter, selection.result.threshold),
+            result.scores, DetectionThreshold(engine.penalty_per_parameter, result.threshold)
         ),
-        unexplained_share=judgement.share,
-        where=_places(selection) if selection.result.lack_of_fit else (),
-        next_runs=next_pose_runs(engine.regression, reported.final.hypothesis, pairs_of(sets)),
+        unexplained_share=remaining_share(outputs),
+        where=_places(selection) if result.lack_of_fit else (),
+        next_runs=next_pose_runs(engine.regression, result.final.hypothesis, pairs_of(sets)),
         notes=(
             *preparation.dataset.notes,
             *missing_pose_excitation(preparation),
-            *judgement.notes,
             *_datum_notes(steps),
         ),
         geometry=geometry,
         fit=fit_statistics(
             engine.regression,
-            reported.initial_model,
-            reported.final,
-            reported.noise,
-            spread_of(engine.regression, reported.final, reported.noise, engine.regression.blocks),
+            result.initial_model,
+            result.final,
+            result.noise,
+            spread_of(engine.regression, result.final, result.noise, engine.regression.blocks),
         ),
         traces=_traces(selection, named=bool(steps)),
     )
     return RobotAnswer(selection, sets, diagnosis)
+
+
+def _steps(selection: RobotSelection, sets: Sequence[EquivalenceSet]) -> Iterator[Step]:
+    """Every addition with its share and doubts; no free curve is compared with its law."""
+    engine, result = selection.engine, selection.result
+    final, noise, folds = result.final, result.noise, engine.regression.groups
+    for place, step in enumerate(map(plain_step, steps_of(engine, result, sets))):
+        index = engine.n_initial_terms + place
+        without = engine.refit(final.hypothesis.without(index), noise)
+        errors = engine.held_out_errors(without, noise, folds)
+        standing = standing_of(
+            errors, selection.outputs, final.hypothesis.terms[index].effect.outputs
+        )
+        yield with_standing(engine, result, step, index=index, standing=standing)
 
 
 def _traces(selection: RobotSelection, *, named: bool) -> tuple[PoseTrace, ...]:
@@ -248,7 +292,7 @@ def _registered_steps(
     selection: RobotSelection, outputs: Mapping[str, OutputFit]
 ) -> tuple[Step, ...]:
     """Effects of the tracker that were registered before the selection, as additions."""
-    engine, reported = selection.engine, selection.judgement.reported
+    engine, reported = selection.engine, selection.result
     spread = spread_of(engine.regression, reported.final, reported.noise, engine.regression.blocks)
     own = estimates(engine.regression, reported.final, spread)
     output = outputs.get("platform_position", outputs["cable_length"])
@@ -330,18 +374,16 @@ def diagnose_robot(
     file_engine = preparation.file_geometry()
     if _geometry_explains_far_more(preparation, file_engine):
         return _concluded(preparation, preparation.free_geometry(), file_engine)
-    result = stepwise_selection(file_engine)
-    if added := result.final.hypothesis.terms[file_engine.n_initial_terms :]:
+    found = RobotSelection.of(preparation, file_engine, file_engine)
+    if found.n_added:
         # Poses estimated from inconsistent cable lengths are tilted, which unbalances tensions.
+        added = found.result.final.hypothesis.terms[file_engine.n_initial_terms :]
         file_engine = preparation.file_geometry(_inconsistent(added))
-        result = stepwise_selection(file_engine)
-    judgement = judge(file_engine, result)
-    if judgement.verdict in ("adequate", "explained") and not _geometry_is_off(
-        preparation, file_engine, result
+        found = RobotSelection.of(preparation, file_engine, file_engine)
+    if found.verdict in ("adequate", "explained") and not _geometry_is_off(
+        preparation, file_engine, found.result
     ):
-        return answer_of(
-            RobotSelection(preparation, file_engine, file_engine, result, judgement), "file"
-        )
+        return answer_of(found, "file")
     return _concluded(preparation, preparation.free_geometry(), file_engine)
 
 
@@ -388,10 +430,7 @@ def _concluded(
     preparation: Preparation, engine: PoseSelection, file_engine: PoseSelection
 ) -> RobotAnswer:
     """Answer with the geometry free."""
-    result = stepwise_selection(engine)
-    return answer_of(
-        RobotSelection(preparation, engine, file_engine, result, judge(engine, result)), "refitted"
-    )
+    return answer_of(RobotSelection.of(preparation, engine, file_engine), "refitted")
 
 
 def _geometry_is_off(

@@ -36,6 +36,7 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.series import harmonic_series
 from winchkit.effects.term import Term
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["LastValue", "SelectionEngine", "Trial"]
 
@@ -194,6 +195,11 @@ class SelectionEngine(ABC):
         return self._last_lack_of_fit_test.of(
             present, noise, lambda: self._test_lack_of_fit(present, noise)
         )
+
+    @property
+    def profile(self) -> WinchProfile | None:
+        """Profile of the winch, for plausible ranges relative to one of its numbers."""
+        return None
 
     @property
     def penalty_per_parameter(self) -> float:

@@ -29,6 +29,7 @@ from winchkit.diagnosis.selection.scores import Projected
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
+from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["TimeSeriesSelection"]
 
@@ -70,6 +71,11 @@ class TimeSeriesSelection(SelectionEngine):
             own = np.hstack([offsets, jacobian[:, jacobian.shape[1] - states :]])
             return noise_from_repeats(self.regression, residual, self._thermal_signatures, own)
         return noise_saturated(self.regression, residual, jacobian, self.signatures.columns)
+
+    @property
+    def profile(self) -> WinchProfile:
+        """Profile of the winch."""
+        return self.regression.dataset.profile
 
     @property
     def coarse(self) -> CoarseTimeSeries | None:

@@ -27,6 +27,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="direction",
     what="A stuck pulley or an eyelet: friction grows with the angle of wrap.",
     formula="T1 = T0 exp(s μ α)",
     source="Euler-Eytelwein; Cable-winding device, Eq. 19",

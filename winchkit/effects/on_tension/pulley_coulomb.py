@@ -27,6 +27,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="direction",
     what="Bearing friction in proportion to the force on the bearing, equal on all pulleys.",
     formula="T1 = T0 + s μ N, N = √(T0² − 2 T0 T1 cos α + T1²)",
     source="Cable-winding device, Eq. 20–23, solved in closed form; about 0.02 per sheave",

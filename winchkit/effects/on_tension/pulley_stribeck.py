@@ -41,6 +41,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="speed",
+    reduces_to=("pulley-coulomb", "pulley-capstan"),
     what="Bearing friction is higher at low speed, before a film of grease builds up.",
     formula="T1 = T0 + s N (μc + (μs − μc) exp(−(v/vs)²))",
     source="Stribeck curve (Armstrong-Hélouvry et al. 1994) with Eq. 22 for N",

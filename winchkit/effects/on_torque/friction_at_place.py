@@ -31,6 +31,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    reduces_to=("motor-coulomb",),
     what="Friction is larger around one position: a damaged tooth or bearing, dirt, a bent shaft.",
     formula="τ + s c exp(−((φ − φ0)/w)²), φ the drum angle since the reference",
     source="Coulomb friction with a smooth window",

@@ -26,6 +26,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="direction",
     what="Tooth friction in proportion to the load: more motor torque winding in, less paying out.",
     formula="τ/η winding in, τ η paying out, smooth between",
     source="Cable-winding device, Eq. 10: 0.68 over six bearings and a belt",

@@ -16,6 +16,7 @@ EFFECT = Effect(
     parameters=(Parameter("torque", "N m", null=0.0, typical=0.02, low=0.0, high=1e6),),
     apply=apply,
     outputs=("motor_torque",),
+    variable="direction",
     what="Coulomb friction of bearings, seals and gears, independent of the load.",
     formula="τ + s c",
     source="Coulomb friction",

@@ -38,6 +38,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="speed",
+    reduces_to=("motor-coulomb",),
     what="Friction of bearings and seals is higher at low speed, before a film builds up.",
     formula="τ + s b exp(−(θ'/ω_s)²)",
     source="Stribeck curve (Armstrong-Hélouvry et al. 1994)",

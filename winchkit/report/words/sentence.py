@@ -103,13 +103,11 @@ def cause_and_error(diagnosis: Diagnosis) -> tuple[str, str]:
         gain = gain_text(outputs, _opening(steps)) or _NO_GAIN
         parts = [gain, still_text(outputs)]
         if diagnosis.verdict == "partly":
-            parts += [_unexplained(diagnosis, "Partly unexplained"), _nearest(diagnosis)]
+            parts += [_unexplained(diagnosis, "Partly unexplained")]
         return _named(steps, diagnosis.data), " ".join(part for part in parts if part)
     if diagnosis.verdict == "partly":
-        opening = "Partly explained by known effects, none of which is named"
-        return f"{_unexplained(diagnosis, opening)} {_nearest(diagnosis)}".strip(), ""
-    opening = "Nothing is named" if diagnosis.closest else "Unexplained by any known effect"
-    return _closest(diagnosis) + _unexplained(diagnosis, opening), ""
+        return _unexplained(diagnosis, "Partly unexplained"), ""
+    return _unexplained(diagnosis, "Unexplained by any known effect"), ""
 
 
 def changes_text(diagnosis: Diagnosis) -> str:
@@ -335,26 +333,6 @@ def _in_one(name: str, output: OutputFit) -> str:
     if output.noise_rms is None:
         return text
     return f"{text} (noise {quantity(output.noise_rms, output.unit)})"
-
-
-def _closest(diagnosis: Diagnosis) -> str:
-    """The effects that would explain the residual, and why they are not named; or nothing."""
-    if not diagnosis.closest:
-        return ""
-    parts = [f"{clause(each.effect)}, but {each.reason}" for each in diagnosis.closest]
-    return f"Closest: {'; '.join(parts)}. "
-
-
-def _nearest(diagnosis: Diagnosis) -> str:
-    """The effects that explain a part and may imitate its cause; or nothing."""
-    if not diagnosis.closest:
-        return ""
-    parts = []
-    for each in diagnosis.closest:
-        values = values_text(each.parameters)
-        parts.append(clause(each.effect) + (f" ({values})" if values else ""))
-    which = "A further part is" if diagnosis.steps else "A part is"
-    return f"{which} explained by these effects, or they imitate its cause: {'; '.join(parts)}."
 
 
 def _unexplained(diagnosis: Diagnosis, opening: str) -> str:

@@ -30,6 +30,7 @@ VERDICT_NAMES = {
     "explained": "Explained",
     "partly": "Partly explained",
     "unknown": "Unknown",
+    "undecided": "Undecided",
 }
 OUTPUT_NAMES = {
     "cable_length": "cable length",

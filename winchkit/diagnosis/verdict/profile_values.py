@@ -1,0 +1,78 @@
+"""Effects of the profile at their file values, and those whose refitted values predict better."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.intervals import Spread, estimates
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.results import Doubt, OutputFit, Place, Step
+from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.stepwise import SelectionResult
+from winchkit.diagnosis.steps import standing_of
+from winchkit.effects.term import Term
+
+__all__ = ["file_model", "refitted_steps"]
+
+
+def file_model(engine: SelectionEngine, noise: Noise) -> Fit:
+    """The profile's effects at their file values; offsets and initial states are fitted."""
+    start = engine.initial_model
+    held = Hypothesis(tuple(map(_held, start.terms)), start.nuisances, start.starts)
+    return fit(engine.regression, held, noise.inverse_sigma(engine.regression))
+
+
+def _held(term: Term) -> Term:
+    """A term whose values are not fitted."""
+    fixed = tuple(replace(p, role="fixed") for p in term.effect.parameters)
+    return Term(replace(term.effect, parameters=fixed, polar=None), term.values)
+
+
+def refitted_steps(
+    engine: SelectionEngine,
+    result: SelectionResult,
+    outputs: Mapping[str, OutputFit],
+    spread: Spread,
+) -> Iterator[Step]:
+    """A step for every effect of the profile whose file values predict an output worse by 2 %.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    result
+        Result of the selection; all values of its final model are fitted.
+    outputs
+        Errors of the file and of the final model.
+    spread
+        Uncertainty of the unknowns of the final model.
+    """
+    final, noise, regression = result.final, result.noise, engine.regression
+    folds = engine.folds(final, noise)
+    now = engine.held_out_errors(final, noise, folds)
+    fitted = estimates(regression, final, spread)
+    for index, old in enumerate(engine.initial_model.terms):
+        start = final.hypothesis.with_term_at(index, _held(old))
+        beside = fit(regression, start, noise.inverse_sigma(regression))
+        errors = engine.held_out_errors(beside, noise, folds)
+        if all(errors[name] <= error / RELEVANT_RATIO for name, error in now.items()):
+            continue
+        term, values = fitted[index]
+        standing = standing_of(errors, outputs, term.effect.outputs)
+        gain = 1 - min(now[name] / errors[name] for name in now if errors[name]) ** 2
+        what = "more is left in its outputs than a tenth of what its new value explains"
+        yield Step(
+            (term.effect.id,),
+            {term.effect.id: values},
+            gain,
+            place=tuple(Place(*at) for at in term.effect.place),
+            certain=standing.certain,
+            share=standing.share,
+            doubts=() if standing.certain else (Doubt("remaining", what),),
+            refitted=True,
+            file_values={name: old.values[name] for name in values},
+        )
