@@ -16,6 +16,7 @@ from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
@@ -37,6 +38,7 @@ from winchkit.diagnosis.selection.stepwise import (
     stepwise_selection,
 )
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.selection.transitions import scanned_transitions, with_fitted_transitions
 from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.diagnosis.steps import candidates_of, standing_of, steps_of, with_standing
 from winchkit.diagnosis.verdict.decision import (
@@ -48,13 +50,14 @@ from winchkit.diagnosis.verdict.decision import (
 )
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
-from winchkit.diagnosis.verdict.laws import simplified
+from winchkit.diagnosis.verdict.laws import simplified, with_first_members
 from winchkit.diagnosis.verdict.open_law import better_curve, predictable_share
 from winchkit.diagnosis.verdict.profile_values import file_model, refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.location import located
 from winchkit.effects.term import Term
+from winchkit.effects.transition import with_transitions
 from winchkit.rendering import Plotted
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -227,14 +230,15 @@ def diagnose_prepared(
     engine = selection_engine(dataset, catalogue)
     if caveats(dataset.sanity) and not as_recorded:
         return _unsearched(engine)
+    file = engine.initial_model
     known: list[SelectionResult] = []
     try:
-        engine.on_trial = _Trials(progress, "fitting", _SEARCH)
-        result = stepwise_selection(engine, known.append)
+        result, rounded = _searched(engine, catalogue, _Trials(progress, "fitting"), known.append)
+        engine, catalogue = rounded or (engine, catalogue)
 
         def searched(offset: Dataset) -> tuple[TimeSeriesSelection, SelectionResult]:
             other = selection_engine(offset, catalogue)
-            other.on_trial = _Trials(progress, "with an offset per run, fitting", _SEARCH)
+            other.on_trial = _Trials(progress, "with an offset per run, fitting")
             return other, stepwise_selection(other)
 
         dataset, (engine, result) = with_offsets_where_better(
@@ -246,14 +250,41 @@ def diagnose_prepared(
         reduced = without_impacts(dataset, result.last_model)
         if reduced is not None:
             engine = selection_engine(reduced, catalogue)
-            engine.on_trial = _Trials(progress, "without impacts, fitting", _SEARCH)
+            engine.on_trial = _Trials(progress, "without impacts, fitting")
             result = stepwise_selection(engine)
         engine.on_trial = _Trials(progress, "naming, compared with", _NAMING)
-        return _answer(engine, result)
+        return _answer(engine, result, file)
     except KeyboardInterrupt:
         if interrupted is not None and known:
             interrupted(_known_at_interrupt(engine, known[0]))
         raise
+
+
+def _searched(
+    engine: TimeSeriesSelection,
+    catalogue: Catalogue,
+    trials: Callable[[str], None],
+    known: Callable[[SelectionResult], None],
+) -> tuple[SelectionResult, tuple[TimeSeriesSelection, Catalogue] | None]:
+    """Result of the search, and engine and catalogue where reversals of friction are rounded.
+
+    As soon as a friction that was found fits better with a transition, the search begins again with
+    it in every law of friction.
+    """
+    transitions: dict[str, float] = {}
+
+    def is_rounded(present: Fit, noise: Noise) -> bool:
+        transitions.update(scanned_transitions(engine, present, noise))
+        return bool(transitions)
+
+    engine.on_trial, engine.on_step = trials, is_rounded
+    result = stepwise_selection(engine, known)
+    if not transitions:
+        return result, None
+    rounded = Catalogue(with_transitions(effect, transitions) for effect in catalogue)
+    again = selection_engine(engine.regression.dataset, rounded)
+    again.on_trial = trials
+    return stepwise_selection(again), (again, rounded)
 
 
 def with_offsets_where_better(
@@ -292,7 +323,9 @@ def with_offsets_where_better(
 class _Trials:
     """Reports the progress of a step by the number of candidates that were fitted."""
 
-    def __init__(self, progress: ProgressCallback, what: str, ends: tuple[float, float]) -> None:
+    def __init__(
+        self, progress: ProgressCallback, what: str, ends: tuple[float, float] = _SEARCH
+    ) -> None:
         self._progress, self._what, self._ends, self._count = progress, what, ends, 0
         progress(what.partition(",")[0], ends[0])
 
@@ -347,21 +380,28 @@ def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
     return WinchAnswer(engine, result, diagnosis)
 
 
-def _answer(engine: TimeSeriesSelection, result: SelectionResult) -> WinchAnswer:
-    """Steps of the final model with their doubts, the verdict, and the next programmes."""
+def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothesis) -> WinchAnswer:
+    """Steps of the final model with their doubts, the verdict, and the next programmes.
+
+    ``file`` are the effects of the profile at their file values.
+    """
     regression, dataset = engine.regression, engine.regression.dataset
-    best = reweighted(engine, *simplified(engine, result.final, result.noise))
+    rounded = with_fitted_transitions(engine, result.final, result.noise)
+    simple, noise = simplified(engine, rounded, result.noise)
+    best = reweighted(engine, with_fitted_transitions(engine, simple, noise), noise)
     found = replace(result, final=best.fit, noise=best.noise)
     found = ordered_by_contribution(engine, found)
     final, noise = found.final, found.noise
-    found = replace(found, initial_model=file_model(engine, noise))
-    outputs = output_fits(engine, (found.initial_model, noise), (final, noise))
-    size = {name: output.noise_rms for name, output in outputs.items()}
     added = range(engine.n_initial_terms, len(final.hypothesis.terms))
     sets = [equivalence_set(engine, final, noise, index) for index in added]
+    final, sets = with_first_members(engine, final, noise, sets)
+    final = with_fitted_transitions(engine, final, noise)
+    found = replace(found, initial_model=file_model(engine, file, noise), final=final)
+    outputs = output_fits(engine, (found.initial_model, noise), (final, noise))
+    size = {name: output.noise_rms for name, output in outputs.items()}
     spread = _spread(engine, found)
     steps = (
-        *refitted_steps(engine, found, outputs, spread),
+        *refitted_steps(engine, found, file, outputs, spread),
         *_steps(engine, found, sets, outputs, spread),
     )
     where = _where(regression, found)

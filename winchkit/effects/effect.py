@@ -86,8 +86,9 @@ class Parameter:
     """Lower bound, in ``unit``."""
     high: float = float("inf")
     """Upper bound, in ``unit``."""
-    role: Literal["amplitude", "shape", "fixed"] = "amplitude"
-    """An amplitude scales the effect, a shape changes its form; a fixed one is not fitted."""
+    role: Literal["amplitude", "shape", "nuisance", "fixed"] = "amplitude"
+    """An amplitude scales the effect, a shape changes its form; a nuisance is fitted and no part of
+    the law; a fixed one is not fitted."""
     reciprocal: bool = False
     """Fitted as 1/value, since the null is infinite (stiffnesses)."""
     grid: tuple[float, ...] = ()

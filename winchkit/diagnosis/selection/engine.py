@@ -118,6 +118,8 @@ class SelectionEngine(ABC):
     ----------
     on_trial : callable
         Called with the id of every candidate before it is fitted.
+    on_step : callable
+        Called with the model and its noise after each addition; the search ends where it is true.
     """
 
     regression: Regression
@@ -133,6 +135,7 @@ class SelectionEngine(ABC):
         self._last_lack_of_fit_test: LastValue[LackOfFitTest] = LastValue()
         self._last_projected: LastValue[Projected] = LastValue()
         self.on_trial: Callable[[str], None] = lambda effect: None
+        self.on_step: Callable[[Fit, Noise], bool] = lambda fitted, noise: False
         self._optima: dict[Hashable, Hypothesis] = {}
         self._refits: list[tuple[Hypothesis, Noise, float, Fit]] = []
         self._refitted: dict[Hashable, Hypothesis] = {}

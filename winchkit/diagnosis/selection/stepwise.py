@@ -174,6 +174,8 @@ def _forward_selection(
         engine.update_signatures(larger.hypothesis)
         present, noise = engine.fit_with_noise(larger.hypothesis, noise)
         present, noise = _exchange_and_eliminate(engine, present, noise)
+        if engine.on_step(present, noise):
+            break
         scores = engine.scores(present, noise)
     return present, noise, tried
 

@@ -17,7 +17,7 @@ Hansen, P. R., Lunde, A., Nason, J. M. (2011). Econometrica 79, 453-497.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import chdtrc
@@ -134,6 +134,14 @@ class EquivalenceSet:
     """Angle between its signature and each rival's, rad."""
     beside: Mapping[str, str] = field(default_factory=dict)
     """Further effect beside which a member explains as much, for members that need one."""
+
+    def beginning_with(self, effect: str) -> EquivalenceSet:
+        """The same set with another member first, beside which the others are compared."""
+        order = sorted(range(len(self.effects)), key=lambda i: self.effects[i] != effect)
+        terms = tuple(self.terms[i] for i in order)
+        fits = tuple(self.fits[i] for i in order)
+        names = tuple(self.effects[i] for i in order)
+        return replace(self, term=terms[0], effects=names, terms=terms, fits=fits)
 
     def only(self, effects: Collection[str]) -> EquivalenceSet:
         """The same set without other members than ``effects``."""

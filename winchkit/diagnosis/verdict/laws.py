@@ -7,7 +7,7 @@ the refitted model without it predicts every output as well, to 2 %.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -18,12 +18,13 @@ from winchkit.diagnosis.results import Estimate
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.starting_values import shape_at_bound
+from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.plausibility import implausible_value
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["reduced_law", "simplified"]
+__all__ = ["reduced_law", "simplified", "with_first_members"]
 
 
 def simplified(engine: SelectionEngine, final: Fit, noise: Noise) -> tuple[Fit, Noise]:
@@ -98,3 +99,25 @@ def _without_needless(engine: SelectionEngine, present: Fit, noise: Noise) -> Fi
         if rise <= 1 / RELEVANT_RATIO and (best is None or rise < best[0]):
             best = rise, without
     return None if best is None else best[1]
+
+
+def with_first_members(
+    engine: SelectionEngine, final: Fit, noise: Noise, sets: Sequence[EquivalenceSet]
+) -> tuple[Fit, list[EquivalenceSet]]:
+    """The model of the first members of all sets, refitted together, and the sets beside it.
+
+    Where it predicts an output worse by more than 2 %, the given model with its own effects first.
+    """
+    hypothesis, first = final.hypothesis, engine.n_initial_terms
+    for index, each in enumerate(sets, start=first):
+        if each.effects[0] != hypothesis.terms[index].effect.id:
+            hypothesis = hypothesis.exchanged(index, each.terms[0], engine.regression.n_runs)
+    own = [term.effect.id for term in final.hypothesis.terms[first:]]
+    if hypothesis is not final.hypothesis:
+        together = engine.refit(hypothesis, noise)
+        folds = engine.folds(final, noise)
+        now = engine.held_out_errors(together, noise, folds)
+        before = engine.held_out_errors(final, noise, folds)
+        if all(now[name] <= error / RELEVANT_RATIO for name, error in before.items()):
+            final, own = together, [each.effects[0] for each in sets]
+    return final, [each.beginning_with(name) for each, name in zip(sets, own, strict=True)]

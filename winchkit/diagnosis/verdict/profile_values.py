@@ -19,9 +19,8 @@ from winchkit.effects.term import Term
 __all__ = ["file_model", "refitted_steps"]
 
 
-def file_model(engine: SelectionEngine, noise: Noise) -> Fit:
+def file_model(engine: SelectionEngine, start: Hypothesis, noise: Noise) -> Fit:
     """The profile's effects at their file values; offsets and initial states are fitted."""
-    start = engine.initial_model
     held = Hypothesis(tuple(map(_held, start.terms)), start.nuisances, start.starts)
     return fit(engine.regression, held, noise.inverse_sigma(engine.regression))
 
@@ -35,6 +34,7 @@ def _held(term: Term) -> Term:
 def refitted_steps(
     engine: SelectionEngine,
     result: SelectionResult,
+    file: Hypothesis,
     outputs: Mapping[str, OutputFit],
     spread: Spread,
 ) -> Iterator[Step]:
@@ -46,6 +46,8 @@ def refitted_steps(
         Selection engine.
     result
         Result of the selection; all values of its final model are fitted.
+    file
+        Effects of the profile at their file values.
     outputs
         Errors of the file and of the final model.
     spread
@@ -55,7 +57,7 @@ def refitted_steps(
     folds = engine.folds(final, noise)
     now = engine.held_out_errors(final, noise, folds)
     fitted = estimates(regression, final, spread)
-    for index, old in enumerate(engine.initial_model.terms):
+    for index, old in enumerate(file.terms):
         start = final.hypothesis.with_term_at(index, _held(old))
         beside = fit(regression, start, noise.inverse_sigma(regression))
         errors = engine.held_out_errors(beside, noise, folds)
