@@ -90,7 +90,7 @@ class LoggerScore:
     @property
     def alarm(self) -> bool:
         """Whether something is said to be missing."""
-        return self.verdict != "adequate"
+        return bool(self.steps) or self.verdict not in {"adequate", "undecided"}
 
     @property
     def ok(self) -> bool:

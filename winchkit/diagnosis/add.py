@@ -19,12 +19,14 @@ from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Score, score
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.selection.transitions import scanned_transitions, with_fitted_transitions
 from winchkit.diagnosis.selection.weighting import Reweighted, reweighted
 from winchkit.diagnosis.verdict.decision import output_fits
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL, placed, variable_of
 from winchkit.effects.term import Term
+from winchkit.effects.transition import with_transitions
 from winchkit.errors import UsageError
 from winchkit.rendering import Shown
 from winchkit.runs.run import Run
@@ -199,7 +201,11 @@ def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -
     reduced = without_impacts(dataset, after[0].hypothesis)
     if reduced is not None:
         engine, before, after = fitted_on(reduced)
-    best = reweighted(engine, *after)
+    if transitions := scanned_transitions(engine, *after):
+        rounded = Catalogue(with_transitions(other, transitions) for other in candidates)
+        engine = _engine(engine.regression.dataset, rounded, effect)
+        after = _fitted(engine, effect_id)[1]
+    best = reweighted(engine, with_fitted_transitions(engine, *after), after[1])
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     outputs = output_fits(engine, before, (best.fit, best.noise))
     terms = tuple(estimates(engine.regression, best.fit, spread))

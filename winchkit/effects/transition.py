@@ -42,12 +42,12 @@ _LEAST = 1e-4
 
 def motor_direction(at: At, values: Values) -> Array:
     """Direction of the motor with the transition of a friction, (n,)."""
-    return _rounded(at.motor_direction, at.motor_rate, values[TRANSITION])
+    return _rounded(at.motor_direction, at.motor_rate, values.get(TRANSITION, 0.0))
 
 
 def cable_direction(at: At, values: Values) -> Array:
     """Direction of the cable with the transition of a friction, (n,)."""
-    return _rounded(at.direction, at.speed, values[TRANSITION])
+    return _rounded(at.direction, at.speed, values.get(TRANSITION, 0.0))
 
 
 def _rounded(direction: Array, rate: Array, transition: float) -> Array:

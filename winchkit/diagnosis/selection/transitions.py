@@ -115,7 +115,7 @@ def with_fitted_transitions(engine: TimeSeriesSelection, final: Fit, noise: Nois
     for unit in _highest_rates(engine):
         for index in _frictions(present.hypothesis, unit)[:1]:
             term = present.hypothesis.terms[index]
-            if term.values[TRANSITION] == 0.0 or Coordinates(term.effect).nuisances:
+            if not term.values.get(TRANSITION) or Coordinates(term.effect).nuisances:
                 continue
             free = engine.refit(_freed(present.hypothesis, index), noise)
             values = free.hypothesis.terms[index]

@@ -42,6 +42,10 @@ AT_NOISE = 1.1
 _EXPLAINED, _PARTLY = 0.1, 0.5
 """Largest share that remains of an explained and of a partly explained excess. Of 127 unseen cases
 the truth leaves at most 0.075, and 0.16 where it is very weak; another effect 0.25 and more."""
+_MEANS = 3.0
+"""Standard errors at the noise, where most models are right: one output in 740 is refuted."""
+_NOISY = 0.1
+"""Noise over the rms of a signal that does not vary by more: instruments in order have 0.03."""
 _UPPER_ROWS = 0.25
 """Share of the highest frequencies of an output from which its white noise is taken."""
 
@@ -72,7 +76,7 @@ def verdict_of(
     predictable
         Whether a free curve or an order predicts a tenth of what remains.
     """
-    at_noise = all(_is_at_noise(output) for output in outputs.values())
+    at_noise = all(is_at_noise(output) for output in outputs.values())
     share = remaining_share(outputs)
     if refuted or (not steps and not deciding):
         share, at_noise = 1.0, False
@@ -85,7 +89,7 @@ def verdict_of(
     return "unknown" if (noise_known and deciding) or predictable() else "undecided"
 
 
-def _is_at_noise(output: OutputFit) -> bool:
+def is_at_noise(output: OutputFit) -> bool:
     return output.noise_rms is not None and output.heldout_rms_after <= AT_NOISE * output.noise_rms
 
 
@@ -148,28 +152,41 @@ def varying_outputs(
 def refuted_outputs(
     regression: TimeSeriesRegression, fit: Fit, noise: Noise, outputs: Mapping[str, OutputFit]
 ) -> set[str]:
-    """Outputs above their noise that each run's own mean predicts better, beyond chance.
+    """Outputs that each run's own mean predicts better than the model, beyond chance.
 
-    The difference of the mean squares is compared with its standard error over blocks of time.
+    The difference of the mean squares is compared with its standard error over blocks of time. At
+    the noise only the variation within the runs is compared: a mean knows the level of its run. An
+    output that is nothing but noise of more than a tenth of its level is no measurement of it.
     """
+    varying = varying_outputs(regression, {name: o.noise_rms for name, o in outputs.items()})
+    noisy = {
+        name
+        for name, output in outputs.items()
+        if name not in varying and (output.noise_rms or 0.0) > _NOISY * output.signal_rms
+    }
     blocks = regression.blocks
     left = held_out_samples(regression, fit, noise, blocks)
     losses = {output: np.zeros(blocks.count) for output in regression.outputs}
     for segment, error, block in zip(regression.segments, left, blocks.of, strict=True):
-        if _is_at_noise(outputs[segment.output]):
-            continue
         samples, valid = regression.measured_of(segment)
         deviation = np.where(valid, samples - np.mean(samples[valid]), 0.0)
-        own = np.bincount(block, weights=error**2 - deviation**2, minlength=blocks.count)
-        losses[segment.output] += own
-    return {output for output, loss in losses.items() if _is_larger(loss[loss != 0.0])}
+        if is_at_noise(outputs[segment.output]):
+            error = np.where(valid, error - np.mean(error[valid]), 0.0)  # noqa: PLW2901
+        losses[segment.output] += np.bincount(
+            block, weights=error**2 - deviation**2, minlength=blocks.count
+        )
+    return noisy | {
+        output
+        for output, loss in losses.items()
+        if _is_larger(loss[loss != 0.0], _MEANS if is_at_noise(outputs[output]) else 1.0)
+    }
 
 
-def _is_larger(losses: Array) -> bool:
-    """Whether the sum of losses per block exceeds zero by more than its standard error."""
+def _is_larger(losses: Array, errors: float) -> bool:
+    """Whether the sum of losses per block exceeds zero by some standard errors."""
     if len(losses) < 2:
         return False
-    return bool(np.sum(losses) > np.sqrt(len(losses)) * np.std(losses, ddof=1))
+    return bool(np.sum(losses) > errors * np.sqrt(len(losses)) * np.std(losses, ddof=1))
 
 
 def output_fits(
