@@ -42,10 +42,10 @@ from winchkit.diagnosis.selection.transitions import scanned_transitions, with_f
 from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.diagnosis.steps import candidates_of, standing_of, steps_of, with_standing
 from winchkit.diagnosis.verdict.decision import (
+    Measured,
+    measured,
     output_fits,
-    refuted_outputs,
     remaining_share,
-    varying_outputs,
     verdict_of,
 )
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
@@ -400,17 +400,18 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
     outputs = output_fits(engine, (found.initial_model, noise), (final, noise))
     size = {name: output.noise_rms for name, output in outputs.items()}
     spread = _spread(engine, found)
+    known = measured(regression, found.initial_model, final, noise, outputs)
     steps = (
         *refitted_steps(engine, found, file, outputs, spread),
-        *_steps(engine, found, sets, outputs, spread),
+        *_steps(engine, found, sets, outputs, known=known, spread=spread),
     )
     where = _where(regression, found)
     verdict = verdict_of(
         outputs,
         steps=len(steps),
         noise_known=noise.from_repeats,
-        deciding=varying_outputs(regression, size),
-        refuted=refuted_outputs(regression, final, noise, outputs),
+        deciding=known.deciding,
+        refuted=known.refuted,
         predictable=lambda: (
             any(w.order is not None and w.share >= _PREDICTED for w in where)
             or predictable_share(engine, final, noise, size) >= _PREDICTED
@@ -426,7 +427,9 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         detectable=detectable(
             result.scores, DetectionThreshold(engine.penalty_per_parameter, result.threshold)
         ),
-        unexplained_share=remaining_share(outputs),
+        unexplained_share=remaining_share(
+            {name: output for name, output in outputs.items() if name in known.deciding}
+        ),
         where=where if verdict != "adequate" else (),
         next_runs=(*repeat, *next_runs(regression, pairs, noise.rms)),
         notes=(
@@ -452,6 +455,8 @@ def _steps(
     result: SelectionResult,
     sets: Sequence[EquivalenceSet],
     outputs: Mapping[str, OutputFit],
+    *,
+    known: Measured,
     spread: Spread,
 ) -> Iterator[Step]:
     """Every addition with its share, law and doubts."""
@@ -463,7 +468,10 @@ def _steps(
         index = engine.n_initial_terms + place
         without = engine.refit(final.hypothesis.without(index), noise)
         errors = engine.held_out_errors(without, noise, folds)
-        standing = standing_of(errors, outputs, final.hypothesis.terms[index].effect.outputs)
+        acts = final.hypothesis.terms[index].effect.outputs
+        standing = standing_of(errors, outputs, acts)
+        trusted = bool(known.deciding.intersection(acts)) and not known.refuted.intersection(acts)
+        standing = replace(standing, certain=standing.certain and trusted)
         curve = better_curve(engine, final, noise, index)
         yield with_standing(engine, result, step, index=index, standing=standing, curve=curve)
 

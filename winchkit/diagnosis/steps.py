@@ -71,7 +71,7 @@ def steps_of(
         parameters = {
             member.effect.id: values
             if member.effect.id == term.effect.id
-            else _values_of_rival(engine, result, fitted)
+            else _values_of_rival(engine, result, fitted, member.effect.id)
             for member, fitted in zip(every.terms, every.fits, strict=True)
         }
         equivalence = _without_reduced(every, parameters, engine.profile)
@@ -225,14 +225,15 @@ def _without_reduced(
 
 
 def _values_of_rival(
-    engine: SelectionEngine, result: SelectionResult, fitted: Fit
+    engine: SelectionEngine, result: SelectionResult, fitted: Fit, effect: str
 ) -> dict[str, Estimate]:
-    """Values of the last effect of a rival's fit, with their uncertainty."""
+    """Values of a rival in its fit, with their uncertainty."""
     regression, noise = engine.regression, result.noise
     # The reported model may have other weights than those of the comparison.
     fitted = engine.refit(fitted.hypothesis, noise)
     spread = spread_of(regression, fitted, noise, regression.blocks)
-    return estimates(regression, fitted, spread)[-1][1]
+    found = estimates(regression, fitted, spread)
+    return next(values for term, values in reversed(found) if term.effect.id == effect)
 
 
 def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:

@@ -185,6 +185,10 @@ class TimeSeriesRegression(Regression):
         """The same of every run that measured an output."""
         return [self.measured_of(s) for s in self.segments if s.output == output]
 
+    def has_run_offsets(self, output: str) -> bool:
+        """Whether the instrument of an output has an offset in every run."""
+        return any(segment.output == output for segment in self.run_offset_segments)
+
     def signal_rms(self, output: str) -> float:
         """Rms of a measured output within the band of the comparison, SI."""
         known = [signal[valid] for signal, valid in self.measured_samples(output)]

@@ -12,8 +12,10 @@ noise (:func:`white_noise`), above the whole residual.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
@@ -28,11 +30,11 @@ from winchkit.model.stages import OUTPUT_UNITS
 
 __all__ = [
     "AT_NOISE",
+    "Measured",
     "excess",
+    "measured",
     "output_fits",
-    "refuted_outputs",
     "remaining_share",
-    "varying_outputs",
     "verdict_of",
     "white_noise",
 ]
@@ -76,9 +78,10 @@ def verdict_of(
     predictable
         Whether a free curve or an order predicts a tenth of what remains.
     """
-    at_noise = all(is_at_noise(output) for output in outputs.values())
-    share = remaining_share(outputs)
-    if refuted or (not steps and not deciding):
+    counted = {name: output for name, output in outputs.items() if name in deciding}
+    at_noise = bool(counted) and all(map(is_at_noise, counted.values()))
+    share = remaining_share(counted) if counted else 1.0
+    if refuted:
         share, at_noise = 1.0, False
     if not steps and at_noise:
         return "adequate"
@@ -136,50 +139,79 @@ def white_noise(regression: TimeSeriesRegression, residual: Array) -> dict[str, 
     return out
 
 
-def varying_outputs(
-    regression: TimeSeriesRegression, noise: Mapping[str, float | None]
-) -> set[str]:
-    """Outputs that vary by more than their noise; only these decide on a model."""
-    out = set()
-    for output, size in noise.items():
-        own = regression.measured_samples(output)
-        values = np.concatenate([samples[valid] for samples, valid in own])
-        if size is not None and float(np.std(values)) > AT_NOISE * size:
-            out.add(output)
-    return out
+@dataclass(frozen=True)
+class Measured:
+    """What the outputs say of a model beside their errors."""
+
+    deciding: frozenset[str]
+    """Outputs that vary by more than their noise: only these decide on a model."""
+    refuted: frozenset[str]
+    """Outputs that the model does not predict, or that measure nothing: see :func:`measured`."""
 
 
-def refuted_outputs(
-    regression: TimeSeriesRegression, fit: Fit, noise: Noise, outputs: Mapping[str, OutputFit]
-) -> set[str]:
-    """Outputs that each run's own mean predicts better than the model, beyond chance.
+def measured(
+    regression: TimeSeriesRegression,
+    before: Fit,
+    final: Fit,
+    noise: Noise,
+    outputs: Mapping[str, OutputFit],
+) -> Measured:
+    """Outputs that decide on a model, and those that refute it.
 
-    The difference of the mean squares is compared with its standard error over blocks of time. At
-    the noise only the variation within the runs is compared: a mean knows the level of its run. An
-    output that is nothing but noise of more than a tenth of its level is no measurement of it.
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    before, final
+        The profile's file and the final model.
+    noise
+        Noise variance.
+    outputs
+        Errors by output.
+
+    Notes
+    -----
+    An output refutes the model where each run's own mean predicts it better, beyond the standard
+    error of the difference over blocks of time. At the noise only the variation within the runs is
+    compared, since a mean knows the level of its run. An output that does not vary measures nothing
+    where the model of the file says that it must vary, or where its noise is more than a tenth of
+    its level.
     """
-    varying = varying_outputs(regression, {name: o.noise_rms for name, o in outputs.items()})
-    noisy = {
-        name
-        for name, output in outputs.items()
-        if name not in varying and (output.noise_rms or 0.0) > _NOISY * output.signal_rms
-    }
     blocks = regression.blocks
-    left = held_out_samples(regression, fit, noise, blocks)
+    left = held_out_samples(regression, final, noise, blocks)
+    first = regression.in_time(before.residual)
     losses = {output: np.zeros(blocks.count) for output in regression.outputs}
-    for segment, error, block in zip(regression.segments, left, blocks.of, strict=True):
+    varied, predicted = dict.fromkeys(losses, 0.0), dict.fromkeys(losses, 0.0)
+    means: dict[str, list[float]] = {output: [] for output in losses}
+    for segment, own, error, block in zip(regression.segments, first, left, blocks.of, strict=True):
+        output = segment.output
         samples, valid = regression.measured_of(segment)
-        deviation = np.where(valid, samples - np.mean(samples[valid]), 0.0)
-        if is_at_noise(outputs[segment.output]):
-            error = np.where(valid, error - np.mean(error[valid]), 0.0)  # noqa: PLW2901
-        losses[segment.output] += np.bincount(
-            block, weights=error**2 - deviation**2, minlength=blocks.count
-        )
-    return noisy | {
-        output
-        for output, loss in losses.items()
-        if _is_larger(loss[loss != 0.0], _MEANS if is_at_noise(outputs[output]) else 1.0)
-    }
+        deviation = _centred(samples, valid)
+        varied[output] += float(deviation @ deviation)
+        predicted[output] += float(np.sum(_centred(own, valid) ** 2))
+        means[output].append(float(np.mean(samples[valid])))
+        loss = _centred(error, valid) if is_at_noise(outputs[output]) else error
+        losses[output] += np.bincount(block, weights=loss**2 - deviation**2, minlength=blocks.count)
+    deciding, refuted = set(), set()
+    for output, loss in losses.items():
+        fitted, count = outputs[output], regression.n_samples(output)
+        between = 0.0 if regression.has_run_offsets(output) else float(np.var(means[output]))
+        size = fitted.noise_rms or 0.0
+        if np.sqrt(varied[output] / count + between) > AT_NOISE * size:
+            deciding.add(output)
+        if np.sqrt(varied[output] / count) <= AT_NOISE * size and (
+            np.sqrt(predicted[output] / count) > AT_NOISE * size
+            or size > _NOISY * fitted.signal_rms
+        ):
+            refuted.add(output)
+        if _is_larger(loss[loss != 0.0], _MEANS if is_at_noise(fitted) else 1.0):
+            refuted.add(output)
+    return Measured(frozenset(deciding), frozenset(refuted))
+
+
+def _centred(values: Array, valid: NDArray[np.bool_]) -> Array:
+    """Values less their mean over the compared samples, zero elsewhere, (n,)."""
+    return np.where(valid, values - np.mean(values[valid]), 0.0)
 
 
 def _is_larger(losses: Array, errors: float) -> bool:
