@@ -68,7 +68,7 @@ def test_slow_noise_keeps_its_inverse_variance_weights(size: float) -> None:
 
 def warming_up() -> Array:
     """A friction three times as large when the run begins, which no Coulomb friction is."""
-    return np.asarray(FRICTION * np.tanh(RATE / 5) * (1 + 2 * np.exp(-RIDE.time / 8)))
+    return np.asarray(FRICTION * np.sign(RATE) * (1 + 2 * np.exp(-RIDE.time / 8)))
 
 
 def least_squares() -> float:

@@ -89,7 +89,8 @@ def verdict_of(
         return "explained"
     if steps and share <= _PARTLY:
         return "partly"
-    return "unknown" if (noise_known and deciding) or predictable() else "undecided"
+    above = not all(map(is_at_noise, outputs.values()))
+    return "unknown" if (noise_known and deciding) or (above and predictable()) else "undecided"
 
 
 def is_at_noise(output: OutputFit) -> bool:
