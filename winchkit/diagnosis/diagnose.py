@@ -40,7 +40,14 @@ from winchkit.diagnosis.selection.stepwise import (
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.selection.transitions import scanned_transitions, with_fitted_transitions
 from winchkit.diagnosis.selection.weighting import reweighted
-from winchkit.diagnosis.steps import candidates_of, standing_of, steps_of, with_standing
+from winchkit.diagnosis.steps import (
+    Standing,
+    candidates_of,
+    is_small,
+    standing_of,
+    steps_of,
+    with_standing,
+)
 from winchkit.diagnosis.verdict.decision import (
     Measured,
     measured,
@@ -460,20 +467,29 @@ def _steps(
     spread: Spread,
 ) -> Iterator[Step]:
     """Every addition with its share, law and doubts."""
+    if not sets:
+        return
     final, noise = result.final, result.noise
-    folds = engine.folds(final, noise)
-    for place, step in enumerate(
-        steps_of(engine, result, sets, engine.regression.dataset, spread) if sets else ()
-    ):
-        index = engine.n_initial_terms + place
-        without = engine.refit(final.hypothesis.without(index), noise)
+    folds, first = engine.folds(final, noise), engine.n_initial_terms
+    standings: list[Standing] = []
+    acts = [frozenset(term.effect.outputs) for term in final.hypothesis.terms[first:]]
+    for place, own in enumerate(acts):
+        without = engine.refit(final.hypothesis.without(first + place), noise)
         errors = engine.held_out_errors(without, noise, folds)
-        acts = final.hypothesis.terms[index].effect.outputs
-        standing = standing_of(errors, outputs, acts)
-        trusted = bool(known.deciding.intersection(acts)) and not known.refuted.intersection(acts)
-        standing = replace(standing, certain=standing.certain and trusted)
-        curve = better_curve(engine, final, noise, index)
-        yield with_standing(engine, result, step, index=index, standing=standing, curve=curve)
+        standing = standing_of(errors, outputs, sorted(own))
+        trusted = bool(known.deciding & own) and not known.refuted & own
+        standings.append(replace(standing, certain=standing.certain and trusted))
+    for place, step in enumerate(steps_of(engine, result, sets, engine.regression.dataset, spread)):
+        beside = [one for one, there in zip(standings, acts, strict=True) if there & acts[place]]
+        yield with_standing(
+            engine,
+            result,
+            step,
+            index=first + place,
+            standing=standings[place],
+            curve=better_curve(engine, final, noise, first + place),
+            small=is_small(standings[place], beside),
+        )
 
 
 def _traces(

@@ -6,7 +6,7 @@ established and less is left in its outputs than a tenth of what it explains.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, zip_longest
 
@@ -30,7 +30,7 @@ from winchkit.diagnosis.verdict.laws import reduced_law
 from winchkit.diagnosis.verdict.plausibility import implausible
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Standing", "candidates_of", "standing_of", "steps_of", "with_standing"]
+__all__ = ["Standing", "candidates_of", "is_small", "standing_of", "steps_of", "with_standing"]
 
 _CERTAIN = 0.1
 """Share of what a step explains that may be left unexplained in its outputs where it is certain:
@@ -101,6 +101,16 @@ class Standing:
     """Share of the excess before that only this step explains."""
     certain: bool
     """Whether less is left in its outputs than a tenth of what it explains."""
+    explained: float = 0.0
+    """Excess that only this step explains."""
+
+
+def is_small(standing: Standing, others: Iterable[Standing]) -> bool:
+    """Whether another step of the same outputs explains more than ten times as much.
+
+    A law is known to a tenth of what it explains: the rest of a larger one may be this step.
+    """
+    return any(standing.explained < _CERTAIN * other.explained for other in others)
 
 
 def standing_of(
@@ -124,7 +134,7 @@ def standing_of(
     there = [name for name in own if name in outputs]
     left = excess({name: after[name] for name in there}, noise)
     share = float(np.clip(explained / whole, 0.0, 1.0)) if whole > 0.0 else float("nan")
-    return Standing(share, left <= _CERTAIN * explained)
+    return Standing(share, left <= _CERTAIN * explained, explained)
 
 
 def with_standing(
@@ -135,6 +145,7 @@ def with_standing(
     index: int,
     standing: Standing,
     curve: tuple[Curve, float] | None = None,
+    small: bool = False,
 ) -> Step:
     """A step with its share, law and doubts.
 
@@ -152,11 +163,16 @@ def with_standing(
         Its standing.
     curve
         A free curve that explains more, and by which share of what the step explains.
+    small
+        Whether another step of the same outputs explains ten times as much.
     """
     doubts = list(_doubts(engine, result, step, index, curve))
     if not standing.certain:
         what = "more is left in its outputs than a tenth of what it explains"
         doubts.append(Doubt("remaining", what))
+    if small:
+        what = "another step explains ten times as much there: it may be a deviation of that law"
+        doubts.append(Doubt("small", what))
     single = len(step.effects) == 1
     established = single and curve is None
     return replace(
@@ -168,7 +184,7 @@ def with_standing(
     )
 
 
-_SERIOUS = frozenset({"implausible", "collinear", "undetermined"})
+_SERIOUS = frozenset({"implausible", "collinear", "undetermined", "small"})
 """Doubts with which no step is certain."""
 
 
