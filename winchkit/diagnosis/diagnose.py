@@ -394,7 +394,12 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
     """
     regression, dataset = engine.regression, engine.regression.dataset
     rounded = with_fitted_transitions(engine, result.final, result.noise)
-    simple, noise = simplified(engine, rounded, result.noise)
+    simple, noise = simplified(
+        engine,
+        rounded,
+        result.noise,
+        lambda fitted: with_fitted_transitions(engine, fitted, result.noise),
+    )
     best = reweighted(engine, with_fitted_transitions(engine, simple, noise), noise)
     found = replace(result, final=best.fit, noise=best.noise)
     found = ordered_by_contribution(engine, found)

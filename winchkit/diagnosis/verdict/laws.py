@@ -1,13 +1,14 @@
 """Simplification of a selected model: nested laws, and steps without which nothing is lost.
 
 A law whose shape is at a bound, beyond what a machine can have, or not determined by the runs is
-that of a simpler effect (``Effect.reduces_to``), which takes its place. A step is left out where
-the refitted model without it predicts every output as well, to 2 %.
+that of a simpler effect (``Effect.reduces_to``), which takes its place; so it does where the
+refitted model with it predicts every output as well, to 2 %. A step is left out where the model
+without it does.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -27,7 +28,12 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = ["reduced_law", "simplified", "with_first_members"]
 
 
-def simplified(engine: SelectionEngine, final: Fit, noise: Noise) -> tuple[Fit, Noise]:
+def simplified(
+    engine: SelectionEngine,
+    final: Fit,
+    noise: Noise,
+    settled: Callable[[Fit], Fit] = lambda fitted: fitted,
+) -> tuple[Fit, Noise]:
     """The model with the simplest laws, and without steps by which nothing is gained.
 
     Parameters
@@ -36,28 +42,45 @@ def simplified(engine: SelectionEngine, final: Fit, noise: Noise) -> tuple[Fit, 
         Selection engine.
     final, noise
         Model with which the search ended.
+    settled
+        Fits further nuisance parameters of a model.
 
     Returns
     -------
     tuple
         Model and noise, the given ones where nothing changed.
     """
-    present = _with_simpler_laws(engine, final, noise)
+    present = _with_simpler_laws(engine, final, noise, settled)
     while (without := _without_needless(engine, present, noise)) is not None:
         present = without
     return (final, noise) if present is final else engine.fit_with_noise(present.hypothesis, noise)
 
 
-def _with_simpler_laws(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:
-    """The model with every law whose shape is not determined replaced by a simpler one."""
+def _with_simpler_laws(
+    engine: SelectionEngine, present: Fit, noise: Noise, settled: Callable[[Fit], Fit]
+) -> Fit:
+    """The model with every law replaced by a simpler one with which nothing is lost."""
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         term = present.hypothesis.terms[index]
-        if term.effect.reduces_to:
-            spread = spread_of(engine.regression, present, noise, engine.regression.blocks)
-            values = estimates(engine.regression, present, spread)[index][1]
-            if reduced_law(term, values, engine.profile):
-                present = _replaced(engine, present, noise, index)
+        if not term.effect.reduces_to:
+            continue
+        simpler = settled(_replaced(engine, present, noise, index))
+        spread = spread_of(engine.regression, present, noise, engine.regression.blocks)
+        values = estimates(engine.regression, present, spread)[index][1]
+        if (
+            reduced_law(term, values, engine.profile)
+            or _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO
+        ):
+            present = simpler
     return present
+
+
+def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: Noise) -> float:
+    """Largest ratio of the held-out errors of a smaller model to those of the present one."""
+    folds = engine.folds(present, noise)
+    now = engine.held_out_errors(present, noise, folds)
+    errors = engine.held_out_errors(smaller, noise, folds)
+    return max(errors[output] / now[output] if now[output] else 1.0 for output in now)
 
 
 def reduced_law(term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None) -> bool:
@@ -89,13 +112,10 @@ def _without_needless(engine: SelectionEngine, present: Fit, noise: Noise) -> Fi
 
     None where every step is needed.
     """
-    folds = engine.folds(present, noise)
-    now = engine.held_out_errors(present, noise, folds)
     best: tuple[float, Fit] | None = None
     for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
         without = engine.refit(present.hypothesis.without(index), noise)
-        errors = engine.held_out_errors(without, noise, folds)
-        rise = max(errors[output] / now[output] if now[output] else 1.0 for output in now)
+        rise = _rise(engine, without, present, noise)
         if rise <= 1 / RELEVANT_RATIO and (best is None or rise < best[0]):
             best = rise, without
     return None if best is None else best[1]
@@ -115,9 +135,6 @@ def with_first_members(
     own = [term.effect.id for term in final.hypothesis.terms[first:]]
     if hypothesis is not final.hypothesis:
         together = engine.refit(hypothesis, noise)
-        folds = engine.folds(final, noise)
-        now = engine.held_out_errors(together, noise, folds)
-        before = engine.held_out_errors(final, noise, folds)
-        if all(now[name] <= error / RELEVANT_RATIO for name, error in before.items()):
+        if _rise(engine, together, final, noise) <= 1 / RELEVANT_RATIO:
             final, own = together, [each.effects[0] for each in sets]
     return final, [each.beginning_with(name) for each, name in zip(sets, own, strict=True)]
