@@ -244,7 +244,7 @@ def remaining_patterns(diagnosis: Diagnosis) -> list[Attribution]:
 
 
 def _at_noise(output: OutputFit) -> bool:
-    return bool(output.noise_rms) and output.heldout_rms_after < AT_NOISE * output.noise_rms
+    return output.heldout_rms_after < AT_NOISE * (output.noise_rms or 0.0)
 
 
 def moved_outputs(outputs: Mapping[str, OutputFit]) -> list[str]:

@@ -51,10 +51,10 @@ def step_title(step: Step) -> str:
         return f"{_refitted_values(step, with_errors=False)} in the profile"
     if has_other_law(step):
         return f"{_open_law(step)}; closest: {clause(step.effects[0])}"
-    kinds = list(dict.fromkeys(kind(effect) for effect in step.effects))
+    kinds = _kinds(step)
     if len(kinds) > _MOST_KINDS:
         return f"one of {len(kinds)} effects is missing, which these data cannot distinguish"
-    return listed(kinds, "or")
+    return listed([clause(effect) for effect in kinds], "or")
 
 
 def has_other_law(step: Step) -> bool:
@@ -140,15 +140,18 @@ def _titled_values(step: Step) -> str:
     if step.refitted:
         values = _refitted_values(step, with_errors=True)
         return f"{clause(step.effects[0])}: {values} in the profile"
-    kinds: dict[str, str] = {}
+    values = {e: values_text(step.parameters.get(e, {})) for e in _kinds(step)}
+    if has_other_law(step) or len(values) == 1:
+        return ": ".join(part for part in (step_title(step), values[step.effects[0]]) if part)
+    return listed([f"{clause(e)} ({v})" if v else clause(e) for e, v in values.items()], "or")
+
+
+def _kinds(step: Step) -> list[str]:
+    """First effect of every kind of a set: there are several laws of elongation."""
+    first: dict[str, str] = {}
     for effect in step.effects:
-        kinds.setdefault(kind(effect), values_text(step.parameters.get(effect, {})))
-    title = step_title(step)
-    if has_other_law(step) or len(kinds) == 1:
-        values = next(iter(kinds.values()))
-        return f"{title}: {values}" if values else title
-    return listed([f"{words} ({values})" if values else words for words, values in kinds.items()],
-                  "or")  # fmt: skip
+        first.setdefault(kind(effect), effect)
+    return list(first.values())
 
 
 def _refitted_values(step: Step, *, with_errors: bool) -> str:
