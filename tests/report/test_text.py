@@ -35,8 +35,7 @@ from winchkit.report.figures.waterfall import errors_without
 from winchkit.report.text import addition_text, compare_text, report_text
 from winchkit.report.words.numbers import percent
 from winchkit.report.words.sentence import changes_text, headline
-from winchkit.report.words.steps import lowered_most
-from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.report.words.steps import lowered_most, step_text
 from winchkit.schema.read import read_profile
 
 UNKNOWN = pytest.param("five-cornered-drum", marks=pytest.mark.slow)
@@ -94,22 +93,21 @@ def test_the_shape_of_a_residual_is_drawn_over_its_variable() -> None:
 
 def test_every_step_has_the_error_without_it_and_its_share() -> None:
     answer = answer_of_both("demo-elastic-rope", "demo-motor-drag")
-    stretch, drag = answer.diagnosis.steps
-    assert {stretch.effects[0], drag.effects[0]} == {"cable-elongation-linear", "motor-coulomb"}
-    lines = report_text(answer).splitlines()
-    told = {
-        line[:2]: " ".join(lines[n : n + 2]) for n, line in enumerate(lines) if line[1:2] == "."
-    }
-    for number, step, without in zip(
-        ("1.", "2."), answer.diagnosis.steps, errors_without(answer), strict=True
-    ):
-        name = lowered_most(answer.diagnosis.outputs, without)
-        # One effect moves the length, the other the torque: without it the error is the first one.
-        before = answer.diagnosis.outputs[name].heldout_rms_before
-        assert without[name] == pytest.approx(before, rel=0.02)
-        assert OUTPUT_NAMES[name] in told[number]
-        assert "→" in told[number]
-        assert f"explains {percent(step.share)}" in told[number].replace("  ", " ")
+    text = " ".join(report_text(answer).split())
+    found = dict(zip(answer.diagnosis.steps, errors_without(answer), strict=True))
+    outputs = {"cable-elongation-linear": "cable_length", "motor-coulomb": "motor_torque"}
+    for step, without in found.items():
+        name = outputs.pop(step.effects[0], "")
+        if name:
+            # One effect moves the length, the other the torque: without it the error is the first.
+            before = answer.diagnosis.outputs[name].heldout_rms_before
+            assert lowered_most(answer.diagnosis.outputs, without) == name
+            assert without[name] == pytest.approx(before, rel=0.02)
+        told = step_text(step, answer.diagnosis.outputs, without)
+        assert "→" in told
+        assert f"explains {percent(step.share)}" in told
+        assert told in text
+    assert not outputs
 
 
 def test_contributions_are_listed_with_verbose() -> None:
@@ -117,9 +115,10 @@ def test_contributions_are_listed_with_verbose() -> None:
     stretch, drag = "cable-elongation-linear", "motor-coulomb"
     text = report_text(answer, verbose=True)
     rows = {line[:34].strip(): line[34:].split() for line in text.splitlines()}
-    # With two effects, one alone is all but the other; the cable moves the length, the drag not.
-    assert rows[f"only {stretch}"] == rows[f"all but {drag}"]
-    assert rows[f"only {drag}"][:2] == rows["unchanged profile"][:2] != rows[f"only {stretch}"][:2]
+    # The cable moves the length, the drag not.
+    length = {label: cells[:2] for label, cells in rows.items()}
+    assert length[f"only {drag}"] == length["unchanged profile"] == length[f"all but {stretch}"]
+    assert length[f"only {stretch}"] == length[f"all but {drag}"] != length["unchanged profile"]
 
 
 def test_errors_before_and_after_are_shown_with_the_noise() -> None:
