@@ -20,7 +20,7 @@ from winchkit.report.words.sentence import (
     remaining_text,
     where_text,
 )
-from winchkit.report.words.steps import doubt_texts, step_text
+from winchkit.report.words.steps import alike, doubt_texts, step_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
 
 __all__ = ["VERDICT_WORDS", "Rung", "card", "ladder", "refitted", "verdict"]

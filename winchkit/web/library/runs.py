@@ -148,7 +148,7 @@ def _judgements(tables: Partitions) -> dict[str, Judgement]:
     for row in tables.read("diagnoses", columns).to_pylist():
         if row["failure"] is None:
             outputs = json.loads(row["result"]).get("outputs", {})
-            causes = [*row["effects"], *row["places"]]
+            causes = [*row["effects"], *(row["places"] or ())]
             found = Judgement(row["verdict"], causes, outputs, row["profile_name"])
             out |= dict.fromkeys(row["runs"], found)
     return out
