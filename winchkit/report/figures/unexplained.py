@@ -7,6 +7,7 @@ from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Step
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
+from winchkit.effects.empirical import empirical_id
 from winchkit.profile_edit.history import LADDER_UNITS
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
@@ -101,7 +102,8 @@ def _open_law(answer: WinchAnswer, step: Step, without: Array, source: str) -> F
     return Figure(
         f"law-{step.effects[0]}",
         capital(f"{output} over {variable}, and the closest law"),
-        f"Mean residual without {step.effects[0]}, and what this law explains of it.",
+        f"Mean residual without {step.effects[0]}, and what this law explains of it; 'winchkit add "
+        f"{empirical_id(over.output, over.variable)}' adds the curve.",
         how.axis(),
         (
             Panel(

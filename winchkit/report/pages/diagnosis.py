@@ -158,7 +158,7 @@ def _open_laws(figures: Sequence[Figure]) -> Markup:
 
 def _offer(diagnosis: Diagnosis) -> Markup:
     """Commands that continue with an unexplained residual."""
-    if not diagnosis.empirical:
+    if not diagnosis.empirical or diagnosis.verdict == "explained":
         return Markup("")
     return element(
         "p",
