@@ -9,7 +9,14 @@ import pytest
 
 from report_answers import AT_NOISE, ELASTIC, FRICTION, NOISY, OPEN, REFITTED
 from winchkit.diagnosis.results import Doubt, Estimate, Step
-from winchkit.report.words.steps import alike, doubt_texts, lowered_most, step_text, step_title
+from winchkit.report.words.steps import (
+    alike,
+    cause,
+    doubt_texts,
+    lowered_most,
+    step_text,
+    step_title,
+)
 
 OUTPUTS = {"cable_length": NOISY, "tension": AT_NOISE}
 
@@ -76,6 +83,17 @@ def test_a_refitted_value_has_that_of_the_file_in_the_same_unit() -> None:
     assert step_text(small) == (
         "the cable is elastic: axial stiffness 249.9 ± 7.0 kN instead of 0.900 kN in the profile; "
         "explains 90 %"
+    )
+
+
+def test_refitted_values_are_counted_apart_from_missing_effects() -> None:
+    old, new = replace(REFITTED, effects=("motor-viscous",)), FRICTION
+    assert cause([old, new]).startswith("the pulleys have Coulomb friction or ")
+    assert cause([old, new]).endswith("; 1 effect of the profile has other values")
+    assert cause([old, old, new, new]).startswith("2 effects are missing; first, the pulleys have")
+    assert cause([REFITTED, REFITTED]) == (
+        "2 effects of the profile have other values; first, axial stiffness 250 kN instead of 100 "
+        "kN in the profile"
     )
 
 

@@ -64,10 +64,9 @@ class Scale:
         return self.labelled(significant(value / self.worth, digits))
 
     def span(self, low: float, high: float | None, digits: int = 3) -> str:
-        """Two values with one unit: ``0.084 to 0.334 N m``; without the second the first alone."""
-        if high is None:
-            return self.text(low, digits)
-        return f"{significant(low / self.worth, digits)} to {self.text(high, digits)}"
+        """Two values with one unit: ``0.084 to 0.334 N m``; one value where both are equal."""
+        first, last = self.text(low, digits), self.text(low if high is None else high, digits)
+        return last if first == last else f"{significant(low / self.worth, digits)} to {last}"
 
     def labelled(self, number: str) -> str:
         """A formatted number followed by the unit."""

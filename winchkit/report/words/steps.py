@@ -30,6 +30,8 @@ _DISTINCT = 20.0
 """Angle between two signatures from which the data distinguish them, °."""
 _LOWERED = 1.01
 """Ratio of the errors without and with a step from which it lowers an output's error."""
+_LEAST = 1e-3
+"""Share below which no figure is shown."""
 _MOST_KINDS = 3
 """Effects of a set that a title names."""
 _WHOLE = "the geometry of the robot differs as a whole"
@@ -37,10 +39,19 @@ _WHOLE = "the geometry of the robot differs as a whole"
 
 def cause(steps: Sequence[Step]) -> str:
     """What is missing, as the headline of a diagnosis with steps; without a full stop."""
-    first = step_title(steps[0])
+    added = [step for step in steps if not step.refitted]
+    refitted = len(steps) - len(added)
+    first = step_title((added or steps)[0])
     if len(steps) == 1:
         return first
-    return f"{len(steps)} effects are missing; first, {first}"
+    if not added:
+        return f"{refitted} effects of the profile have other values; first, {first}"
+    one = len(added) == 1
+    text = first if one else f"{len(added)} effects are missing; first, {first}"
+    if refitted:
+        have = "effect of the profile has" if refitted == 1 else "effects of the profile have"
+        text += f"; {refitted} {have} other values"
+    return text
 
 
 def step_title(step: Step) -> str:
@@ -93,7 +104,9 @@ def step_text(
         before = significant(without[name] / scale.worth)
         parts.append(f"{OUTPUT_NAMES.get(name, name)} {before} → {then}")
     if isfinite(step.share):
-        parts.append(f"explains {percent(step.share)}")
+        parts.append(
+            f"explains {percent(step.share) if step.share >= _LEAST else _NEXT_TO_NOTHING}"
+        )
     return "; ".join(parts)
 
 
