@@ -70,7 +70,7 @@ def size_texts(outputs: Mapping[str, OutputError] | Mapping[str, OutputFit]) -> 
 
 
 def noise_text(output: OutputFit) -> str:
-    """``noise 0.304 mm``; its two bounds where no repeats and no instruments tell it."""
+    """``noise 0.304 mm``; its two bounds where neither repeats nor instruments give it."""
     if output.noise_rms is None:
         return "noise unknown"
     scale = scale_for(output.heldout_rms_before, output.unit)

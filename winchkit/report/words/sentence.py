@@ -307,7 +307,7 @@ def _wrong_channels(diagnosis: Diagnosis) -> list[str]:
 
 
 def _noise_is_known(diagnosis: Diagnosis) -> bool:
-    """Whether repeats or instruments tell the noise, instead of two bounds."""
+    """Whether repeats or instruments give the noise, instead of two bounds."""
     return all(output.noise_upper is None for output in diagnosis.outputs.values())
 
 

@@ -104,9 +104,8 @@ def step_text(
         before = significant(without[name] / scale.worth)
         parts.append(f"{OUTPUT_NAMES.get(name, name)} {before} → {then}")
     if isfinite(step.share):
-        parts.append(
-            f"explains {percent(step.share) if step.share >= _LEAST else _NEXT_TO_NOTHING}"
-        )
+        share = percent(step.share) if step.share >= _LEAST else "under 0.1 %"
+        parts.append(f"explains {share}")
     return "; ".join(parts)
 
 
@@ -151,8 +150,8 @@ def _titled_values(step: Step) -> str:
     if step.whole:
         return _WHOLE
     if step.refitted:
-        values = _refitted_values(step, with_errors=True)
-        return f"{clause(step.effects[0])}: {values} in the profile"
+        changed = _refitted_values(step, with_errors=True)
+        return f"{clause(step.effects[0])}: {changed} in the profile"
     values = {e: values_text(step.parameters.get(e, {})) for e in _kinds(step)}
     if has_other_law(step) or len(values) == 1:
         return ": ".join(part for part in (step_title(step), values[step.effects[0]]) if part)
