@@ -59,6 +59,8 @@ def output_scale(output: OutputFit) -> Scale:
 def figures(diagnosis: Diagnosis) -> Markup:
     """Held-out error before and after, and noise, per output."""
     extended = bool(diagnosis.steps)
+    # The two bounds of a noise need the room of the last column.
+    known = all(output.noise_upper is None for output in diagnosis.outputs.values())
     head = ["output", "today" if extended else "error"]
     head += ["with it"] if extended else []
     rows = []
@@ -74,10 +76,12 @@ def figures(diagnosis: Diagnosis) -> Markup:
         cells.append(noise_text(output).removeprefix("noise "))
         most = "" if output.noise_upper is None else "≤ "
         cells.append(f"{most}{significant(last / noise, 2)}" if noise else "–")
-        cells.append(quantity(output.signal_rms, output.unit))
+        if known:
+            cells.append(quantity(output.signal_rms, output.unit))
         rows.append(cells)
     caption = f"Held-out error, rms: measured on {diagnosis.data} that the fit had not seen."
-    return table(caption, [*head, "noise", "÷ noise", "measured"], rows)
+    last_head = ["measured"] if known else []
+    return table(caption, [*head, "noise", "÷ noise", *last_head], rows)
 
 
 def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> Markup:

@@ -233,7 +233,7 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
     elif first is None and diagnosis.steps:
         from winchkit.profile_edit.naming import extended_name
 
-        file = extended_name(asked.profile, "refitted")
+        file = extended_name(asked.profile, "without")
         suggest_next("remove", diagnosis.steps[0].effects[0], *words, "-o", file)
     elif first is None and diagnosis.verdict == "unknown" and diagnosis.data == "runs":
         suggest_next("effects", "new", "own.py", "--fit", runs, *words)
