@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
+from winchkit.diagnosis.regression.cross_validation import held_out_rms as held_out_rows
 from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
@@ -33,10 +34,14 @@ __all__ = [
     "Errors",
     "FittedModel",
     "column_names",
+    "errors_in_noise",
     "errors_of",
     "held_out_rms",
+    "known_noise",
     "noise_rms",
+    "output_fits_in_noise",
     "output_fits_of",
+    "refuted_outputs",
     "rms",
     "signal_rms",
 ]
@@ -44,6 +49,8 @@ __all__ = [
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
 _LEAST_SINGULAR_VALUE = 1e-9
+_LEAST_DOF = 8.0
+"""Degrees of freedom below which a noise is unknown: it is then a number assumed at the start."""
 
 
 @dataclass(frozen=True)
@@ -190,6 +197,61 @@ def output_fits_of(
     }
 
 
+def errors_in_noise(model: FittedModel) -> dict[str, float]:
+    """Held-out rms of the whitened equations by output, in standard deviations of their noise.
+
+    Every measured coordinate has the weight of its variance component: in an error in metres the
+    least accurate angle hides what a tracker sees.
+    """
+    left = held_out_rows(model.regression, model.fit, model.noise, model.folds)
+    return {output: error / model.noise.rms[output] for output, error in left.items()}
+
+
+def known_noise(model: FittedModel) -> dict[str, float | None]:
+    """Upper limit of the noise by output, in its standard deviations; None where it is unknown.
+
+    Two standard errors above the estimate: repeats of a few poses determine a noise to some 10 %.
+    """
+    regression, noise = model.regression, model.noise
+    beyond = noise.uncertainty(regression)
+    out: dict[str, float | None] = {}
+    for output in noise.rms:
+        own = np.array([band[0] == output for band in regression.bands])
+        known = float(np.sum(noise.dof[own])) >= _LEAST_DOF
+        out[output] = float(np.sqrt(1 + beyond[output])) if known else None
+    return out
+
+
+def output_fits_in_noise(begin: FittedModel, final: FittedModel) -> dict[str, OutputFit]:
+    """Errors of every kind of equation before and after, in standard deviations of their noise."""
+    before, after, noise = errors_in_noise(begin), errors_in_noise(final), known_noise(final)
+    return {
+        output: OutputFit(
+            unit="1",
+            band=None,
+            signal_rms=float("nan"),
+            rms_before=before[output],
+            rms_after=after[output],
+            heldout_rms_before=before[output],
+            heldout_rms_after=after[output],
+            noise_rms=noise[output],
+        )
+        for output in after
+    }
+
+
+def refuted_outputs(model: FittedModel) -> set[str]:
+    """Outputs that their mean over the poses predicts better, beyond the standard error."""
+    signals, out = _signals(model.regression), set()
+    for name, error in _held_out(model).items():
+        signal = signals[name]
+        deviation = signal - np.nanmean(signal, axis=0) if np.isfinite(signal).any() else signal
+        loss = np.nansum(error**2, axis=1) - np.nansum(deviation**2, axis=1)
+        if np.sum(loss) > np.sqrt(len(loss)) * np.std(loss):
+            out.add(name)
+    return out
+
+
 def rms(name: str, error: Array) -> float:
     """Root mean square of all values; of a position that of its distance."""
     known = error[np.isfinite(error).all(axis=1)] if name == "platform_position" else error
@@ -200,6 +262,16 @@ def rms(name: str, error: Array) -> float:
 
 def signal_rms(regression: PoseRegression) -> dict[str, float]:
     """Rms of each output about its mean, SI."""
+    out = {}
+    for name, array in _signals(regression).items():
+        known = np.isfinite(array).all(axis=1)
+        centred = array[known] - array[known].mean(axis=0) if known.any() else array[known]
+        out[name] = rms(name, centred) if known.any() else float("nan")
+    return out
+
+
+def _signals(regression: PoseRegression) -> Errors:
+    """Measured values of every output, (p, k), SI; lengths by the drums."""
     measured = regression.dataset.measured
     length = regression.equations.residuals(regression.robot)[
         "closure"
@@ -208,17 +280,11 @@ def signal_rms(regression: PoseRegression) -> dict[str, float]:
         regression.equations.forces(regression.robot),
         regression.equations.temperature,
     )
-    values = {
+    return {
         "cable_length": length,
         "platform_position": measured.position,
         "tension": measured.tension,
     }
-    out = {}
-    for name, array in values.items():
-        known = np.isfinite(array).all(axis=1)
-        centred = array[known] - array[known].mean(axis=0) if known.any() else array[known]
-        out[name] = rms(name, centred) if known.any() else float("nan")
-    return out
 
 
 def held_out_rms(model: FittedModel) -> dict[str, float]:
