@@ -158,7 +158,7 @@ class RobotSelection:
     @cached_property
     def in_noise(self) -> dict[str, OutputFit]:
         """Errors of every kind of equation before and after, in units of the noise."""
-        return output_fits_in_noise(self.initial_model, self.final)
+        return output_fits_in_noise(self.initial_model, self.final, self.preparation.noise)
 
     @property
     def remaining(self) -> float:
@@ -185,7 +185,7 @@ class RobotSelection:
         return verdict_of(
             self.in_noise,
             steps=self.n_added + len(self.preparation.found) + self.geometry_is_free,
-            noise_known=all(output.noise_rms for output in self.in_noise.values()),
+            noise_known=self.preparation.noise.from_repeats,
             deciding=self.deciding,
             refuted=self.refuted,
             predictable=lambda: any(w.share >= _TENTH for w in _places(self)),

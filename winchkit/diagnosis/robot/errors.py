@@ -10,7 +10,7 @@ whitened wrench that measured cable forces and the weight leave over.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ __all__ = [
     "errors_in_noise",
     "errors_of",
     "held_out_rms",
-    "known_noise",
+    "least_noise",
     "noise_rms",
     "output_fits_in_noise",
     "output_fits_of",
@@ -49,8 +49,6 @@ __all__ = [
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
 _LEAST_SINGULAR_VALUE = 1e-9
-_LEAST_DOF = 8.0
-"""Degrees of freedom below which a noise is unknown: it is then a number assumed at the start."""
 
 
 @dataclass(frozen=True)
@@ -177,7 +175,7 @@ def output_fits_of(
         errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (begin, final)
     )
     held_before, held_after = held_out_rms(begin), held_out_rms(final)
-    least = noise_rms(final.regression, noise)
+    least = noise_rms(final.regression, replace(noise, sigma=noise.least))
     signal = signal_rms(final.regression)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
@@ -191,6 +189,7 @@ def output_fits_of(
             heldout_rms_after=held_after[name],
             noise_rms=least[name],
             noise_source=source,
+            noise_upper=None if noise.from_repeats else max(rms(name, after[name]), least[name]),
         )
         for name in after
         if name in before
@@ -207,24 +206,27 @@ def errors_in_noise(model: FittedModel) -> dict[str, float]:
     return {output: error / model.noise.rms[output] for output, error in left.items()}
 
 
-def known_noise(model: FittedModel) -> dict[str, float | None]:
-    """Upper limit of the noise by output, in its standard deviations; None where it is unknown.
+def least_noise(model: FittedModel, noise: PoseNoise) -> dict[str, float]:
+    """Noise by output that decides on a model, in standard deviations of the equations.
 
-    Two standard errors above the estimate: repeats of a few poses determine a noise to some 10 %.
+    Two standard errors above that of the repeats, which a few poses determine to some 10 %. Without
+    repeats what is beyond the noise of usual instruments may be an effect, and does not count.
     """
-    regression, noise = model.regression, model.noise
-    beyond = noise.uncertainty(regression)
-    out: dict[str, float | None] = {}
-    for output in noise.rms:
-        own = np.array([band[0] == output for band in regression.bands])
-        known = float(np.sum(noise.dof[own])) >= _LEAST_DOF
-        out[output] = float(np.sqrt(1 + beyond[output])) if known else None
+    regression, beyond = model.regression, model.noise.uncertainty(model.regression)
+    here, out = regression.residuals(()), {}
+    for output in model.noise.rms:
+        kinds = ["tension"] if output == "tension" else [k for k in POSED if k in noise.unexplained]
+        shares = [(noise.least[kind] / noise.sigma[kind]) ** 2 for kind in kinds]
+        share = np.average(shares, weights=[here[kind].shape[1] for kind in kinds])
+        out[output] = float(np.sqrt(share * (1 + beyond[output])))
     return out
 
 
-def output_fits_in_noise(begin: FittedModel, final: FittedModel) -> dict[str, OutputFit]:
+def output_fits_in_noise(
+    begin: FittedModel, final: FittedModel, noise: PoseNoise
+) -> dict[str, OutputFit]:
     """Errors of every kind of equation before and after, in standard deviations of their noise."""
-    before, after, noise = errors_in_noise(begin), errors_in_noise(final), known_noise(final)
+    before, after, least = errors_in_noise(begin), errors_in_noise(final), least_noise(final, noise)
     return {
         output: OutputFit(
             unit="1",
@@ -234,7 +236,7 @@ def output_fits_in_noise(begin: FittedModel, final: FittedModel) -> dict[str, Ou
             rms_after=after[output],
             heldout_rms_before=before[output],
             heldout_rms_after=after[output],
-            noise_rms=noise[output],
+            noise_rms=least[output],
         )
         for output in after
     }
