@@ -80,6 +80,36 @@ def test_two_effects_on_different_equations_share_what_was_unexplained(tmp_path:
     assert sum(step["share"] for step in found["steps"]) == pytest.approx(1.0, abs=0.05)
 
 
+def test_a_wrong_value_of_the_profile_is_a_step_beside_that_of_the_file(tmp_path: Path) -> None:
+    profile, run = files(tmp_path, "home length")
+    table = '\n[[effect]]\nid = "home-length"\nlength = { 4 = "2 mm" }\n'
+    profile.write_text(profile_text() + table)
+    found = answered("diagnose", run, "--profile", profile)
+    assert found["verdict"] == "explained"
+    (step,) = found["steps"]
+    assert (step["lines"], step["refitted"]) == ({"home-length": ["4"]}, True)
+    assert step["file_values"] == {"length": pytest.approx(2e-3)}
+    length = step["parameters"]["home-length"]["length"]
+    assert abs(length["value"] - 0.5e-3) < 4 * length["std"]
+    place = found["outputs"]["platform_position"]
+    assert place["heldout_rms_before"] > 3 * place["heldout_rms_after"]
+    profile.write_text(profile_text() + table.replace("2 mm", "0.5 mm"))
+    assert answered("diagnose", run, "--profile", profile)["verdict"] == "adequate"
+
+
+def test_without_repeats_an_error_beyond_usual_instruments_is_not_adequate(tmp_path: Path) -> None:
+    """Waves of 0.3 mm that no effect has: without repeats they are in the estimated noise."""
+    profile, run = files(tmp_path, "outside: waves, no repeats", count=40)
+    found = answered("diagnose", run, "--profile", profile)
+    assert found["verdict"] in ("undecided", "unknown")
+    assert not any(step["certain"] for step in found["steps"])
+    place = found["outputs"]["platform_position"]
+    assert place["noise_rms"] < 0.5 * place["heldout_rms_after"]
+    assert place["noise_upper"] >= place["rms_after"]
+    if found["verdict"] == "undecided":
+        assert "twice" in found["next_runs"][0]["repeat"]
+
+
 def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
     profile, run = files(tmp_path, "none")
     found = answered("diagnose", run, "--profile", profile)

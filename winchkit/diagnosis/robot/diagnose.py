@@ -50,7 +50,13 @@ from winchkit.diagnosis.robot.errors import (
 )
 from winchkit.diagnosis.robot.excitation import missing_pose_excitation
 from winchkit.diagnosis.robot.pose_design import next_pose_runs
-from winchkit.diagnosis.robot.preparation import Preparation, calibrated_on, prepare_selection
+from winchkit.diagnosis.robot.preparation import (
+    Preparation,
+    calibrated_on,
+    own_effects,
+    prepare_selection,
+)
+from winchkit.diagnosis.robot.registration import datum_notes
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.steps import (
@@ -68,6 +74,7 @@ from winchkit.diagnosis.verdict.decision import (
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.laws import simplified, with_first_members
+from winchkit.diagnosis.verdict.profile_values import held, refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.model.stages import Stage
@@ -184,12 +191,24 @@ class RobotSelection:
         """Verdict on the errors in units of the noise."""
         return verdict_of(
             self.in_noise,
-            steps=self.n_added + len(self.preparation.found) + self.geometry_is_free,
+            steps=self.n_added
+            + len(self.refitted)
+            + len(self.preparation.found)
+            + self.geometry_is_free,
             noise_known=self.preparation.noise.from_repeats,
             deciding=self.deciding,
             refuted=self.refuted,
             predictable=lambda: any(w.share >= _TENTH for w in _places(self)),
         )
+
+    @cached_property
+    def refitted(self) -> tuple[Step, ...]:
+        """Effects of the profile whose file values predict worse than fitted ones."""
+        final = self.final
+        spread = spread_of(final.regression, final.fit, final.noise, final.regression.blocks)
+        file = own_effects(self.preparation.of_file)
+        steps = refitted_steps(self.engine, self.result, file, self.in_noise, spread)
+        return tuple(map(plain_step, steps)) if file.terms else ()
 
     @property
     def geometry_is_free(self) -> bool:
@@ -198,10 +217,12 @@ class RobotSelection:
 
     @cached_property
     def initial_model(self) -> FittedModel:
-        """The profile's own effects fitted, with the geometry of the file."""
+        """The profile's own effects at their file values, with the geometry of the file."""
         start = self.file_engine.initial_model
         for index in reversed(self.preparation.found):
             start = start.without(index)
+        for index, term in enumerate(self.preparation.of_file):
+            start = start.with_term_at(index, held(term))
         first, noise = self.file_engine.fit_with_noise(start)
         return FittedModel(
             self.file_engine.regression, first, noise, self.file_engine.regression.groups
@@ -253,7 +274,12 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     final, sets = with_first_members(engine, final, noise, sets)
     selection = replace(selection, result=replace(selection.result, final=final))
     result, outputs, verdict = selection.result, selection.outputs, selection.verdict
-    steps = (*_registered_steps(selection), *_geometry_steps(selection), *_steps(selection, sets))
+    steps = (
+        *selection.refitted,
+        *_registered_steps(selection),
+        *_geometry_steps(selection),
+        *_steps(selection, sets),
+    )
     repeat = [NextRun((), _REPEAT)] if verdict == "undecided" else []
     diagnosis = RobotDiagnosis(
         verdict=verdict,
@@ -272,7 +298,7 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
         notes=(
             *preparation.dataset.notes,
             *missing_pose_excitation(preparation),
-            *_datum_notes(steps),
+            *datum_notes({effect for step in steps for effect in step.effects}),
         ),
         geometry=geometry,
         fit=fit_statistics(
@@ -319,24 +345,6 @@ def _traces(selection: RobotSelection, *, named: bool) -> tuple[PoseTrace, ...]:
     before, after = selection.errors
     names = column_names(selection.preparation.dataset, before)
     return pose_traces(names, UNITS, *((after, before) if named else (before,)))
-
-
-_SAME_AS = {
-    "tracker-frame": "all exit points and the home pose moved together the other way",
-    "reflector-offset": "all anchor points and the home pose moved together the other way",
-}
-
-
-def _datum_notes(steps: Sequence[Step]) -> list[str]:
-    """The datum by which a named frame or offset is no effect of the robot, in words."""
-    named = {effect for step in steps for effect in step.effects}
-    return [
-        f"{effect}: datum is the robot's home pose with its points; {same} are the same to all "
-        "measurements. Fixed points of the frame or the platform, measured with the tracker, "
-        "distinguish the two"
-        for effect, same in _SAME_AS.items()
-        if effect in named
-    ]
 
 
 def _registered_steps(selection: RobotSelection) -> Iterator[Step]:

@@ -197,28 +197,27 @@ def output_fits_of(
 
 
 def errors_in_noise(model: FittedModel) -> dict[str, float]:
-    """Held-out rms of the whitened equations by output, in standard deviations of their noise.
+    """Held-out rms of the whitened equations by output, in standard deviations of white noise.
 
     Every measured coordinate has the weight of its variance component: in an error in metres the
     least accurate angle hides what a tracker sees.
     """
-    left = held_out_rows(model.regression, model.fit, model.noise, model.folds)
-    return {output: error / model.noise.rms[output] for output, error in left.items()}
+    return held_out_rows(model.regression, model.fit, model.noise, model.folds)
 
 
 def least_noise(model: FittedModel, noise: PoseNoise) -> dict[str, float]:
-    """Noise by output that decides on a model, in standard deviations of the equations.
+    """Noise by output that decides on a model, in the unit of :func:`errors_in_noise`.
 
     Two standard errors above that of the repeats, which a few poses determine to some 10 %. Without
     repeats what is beyond the noise of usual instruments may be an effect, and does not count.
     """
     regression, beyond = model.regression, model.noise.uncertainty(model.regression)
     here, out = regression.residuals(()), {}
-    for output in model.noise.rms:
+    for output, size in model.noise.rms.items():
         kinds = ["tension"] if output == "tension" else [k for k in POSED if k in noise.unexplained]
         shares = [(noise.least[kind] / noise.sigma[kind]) ** 2 for kind in kinds]
         share = np.average(shares, weights=[here[kind].shape[1] for kind in kinds])
-        out[output] = float(np.sqrt(share * (1 + beyond[output])))
+        out[output] = size * float(np.sqrt(share * (1 + beyond[output])))
     return out
 
 

@@ -221,18 +221,20 @@ class Preparation:
     registration: Registration | None = None
 
     @cached_property
+    def of_file(self) -> tuple[Term, ...]:
+        """The profile's own effects at their file values."""
+        return tuple(robot_terms(self.dataset.robot, self.catalogue, moving=self.dataset.moves))
+
+    @cached_property
     def own(self) -> tuple[Term, ...]:
         """The profile's own effects at their file values, and those of the registration."""
-        terms = self.registration.terms if self.registration else ()
-        own = robot_terms(self.dataset.robot, self.catalogue, moving=self.dataset.moves)
-        return (*own, *terms)
+        return (*self.of_file, *(self.registration.terms if self.registration else ()))
 
     @property
     def found(self) -> range:
         """Indices of the effects that the registration found, in the initial model."""
         count = len(self.registration.found) if self.registration else 0
-        first = len(self.own) - (len(self.registration.terms) if self.registration else 0)
-        return range(first, first + count)
+        return range(len(self.of_file), len(self.of_file) + count)
 
     def engine(
         self, geometry: Sequence[GeometryPrior], beside: tuple[Term, ...] = ()
