@@ -98,9 +98,11 @@ def wrong(case: Case, found: dict[str, Any]) -> list[str]:
 
 
 def right(case: Case, found: dict[str, Any]) -> bool:
-    """Whether all that is hidden is in a set and nothing else is told; of what is outside the
-    catalogue nothing is certain, and it is called unexplained, the geometry's, or without repeats
-    something that cannot be excluded."""
+    """Whether all that is hidden is in a set and nothing else is named.
+
+    Outside the catalogue nothing is certain, and the verdict says that something is missing, that
+    it is the geometry as a whole, or without repeats that it cannot be excluded.
+    """
     steps = found["steps"]
     sets = [_members(step) for step in steps]
     if case.outside:

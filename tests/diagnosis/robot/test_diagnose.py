@@ -130,7 +130,7 @@ def test_what_no_effect_explains_is_unknown(tmp_path: Path) -> None:
 
 
 @pytest.mark.campaign
-def test_a_geometry_that_fits_another_cause_is_told_with_its_doubt(tmp_path: Path) -> None:
+def test_a_geometry_that_fits_another_cause_is_never_certain(tmp_path: Path) -> None:
     """A tracker whose metre is 2 mm long: the geometry imitates it, and nothing is certain."""
     profile, run = files(tmp_path, "outside: tracker's metre")
     found = answered("diagnose", run, "--profile", profile)

@@ -410,7 +410,7 @@ def _geometry_steps(selection: RobotSelection) -> Iterator[Step]:
 _SINGLE_EFFECT_SHARE = 0.4
 _FEW_EFFECTS = 4
 _EXPLAINING = ("adequate", "explained", "partly")
-"""Verdicts with which a free geometry is told: its many numbers lower any error a little."""
+"""Verdicts with which a free geometry is reported: its many numbers lower any error a little."""
 _TENTH = 0.1
 """Share of the excess that a free geometry must explain beyond the effects found without it, and
 share of a residual that a variable must explain for it to be no noise: the tenth of the verdict."""
