@@ -432,7 +432,13 @@ def _step(step: Step) -> dict[str, Any]:
         "combination": vars(step.combination) if step.combination else None,
         "whole": step.whole,
         **step.standing_json(),
+        "place": [{**vars(place), "line": _line_of(step)} for place in step.place],
     }
+
+
+def _line_of(step: Step) -> str | None:
+    """Line of the first effect, None for all lines or the platform."""
+    return None if step.whole else effect_and_line(step.effects[0])[1]
 
 
 def _placed(candidate: Mapping[str, Any]) -> dict[str, Any]:

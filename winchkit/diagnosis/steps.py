@@ -199,7 +199,7 @@ def _doubts(
     regression, term = engine.regression, result.final.hypothesis.terms[index]
     if len(step.effects) > 1:
         others = ", ".join(step.effects[1:])
-        out.append(Doubt("alternatives", f"these runs cannot distinguish it from {others}"))
+        out.append(Doubt("alternatives", f"these data cannot distinguish it from {others}"))
     if curve is not None:
         free, share = curve
         over = free.variable.replace("_", " ")
@@ -213,7 +213,7 @@ def _doubts(
         out.append(Doubt("collinear", what))
     amplitudes = [e for n, e in values.items() if term.effect.parameter(n).role == "amplitude"]
     if amplitudes and all(not _is_determined(term.effect.null, n, e) for n, e in values.items()):
-        out.append(Doubt("undetermined", "its values are not determined by these runs"))
+        out.append(Doubt("undetermined", "its values are not determined by these data"))
     return out
 
 

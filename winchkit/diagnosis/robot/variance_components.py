@@ -54,6 +54,13 @@ class PoseNoise:
     unexplained: Mapping[str, float]
     """Standard deviations of the saturated model by kind, SI."""
 
+    @property
+    def least(self) -> dict[str, float]:
+        """Standard deviations that instruments surely have: without repeats those of usual ones."""
+        if self.from_repeats:
+            return dict(self.sigma)
+        return {kind: min(own, START[kind]) for kind, own in self.sigma.items()}
+
 
 @dataclass(frozen=True)
 class Stack:

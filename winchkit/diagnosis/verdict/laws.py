@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
@@ -78,8 +79,8 @@ def _with_simpler_laws(
 def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: Noise) -> float:
     """Largest ratio of the held-out errors of a smaller model to those of the present one."""
     folds = engine.folds(present, noise)
-    now = engine.held_out_errors(present, noise, folds)
-    errors = engine.held_out_errors(smaller, noise, folds)
+    now = held_out_rms(engine.regression, present, noise, folds)
+    errors = held_out_rms(engine.regression, smaller, noise, folds)
     return max(errors[output] / now[output] if now[output] else 1.0 for output in now)
 
 

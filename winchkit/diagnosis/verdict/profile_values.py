@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, estimates
@@ -16,16 +17,16 @@ from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.steps import standing_of
 from winchkit.effects.term import Term
 
-__all__ = ["file_model", "refitted_steps"]
+__all__ = ["file_model", "held", "refitted_steps"]
 
 
 def file_model(engine: SelectionEngine, start: Hypothesis, noise: Noise) -> Fit:
     """The profile's effects at their file values; offsets and initial states are fitted."""
-    held = Hypothesis(tuple(map(_held, start.terms)), start.nuisances, start.starts)
-    return fit(engine.regression, held, noise.inverse_sigma(engine.regression))
+    of_file = Hypothesis(tuple(map(held, start.terms)), start.nuisances, start.starts)
+    return fit(engine.regression, of_file, noise.inverse_sigma(engine.regression))
 
 
-def _held(term: Term) -> Term:
+def held(term: Term) -> Term:
     """A term whose values are not fitted."""
     fixed = tuple(replace(p, role="fixed") for p in term.effect.parameters)
     return Term(replace(term.effect, parameters=fixed, polar=None), term.values)
@@ -55,12 +56,12 @@ def refitted_steps(
     """
     final, noise, regression = result.final, result.noise, engine.regression
     folds = engine.folds(final, noise)
-    now = engine.held_out_errors(final, noise, folds)
+    now = held_out_rms(regression, final, noise, folds)
     fitted = estimates(regression, final, spread)
     for index, old in enumerate(file.terms):
-        start = final.hypothesis.with_term_at(index, _held(old))
+        start = final.hypothesis.with_term_at(index, held(old))
         beside = fit(regression, start, noise.inverse_sigma(regression))
-        errors = engine.held_out_errors(beside, noise, folds)
+        errors = held_out_rms(regression, beside, noise, folds)
         if all(errors[name] <= error / RELEVANT_RATIO for name, error in now.items()):
             continue
         term, values = fitted[index]
