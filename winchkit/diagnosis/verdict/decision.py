@@ -48,6 +48,8 @@ _MEANS = 3.0
 """Standard errors at the noise, where most models are right: one output in 740 is refuted."""
 _NOISY = 0.1
 """Noise over the rms of a signal that does not vary by more: instruments in order have 0.03."""
+_LIMIT = 2.0
+"""Standard deviations from the estimate of a white noise to its upper limit, which is taken."""
 _UPPER_ROWS = 0.25
 """Share of the highest frequencies of an output from which its white noise is taken."""
 
@@ -125,17 +127,20 @@ def white_noise(regression: TimeSeriesRegression, residual: Array) -> dict[str, 
     """
     out = {}
     for output in regression.outputs:
-        upper = power = floor = passed = 0.0
+        upper = power = floor = passed = count = 0.0
         for segment in (s for s in regression.segments if s.output == output):
             share = float(regression.share_of_row[segment.rows.start])
             gain = np.broadcast_to(segment.band.gain, segment.rows.stop - segment.rows.start)
             first = len(gain) - max(1, round(_UPPER_ROWS * len(gain)))
             power += float(np.sum(residual[segment.rows][first:] ** 2))
             upper += share * float(np.sum(gain[first:] ** 2))
+            count += share * (len(gain) - first)
             passed += share * float(np.sum(gain**2))
             bands = regression.band_of_row[segment.rows]
             floor += share * float(np.sum(regression.power_floor[bands]))
-        total = max(power / upper * passed, floor)
+        # The variance of a mean square of n normal values is 2/n of its square.
+        limit = 1.0 + _LIMIT * np.sqrt(2.0 / max(count, 1.0))
+        total = max(limit * power / upper * passed, floor)
         out[output] = float(np.sqrt(total / regression.n_samples(output)))
     return out
 

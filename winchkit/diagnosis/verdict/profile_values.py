@@ -66,6 +66,8 @@ def refitted_steps(
             continue
         term, values = fitted[index]
         standing = standing_of(errors, outputs, term.effect.outputs)
+        if not standing.explained > 0.0:
+            continue  # within the noise both values are right
         gain = 1 - min(now[name] / errors[name] for name in now if errors[name]) ** 2
         what = "more is left in its outputs than a tenth of what its new value explains"
         yield Step(
