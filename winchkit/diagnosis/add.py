@@ -22,6 +22,7 @@ from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.selection.transitions import scanned_transitions, with_fitted_transitions
 from winchkit.diagnosis.selection.weighting import Reweighted, reweighted
 from winchkit.diagnosis.verdict.decision import output_fits
+from winchkit.diagnosis.verdict.profile_values import file_model
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL, placed, variable_of
@@ -130,7 +131,7 @@ def add(
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Addition:
-    """Fit an effect beside those of a profile, all of them refitted.
+    """Fit an effect beside those of a profile, all of them refitted; one that is there too.
 
     Parameters
     ----------
@@ -153,7 +154,7 @@ def add(
     Raises
     ------
     UsageError
-        For an effect that is unknown, present already, or that the runs cannot show.
+        For an effect that is unknown, or that the runs cannot show.
     RunError
         With every fault of every run.
     """
@@ -171,7 +172,6 @@ def fitted_addition(
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")
     catalogue = catalogue or load_catalogue()
-    _require_absent(catalogue[effect_id], profile)
     dataset = prepare(runs, profile, band, decimate=True, fast=True, catalogue=catalogue)
     return fitted_addition_to(effect_id, dataset, catalogue)
 
@@ -179,7 +179,8 @@ def fitted_addition(
 def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedAddition:
     """The same as :func:`fitted_addition` on a prepared data set, as that of a diagnosis."""
     effect = catalogue[effect_id]
-    _require_absent(effect, dataset.profile)
+    if not effect.repeatable and any(t.id == effect.id for t in dataset.profile.effect):
+        return _refitted(effect_id, dataset, catalogue)
     candidates = Catalogue([*catalogue, _placed(effect, dataset)])
     engine = _engine(dataset, candidates, effect)
     lacking = engine.regression.missing_needs(effect)
@@ -214,9 +215,26 @@ def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -
     )
 
 
-def _require_absent(effect: Effect, profile: WinchProfile) -> None:
-    if not effect.repeatable and any(table.id == effect.id for table in profile.effect):
-        raise UsageError(f"profile '{profile.name}' has the effect '{effect.id}' already")
+def _refitted(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedAddition:
+    """The profile's effects refitted, one of them last, beside their file values."""
+    engine = selection_engine(dataset, catalogue)
+    fitted, noise = engine.fit_with_noise(engine.initial_model)
+    transitions = scanned_transitions(engine, fitted, noise)
+    if transitions:
+        rounded = Catalogue(with_transitions(other, transitions) for other in catalogue)
+        again = selection_engine(dataset, rounded)
+        fitted, noise = again.fit_with_noise(again.initial_model)
+        fitted = with_fitted_transitions(again, fitted, noise)
+    best = reweighted(engine, fitted, noise)
+    before = file_model(engine, engine.initial_model, best.noise)
+    spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
+    outputs = output_fits(engine, (before, best.noise), (best.fit, best.noise))
+    terms = sorted(
+        estimates(engine.regression, best.fit, spread),
+        key=lambda pair: pair[0].effect.id == effect_id,
+    )
+    addition = Addition(outputs, tuple(terms), _notes(engine, best))
+    return FittedAddition(engine.regression, before, best.fit, addition)
 
 
 def _engine(dataset: Dataset, catalogue: Catalogue, effect: Effect) -> TimeSeriesSelection:

@@ -220,21 +220,16 @@ def _figures(answer: WinchAnswer, asked: Asked) -> Sequence[Figure]:
 
 
 def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
-    """Next command: add the first effect with one law, else plan runs or write an own effect."""
+    """Next command: add or refit the first effect of one law, else plan runs or write an effect."""
     if diagnosis.interrupted or diagnosis.verdict == "undecided":
         return
-    first = next((step for step in diagnosis.steps if not step.refitted), None)
+    first = next(iter(diagnosis.steps), None)
     words = ("-p", asked.profile, *asked.options)
     if first is not None and len(first.effects) == 1:
         from winchkit.profile_edit.naming import extended_name
 
         file = extended_name(asked.profile, first.effects[0])
         suggest_next("add", first.effects[0], "--fit", runs, *words, "-o", file)
-    elif first is None and diagnosis.steps:
-        from winchkit.profile_edit.naming import extended_name
-
-        file = extended_name(asked.profile, "without")
-        suggest_next("remove", diagnosis.steps[0].effects[0], *words, "-o", file)
     elif first is None and diagnosis.verdict == "unknown" and diagnosis.data == "runs":
         suggest_next("effects", "new", "own.py", "--fit", runs, *words)
     else:
