@@ -35,6 +35,9 @@ __all__ = ["Standing", "candidates_of", "is_small", "standing_of", "steps_of", "
 _CERTAIN = 0.1
 """Share of what a step explains that may be left unexplained in its outputs where it is certain:
 the tenth of the verdict ``explained``."""
+_MOST_ALTERNATIVES = 3
+"""Members of a set, the simplest first; more are named in a doubt. Rule of thumb: what a reader can
+compare."""
 _LARGEST_COLLINEARITY = 1e5
 """Law and channel are accurate to 0.3 % at best: where the others imitate an effect's change to
 within that, what distinguishes it is less than their error."""
@@ -75,6 +78,8 @@ def steps_of(
             for member, fitted in zip(every.terms, every.fits, strict=True)
         }
         equivalence = _without_reduced(every, parameters, engine.profile)
+        further = equivalence.effects[_MOST_ALTERNATIVES:]
+        equivalence = equivalence.only(equivalence.effects[:_MOST_ALTERNATIVES])
         parameters = {name: parameters[name] for name in equivalence.effects}
         combination = combination_of_set(equivalence.terms, parameters, dataset)
         if combination is None and equivalence.term.effect.id == term.effect.id:
@@ -88,6 +93,7 @@ def steps_of(
                 equivalence.angles,
                 combination=combination,
                 place=place,
+                doubts=(Doubt("further", _further_text(further)),) if further else (),
             )
         )
     return tuple(out)
@@ -200,6 +206,7 @@ def _doubts(
     if len(step.effects) > 1:
         others = ", ".join(step.effects[1:])
         out.append(Doubt("alternatives", f"these data cannot distinguish it from {others}"))
+        out += step.doubts
     if curve is not None:
         free, share = curve
         over = free.variable.replace("_", " ")
@@ -222,6 +229,10 @@ def _is_determined(null: Mapping[str, float], name: str, estimate: Estimate) -> 
     if np.isinf(null[name]):
         return bool(estimate.std < abs(estimate.value))
     return bool(estimate.std < abs(estimate.value - null[name]))
+
+
+def _further_text(effects: Sequence[str]) -> str:
+    return f"nor can they distinguish it from {', '.join(effects)}"
 
 
 def _without_reduced(
