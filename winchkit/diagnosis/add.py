@@ -45,6 +45,7 @@ __all__ = [
 ]
 
 _STARTS = 4
+"""Grid points of the effect from which `add` begins a fit; computing cost, rule of thumb."""
 _Fits = tuple[TimeSeriesSelection, tuple[Fit, Noise], tuple[Fit, Noise]]
 """Engine, and the fits before and after the addition, each with its noise."""
 

@@ -95,8 +95,13 @@ ProgressCallback = Callable[[str, float], None]
 """Called with the present step and the share of the work done, 0 to 1."""
 
 _USUAL_TRIALS = 7.0
+"""Candidates after whose fits the progress bar has covered 63 % of a step; measured: a search of
+the timing benchmark fits 7, 7, 7 and 8 candidates (four hidden effects)."""
 _SEARCH = (0.4, 0.8)
+"""Part of the progress bar for the search; measured: the search of these four begins at 36 to 40 %
+of the processor time and ends at 79 to 86 %."""
 _NAMING = (0.8, 1.0)
+"""The same for the equivalence sets; measured: the rest."""
 
 
 class Answer(Plotted, Tabular):
@@ -254,7 +259,7 @@ def diagnose_prepared(
             searched,
             lambda found: (found[0], found[1].final, found[1].noise),
         )
-        reduced = without_impacts(dataset, result.last_model)
+        reduced = without_impacts(dataset, result.final.hypothesis)
         if reduced is not None:
             engine = selection_engine(reduced, catalogue)
             engine.on_trial = _Trials(progress, "without impacts, fitting")
@@ -439,7 +444,9 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         detectable=detectable(
             result.scores, DetectionThreshold(engine.penalty_per_parameter, result.threshold)
         ),
-        unexplained_share=remaining_share(
+        unexplained_share=0.0
+        if verdict == "adequate"
+        else remaining_share(
             {name: output for name, output in outputs.items() if name in known.deciding}
         ),
         where=where if verdict != "adequate" else (),

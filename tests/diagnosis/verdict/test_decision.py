@@ -140,11 +140,11 @@ def test_partly() -> None:
     """A large drag keeps its name beside a wobble of another output that no effect explains."""
     strange = {"cable_length": strange_length(2e-3)}
     found = verdict_of(diagnose(runs((DRAG,), beside=strange), GROOVED).diagnosis, "partly")
-    (step,) = found.steps
+    step = found.steps[0]
     assert step.effects == ("motor-coulomb",)
     torque = step.parameters["motor-coulomb"]["torque"]
     assert torque.value == pytest.approx(0.02, abs=5 * torque.std)
-    assert found.where[0].output == "cable_length"
+    assert "cable_length" in {where.output for where in found.where}
     assert step.certain
     assert 0 < found.unexplained_share <= 0.5
 

@@ -33,9 +33,16 @@ __all__ = [
 ]
 
 _TOUCHED = 0.02
+"""Blocks whose loss changes by less than this share of the largest change are not ranked;
+screened."""
 _AT_LEAST = 8
+"""Blocks that are ranked at least; theory: below six blocks the smallest possible p-value, 2⁻ⁿ,
+exceeds 2 %; eight instead of six is a rule of thumb."""
 _MOST_EXACT = 50
+"""Differences up to which the signed-rank distribution is exact; numerical: at 50 the normal
+approximation is within 10⁻³ of it."""
 _RIDGE = 1e-12
+"""Ridge on scaled normal equations of an extrapolation; numerical."""
 
 
 def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> float:

@@ -408,7 +408,10 @@ def _geometry_steps(selection: RobotSelection) -> Iterator[Step]:
 
 
 _SINGLE_EFFECT_SHARE = 0.4
+"""Share of the geometry's explained χ² below which no single effect replaces it; rule of thumb."""
 _FEW_EFFECTS = 4
+"""Effects in turn beside which the whole geometry is tested before the search; rule of thumb: more
+than a search names beside a right geometry."""
 _EXPLAINING = ("adequate", "explained", "partly")
 """Verdicts with which a free geometry is reported: its many numbers lower any error a little."""
 _TENTH = 0.1

@@ -49,6 +49,8 @@ __all__ = [
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
 _LEAST_SINGULAR_VALUE = 1e-9
+"""Singular values of a hanging pose's derivatives below this share of the largest are zero;
+numerical."""
 
 
 @dataclass(frozen=True)

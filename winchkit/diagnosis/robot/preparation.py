@@ -54,6 +54,8 @@ __all__ = [
 ]
 
 _MOST_IMBALANCE = 0.2
+"""Unexplained imbalance over the standard deviation of tensions above which the balance is left
+out; rule of thumb."""
 
 
 def own_effects(terms: Sequence[Term]) -> Hypothesis:
@@ -187,7 +189,9 @@ def _from(
 
 
 _SHORT_LIST = 3
+"""Candidates that are fitted beside a free geometry; computing cost, rule of thumb."""
 _GEOMETRY_LEVEL = 1e-3
+"""Level of the F test of a free geometry: screened."""
 
 
 @dataclass(frozen=True)

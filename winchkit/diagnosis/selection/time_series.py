@@ -34,7 +34,12 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = ["TimeSeriesSelection"]
 
 _LARGEST_EXTRAPOLATION = 0.2
+"""Variance of a held-out group's prediction over the noise's above which five blocks of time
+replace groups; theory: it lifts a held-out error by √1.2 = 1.095, to the limit `_AT_NOISE` of the
+verdict."""
 _MOST_PEAKS = 12
+"""Orders that enter the grids in one scan of all effects with an order; computing cost; further
+ones are found by the harmonic series and by later scans."""
 
 
 class TimeSeriesSelection(SelectionEngine):

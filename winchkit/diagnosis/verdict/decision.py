@@ -48,6 +48,9 @@ _MEANS = 3.0
 """Standard errors at the noise, where most models are right: one output in 740 is refuted."""
 _NOISY = 0.1
 """Noise over the rms of a signal that does not vary by more: instruments in order have 0.03."""
+_STANDS = 3.0
+"""Error of the file's model over the noise from which an output that does not vary is no measured
+one: an effect at the noise can cancel a variation by chance."""
 _LIMIT = 2.0
 """Standard deviations from the estimate of a white noise to its upper limit, which is taken."""
 _UPPER_ROWS = 0.25
@@ -206,8 +209,7 @@ def measured(
         if np.sqrt(varied[output] / count + between) > AT_NOISE * size:
             deciding.add(output)
         if np.sqrt(varied[output] / count) <= AT_NOISE * size and (
-            np.sqrt(predicted[output] / count) > AT_NOISE * size
-            or size > _NOISY * fitted.signal_rms
+            np.sqrt(predicted[output] / count) > _STANDS * size or size > _NOISY * fitted.signal_rms
         ):
             refuted.add(output)
         if _is_larger(loss[loss != 0.0], _MEANS if is_at_noise(fitted) else 1.0):
@@ -264,6 +266,12 @@ def output_fits(
     noise_leakage = leakage.noise(final[0].hypothesis)
     known = noise.from_repeats
     size = noise.rms if known else white_noise(regression, final[0].residual)
+    if any(held_after[output] > AT_NOISE * size[output] for output in size):
+        # What coarse samples of a fast motion add to the error is known, and no effect.
+        sampled = engine.discretization_power(*final)
+        size = {
+            output: float(np.hypot(own, sampled[output] ** 0.5)) for output, own in size.items()
+        }
     return {
         output: OutputFit(
             unit=OUTPUT_UNITS[output],
