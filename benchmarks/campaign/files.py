@@ -14,6 +14,7 @@ __all__ = ["write_run"]
 UNITS = {
     "time": "s",
     "motor_angle": "rad",
+    "motor_velocity": "rad/s",
     "motor_torque": "N m",
     "tension": "N",
     "load": "N",
