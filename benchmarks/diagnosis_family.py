@@ -15,14 +15,18 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))
 
-from campaign.family.run import CASES, Job, read_lines, run_jobs
+from campaign.family.relation_run import run_relations
+from campaign.family.relation_score import relation_table
+from campaign.family.run import CASES, Job, read_lines, run_job, run_jobs
 from campaign.family.score import changes, table
+
+METAMORPHIC = "metamorphic"
 
 
 def main() -> None:
     """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--kind", choices=CASES, required=True)
+    parser.add_argument("--kind", choices=(*CASES, METAMORPHIC), required=True)
     parser.add_argument("--cases", type=int, default=40)
     parser.add_argument("--first", type=int, default=0, help="index of the first case")
     parser.add_argument("--seed", type=int, default=1)
@@ -37,8 +41,9 @@ def main() -> None:
         Job(args.kind, args.seed, index, args.limit, keep)
         for index in range(args.first, args.first + args.cases)
     ]
-    lines = run_jobs(jobs, args.jobs, args.out)
-    print(table(lines))
+    run = run_relations if args.kind == METAMORPHIC else run_job
+    lines = run_jobs(jobs, args.jobs, args.out, run)
+    print(relation_table(lines) if args.kind == METAMORPHIC else table(lines))
     if args.compare:
         changed = changes(read_lines(args.compare), lines)
         print(f"changed: {len(changed)}", *changed, sep="\n")

@@ -2,19 +2,24 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from campaign.family.answers import answer
+from campaign.family.base import draw_base
 from campaign.family.case import write_case
 from campaign.family.friction import ELEMENTS, LAWS, Shape, sense
 from campaign.family.machine import STEP, Friction, show_fine
 from campaign.family.places import is_certain, places
+from campaign.family.relation_score import relation_table, violations
+from campaign.family.relations import RELATIONS, write_files
 from campaign.family.run import CASES, Job, run_job
 from campaign.family.score import changes, judge, table
 from campaign.truth import G
 from campaign.winch import Winch
+from winchkit import compare, read_profile, read_run
 from winchkit.arrays import Array
 
 TIME = np.arange(0.0, 4.0, STEP)
@@ -136,3 +141,51 @@ def test_the_place_of_a_step_is_what_it_says_or_that_of_its_effects() -> None:
     assert is_certain({"effects": ["a"]})
     assert not is_certain({"effects": ["a"], "certain": False})
     assert not is_certain({"effects": ["a", "b"]})
+
+
+@pytest.mark.parametrize("relation", ["a day later", "another unit", "sign and direction"])
+def test_errors_are_the_same_for_the_same_information(relation: str, tmp_path: Path) -> None:
+    base, random = draw_base((2, 5), 5), np.random.default_rng(1)
+    errors = []
+    for name in ("twice", relation):
+        paths, profile = write_files(RELATIONS[name].files(base, random), tmp_path / name)
+        told = compare([read_run(path) for path in paths], read_profile(profile)).to_json()
+        errors.append([output["rms"] for output in told["outputs"].values()])
+    assert errors[1] == pytest.approx(errors[0], rel=1e-5)
+
+
+def test_further_repeats_and_loads_leave_the_files_as_they_are() -> None:
+    base = draw_base((2, 5), 5)
+    once, twice, more = base.runs(1), base.runs(2), base.runs(2, further=True)
+    assert (2 * len(once), len(twice) + 2) == (len(twice), len(more))
+    for a, b, c in zip(once, twice, more, strict=False):
+        assert np.array_equal(a.channels["tension"], b.channels["tension"])
+        assert np.array_equal(b.channels["tension"], c.channels["tension"])
+    other = base.runs(1, noise=1)[0].channels["tension"]
+    same = np.resize(once[0].channels["tension"], other.shape)
+    assert not np.array_equal(other, same)
+
+
+def test_a_name_that_is_lost_replaced_or_doubtful_is_a_violation() -> None:
+    def told(verdict: str, *sets: list[str], value: float = 1.0) -> dict[str, Any]:
+        size = {"size": {"value": value, "std": 0.01}}
+        steps = [{"effects": s, "values": {s[0]: size}} for s in sets]
+        return {"verdict": verdict, "steps": steps, "text": "", "detectable": {}}
+
+    base, exact = told("explained", ["a"]), "stamps 1 ns"
+    kept = violations(base, told("explained", ["a"]), exact)
+    assert not any(kept[k] for k in ("failed", "lost", "uncertain", "another", "silent", "outside"))
+    assert violations(base, told("unknown"), exact)["lost"] == ["a"]
+    assert violations(base, told("unknown"), exact)["silent"]
+    assert violations(base, told("explained", ["a", "b"]), exact)["uncertain"] == ["a"]
+    assert violations(base, told("explained", ["b"]), exact)["another"] == ["b"]
+    assert violations(base, told("explained", ["a"], ["b"]), "three times")["another"] == []
+    assert len(violations(base, told("explained", ["a"], value=1.1), exact)["outside"]) == 1
+    assert violations(base, told("crash"), exact) == {"failed": True}
+    # A name that is hardly detectable may go with other noise, and may not with the same.
+    small = base | {"detectable": {"a": {"size": 0.9}}}
+    assert violations(small, told("adequate"), "another noise")["lost"] == []
+    assert violations(small, told("adequate"), exact)["lost"] == ["a"]
+    relations = dict.fromkeys(list(RELATIONS)[1:], told("unknown"))
+    line = base | {"seed": 1, "truth": {"words": "x"}, "relations": relations}
+    assert "stamps 1 ns" in relation_table([line])

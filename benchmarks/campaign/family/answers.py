@@ -58,6 +58,7 @@ def answer(runs: Sequence[Path], profile: Path, limit: float) -> dict[str, Any]:
         "verdict": verdict,
         "steps": [_step(step) for step in told.get("steps", ())],
         "outputs": {name: _errors(output) for name, output in told.get("outputs", {}).items()},
+        "detectable": _detectable(told),
         "share": (told.get("unexplained") or {}).get("share"),
         "sanity": sorted({f"{s['code']} {s['channel']}" for s in told.get("sanity", ())}),
         "caveats": list(told.get("caveats", ())),
@@ -71,6 +72,16 @@ def _step(step: dict[str, Any]) -> dict[str, Any]:
     keys = ("effects", "place", "law", "certain", "share", "heldout_gain", "doubts", "refitted")
     kept = {key: step[key] for key in keys if key in step}
     return kept | {"values": step.get("parameters", {})}
+
+
+def _detectable(told: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Smallest detectable value of each parameter of the effects of the steps."""
+    named = {effect for step in told.get("steps", ()) for effect in step["effects"]}
+    out: dict[str, dict[str, float]] = {}
+    for one in told.get("detectable", ()):
+        if one["effect"] in named:
+            out.setdefault(one["effect"], {})[one["parameter"]] = one["smallest"]
+    return out
 
 
 def _errors(output: dict[str, Any]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,11 +90,16 @@ def runs_of(
     random: Random,
     machine: Machine,
     chain: Chain,
-    shown: dict[tuple[int, float], Shown],
+    shown: Mapping[tuple[int, float], Shown],
     repeats: int,
+    *,
+    zero: float | None = None,
 ) -> list[Recording]:
-    """Every motion with every load, each ``repeats`` times; the length counts from one zero."""
-    offset = random.normal(0, 0.02)
+    """Every motion with every load, each ``repeats`` times; the length counts from one zero.
+
+    That zero (m) is drawn where it is not given.
+    """
+    offset = random.normal(0, 0.02) if zero is None else zero
     out = []
     for (number, mass), ideal in shown.items():
         for _ in range(repeats):

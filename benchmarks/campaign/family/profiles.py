@@ -31,6 +31,8 @@ UNITS = {
 }
 """Effect that a profile has: its number, that one's unit, its part, its output."""
 WRONG = (*UNITS, "drum-radius", "gear-ratio")
+COARSE = 0.02
+"""Longest interval of samples from which an acceleration is known, s."""
 SIZES = (10.0, 30.0)
 """Of the true effect over the noise: 3 to 60 times the noise is then wrong."""
 
@@ -43,7 +45,9 @@ def draw_wrong_profile(random: Random, index: int) -> Case:
         bench = draw_bench(random, repeats, small=True, finely=True)
         known, loads = bench.load != "cell", len(bench.scene.masses)
         if name in UNITS:
-            if not (name == "rotor-inertia" or allowed(name, bench.winch, known, False, loads)):
+            if not allowed(name, bench.winch, known, False, loads):
+                continue
+            if name == "rotor-inertia" and _interval(bench) > COARSE:
                 continue
             size = float(np.exp(random.uniform(*np.log(SIZES))))
             hidden = size_effects(random, Plan("single", size), bench, (name,))
@@ -52,6 +56,12 @@ def draw_wrong_profile(random: Random, index: int) -> Case:
         elif name == "drum-radius" or bench.winch.ratio > 1:
             return _wrong_drive(random, bench, name, repeats)
     raise AssertionError(f"no bench can have {name}")
+
+
+def _interval(bench: Bench) -> float:
+    """Of the samples, s."""
+    first = bench.situations[0]
+    return first.every * float(first.time[1] - first.time[0])
 
 
 def _times(random: Random) -> float:

@@ -94,7 +94,8 @@ def run_jobs(
             with out.open("a", encoding="utf-8") as log:
                 log.write(text + "\n")
         names = ["|".join(step["effects"]) for step in line["steps"]]
-        said = f"{line['verdict']} {names} {line['seconds']} s {line['text'][:200]}"
+        why = line["text"].partition("\n")[0][:200]
+        said = f"{line['verdict']} {names} {line['seconds']} s {why}"
         print(line["seed"], line["truth"]["words"], "->", said, file=sys.stderr, flush=True)
     return [known[job.number] for job in jobs]
 
