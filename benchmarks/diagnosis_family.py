@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from campaign.family.relation_run import run_relations
 from campaign.family.relation_score import relation_table
 from campaign.family.run import CASES, Job, read_lines, run_job, run_jobs
-from campaign.family.score import changes, table
+from campaign.family.score import changes, failures, table
 
 METAMORPHIC = "metamorphic"
 
@@ -43,7 +43,10 @@ def main() -> None:
     ]
     run = run_relations if args.kind == METAMORPHIC else run_job
     lines = run_jobs(jobs, args.jobs, args.out, run)
-    print(relation_table(lines) if args.kind == METAMORPHIC else table(lines))
+    if args.kind == METAMORPHIC:
+        print(relation_table(lines))
+    else:
+        print(table(lines), "", "failures", *failures(lines), sep="\n")
     if args.compare:
         changed = changes(read_lines(args.compare), lines)
         print(f"changed: {len(changed)}", *changed, sep="\n")

@@ -16,7 +16,7 @@ from campaign.family.places import is_certain, places
 from campaign.family.relation_score import relation_table, violations
 from campaign.family.relations import RELATIONS, write_files
 from campaign.family.run import CASES, Job, run_job
-from campaign.family.score import changes, judge, table
+from campaign.family.score import changes, failures, judge, table
 from campaign.truth import G
 from campaign.winch import Winch
 from winchkit import compare, read_profile, read_run
@@ -114,6 +114,7 @@ def test_an_answer_is_a_line_that_the_scores_can_read(kind: str, index: int) -> 
     assert not judge(line)["failed"]
     assert "verdicts" in table([line])
     assert changes([line], [line]) == []
+    assert all(str(line["seed"]) in text for text in failures([line]))
     other = {**line, "verdict": "other"}
     assert len(changes([other], [line])) == 1
 
@@ -189,3 +190,16 @@ def test_a_name_that_is_lost_replaced_or_doubtful_is_a_violation() -> None:
     relations = dict.fromkeys(list(RELATIONS)[1:], told("unknown"))
     line = base | {"seed": 1, "truth": {"words": "x"}, "relations": relations}
     assert "stamps 1 ns" in relation_table([line])
+
+
+@pytest.mark.slow
+def test_the_same_information_is_told_the_same_name(tmp_path: Path) -> None:
+    base, told = draw_base((1, 2), 2), {}
+    for name in (name for name, relation in RELATIONS.items() if relation.exact):
+        files = RELATIONS[name].files(base, np.random.default_rng(1))
+        told[name] = answer(*write_files(files, tmp_path / name.replace(" ", "-")), 60.0)
+    first = told.pop("twice")
+    assert first["verdict"] == "explained"
+    for name, other in told.items():
+        found = violations(first, other, name)
+        assert not any(w for key, w in found.items() if key != "values"), (name, found)

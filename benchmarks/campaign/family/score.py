@@ -8,7 +8,7 @@ from typing import Any
 from campaign.family.places import VARIABLES, is_certain, places
 from campaign.logger_score import clopper_pearson
 
-__all__ = ["changes", "judge", "table"]
+__all__ = ["changes", "failures", "judge", "table"]
 
 Line = Mapping[str, Any]
 FAILED = ("crash", "timeout")
@@ -158,6 +158,52 @@ _ROWS: dict[str, Callable[[Sequence[Line]], list[tuple[str, str]]]] = {
     "garbage": _garbage,
     "profiles": _profiles,
 }
+
+
+def _friction_fails(line: Line) -> bool:
+    said = judge(line)
+    return not said["right"] or bool(said["wrong"])
+
+
+def _garbage_fails(line: Line) -> bool:
+    kind = line["truth"]["detail"]["garbage"]
+    if kind == "grounded":
+        return not (_ground_found(line) and _rest_right(line))
+    if kind == "constant":
+        return bool(line["verdict"] == "adequate")
+    return line["verdict"] in GOOD or any(map(is_certain, line["steps"]))
+
+
+def _profile_fails(line: Line) -> bool:
+    return line["verdict"] == "adequate" or bool(judge(line)["wrong"])
+
+
+_FAILS: dict[str, Callable[[Line], bool]] = {
+    "friction": _friction_fails,
+    "garbage": _garbage_fails,
+    "profiles": _profile_fails,
+}
+
+
+def failures(lines: Sequence[Line]) -> list[str]:
+    """Cases that are not as the aims want them, a line each, with the errors over the noise."""
+    out = []
+    for line in lines:
+        if not (line["verdict"] in FAILED or _FAILS[line["kind"]](line)):
+            continue
+        errors = " ".join(
+            f"{name} {o['before'] / o['noise']:.3g} -> {o['after'] / o['noise']:.3g}"
+            for name, o in line["outputs"].items()
+            if o["noise"] and o["before"] is not None and o["after"] is not None
+        )
+        wrong = ", ".join(judge(line)["wrong"])
+        told = f"{_told(line)}{f', certain and wrong {wrong}' if wrong else ''}"
+        out.append(f"{line['seed']} {line['truth']['words']}: {told}; {errors} {_first(line)}")
+    return out
+
+
+def _first(line: Line) -> str:
+    return str(line["text"].partition("\n")[0][:160])
 
 
 def changes(old: Sequence[Line], new: Sequence[Line]) -> list[str]:
