@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import pi
 from typing import Any
 
 from campaign.family.places import is_certain
@@ -65,12 +66,14 @@ def _times_detectable(answer: Answer, effect: str) -> float:
 
 
 def _values(answer: Answer) -> dict[tuple[str, str], Mapping[str, Any]]:
+    """Values with a standard deviation, of effects of one step only: an order has a step each."""
+    steps = [effect for step in answer["steps"] for effect in step["values"]]
     return {
         (effect, name): value
         for step in answer["steps"]
         for effect, values in step["values"].items()
         for name, value in values.items()
-        if value.get("std") and value.get("value") is not None
+        if steps.count(effect) == 1 and value.get("std") and value.get("value") is not None
     }
 
 
@@ -89,7 +92,10 @@ def _outside(base: Answer, other: Answer, relation: str) -> tuple[list[str], int
         spread = max(a["std"], b["std"])
         if not RELATIONS[relation].exact:
             spread = float((a["std"] ** 2 + b["std"] ** 2) ** 0.5)
-        if abs(a["value"] - b["value"]) > 1.96 * spread:
+        apart = a["value"] - b["value"]
+        if key[1] == "phase":
+            apart = (apart + pi) % (2 * pi) - pi
+        if abs(apart) > 1.96 * spread:
             off = f"{' '.join(key)} {a['value']:.4g} ± {a['std']:.2g} -> {b['value']:.4g}"
             out.append(f"{off} ± {b['std']:.2g}")
     return sorted(out), count
