@@ -268,6 +268,14 @@ def test_killed_workers_and_a_second_client_lose_nothing_and_give_nothing_twice(
         assert {one.diagnosis["key"]: one for one in found} == plain
 
 
+def test_the_processes_by_default_are_as_many_as_cores_and_memory_allow() -> None:
+    pytest.importorskip("distributed")
+    due = tasks(2, "d")
+    found = list(cluster_outcomes(due, work=outcome))
+    assert {one.diagnosis["key"]: one for one in found} == {t.key: outcome(t) for t in due}
+    assert 1 <= cluster._processes() <= (os.cpu_count() or 1)
+
+
 @pytest.mark.slow
 def test_workers_of_this_computer_never_get_sigint_not_even_those_that_replace_lost_ones(
     tmp_path: Path,

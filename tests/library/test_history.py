@@ -38,7 +38,14 @@ def test_every_set_has_one_of_the_common_effects(sets: list[list[str]]) -> None:
     chosen = common_effects(sets)
     assert all(set(chosen) & set(one) for one in sets)
     assert len(set(chosen)) == len(chosen)
-    assert common_effects([list(reversed(one)) for one in reversed(sets)]) == chosen
+    assert common_effects(list(reversed(sets))) == chosen
+
+
+def test_of_effects_in_equally_many_sets_the_named_one_is_followed() -> None:
+    assert common_effects([["gear-ratio", "drum-radius"]]) == ("gear-ratio",)
+    sets = [["gear-ratio", "drum-radius"]] * 2 + [["drum-radius", "gear-ratio"]]
+    assert common_effects(sets) == ("gear-ratio",)
+    assert common_effects([["gear-ratio", "drum-radius"], ["drum-radius"]]) == ("drum-radius",)
 
 
 def estimates(winch: str, values: Sequence[float], std: float) -> list[SessionEstimate]:

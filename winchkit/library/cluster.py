@@ -207,8 +207,9 @@ def _watched(client: Any, give_up: Callable[[], object]) -> Iterator[threading.E
 
 def _processes() -> int:
     """Processes for the cores and the memory of this computer."""
-    system: Any = import_module("distributed.system")
-    return max(1, min(int(system.CPU_COUNT), int(system.MEMORY_LIMIT // _WORKER_BYTES)))
+    cores: int = import_module("dask.system").CPU_COUNT
+    memory: int = import_module("distributed.system").MEMORY_LIMIT
+    return max(1, min(cores, memory // _WORKER_BYTES))
 
 
 def _version_of_worker() -> str:

@@ -46,19 +46,21 @@ def common_effects(sets: Iterable[Sequence[str]]) -> tuple[str, ...]:
     Parameters
     ----------
     sets : iterable of sequence of str
-        Equivalence sets of all sessions.
+        Equivalence sets of all sessions, each with the effect first that its diagnosis named.
 
     Returns
     -------
     tuple of str
         The effect that is in most sets, then that in most of the others, and so on: the name of a
-        cause is the same in all sessions.
+        cause is the same in all sessions. Of effects in equally many sets the one that most
+        diagnoses named.
     """
     left = [tuple(one) for one in sets if one]
     chosen: list[str] = []
     while left:
         counts = Counter(effect for one in left for effect in set(one))
-        best = min(counts, key=lambda effect: (-counts[effect], effect))
+        named = Counter(one[0] for one in left)
+        best = min(counts, key=lambda effect: (-counts[effect], -named[effect], effect))
         chosen.append(best)
         left = [one for one in left if best not in one]
     return tuple(chosen)

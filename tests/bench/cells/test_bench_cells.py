@@ -84,6 +84,39 @@ def test_no_zero_and_no_tare_while_the_winch_moves(bench: Bench, wiring: Path) -
     assert bench.winch["A"].moving, "nobody was disturbed"
 
 
+def test_tares_are_restored_to_what_they_were_before(bench: Bench, wiring: Path) -> None:
+    station = attach(bench.spec)
+    assert station is not None
+
+    def comes(tares: object, net: float) -> None:
+        end = time.monotonic() + 10
+        while station.cell("tares", "A") != tares or abs(bench.winch["A"].tension - net) > 8:
+            assert time.monotonic() < end, (station.cell("tares", "A"), bench.winch["A"].tension)
+            time.sleep(0.01)
+
+    try:
+        none = station.cell("tares", "A")
+        assert none == {"device": False, "host": None}
+        station.cell("host tare", "A", 0.3)
+        by_host = station.cell("tares", "A")
+        assert by_host["host"]["value"] == pytest.approx(WEIGHT, abs=8)
+        station.tare("A")
+        assert station.status()["tare"]["A"] == pytest.approx(2 * WEIGHT, abs=16)
+        station.cell("restore tares", "A", by_host)
+        comes(by_host, 0.0)
+        kept = (wiring.parent / "bench.tares.toml").read_text()
+        assert by_host["host"]["taken"][:10] in kept
+        station.cell("restore tares", "A", none)
+        comes(none, WEIGHT)
+        assert station.status()["tare"]["A"] == 0.0
+        station.tare("A")
+        by_device = station.cell("tares", "A")
+        with pytest.raises(NotPermitted, match="keeps no earlier one"):
+            station.cell("restore tares", "A", by_device)
+    finally:
+        station.close()
+
+
 def test_an_unknown_task_is_refused(bench: Bench) -> None:
     station = attach(bench.spec)
     assert station is not None

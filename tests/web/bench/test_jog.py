@@ -18,7 +18,7 @@ STOPS = 2.0
 """Bound for a jog to end after its release, s: dead-man 0.2 s, ramp 0.05 / 1 s, pictures 0.1 s,
 and stalls of this computer."""
 MOVING = {"winding in", "paying out"}
-REFUSED = "the page answers too late to jog"
+REFUSED = "the browser was too slow"
 
 pytestmark = [pytest.mark.slow, pytest.mark.realtime, NEEDS_CHROMIUM]
 

@@ -74,5 +74,10 @@ def test_a_jog_that_trips_the_tension_is_reported_and_its_last_seconds_are_saved
     assert np.nanmax(tension) > HIGH
     assert run.metadata["tripped"] in words or "tension" in run.metadata["tripped"]
     page.screenshot(path=tmp_path / "trip.png", full_page=True)
+    page.keyboard.press("r")
+    assert "Nothing moves before a new command" in page.inner_text("#dialog")
+    page.keyboard.press("Enter")
+    until(page, lambda: page.locator("#trips .trip").count() == 0, 10.0)
+    assert page.locator(".controls .jog").first.is_enabled()
     assert complaints == []
     page.context.close()

@@ -29,15 +29,16 @@ from winchkit.web.bench.browser import Browser, Inbox
 from winchkit.web.bench.drive_objects import drive_objects, drive_settings, write_setting
 from winchkit.web.bench.frames import FrameWords
 from winchkit.web.bench.live_model import CHANNELS, LiveModel
+from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.trip_file import trip_file
 from winchkit.web.bench.view import BenchView
 
 
-def taken(inbox: Inbox) -> list[dict[str, Any]]:
+def taken(inbox: Inbox) -> list[Message]:
     """Everything that waits, in its order."""
 
-    async def all_of() -> list[dict[str, Any]]:
+    async def all_of() -> list[Message]:
         found = []
         while inbox._waiting:
             found.append(await inbox.next())
@@ -87,7 +88,7 @@ def test_a_message_of_the_page_names_the_direction(
     spec = read_simbench(find("sim", "spiral-bench")).bench
     browser = Browser("page", spec, Programmes(spec, tmp_path, tmp_path))
     browser.take(Station())  # type: ignore[arg-type]
-    browser.do(message["do"], {**message, "winch": "A"})
+    browser.action({**message, "winch": "A"})()
     assert seen == [(call[0], "A", call[1])]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from typing import Any
@@ -9,10 +10,18 @@ from typing import Any
 from winchkit.bench.cells.desk import CellDesk, steady
 from winchkit.bench.cells.instruments import tares_of
 from winchkit.calibration.cell.files import tares_toml, write_text
-from winchkit.errors import UsageError
+from winchkit.errors import NotPermitted, UsageError
 from winchkit.schema.calibration import HostTare, TareBook, tare_book_path
 
-__all__ = ["clear_device_tare", "clear_tare", "device_tare", "device_zero", "host_tare"]
+__all__ = [
+    "clear_device_tare",
+    "clear_tare",
+    "device_tare",
+    "device_zero",
+    "host_tare",
+    "restore_tares",
+    "tares_now",
+]
 
 _CHECK = 0.3
 """s: an indicator's filter of some readings has settled, and a fast cell gives ten readings."""
@@ -54,6 +63,47 @@ def clear_tare(desk: CellDesk, name: str) -> dict[str, Any]:
     _keep(desk, book, {other: tare for other, tare in book.tare.items() if other != name})
     _apply(desk, name, 0.0)
     return {"removed": removed, "file": _book_path(desk)}
+
+
+def tares_now(desk: CellDesk, name: str) -> dict[str, Any]:
+    """The tares of an instrument, for :func:`restore_tares`.
+
+    ``device``: whether the device shows a net value, None where it does not say; ``host``: value,
+    standard deviation and time of the host's tare, None without one.
+    """
+    kept, value = tares_of(desk.spec).tare.get(name), desk.publisher(name).scale.tare
+    if kept is None and value:
+        kept = HostTare(value)
+    host = None
+    if kept is not None:
+        taken = None if kept.taken is None else kept.taken.isoformat()
+        host = {"value": kept.value, "std": kept.std, "taken": taken}
+    return {"device": desk.sensors[name].tared, "host": host}
+
+
+def restore_tares(desk: CellDesk, name: str, before: Mapping[str, Any]) -> dict[str, Any]:
+    """Undo a tare: the tares of an instrument are again what :func:`tares_now` gave before it.
+
+    Raises NotPermitted in motion, and where the device itself had been tared: it keeps no earlier
+    tare.
+    """
+    desk.permit(name)
+    if desk.device(name).commands.get("tare") is False:
+        if before["device"]:
+            raise NotPermitted(
+                f"{name}: the device had a tare of its own before and keeps no earlier one; "
+                "`winchkit cell tare --device --clear` shows the gross value"
+            )
+        desk.command(name, "gross")
+    book, host = tares_of(desk.spec), before["host"]
+    others = {other: tare for other, tare in book.tare.items() if other != name}
+    if host is not None:
+        taken = None if host["taken"] is None else datetime.fromisoformat(host["taken"])
+        others[name] = HostTare(float(host["value"]), float(host["std"]), taken)
+    if others != book.tare:
+        _keep(desk, book, others)
+    _apply(desk, name, 0.0 if host is None else float(host["value"]))
+    return {}
 
 
 def device_tare(desk: CellDesk, name: str, duration: float) -> dict[str, Any]:

@@ -14,6 +14,8 @@ from winchkit.bench.cells.tares import (
     device_tare,
     device_zero,
     host_tare,
+    restore_tares,
+    tares_now,
 )
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import UsageError
@@ -90,8 +92,10 @@ TASKS: Mapping[str, Callable[..., dict[str, Any]]] = {
     "identify": _identify,
     "indicated": _indicated,
     "rate": rate_report,
+    "restore tares": restore_tares,
     "store": _store,
+    "tares": tares_now,
     "watch": _watch,
     "zero": device_zero,
 }
-"""Each takes a desk, the full name of an instrument and numbers in SI."""
+"""Each takes a desk, the full name of an instrument and numbers in SI, or what "tares" gave."""

@@ -19,6 +19,7 @@ from winchkit.bench.remote.programme_run import ProgrammeRun
 from winchkit.bench.winch import Winch
 from winchkit.drivers.can.bus.frame_tap import SeenFrame
 from winchkit.drivers.clock import Clock
+from winchkit.drivers.reading import Sensor
 from winchkit.errors import UsageError
 from winchkit.schema.programme import ALL
 
@@ -203,6 +204,11 @@ class LocalStation:
                 "counts": list(self._bench.loop.cycle_counts),
             },
             "bus": buses,
+            "tare": {
+                name: _tare(winch.sensors["cell"])
+                for name, winch in self._bench.winch.items()
+                if "cell" in winch.sensors
+            },
             "realtime": [asdict(item) for item in self._bench.realtime.items],
             "not_commissioned": self._bench.not_commissioned,
             "owner": self._bench.commanders.owner.name,
@@ -452,6 +458,14 @@ class LocalStation:
         """One winch, or with "all" every one."""
         every = list(self._bench.winch.values())
         return every if winch == ALL else [self._bench.named(winch)]
+
+
+def _tare(cell: Sensor) -> float | None:
+    """Gross less net value, by the device and the host together, N; None without a measurement."""
+    reading = cell.latest
+    if reading is None or not reading.quality.usable:
+        return None
+    return reading.gross - reading.value
 
 
 def _frame(frame: SeenFrame) -> list[Any]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import json
-import math
 import time
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,30 +17,38 @@ from winchkit.bench.direction import directed
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.errors import UsageError, WinchkitError
 from winchkit.schema.bench import BenchSpec
+from winchkit.schema.programme import ALL
+from winchkit.web.bench import messages
+from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 
-__all__ = ["Browser", "Inbox", "counting", "received"]
+__all__ = ["BEGINS_NOTHING", "Browser", "Inbox", "counting", "received"]
+
+BEGINS_NOTHING = frozenset(
+    {"show", "leave", "release", "alive", "programme", "end_programme", "end_record"}
+)
+"""Messages that may come late: they end something, or say that the page is seen."""
 
 _COUNTED = 0.5
 """Period in which the rows of a log are asked for, s."""
-_LARGEST = 4_000
-"""Bytes of a message of a browser."""
+_AXES = ("x", "y", "z")
+"""Of a robot's platform."""
 
 
 class Inbox:
     """Messages in their order; a jog replaces one that waits, and every other message ends it."""
 
     def __init__(self) -> None:
-        self._waiting: deque[dict[str, Any]] = deque()
+        self._waiting: deque[Message] = deque()
         self._filled = asyncio.Event()
 
-    def put(self, asked: dict[str, Any]) -> None:
+    def put(self, asked: Message) -> None:
         """Take a message."""
         kept = [item for item in self._waiting if item.get("do") != "jog"]
         self._waiting = deque([*kept, asked])
         self._filled.set()
 
-    async def next(self) -> dict[str, Any]:
+    async def next(self) -> Message:
         """The oldest message."""
         while not self._waiting:
             self._filled.clear()
@@ -53,15 +60,13 @@ async def received(socket: WebSocket, browser: Browser) -> None:
     """Read messages until the browser closes; malformed ones are reported and dropped."""
     with suppress(WebSocketDisconnect):
         while True:
-            text = await socket.receive_text()
+            got = await socket.receive()
+            if got["type"] == "websocket.disconnect":
+                return
             try:
-                asked = json.loads(text) if len(text) <= _LARGEST else None
-            except ValueError:
-                asked = None
-            if isinstance(asked, dict):
-                browser.inbox.put(asked)
-            else:
-                browser.said = f"the message is no JSON object of at most {_LARGEST} characters"
+                browser.inbox.put(messages.decoded(got.get("text") or ""))
+            except UsageError as error:
+                browser.say(str(error))
 
 
 async def counting(browser: Browser) -> None:
@@ -78,13 +83,27 @@ class Browser:
         self.name = name
         self.spec, self._programmes = spec, programmes
         self.shown = next(iter(spec.winch))
-        self.said = ""
+        self.said: dict[str, Any] = {"number": 0, "text": ""}
+        """Answer to the latest order, empty for one that was carried out; each has its number."""
         self.inbox = Inbox()
         self._station: RemoteStation | None = None
         self._log: tuple[str, float] | None = None
         self._counted: dict[str, Any] = {}
+        self._tares: dict[str, dict[str, Any]] = {}
+        self._started: set[str] = set()
+        """Winches, or all, with a move or a step of this page whose end was not reported."""
         self.programme: dict[str, Any] | None = None
         """Where the programme is that this page started; None where it started none."""
+
+    def say(self, words: str) -> None:
+        """Answer an order; words that repeat are said again."""
+        if words or self.said["text"]:
+            self.said = {"number": self.said["number"] + 1, "text": words}
+
+    @property
+    def undo_tare(self) -> list[str]:
+        """Winches whose tares of before this page's can be restored."""
+        return list(self._tares)
 
     def take(self, station: RemoteStation) -> None:
         """Command by a station."""
@@ -94,7 +113,8 @@ class Browser:
     def leave(self) -> None:
         """Close the station: the owner ends what was started by it."""
         station, self._station, self._log = self._station, None, None
-        self._counted, self.programme = {}, None
+        self._counted, self.programme, self._tares = {}, None, {}
+        self._started.clear()
         if station is not None:
             with suppress(WinchkitError):
                 station.close()
@@ -113,48 +133,101 @@ class Browser:
                 log = self._station.counters()["log"]
                 self._counted = {"rows": log["rows"], "lost": log["drops"]}
 
-    def do(self, name: str, asked: dict[str, Any]) -> None:
-        """Carry out a message; raises what the station raises."""
+    def action(self, asked: Message) -> Callable[[], object]:
+        """What a message orders, not carried out yet: every value in it is checked here.
+
+        Raises UsageError. Carrying it out raises what the station raises.
+        """
         station = self._station
         if station is None:
             raise UsageError("this page only watches; request command first")
-        winch = str(asked["winch"]) if "winch" in asked else None
-        if winch is not None and winch != "all" and winch not in self.spec.winch:
-            raise UsageError(f"there is no winch '{winch}'")
-        actions: dict[str, Callable[[], object]] = {
+        decoders: dict[str, Callable[[], Callable[[], object]]] = {
             # In a message a jog's speed is positive winding in, a step's change paying out.
-            "jog": lambda: station.jog(winch, **directed(-_number(asked["speed"]))),
-            "release": lambda: station.release(winch),
-            "alive": lambda: station.moving(winch),
-            "step": lambda: station.step(
-                winch, **directed(_number(asked["change"])), speed=_number(asked["speed"])
+            "jog": lambda: partial(
+                station.jog, self._winch(asked), **directed(-messages.signed_speed(asked))
             ),
-            "move": lambda: station.move(
-                winch, to=_number(asked["to"]), speed=_number(asked["speed"])
+            "release": lambda: partial(station.release, self._winch(asked)),
+            "alive": lambda: partial(
+                self._live, station, ALL if asked.get("winch") == ALL else self._winch(asked)
             ),
-            "move_pose": lambda: station.move_pose(
-                {str(asked["axis"]): _number(asked["change"])}, True, _number(asked["speed"])
+            "step": lambda: partial(
+                self._start,
+                winch := self._winch(asked),
+                partial(
+                    station.step,
+                    winch,
+                    **directed(messages.change(asked, "change")),
+                    speed=messages.speed(asked),
+                ),
             ),
-            "reset": station.reset,
-            "tare": lambda: station.tare(winch),
-            "take_over": lambda: station.take_over(winch),
-            "run_programme": lambda: self._run(station, asked),
-            "programme": lambda: self._look(station),
-            "answer_programme": station.answer_programme,
-            "end_programme": station.end_programme,
-            "record": lambda: self._record(station, str(asked["file"])),
-            "end_record": lambda: self._end_record(station),
+            "move": lambda: partial(
+                self._start,
+                winch := self._winch(asked),
+                partial(
+                    station.move,
+                    winch,
+                    to=messages.length(asked, "to"),
+                    speed=messages.speed(asked),
+                ),
+            ),
+            "move_pose": lambda: partial(
+                self._start,
+                ALL,
+                partial(
+                    station.move_pose,
+                    {messages.name(asked, "axis", _AXES): messages.change(asked, "change")},
+                    True,
+                    messages.speed(asked),
+                ),
+            ),
+            "reset": lambda: station.reset,
+            "tare": lambda: partial(self._tare, station, self._winch(asked)),
+            "undo_tare": lambda: partial(self._undo_tare, station, self._winch(asked)),
+            "take_over": lambda: partial(station.take_over, self._winch(asked)),
+            "run_programme": lambda: partial(
+                self._run, station, messages.text(asked, "name"), messages.text(asked, "folder")
+            ),
+            "programme": lambda: partial(self._look, station),
+            "answer_programme": lambda: station.answer_programme,
+            "end_programme": lambda: station.end_programme,
+            "record": lambda: partial(self._record, station, messages.text(asked, "file")),
+            "end_record": lambda: partial(self._end_record, station),
         }
-        if name not in actions:
-            raise UsageError(f"there is no action '{name}'; there are {', '.join(actions)}")
-        actions[name]()
+        return decoders[messages.name(asked, "do", decoders, "action")]()
 
-    def _run(self, station: RemoteStation, asked: dict[str, Any]) -> None:
+    def _winch(self, asked: Message) -> str:
+        return messages.name(asked, "winch", self.spec.winch)
+
+    def _start(self, moved: str, order: Callable[[], object]) -> None:
+        order()
+        self._started.add(moved)
+
+    def _live(self, station: RemoteStation, moved: str) -> None:
+        """A sign of life for a motion of this page; what ended it is raised once."""
+        if moved not in self._started:
+            return
+        self._started.discard(moved)
+        if station.moving(moved):
+            self._started.add(moved)
+
+    def _tare(self, station: RemoteStation, winch: str) -> None:
+        """Tare a load cell, and note what it was tared by before."""
+        before = station.cell("tares", f"{winch}.cell")
+        station.tare(winch)
+        self._tares[winch] = before
+
+    def _undo_tare(self, station: RemoteStation, winch: str) -> None:
+        if winch not in self._tares:
+            raise UsageError(f"this page has not tared winch {winch}")
+        station.cell("restore tares", f"{winch}.cell", self._tares[winch])
+        del self._tares[winch]
+
+    def _run(self, station: RemoteStation, programme: str, folder: str) -> None:
         """Start a programme; its runs go into a folder beside those of the page's work."""
-        folder = str(asked["folder"]).strip() or "."
+        folder = folder.strip() or "."
         if Path(folder).name != folder and folder != ".":
             raise UsageError(f"folder '{folder}': name one without / beside this page's work")
-        path = self._programmes.path(str(asked["name"]))
+        path = self._programmes.path(programme)
         station.start_programme(
             str(path.resolve()), str((self._programmes.work / folder).resolve())
         )
@@ -163,20 +236,13 @@ class Browser:
     def _look(self, station: RemoteStation) -> None:
         self.programme = station.programme()
 
-    def _record(self, station: RemoteStation, name: str) -> None:
-        path = Path(name)
-        if path.name != name or path.suffix not in {".csv", ".mcap"}:
+    def _record(self, station: RemoteStation, file: str) -> None:
+        path = Path(file)
+        if path.name != file or path.suffix not in {".csv", ".mcap"}:
             raise UsageError("a log's name has no folder and ends with .csv or .mcap")
         station.start_log(str(path.resolve()))
-        self._log, self._counted = (name, time.monotonic()), {}
+        self._log, self._counted = (file, time.monotonic()), {}
 
     def _end_record(self, station: RemoteStation) -> None:
         station.end_log()
         self._log = None
-
-
-def _number(value: Any) -> float:
-    number = float(value)
-    if not math.isfinite(number):
-        raise UsageError("a speed or a length is no finite number")
-    return number

@@ -9,7 +9,7 @@ moved. Stop is every browser's.
 from __future__ import annotations
 
 import asyncio
-import json
+import logging
 import threading
 import time
 from collections import deque
@@ -28,9 +28,11 @@ from winchkit.bench.control.dead_man import DEAD_MAN
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.bench.remote.session import attach
 from winchkit.catalog import find
+from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, UsageError, WinchkitError
 from winchkit.schema.read import read_bench
-from winchkit.web.bench.browser import Browser, counting, received
+from winchkit.web.bench import messages
+from winchkit.web.bench.browser import BEGINS_NOTHING, Browser, counting, received
 from winchkit.web.bench.drive_objects import (
     drive_objects,
     drive_settings,
@@ -40,10 +42,13 @@ from winchkit.web.bench.drive_objects import (
 from winchkit.web.bench.frames import FrameWords
 from winchkit.web.bench.live_model import CHANNELS, LiveModel
 from winchkit.web.bench.live_robot import LiveRobot
+from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.trip_file import trip_file
 
 __all__ = ["BenchView"]
+
+_LOGGER = logging.getLogger(__name__)
 
 _PERIOD = 0.05
 """Pictures are sent 20 times a second."""
@@ -55,6 +60,9 @@ _POSES = 0.1
 """Period of the pose of a robot's platform, s."""
 _LATEST_PICTURE = 0.4
 """Age of the picture that a browser had when it ordered a jog, s: eight periods."""
+_OLD = 1.0
+"""Age of the picture that a browser had when it ordered anything else, s: with an older one the
+page offers nothing."""
 _AT_REST = 10.0
 """For what a page moved to come to rest at the end, s: the longest ramp."""
 _ENDING = 0.3
@@ -238,16 +246,17 @@ class BenchView:
 
     async def _setting(self, request: Request) -> Response:
         query = request.query_params
-        winch, name = query.get("winch", ""), query.get("object", "")
-        value = await asyncio.to_thread(read_setting, self.spec, self._newest, winch, name)
+        winch, setting = query.get("winch", ""), query.get("object", "")
+        value = await asyncio.to_thread(read_setting, self.spec, self._newest, winch, setting)
         return JSONResponse({"value": value})
 
     async def _write(self, request: Request) -> Response:
-        asked = json.loads(await request.body())
-        winch, name, text = (str(asked[key]) for key in ("winch", "object", "value"))
-        return JSONResponse(await asyncio.to_thread(self._write_setting, winch, name, text))
+        asked = messages.decoded((await request.body()).decode(errors="replace"))
+        winch = messages.name(asked, "winch", self.spec.winch)
+        values = winch, *(messages.text(asked, key) for key in ("object", "value"))
+        return JSONResponse(await asyncio.to_thread(self._write_setting, *values))
 
-    def _write_setting(self, winch: str, name: str, text: str) -> dict[str, Any]:
+    def _write_setting(self, winch: str, setting: str, value: str) -> dict[str, Any]:
         """Write a setting of a drive while no page commands."""
         if not self.allow_motion:
             raise UsageError(
@@ -260,7 +269,7 @@ class BenchView:
             )
         self._lent.set()
         try:
-            return write_setting(self.spec, self._newest, winch, name, text)
+            return write_setting(self.spec, self._newest, winch, setting, value)
         finally:
             self._lent.clear()
 
@@ -269,7 +278,7 @@ class BenchView:
         return JSONResponse({"stopped": True})
 
     async def _in(
-        self, pool: ThreadPoolExecutor, call: Callable[..., None], *arguments: Any
+        self, pool: ThreadPoolExecutor, call: Callable[..., object], *arguments: Any
     ) -> None:
         await asyncio.get_running_loop().run_in_executor(pool, call, *arguments)
 
@@ -340,6 +349,7 @@ class BenchView:
                     "you_command": self._commander is browser,
                     "commander": self._commander.name if self._commander else "",
                     "said": browser.said,
+                    "undo_tare": browser.undo_tare,
                     "recording": browser.recording(),
                     "programme": browser.programme,
                 }
@@ -365,44 +375,64 @@ class BenchView:
 
     async def _obeying(self, browser: Browser) -> None:
         """Carry out the messages of a browser in their order, one after another."""
+        refused = False
         while True:
             asked = await browser.inbox.next()
-            keeps = asked.get("do") in {"jog", "alive", "programme"}
+            jogs = asked.get("do") == "jog"
+            if jogs and refused:
+                continue  # until it is released and pressed again
             try:
                 await self._obey(asked, browser)
-                browser.said = browser.said if keeps else ""
             except WinchkitError as error:
-                browser.said = str(error)
-            except (ValueError, KeyError, TypeError) as error:
-                browser.said = f"the message is malformed: {error}"
+                browser.say(str(error))
+                refused = jogs
+                continue
+            except Exception as error:
+                _LOGGER.exception("the order %s failed", asked)
+                browser.say(f"defect of winchkit: {type(error).__name__}: {error}")
+                refused = jogs
+                continue
+            refused = False
+            if jogs or asked.get("do") not in BEGINS_NOTHING:
+                browser.say("")
 
-    async def _obey(self, asked: dict[str, Any], browser: Browser) -> None:
-        name = str(asked.get("do"))
-        if name == "show":
-            if asked["winch"] in self.spec.winch:
-                browser.shown = str(asked["winch"])
+    async def _obey(self, asked: Message, browser: Browser) -> None:
+        order = asked.get("do")
+        if order == "show":
+            browser.shown = messages.name(asked, "winch", self.spec.winch)
             return
-        if name == "command":
+        if order == "command":
             await self._in(self._orders, self._give_command, browser)
             return
-        if name == "leave":
+        if order == "leave":
             if self._commander is browser:
                 self._commander = None
             await self._in(self._orders, browser.leave)
             return
         if self._commander is not browser:
+            if order in BEGINS_NOTHING:
+                return  # a sign of life that crossed the end of its command
             raise UsageError("this page only watches; request command first")
-        if name == "jog" and not self._is_fresh(asked):
-            raise UsageError("the page answers too late to jog; the winch stops")
-        await self._in(self._orders, browser.do, name, asked)
+        action = browser.action(asked)
+        if order == "jog":
+            if not self._has_seen(asked, _LATEST_PICTURE):
+                raise UsageError("Jog ended: the browser was too slow. Release and press again.")
+        elif order not in BEGINS_NOTHING and not self._has_seen(asked, _OLD):
+            raise UsageError(
+                "The order came late: the page showed older values. Look at it and order again."
+            )
+        await self._in(self._orders, action)
 
-    def _is_fresh(self, asked: dict[str, Any]) -> bool:
-        """Whether a jog was ordered by somebody who saw the bench within the last 0.4 s.
+    def _has_seen(self, asked: Message, age: float) -> bool:
+        """Whether an order is of somebody who saw the bench within the last ``age`` seconds.
 
-        Messages that waited on their way would otherwise move the winch after its key was released.
+        Messages that waited on their way, or in this process, would otherwise move the winch after
+        its key was released.
         """
-        now = self._newest.get("time")
-        return now is not None and now - float(asked["seen"]) <= _LATEST_PICTURE
+        seen = asked.get("seen")
+        if isinstance(seen, bool) or not isinstance(seen, int | float):
+            return False
+        return 0 <= MonotonicClock().now() - seen <= age
 
     def _give_command(self, browser: Browser) -> None:
         if not self.allow_motion:

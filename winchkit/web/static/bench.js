@@ -1,16 +1,18 @@
 // The Bench view, and the Stop of all views. A jog lasts as long as its messages: one each 50 ms.
-import { alarm, ask, attempt, download, el, fill, icon, number, renew, say, socket, svg } from "./page.js";
+import { alarm, ask, attempt, confirmed, download, el, fill, icon, number, renew, review, socket, svg } from "./page.js";
 import { cycles } from "./cycle.js";
 import { frames } from "./frames.js";
 import { objects } from "./objects.js";
-import { choose, progress, refused } from "./programme.js";
+import * as orders from "./orders.js";
+import { choose, progress } from "./programme.js";
 import { live } from "./robot.js";
 import * as strips from "./strips.js";
 import { consequences, together, trip } from "./trip.js";
 import { card, picture as drawn, words as said } from "./winch.js";
 
-const PERIOD = 50, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
-let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
+// Values that are older than `OLD` ms, twenty pictures, are grey, and nothing is offered.
+const PERIOD = 50, OLD = 1000, LOOK = 250, ANSWER = 3000, SENSE = { "winding in": "↑ ", "paying out": "↓ ", }, MOVING = new Set(["moving", "running down"]);
+let declared = null, link = null, picture = null, root = null, winch = null, speed = 0.05, held = null, timer = null, history = {}, drawnAt = 0, stripsAt = 0, tab = "Charts", alive = null, heard = 0, cut = false, answers = 0, beaten = 0, posed, drawnAge = "", lastTrip = null, askedTrip = 0, logName = "bench.csv", wanted = null, awaited = false;
 
 // A request that fails is repeated: without it there is no Stop.
 export async function station(state) {
@@ -20,11 +22,13 @@ export async function station(state) {
     history = await ask("/api/bench/history");
     declared = found;
     winch = Object.keys(declared.winch)[0];
-    link = socket("/live/bench", receive, () => { picture = null; release(); show(); });
+    link = socket("/live/bench", receive, () => { cut = true; answers = 0; look(); });
+    setInterval(look, LOOK);
+    alarm("", "station");
     show();
     if (root) enter(root);
   } catch (error) {
-    alarm(`${error.message} (the bench is asked again in a second)`);
+    alarm(`${error.message} (the bench is asked again in a second)`, "station");
     setTimeout(() => station(state), 1000);
   }
 }
@@ -48,26 +52,41 @@ export function update() {}
 
 function receive(message) {
   if (message.predicted) Object.assign(predictions, message.predicted);
-  if (message.robot !== undefined) live(message.robot, declared.robot && platform);
-  const before = picture;
-  if (!before) send("show", { winch });
+  if (message.robot !== undefined) { posed = message.robot; live(posed, declared.robot && platform); }
+  const before = picture, time = message.status.time;
+  if (!before || cut) send("show", { winch });
+  if (!before || time === undefined || time !== before.status.time) heard = performance.now();
+  cut = false;
   picture = message;
-  const time = message.status.time;
   for (const [name, now] of Object.entries(message.status.winch || {})) {
     const rows = history[name] || (history[name] = []);
     if (!rows.length || rows.at(-1).time < time) rows.push({ ...now, time });
     while (rows.length && rows[0].time < time - 60) rows.shift();
   }
   watchTrip();
-  if (message.said && (!before || before.said !== message.said)) { alarm(message.said); say(message.said); release(); }
-  saidOnce();
+  answer(message.said);
   soon();
 }
 
-// A command that a trip ended is told by the trip's banner alone.
-function saidOnce() {
-  const shown = document.getElementById("banner");
-  if (tripped().some((words) => shown.textContent.startsWith(words))) alarm("");
+// What the bench answered to an order of this page; a command that a trip ended is told by the trip.
+function answer({ number: count, text }) {
+  if (count === answers) return;
+  answers = count;
+  if (text) release();
+  alarm(text, "bench", () => !tripped().some((words) => text.startsWith(words)));
+}
+
+// Where the pictures end: the last values stay, grey and with their age, and nothing is offered.
+const since = () => (performance.now() - heard) / 1000;
+const old = () => cut || Boolean(picture && (picture.lost || 1000 * since() > OLD));
+const ago = () => (since() < 120 ? `${Math.floor(since())} s old` : `${Math.floor(since() / 60)} min old`);
+let wasOld = false;
+function look() {
+  if (!old() && !wasOld) return;
+  wasOld = old();
+  if (wasOld) { release(); clearInterval(alive); }
+  if (posed !== undefined) live(posed, declared.robot && platform);
+  show();
 }
 
 // Pictures that come faster than the screen is drawn are skipped, so that keys never wait behind them.
@@ -98,21 +117,44 @@ function watchTrip() {
 }
 
 const predictions = {};
-const send = (name, more = {}) => link && link.send({ do: name, ...more });
+// An order says which picture of the bench its giver saw.
+const send = (name, more = {}) => link && link.send({ do: name, seen: (picture && picture.status.time) ?? null, ...more });
 const tripped = () => (picture && picture.status.tripped) || [];
 const now = () => (picture && picture.status.winch && picture.status.winch[winch]) || null;
-const commands = () => Boolean(picture && picture.you_command);
+const commands = () => Boolean(picture && picture.you_command && !old());
+const moving = () => Object.values((picture && picture.status.winch) || {}).some((one) => one.phase !== "disabled");
+const tensions = () => orders.tensions(now() || { tension: null }, picture && picture.status.tare && picture.status.tare[winch]);
+const tared = () => Boolean(picture && picture.status.tare && winch in picture.status.tare);
+export const attached = () => Boolean(declared);
 
-export function stopKey(event) {
+// Whether nothing can be ordered now; says why, for as long as it is so.
+function refused() {
+  if (old()) alarm("There are no new values of the bench: nothing is ordered.", "refused", old);
+  else if (!commands()) alarm("This page only watches; request command first.", "refused", () => !commands());
+  else if (tripped().length) alarm("Tripped: reset first.", "refused", () => tripped().length > 0);
+  else return false;
+  return true;
+}
+
+// Space stops but where text is typed, Esc also there. Where the values are old Esc stops as well,
+// since nobody knows whether something moves.
+export function stopKey(event, writes) {
   if (!declared) return false;
-  if (event.code === "Space" && !event.target.closest("input, textarea, select")) { stop(); return true; }
-  if (event.key === "Escape" && now() && MOVING.has(now().phase)) { stop(); return true; }
-  return false;
+  const space = event.code === "Space" && !writes;
+  if (!space && !(event.key === "Escape" && (moving() || old()))) return false;
+  if (!event.repeat) stop();
+  return space || moving();
 }
 
 async function stop() {
   release();
-  await attempt(() => ask("/api/bench/stop", ""));
+  const late = setTimeout(() => alarm(`Stop has had no answer for ${ANSWER / 1000} s: use the emergency stop.`, "stop"), ANSWER);
+  try {
+    await ask("/api/bench/stop", "");
+    alarm("", "stop");
+  } catch (error) {
+    alarm(`Stop did not reach the bench: use the emergency stop. (${error.message})`, "stop");
+  } finally { clearTimeout(late); }
 }
 
 const stopButton = () => el("button", { class: "stop", onclick: stop, "aria-keyshortcuts": "Space" }, svg("svg", { width: 22, height: 22, viewBox: "0 0 22 22", "aria-hidden": "true" }, svg("path", { d: "M7 1h8l6 6v8l-6 6H7l-6-6V7z", fill: "#fff" }), svg("rect", { x: 8, y: 8, width: 6, height: 6, fill: "#C5221A" })), "Stop ", el("kbd", {}, "Space"));
@@ -121,10 +163,10 @@ function header() {
   const box = document.getElementById("station");
   if (!box.firstChild) { box.append(el("span", { id: "where" }), el("span", { id: "tripped", class: "chip trip" }, icon("trip"), "Tripped"), el("span", { id: "role" }), stopButton()); if (!root) fill(document.getElementById("stopbar"), stopButton()); }
   const state = now();
-  box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${number(state.cable_length)} m` : ""}`;
+  box.querySelector("#where").textContent = `${declared.name}${state ? ` · ${winch} ${words(state)} · ${number(state.cable_length)} m` : ""}${old() && picture ? ` · ${ago()}` : ""}`;
   box.querySelector("#tripped").hidden = !tripped().length;
-  const role = box.querySelector("#role"), kind = commands() ? "command" : "watch";
-  if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, icon(kind), commands() ? "You command" : "Watching")); }
+  const role = box.querySelector("#role"), kind = old() ? "unknown" : commands() ? "command" : "watch";
+  if (role.dataset.kind !== kind) { role.dataset.kind = kind; fill(role, el("span", { class: `chip ${kind}` }, icon(kind), { unknown: "No values", command: "You command", watch: "Watching" }[kind])); }
 }
 
 const words = (state) => said(state, tripped().length > 0);
@@ -134,26 +176,31 @@ function show() {
   if (!declared) return;
   header();
   banner();
-  if (root) refresh(); else progress(null, picture && picture.programme, send);
+  review();
+  document.body.classList.toggle("old", old());
+  for (const node of document.querySelectorAll(".offers, #dialog")) node.inert = old();
+  progress(document.getElementById("programme"), picture && picture.programme, send);
+  if (root) refresh();
 }
 
 function banner() {
-  const box = document.getElementById("trips"), trips = tripped(), lost = picture ? picture.lost : "The page's server does not answer: Stop cannot reach the bench. Use the emergency stop.";
+  const box = document.getElementById("trips"), trips = tripped(), lost = (!cut && picture && picture.lost) || (old() ? `${cut ? "The page's server does not answer" : "The bench sends no values"}: Stop cannot reach the bench. Use the emergency stop.` : "");
   const text = lost ? `lost:${lost}` : trips.length ? `${commands()}|${Boolean(lastTrip)}|${Boolean(root)}|${trips.join("|")}` : "";
+  const aged = box.querySelector(".age");
+  if (aged && picture) aged.textContent = `What is shown is ${ago()}.`;
   if (box.dataset.text === text) return;
   if (!text && !box.dataset.text) return;
   box.dataset.text = text;
   if (!text) { fill(box); return; }
-  const margin = { margin: "12px 24px 0" };
-  if (lost) fill(box, el("div", { class: "alert", style: margin }, el("div", {}, lost)));
-  else fill(box, el("div", { class: "alert trip", style: margin }, el("b", { class: "row title" }, icon("trip"), "Tripped"), el("div", {}, together(trips).map((words) => el("p", {}, el("b", { class: "title" }, words))), lastTrip ? consequences(lastTrip) : el("p", {}, "Everything stopped. After the reset nothing moves before a new command."), lastTrip && !root ? el("a", { href: "#bench" }, "Show the last two seconds") : null), el("span", { class: "row" }, lastTrip ? el("button", { id: "save-trip", onclick: () => attempt(() => download("/api/bench/trip.csv")) }, "Save these 2.5 s") : null,
-    el("button", { id: "reset", class: "primary", onclick: () => { if (confirm("Clear the trips and drive faults? Nothing moves before a new command.")) send("reset"); }, disabled: !commands() }, "Reset… ", el("kbd", {}, "R")))));
+  if (lost) fill(box, el("div", { class: "alert" }, el("div", {}, lost), el("span", { class: "age", "aria-hidden": "true" })));
+  else fill(box, el("div", { class: "alert trip" }, el("b", { class: "row title" }, icon("trip"), "Tripped"), el("div", {}, together(trips).map((words) => el("p", {}, el("b", { class: "title" }, words))), lastTrip ? consequences(lastTrip) : el("p", {}, "Everything stopped. After the reset nothing moves before a new command."), lastTrip && !root ? el("a", { href: "#bench" }, "Show the last two seconds") : null), el("span", { class: "row offers" }, lastTrip ? el("button", { id: "save-trip", onclick: () => attempt(() => download("/api/bench/trip.csv")) }, "Save these 2.5 s") : null,
+    el("button", { id: "reset", class: "primary", onclick: () => confirmed("Reset", "Clear the trips and drive faults? Nothing moves before a new command.", () => send("reset")), disabled: !commands() }, "Reset… ", el("kbd", {}, "R")))));
 }
 
 function build() {
   const limits = declared.winch[winch].limits, names = Object.keys(declared.winch);
-  const speeds = [0.02, 0.05, 0.15, 0.3].filter((v) => v <= limits.speed);
-  if (!speeds.includes(speed)) speed = speeds[0] || limits.speed;
+  const slow = [0.02, 0.05, 0.15, 0.3].filter((v) => v <= limits.speed), speeds = slow.length ? slow : [limits.speed];
+  if (!speeds.includes(speed)) speed = speeds[0];
   const jogButton = (sign) => {
     const button = el("button", { class: "jog", data: { sign } }, el("span", {}, sign > 0 ? "↑ Wind in" : "↓ Pay out"), el("span", {}, el("small", {}, "hold to move"), " ", el("kbd", {}, sign > 0 ? "↑" : "↓")));
     button.addEventListener("pointerdown", (event) => { if (event.button === 0 && event.isPrimary) { button.setPointerCapture(event.pointerId); hold(sign); } else release(); });
@@ -163,28 +210,26 @@ function build() {
     return button;
   };
   const step = (mm) => el("button", { onclick: () => { send("step", { winch, change: -mm / 1000, speed }); watchMotion(); } }, `${mm > 0 ? "+" : "−"}${Math.abs(mm)}`);
-  const target = el("input", { value: now() ? number(now().cable_length, 4) : "", "aria-label": "Cable length, m" });
   const file = el("input", { class: "file", value: logName, onchange: (event) => { logName = event.target.value; }, "aria-label": "Name of the log" });
   keep();
   fill(root, el("h1", { class: "visually-hidden" }, `Bench ${declared.name}`),
     el("div", { class: "row context" }, el("span", { class: "label" }, "Winch"), el("span", { class: "segments" }, names.map((name) => el("button", { "aria-pressed": String(name === winch), onclick: () => chooseWinch(name) }, name))),
       el("span", { class: "segments", id: "tabs" }, tabs().map((name) => el("button", { "aria-pressed": String(name === tab), onclick: () => { tab = name; build(); } }, name))),
-      el("span", { class: "row end" }, el("span", { id: "recording", class: "note" }), el("span", { id: "says", class: "note" }),
+      el("span", { class: "row end offers" }, el("span", { id: "recording", class: "note" }), el("span", { id: "says", class: "note" }),
         declared.allow_motion ? [file, el("button", { id: "record", onclick: () => (picture && picture.recording ? send("end_record") : send("record", { file: file.value })) }, "Record"), el("button", { id: "take", onclick: () => send(commands() ? "leave" : "command") }, "Request command")] : el("span", { class: "note" }, "watching: start with --allow-motion to move"))),
-    el("div", { id: "programme" }),
     el("div", { class: `bench-grid${names.length > 1 ? " several" : ""}` },
       el("div", { class: "column" }, el("section", { class: "panel", "aria-label": `Winch ${winch}` }, el("header", {}, el("h2", {}, `Winch ${winch}`), el("span", { class: "note" }, `profile ${declared.winch[winch].profile}${declared.winch[winch].effects.length ? ` + ${declared.winch[winch].effects.length} effect${declared.winch[winch].effects.length === 1 ? "" : "s"}` : ""}`)), el("div", { id: "drawing" })),
         names.length > 1 ? el("section", { class: "panel", "aria-label": "All winches" }, el("div", { id: "cards" })) : null),
       el("div", { class: "column" },
         el("section", { class: "panel live", id: "values", "aria-label": "Live values" }),
         panel())),
-    el("section", { class: "panel controls", style: { marginTop: "16px" }, "aria-label": "Controls" },
+    el("section", { class: "panel controls offers", style: { marginTop: "16px" }, "aria-label": "Controls" },
       el("fieldset", { class: "jogs" }, el("legend", {}, "Jog"), el("div", { class: "row" }, jogButton(1), jogButton(-1))),
       el("fieldset", {}, el("legend", {}, "Jog speed, m/s"), el("div", { class: "segments", id: "speeds" }, speeds.map((v) => el("button", { "aria-pressed": String(v === speed), onclick: () => { speed = v; build(); } }, String(v))))),
-      el("fieldset", { class: "orders" }, el("legend", {}, "Inch, mm (+ winds in)"), el("div", { class: "segments" }, [-10, -1, 1, 10].map(step))),
-      el("fieldset", { class: "orders" }, el("legend", {}, "Move to, m"), el("div", { class: "row" }, target, el("button", { onclick: () => { send("move", { winch, to: Number(target.value.replace(",", ".")), speed }); watchMotion(); } }, "Move"))),
-      el("fieldset", { class: "orders" }, el("legend", {}, "Load cell"), el("button", { onclick: () => send("tare", { winch }) }, "Tare ", el("kbd", {}, "T"))),
-      el("fieldset", { class: "orders" }, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused(commands(), tripped().length > 0)) choose((name, folder) => send("run_programme", { name, folder })); } }, "Run…"))));
+      el("fieldset", { class: "orders" }, el("legend", {}, "Inch, mm (+ winds in)"), el("div", { class: "segments" }, [-10, -1, 1, 10].map(step)), el("span", { class: "note" }, `at ${speed} m/s`)),
+      orders.move(speeds, (to, at) => { send("move", { winch, to, speed: at }); watchMotion(); }),
+      el("fieldset", { class: "orders" }, el("legend", {}, "Load cell"), el("div", { class: "upright" }, el("button", { id: "tare", onclick: tare }, "Tare… ", el("kbd", {}, "T")), el("button", { id: "untare", hidden: true, onclick: () => send("undo_tare", { winch }) }, "Undo tare"))),
+      el("fieldset", { class: "orders" }, el("legend", {}, "Programme"), el("button", { id: "programmes", onclick: () => { if (!refused()) choose((name, folder) => send("run_programme", { name, folder })); } }, "Run…"))));
   fill(document.getElementById("stopbar"), jogButton(1), jogButton(-1), stopButton());
   if (tab === "Charts") strips.strips(document.getElementById("strips"), () => ({ rows: [...(history[winch] || [])], predicted: predictions[winch] }), { winch, limits, bench: declared.name, profile: declared.winch[winch].profile });
   if (tab === "Trip") trip(document.getElementById("trip"), lastTrip, winch, declared);
@@ -194,7 +239,9 @@ function build() {
   refresh();
 }
 
-function chooseWinch(name) { release(); winch = name; send("show", { winch }); build(); }
+function chooseWinch(name) { release(); winch = name; orders.forget(); send("show", { winch }); build(); }
+
+function tare() { const own = winch; if (!refused()) orders.tare(own, declared.winch[own].limits.tension, tensions, () => send("tare", { winch: own })); }
 
 function panel() {
   const own = (id, title, more = {}) => el("section", { class: "panel", "aria-label": tab, ...more }, el("header", {}, el("h2", {}, title)), el("div", { id }));
@@ -209,9 +256,10 @@ function panel() {
 const tabs = () => [...(lastTrip ? ["Trip"] : []), "Charts", "Bus frames", "Drive objects", "Cycle time"];
 
 function hold(sign) {
-  if (!commands() || tripped().length) { alarm(tripped().length ? "Tripped: reset first." : "This page only watches; request command first."); return; }
-  alarm("");
+  if (refused()) return;
+  alarm("", "bench");
   held = sign;
+  beaten = performance.now();
   clearInterval(timer);
   beat();
   timer = setInterval(beat, PERIOD);
@@ -220,12 +268,19 @@ function hold(sign) {
 
 // What the Robot view may order of a robot's bench.
 const platform = {
-  allowed: () => declared.allow_motion, commands, tripped: () => tripped().length > 0,
+  allowed: () => declared.allow_motion, commands, old, ago, tripped: () => tripped().length > 0,
   command: () => send(commands() ? "leave" : "command"), taken: () => Boolean(picture && picture.commander && !commands()),
-  step: (axis, change, speed) => { if (refused(commands(), tripped().length > 0)) return; send("move_pose", { axis, change, speed }); watchMotion("all"); },
+  step: (axis, change, speed) => { if (refused()) return; send("move_pose", { axis, change, speed }); watchMotion("all"); },
 };
 
-function beat() { if (held && picture) send("jog", { winch, speed: held * speed, seen: picture.status.time }); }
+// A browser that was too slow for the dead-man ends its jog: the key may be up meanwhile.
+function beat() {
+  if (!held) return;
+  const at = performance.now();
+  if (at - beaten > 1000 * declared.dead_man) { release(); alarm("Jog ended: the browser was too slow. Release and press again.", "bench"); return; }
+  beaten = at;
+  send("jog", { winch, speed: held * speed });
+}
 
 function release() {
   if (!held) return;
@@ -246,7 +301,7 @@ function watchMotion(moved = winch) {
   alive = setInterval(() => {
     const state = now();
     const all = moved === "all" && picture ? Object.values(picture.status.winch) : [state];
-    if (!state || (Date.now() > until && all.every((one) => one.phase === "disabled"))) { clearInterval(alive); return; }
+    if (!state || !commands() || (Date.now() > until && all.every((one) => one.phase === "disabled"))) { clearInterval(alive); return; }
     if (!document.hidden) send("alive", { winch: moved });
   }, 100);
 }
@@ -256,7 +311,7 @@ export function keys(event) {
   if (!declared || event.repeat) return ["ArrowUp", "ArrowDown"].includes(event.key);
   if (event.key === "ArrowUp") hold(1);
   else if (event.key === "ArrowDown") hold(-1);
-  else if (event.key === "t") send("tare", { winch });
+  else if (event.key === "t") { if (tared()) tare(); }
   else if (event.key === "p") document.getElementById("pause")?.click();
   else if (event.key === "r" && tripped().length) document.getElementById("reset")?.click();
   else if (event.key === "[" || event.key === "]") { const all = [...document.querySelectorAll("#speeds button")], at = all.findIndex((b) => b.getAttribute("aria-pressed") === "true") + (event.key === "]" ? 1 : -1); if (all[at]) all[at].click(); }
@@ -271,16 +326,18 @@ function mark() {
     button.className = `jog ${own ? (moving ? "held" : "pressed") : !held && state && state.phase === "running down" ? "ramping" : ""}`;
     button.disabled = !commands() || tripped().length > 0;
     button.querySelector("kbd").hidden = button.disabled;
-    button.querySelector("small").textContent = own ? (moving ? "held: moving" : "pressed") : button.disabled ? (tripped().length ? "tripped" : "watching") : "hold to move";
+    button.querySelector("small").textContent = own ? (moving ? "held: moving" : "pressed") : button.disabled ? (old() ? "no values" : tripped().length ? "tripped" : "watching") : "hold to move";
   }
 }
 
 // Orders without effect are off while the page watches, and after a trip until the reset.
 function offer() {
   const off = !commands() || tripped().length > 0;
-  for (const node of document.querySelectorAll(".controls .orders button, .controls .orders input")) node.disabled = off;
-  const target = document.querySelector(".orders input"), state = now();
-  if (target && state && target.value === "" && document.activeElement !== target && state.cable_length !== null) target.value = state.cable_length.toFixed(3);
+  for (const node of document.querySelectorAll(".controls .orders :is(button, input, select)")) node.disabled = off;
+  const button = document.getElementById("tare"), undo = document.getElementById("untare");
+  if (button) button.disabled = off || !tared();
+  if (undo) undo.hidden = !(picture && picture.undo_tare.includes(winch));
+  orders.renewTare(tensions);
 }
 
 function gauge(value, low, high, limits, unit) {
@@ -301,8 +358,7 @@ function refresh() {
   offer();
   const take = document.getElementById("take");
   if (take) { take.textContent = commands() ? "Release command" : "Request command"; take.disabled = !commands() && Boolean(picture && picture.commander); }
-  document.getElementById("says").textContent = picture && picture.commander && !commands() ? `${picture.commander} commands` : "";
-  progress(document.getElementById("programme"), picture && picture.programme, send);
+  document.getElementById("says").textContent = picture && picture.commander && !commands() && !old() ? `${picture.commander} commands` : "";
   const log = picture && picture.recording;
   document.getElementById("recording").textContent = log ? `● Recording ${log.file} · ${Math.floor(log.seconds / 60)}:${String(Math.floor(log.seconds % 60)).padStart(2, "0")}${log.rows === undefined ? "" : ` · ${log.rows} rows${log.lost ? `, ${log.lost} lost` : ""}`}` : "";
   const record = document.getElementById("record"), mine = commands() || Boolean(log);
@@ -310,15 +366,16 @@ function refresh() {
   if (record) { record.hidden = !mine; named.hidden = !mine || Boolean(log); }
   if (record) { record.textContent = log ? "End" : "Record"; record.disabled = !commands(); }
   if (!state) { fill(values, el("p", { class: "note" }, "No values of the bench yet.")); return; }
-  if (drawnAt === picture.status.time) return;
-  drawnAt = picture.status.time;
+  const aged = old() ? ` · ${ago()}` : "";
+  if (drawnAt === picture.status.time && drawnAge === aged) return;
+  drawnAt = picture.status.time; drawnAge = aged;
   values.dataset.time = drawnAt;
-  const cell = (name, value, digits, unit, low, high, limits) => el("div", {}, el("span", { class: "note" }, name), el("div", { class: "value" }, value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, unit)), gauge(value, low, high, limits, unit));
-  const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, winding = state.cable_speed === null ? null : -state.cable_speed;
+  const cell = (name, value, digits, unit, low, high, limits) => el("div", {}, el("span", { class: "note" }, name, aged), el("div", { class: "value" }, value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, unit)), gauge(value, low, high, limits, unit));
+  const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, net = Boolean(tensions().gross !== null && picture.status.tare[winch]), winding = state.cable_speed === null ? null : -state.cable_speed;
   const kind = tripped().length ? "tripped" : MOVING.has(state.phase) ? "moving" : state.phase === "stopping" ? "stopping" : "";
-  renew(values, cell("Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell("Tension", state.tension, 1, "N", 0, top * 1.05, tension),
+  renew(values, cell("Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell(net ? `Tension, net; gross ${tensions().gross.toFixed(1).replace("-", "−")} N` : "Tension", state.tension, 1, "N", 0, top * 1.05, tension),
     cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
-    el("div", {}, el("span", { class: "note" }, "State"), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
+    el("div", {}, el("span", { class: "note" }, "State", aged), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
   renew(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));
   const host = document.getElementById("cycles");
   if (host && picture.status.cycle_time) cycles(host, picture.status.cycle_time, picture.status.overruns);

@@ -1,5 +1,5 @@
 // The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
-import { alarm, ask, attempt, colour, dialog, download, el, fill, icon, number, order, say, sourceOf, svg } from "./page.js";
+import { alarm, ask, attempt, colour, dialog, download, el, filesOf, fill, icon, number, order, say, sourceOf, svg } from "./page.js";
 import { exporter } from "./figures.js";
 import { importFile } from "./import.js";
 import { counted, ladderFigure, ladderGrid, place, presentName, reach } from "./ladder.js";
@@ -17,7 +17,7 @@ export function update(state) {
   const same = root.dataset.signature === signature && root.firstChild;
   if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
   view = state;
-  if (same) { busy(); return; }
+  if (same) { busy(); faults(); return; }
   root.dataset.signature = signature;
   cards = {}; span = null;
   if (state.said) say(state.said);
@@ -34,7 +34,7 @@ const source = () => sourceOf(`profile ${[view.profile.name, ...view.profile.add
 
 function render() {
   const d = view.diagnosis;
-  fill(root, context(), el("div", { id: "busy" }), faults());
+  fill(root, context(), el("div", { id: "busy" }), el("div", { id: "faults" }));
   if (!view.runs.length) root.append(empty());
   else if (d && view.beside) {
     if (!both(view).includes(shown.output)) shown.output = both(view).includes(d.ladder.focus) ? d.ladder.focus : both(view)[0];
@@ -61,6 +61,7 @@ function render() {
   } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with.")));
   else if (!view.busy) root.append(el("div", { class: "panel" }, el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")));
   busy();
+  faults();
 }
 
 function context() {
@@ -91,13 +92,17 @@ function busy() {
     el("span", { class: "label" }, view.busy.what), el("button", { class: "plain", onclick: () => attempt(() => order("cancel")) }, "Cancel")));
 }
 
+// Refused files and requests change nothing else of the state.
 function faults() {
-  return view.faults.length ? el("div", { class: "alert", role: "alert" }, el("div", {}, view.faults.slice(0, 8).map((text) => el("p", {}, text)),
-    view.faults.length > 8 ? el("p", { class: "note" }, `and ${view.faults.length - 8} more`) : null)) : null;
+  const box = root.querySelector("#faults"), text = view.faults.join("\n");
+  if (box.dataset.text === text) return;
+  box.dataset.text = text;
+  fill(box, text ? el("div", { class: "alert", role: "alert" }, el("div", {}, view.faults.slice(0, 8).map((words) => el("p", {}, words)),
+    view.faults.length > 8 ? el("p", { class: "note" }, `and ${view.faults.length - 8} more`) : null)) : null);
 }
 
 function empty() {
-  const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "files", "aria-label": "Run files", tabindex: -1, onchange: (event) => drop(event.target.files) });
+  const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "files", "aria-label": "Run files", tabindex: -1, onchange: (event) => drop(filesOf(event.target)) });
   return el("div", { class: "drop" }, el("h1", {}, "Drop run files here"),
     el("p", { class: "note" }, "CSV, MCAP, Parquet, MF4 of winchkit, or a file of another program: it opens a table of its columns."),
     el("div", { class: "row" }, input, el("button", { class: "primary", onclick: () => input.click() }, "Choose files"),
@@ -125,7 +130,7 @@ async function openExample() {
 async function chooseProfile() {
   const choices = await ask("/api/choices");
   const list = el("select", { "aria-label": "Profile" }, choices.profiles.map((name) => el("option", {}, name)));
-  const file = el("input", { type: "file", accept: ".toml", "aria-label": "Profile file", onchange: () => attempt(async () => { await drop(file.files); document.getElementById("dialog").close(); }) });
+  const file = el("input", { type: "file", accept: ".toml", "aria-label": "Profile file", onchange: () => attempt(async () => { await drop(filesOf(file)); document.getElementById("dialog").close(); }) });
   dialog("Profile", el("div", { class: "row" }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("profile", { name: list.value }); document.getElementById("dialog").close(); }) }, "Use")),
     el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or a file"), file);
 }

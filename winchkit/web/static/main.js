@@ -3,7 +3,7 @@ import * as bench from "./bench.js";
 import * as diagnose from "./diagnose.js";
 import * as library from "./library.js";
 import * as robot from "./robot.js";
-import { alarm, dialog, el, socket, version } from "./page.js";
+import { alarm, closeDialog, dialog, el, socket, version } from "./page.js";
 
 const views = { diagnose, bench, robot, library };
 const main = document.getElementById("main");
@@ -14,6 +14,7 @@ function route() {
   const next = views[wanted] ? wanted : "diagnose";
   if (next === name || !state) return;
   if (name && views[name].leave) views[name].leave();
+  alarm("", "order");
   name = next;
   for (const link of document.querySelectorAll("#views a")) { if (link.dataset.view === name) link.setAttribute("aria-current", "page"); else link.removeAttribute("aria-current"); }
   document.title = `${name[0].toUpperCase()}${name.slice(1)} · winchkit`;
@@ -25,11 +26,15 @@ function route() {
 
 socket("/live", (fresh) => {
   const first = !state;
-  if (first) alarm("");
+  alarm("", "server");
   state = fresh;
   version.text = fresh.version;
   if (first) bench.station(state).finally(route); else if (name) views[name].update(state);
-}, () => alarm("The server does not answer. Trying again; if it was ended, start 'winchkit serve' anew."));
+}, () => { if (!state || !state.bench) alarm("The server does not answer. Trying again; if it was ended, start 'winchkit serve' anew.", "server"); });
+
+// Messages stand above a dialog, and a dialog below them.
+const head = document.getElementById("head");
+new ResizeObserver(() => document.documentElement.style.setProperty("--head", `${head.offsetHeight}px`)).observe(head);
 
 addEventListener("hashchange", route);
 
@@ -38,14 +43,19 @@ for (const kind of ["dragover", "drop"]) addEventListener(kind, (event) => {
   if (kind === "drop" && event.dataTransfer.files.length) { if (name === "robot") robot.drop(event.dataTransfer.files); else { location.hash = "#diagnose"; diagnose.drop(event.dataTransfer.files); } }
 });
 
-const KEYS = [["1–4", "views"], ["J K", "candidate"], ["A", "add to the profile"], ["B", "mark samples in a focused plot; arrows move the mark"], ["U", "undo"], ["C", "compare"], ["S", "save the profile"], ["/", "filter the library"], ["Esc", "clear the brush, close"], ["Space", "Stop, with a bench"], ["?", "this list"]];
+const KEYS = [["Space", "Stop, with a bench; everywhere but in a text field"], ["Esc", "Stop while a winch moves, also in a text field; else close, clear the brush"], ["Enter", "a button or a box that has the focus"], ["↑ ↓", "Bench: hold to wind in, pay out"], ["[ ]", "Bench: jog speed"], ["T", "Bench: tare"], ["R", "Bench: reset"], ["P", "Bench: pause the charts"], ["1–4", "views"], ["J K", "candidate"], ["A", "add to the profile"], ["B", "mark samples in a focused plot; arrows move the mark"], ["U", "undo"], ["C", "compare"], ["S", "save the profile"], ["/", "filter the library"], ["?", "this list"]];
+const WRITTEN = "textarea, input:not([type=checkbox], [type=radio], [type=range], [type=file])";
 
 addEventListener("keydown", (event) => {
+  if (bench.stopKey(event, Boolean(event.target.closest(WRITTEN)))) { event.preventDefault(); event.stopPropagation(); return; }
   if (event.ctrlKey || event.metaKey || event.altKey) return;
-  if (bench.stopKey(event)) { event.preventDefault(); event.stopPropagation(); return; }
+  if (event.key === "Escape" && document.getElementById("dialog").open) { closeDialog(); event.preventDefault(); event.stopPropagation(); return; }
+  if (event.key === "Enter" && event.target.type === "checkbox") { event.target.click(); event.preventDefault(); return; }
   if (event.target.closest("input, select, textarea") && event.target.type !== "checkbox") return;
   if (document.getElementById("dialog").open) return;
   if ("1234".includes(event.key)) { location.hash = `#${Object.keys(views)[event.key - 1]}`; event.preventDefault(); return; }
-  if (event.key === "?") { dialog("Keys", el("table", {}, el("tbody", {}, KEYS.map(([key, words]) => el("tr", {}, el("td", {}, el("kbd", {}, key)), el("td", {}, words)))))); event.preventDefault(); return; }
+  if (event.key === "?") { dialog("Keys", el("table", {}, el("tbody", {}, KEYS.map(([key, words]) => el("tr", {}, el("td", { class: "tight" }, el("kbd", {}, key)), el("td", {}, words)))))); event.preventDefault(); return; }
   if (name && views[name].keys && views[name].keys(event)) event.preventDefault();
 }, true);
+// Some browsers press a focused button where Space is let go.
+addEventListener("keyup", (event) => { if (event.code === "Space" && bench.attached() && !event.target.closest(WRITTEN)) event.preventDefault(); }, true);

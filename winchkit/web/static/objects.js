@@ -1,5 +1,5 @@
 // Objects of a winch's drive as a tree to read, and its settings to write where the bench is disabled.
-import { ask, el, fill, number } from "./page.js";
+import { ask, confirmed, el, fill, number } from "./page.js";
 
 export async function objects(host, winch) {
   fill(host, el("p", { class: "note" }, "Reading the drive"));
@@ -13,7 +13,7 @@ export async function objects(host, winch) {
 
 // Writes one setting: its type and limits, the present value, a confirmation, the value read back.
 function writer(winch, settings) {
-  const said = el("p", { class: "note", role: "status" }), value = el("input", { "aria-label": "New value", disabled: true }), write = el("button", { disabled: true, onclick: () => store() }, "Write…");
+  const said = el("p", { class: "note", role: "status" }), value = el("input", { "aria-label": "New value", disabled: true }), write = el("button", { disabled: true, onclick: asked }, "Write…");
   const list = el("select", { "aria-label": "Setting", onchange: () => read() }, el("option", { value: "" }, "Choose a setting…"), settings.map((one) => el("option", { value: one.object }, `${one.object} ${one.name}`)));
   const chosen = () => settings.find((one) => one.object === list.value);
   let present = null;
@@ -31,9 +31,12 @@ function writer(winch, settings) {
     } catch (error) { said.textContent = error.message; }
   }
 
-  async function store() {
+  function asked() {
     const one = chosen();
-    if (!confirm(`Write ${one.object} ${one.name} of winch ${winch}: ${value.value} instead of ${present}? The bench is opened anew; the drive forgets it when it is switched off, unless 'winchkit config store' follows.`)) return;
+    confirmed("Write", `Write ${one.object} ${one.name} of winch ${winch}: ${value.value} instead of ${present}? The bench is opened anew; the drive forgets it when it is switched off, unless 'winchkit config store' follows.`, () => store(one));
+  }
+
+  async function store(one) {
     write.disabled = true;
     try {
       const done = await ask("/api/bench/setting", JSON.stringify({ winch, object: one.object, value: value.value }));

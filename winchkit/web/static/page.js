@@ -12,7 +12,12 @@ export async function ask(path, body, headers = {}) {
   return data;
 }
 
-export const order = (name, more = {}) => ask("/api/do", JSON.stringify({ do: name, ...more }));
+// An order that is carried out ends the message of one that was refused.
+export async function order(name, more = {}) {
+  const answer = await ask("/api/do", JSON.stringify({ do: name, ...more }));
+  alarm("", "order");
+  return answer;
+}
 
 export function socket(path, receive, lost) {
   let open = true, line;
@@ -114,13 +119,23 @@ export const version = { text: "" };
 
 export function say(text) { document.getElementById("live").textContent = text; }
 
-export function alarm(text, kind = "") {
-  const banner = document.getElementById("banner");
-  banner.replaceChildren();
+// Messages below the top bar, one of each cause: until it is closed, replaced, or no longer true.
+const messages = new Map(), AT_ONCE = 1000;
+
+// `holds` says whether the message is still true. A message that repeats is shown anew, with its time;
+// the answers to orders that were under way together count once.
+export function alarm(text, cause = "order", holds = () => true) {
+  const before = messages.get(cause), now = performance.now();
+  if (before && before.text === text && now - before.at < AT_ONCE) return;
+  if (before) { before.node.remove(); messages.delete(cause); }
   if (!text) return;
-  banner.append(el("div", { class: `alert ${kind}`, style: { margin: "12px 24px 0" } },
-    el("div", {}, text), el("button", { class: "plain", onclick: () => alarm("") }, "Close")));
+  const node = el("div", { class: "alert" }, el("div", {}, text), el("span", { class: "note" }, new Date().toTimeString().slice(0, 8)), el("button", { class: "plain", onclick: () => alarm("", cause) }, "Close"));
+  messages.set(cause, { text, node, holds, at: now });
+  document.getElementById("banner").append(node);
 }
+
+// Removes the messages that are no longer true.
+export function review() { for (const [cause, { holds }] of [...messages]) if (!holds()) alarm("", cause); }
 
 export function dialog(title, ...content) {
   const box = document.getElementById("dialog");
@@ -129,11 +144,21 @@ export function dialog(title, ...content) {
     el("button", { class: "plain", style: { marginLeft: "auto" }, onclick: () => box.close() }, "Close")), ...content);
   box.setAttribute("aria-label", title);
   box.onclose = () => before && before.focus && before.focus();
-  box.onkeydown = (event) => { if (event.key === "Escape") box.close(); };
   if (!box.open) box.show();
   (box.querySelector("select, input, .primary") || box.querySelector("button")).focus();
   return box;
 }
+
+export function closeDialog() { document.getElementById("dialog").close(); }
+
+// Asks before something is done; the page goes on meanwhile, so that Stop is free.
+export function confirmed(title, words, act, ...content) {
+  dialog(title, el("p", {}, words), ...content, el("div", { class: "row", style: { marginTop: "16px" } },
+    el("button", { class: "primary", onclick: () => { closeDialog(); act(); } }, title), el("button", { onclick: closeDialog }, "Cancel")));
+}
+
+// Files of a field, which is emptied: the same file can be chosen again after its correction.
+export const filesOf = (field) => { const files = [...field.files]; field.value = ""; return files; };
 
 export async function attempt(action) {
   try { await action(); } catch (error) { alarm(error.message); }

@@ -1,5 +1,5 @@
 // The programme runner: choose one, see what it would do, hold a button to start it; its progress.
-import { alarm, ask, attempt, dialog, el, fill, number, svg } from "./page.js";
+import { ask, attempt, closeDialog, dialog, el, fill, number, svg } from "./page.js";
 
 const HOLD = 800, SIGN = 100;
 let signs = null, asked = 0;
@@ -27,7 +27,7 @@ export function choose(start) {
         const plan = await ask(`/api/bench/programme?name=${encodeURIComponent(name)}`);
         if (mine !== asked) return;
         fill(shown, el("p", {}, plan.description || plan.name), curves(plan), el("p", { class: "note" }, `${plan.repeats} repeat${plan.repeats === 1 ? "" : "s"} of ${number(plan.duration, 3)} s${plan.asks.length ? `, ${plan.asks.length} question${plan.asks.length === 1 ? "" : "s"}` : ""}; all within the limits. It ends where this page is hidden or closed.`),
-          el("details", {}, el("summary", {}, `${plan.steps.length} step${plan.steps.length === 1 ? "" : "s"}`), el("ol", {}, plan.steps.map((words) => el("li", {}, words)))), held("Hold to start", () => { document.getElementById("dialog").close(); start(name, folder.value); }));
+          el("details", {}, el("summary", {}, `${plan.steps.length} step${plan.steps.length === 1 ? "" : "s"}`), el("ol", {}, plan.steps.map((words) => el("li", {}, words)))), held("Hold to start", () => { closeDialog(); start(name, folder.value.trim() || "."); }));
       } catch (error) { if (mine === asked) fill(shown, el("p", {}, error.message)); }
     }
   });
@@ -61,9 +61,8 @@ function curves(plan) {
 
 // The programme under way: signs of life while this page is seen, progress, its questions, its end.
 export function progress(host, now, send) {
-  if (!now) { clearInterval(signs); signs = null; if (host && host.firstChild) { fill(host); delete host.dataset.text; } return; }
+  if (!now) { clearInterval(signs); signs = null; if (host.firstChild) { fill(host); delete host.dataset.text; } return; }
   if (now.ended) { clearInterval(signs); signs = null; } else if (!signs) signs = setInterval(() => { if (!document.hidden) send("programme"); }, SIGN);
-  if (!host) return;
   const text = JSON.stringify(now);
   if (host.dataset.text === text) return;
   host.dataset.text = text;
@@ -80,5 +79,3 @@ export function progress(host, now, send) {
   if (now.steps) bar.value = ((now.repeat ? now.repeat - 1 : 0) * now.steps + Math.max(0, now.step - 1)) / (now.repeats * now.steps); else bar.removeAttribute("value");
   host.querySelector(".primary").hidden = !now.asks;
 }
-
-export const refused = (commands, trips) => { if (!commands) alarm("This page only watches; request command first."); else if (trips) alarm("Tripped: reset first."); return !commands || trips; };

@@ -1,5 +1,5 @@
 // The Robot view: cables and platform, feasible poses, errors before and after the calibration.
-import { alarm, ask, attempt, dialog, download, el, fill, icon, number, order, sourceOf, svg } from "./page.js";
+import { alarm, ask, attempt, dialog, download, el, filesOf, fill, icon, number, order, sourceOf, svg } from "./page.js";
 import { drawingExporter } from "./exports.js";
 
 let bench = null, drawnAt = 0, root = null, view = null, now = null, newest = null, signature = null, shown = { row: 0, side: "Iso", z: null, limits: null }, picture = null, slice = null, asked = 0;
@@ -29,6 +29,7 @@ async function read() {
     do {
       again = false;
       const next = await ask("/api/robot");
+      alarm("", "robot");
       if (!view || next.name !== view.name) { shown = { row: now ? "live" : 0, side: "Iso", z: null, limits: next.limits }; slice = null; }
       view = next;
       if (shown.row !== "live") shown.row = Math.min(shown.row, view.poses);
@@ -37,7 +38,7 @@ async function read() {
     } while (again);
     if (root && newest.robot) fetchSlice();
   } catch (error) {
-    alarm(`${error.message} (read again in a second)`);
+    alarm(`${error.message} (read again in a second)`, "robot");
     setTimeout(() => { if (root && newest.robot) read(); }, 1000);
   } finally { reading = false; }
 }
@@ -57,7 +58,7 @@ export function live(found, station) {
 }
 
 const FORCES = { live: "Cable forces now", measured: "Measured cable forces", computed: "Computed cable forces", none: "No forces within the limits hold the platform" };
-const where = () => { if (shown.row === "live" && !now) return "The motor angles fit no pose now"; const at = picture.position.map((v) => number(v, 3)); return `${FORCES[shown.row === "live" ? "live" : picture.source]} at x ${at[0]}, y ${at[1]}, z ${at[2]} m`; };
+const where = () => { if (shown.row === "live" && !now) return "The motor angles fit no pose now"; const at = picture.position.map((v) => number(v, 3)); return `${shown.row === "live" && bench.old() ? `Cable forces, ${bench.ago()},` : FORCES[shown.row === "live" ? "live" : picture.source]} at x ${at[0]}, y ${at[1]}, z ${at[2]} m`; };
 
 async function fetchPicture() {
   const [low, high] = shown.limits;
@@ -104,7 +105,7 @@ export { drop };
 function render(state) {
   const found = view.calibration;
   fill(root, context(state), state.busy ? el("div", { class: "row", style: { paddingBottom: "12px" } }, el("progress", { "aria-label": "Progress" }), el("span", { class: "label" }, state.busy.what)) : null,
-    faults(state), found ? head(found) : el("div", { class: "verdict" }, el("h1", {}, view.poses ? `${view.poses} poses` : now ? "Platform and cables now" : "No poses yet"), view.poses ? null : el("p", {}, "Drop a recording of poses to calibrate the robot.")),
+    faults(state), found ? head(found) : el("div", { class: "verdict" }, el("h1", {}, view.poses ? `${view.poses} poses` : now ? "Platform and cables" : "No poses yet"), view.poses ? null : el("p", {}, "Drop a recording of poses to calibrate the robot.")),
     el("div", { class: "grid" },
       el("section", { class: "panel w7", id: "picture", "aria-label": "Cables and platform" }),
       el("div", { class: "w5 stack" }, found ? [error(found), el("section", { class: "panel", id: "details", "aria-label": "Errors of poses and cables" }), warnings(found)] : null, platform(), proposals())));
@@ -114,7 +115,7 @@ function render(state) {
 }
 
 function context(state) {
-  const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "poses", "aria-label": "Recordings of poses", tabindex: -1, onchange: (event) => drop(event.target.files) });
+  const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "poses", "aria-label": "Recordings of poses", tabindex: -1, onchange: (event) => drop(filesOf(event.target)) });
   const busy = Boolean(state.busy), without = !view.calibration;
   return el("div", { class: "row context" }, input,
     el("span", { class: "label" }, "Robot"), el("button", { onclick: chooseProfile }, el("b", {}, view.name), el("span", { class: "note" }, `${view.lines.length} cables, ${number(view.mass, 3)} kg platform`)),
@@ -210,9 +211,9 @@ const AXES = ["x", "y", "z"], CHANGES = [-50, -10, -1, 1, 10, 50], SPEED = 0.05;
 function platform() {
   if (!now || !bench) return null;
   const step = (axis, mm) => el("button", { onclick: () => bench.step(axis, mm / 1000, SPEED), "aria-label": `${axis} ${mm > 0 ? "+" : "−"}${Math.abs(mm)} mm` }, `${mm > 0 ? "+" : "−"}${Math.abs(mm)}`);
-  return el("section", { class: "panel", id: "platform", "aria-label": "Platform" }, el("header", {}, el("h2", {}, "Platform"), bench.allowed() ? el("span", { class: "note" }, el("button", { id: "take", onclick: () => bench.command() }, "Request command")) : el("span", { class: "note" }, "watching: start with --allow-motion to move")),
+  return el("section", { class: "panel", id: "platform", "aria-label": "Platform" }, el("header", {}, el("h2", {}, "Platform"), bench.allowed() ? el("span", { class: "note offers" }, el("button", { id: "take", onclick: () => bench.command() }, "Request command")) : el("span", { class: "note" }, "watching: start with --allow-motion to move")),
     el("div", { class: "live three", id: "position" }), el("h2", {}, "Force of each cable"), el("div", { id: "forces" }),
-    view.lines.length < 6 ? el("p", { class: "note" }, `No steps: ${view.lines.length} cables do not determine the rotation of the platform; a move along a path needs at least 6.`) : el("fieldset", { class: "steps" }, el("legend", { class: "note" }, `Step the platform, mm, at ${number(SPEED)} m/s`), AXES.map((axis) => el("div", { class: "row" }, el("b", {}, axis), el("span", { class: "segments" }, CHANGES.map((mm) => step(axis, mm)))))));
+    view.lines.length < 6 ? el("p", { class: "note" }, `No steps: ${view.lines.length} cables do not determine the rotation of the platform; a move along a path needs at least 6.`) : el("fieldset", { class: "steps offers" }, el("legend", { class: "note" }, `Step the platform, mm, at ${number(SPEED)} m/s`), AXES.map((axis) => el("div", { class: "row" }, el("b", {}, axis), el("span", { class: "segments" }, CHANGES.map((mm) => step(axis, mm)))))));
 }
 
 function drawPlatform() {
@@ -222,7 +223,7 @@ function drawPlatform() {
   const off = !bench.commands() || bench.tripped(), take = box.querySelector("#take");
   if (take) { take.textContent = bench.commands() ? "Release command" : "Request command"; take.disabled = bench.taken(); }
   for (const button of box.querySelectorAll(".steps button")) button.disabled = off;
-  fill(box.querySelector("#position"), AXES.map((axis, i) => el("div", {}, el("span", { class: "note" }, axis), el("div", { class: "value" }, (now.position[i] * 1e3).toFixed(1).replace("-", "−"), el("small", {}, "mm")))));
+  fill(box.querySelector("#position"), AXES.map((axis, i) => el("div", {}, el("span", { class: "note" }, axis, bench.old() ? ` · ${bench.ago()}` : ""), el("div", { class: "value" }, (now.position[i] * 1e3).toFixed(1).replace("-", "−"), el("small", {}, "mm")))));
   const most = Math.max(shown.limits[1] * 1.1, ...now.tension.map((v) => v ?? 0)), share = (v) => `${Math.max(0, Math.min(100, (v / most) * 100))}%`;
   fill(box.querySelector("#forces"), view.lines.map((name, i) => el("div", { class: "force" }, el("span", {}, name), svg("svg", { width: "100%", height: 12, "aria-hidden": "true" }, svg("rect", { y: 2, width: "100%", height: 8, fill: "var(--band)" }), svg("rect", { y: 2, width: share(shown.limits[0]), height: 8, fill: "url(#hatch)" }), svg("rect", { x: share(shown.limits[1]), y: 2, width: `${100 - parseFloat(share(shown.limits[1]))}%`, height: 8, fill: "url(#hatch)" }),
     now.tension[i] === null ? null : svg("rect", { x: `calc(${share(now.tension[i])} - 1.5px)`, width: 3, height: 12, fill: "var(--ink)" })), el("b", {}, now.tension[i] === null ? "–" : `${now.tension[i].toFixed(1)} N`))));
