@@ -1,4 +1,4 @@
-"""Group screening of the constants whose reason in docs/methods.md is a rule of thumb.
+"""Group screening of the constants whose reason in the code is a rule of thumb.
 
 ``python benchmarks/constant_screening.py --draws 8 --cases 16 --seed 1 --json``: in each draw every
 such constant of the time-series diagnosis is made larger or smaller by a factor, at random and all
@@ -13,6 +13,7 @@ constants of robots. See benchmarks/README.md.
 from __future__ import annotations
 
 import argparse
+import ast
 import importlib
 import os
 import pkgutil
@@ -21,6 +22,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +42,7 @@ from summaries import print_summary
 
 Name = tuple[str, str]
 """File below winchkit/diagnosis, and constant."""
-PAGE = Path(__file__).parents[1] / "docs" / "methods.md"
+PACKAGE = Path(__file__).parents[1] / "winchkit" / "diagnosis"
 KINDS = ("none", "single", "pair", "outside")
 ROOMS = ("data", "regression", "selection", "verdict")
 """Folders whose constants can change the answer for a winch."""
@@ -50,18 +52,34 @@ SETS = {"_DEGREES", "_POWERS"}
 """Sets of laws, which have no size."""
 
 
-def rules_of_thumb(page: str, rooms: Sequence[str] = ROOMS) -> list[Name]:
+def rules_of_thumb(rooms: Sequence[str] = ROOMS) -> list[Name]:
     """Constants of folders that were chosen by judgement, and not by the computing cost."""
-    found, place = [], ""
-    for line in page.splitlines():
-        if heading := re.fullmatch(r"### `([\w/]+\.py)`", line):
-            place = heading[1]
-        row = re.match(r"\| `(\w+)` \| `[^`]+` \| .* \| ([^|]+) \|$", line)
-        if not row or row[1] in SETS:
-            continue
-        if place.split("/")[0] in rooms and row[2].startswith(("rule of thumb", "screened")):
-            found.append((place, row[1]))
+    found = []
+    for room in rooms:
+        for path in sorted((PACKAGE / room).rglob("*.py")):
+            body = ast.parse(path.read_text(encoding="utf-8")).body
+            for node, after in pairwise(body):
+                names = _names(node)
+                if names and _is_judgement(after) and not SETS & set(names):
+                    place = path.relative_to(PACKAGE).as_posix()
+                    found += [(place, name) for name in names]
     return found
+
+
+def _names(node: ast.stmt) -> list[str]:
+    if not isinstance(node, ast.Assign):
+        return []
+    target = node.targets[0]
+    parts = target.elts if isinstance(target, ast.Tuple) else [target]
+    return [part.id for part in parts if isinstance(part, ast.Name)]
+
+
+def _is_judgement(node: ast.stmt) -> bool:
+    """Whether the docstring after a constant says so."""
+    if not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)):
+        return False
+    text = " ".join(str(node.value.value).lower().split())
+    return "computing cost" not in text and ("rule of thumb" in text or "screened" in text)
 
 
 def value_of(name: Name) -> Any:
@@ -157,9 +175,7 @@ def main() -> None:
         importlib.import_module(module.name)
     names = [
         name
-        for name in rules_of_thumb(
-            PAGE.read_text(encoding="utf-8"), ROBOT_ROOMS if args.robots else ROOMS
-        )
+        for name in rules_of_thumb(ROBOT_ROOMS if args.robots else ROOMS)
         if re.search(args.only, " ".join(name))
     ]
     usual = {name: value_of(name) for name in names}

@@ -6,7 +6,7 @@
 Poses are made by robot_poses, which shares no code with winchkit. The profile has the true
 geometry; "calibrated" cases give the CABTIVE robot's nominal numbers to ``winchkit calibrate``
 first, as a user would, with the elasticity hidden from it. At the end: how often the answer was
-right, how often a single wrong effect was named, and how often 95 % intervals held the truth.
+right, how often a wrong effect was certain, and how often 95 % intervals held the truth.
 ``--intervals`` asks the latter alone, quicker: ``winchkit add`` gets what is hidden.
 """
 
@@ -92,24 +92,25 @@ def _members(step: dict[str, Any]) -> list[str]:
 
 
 def wrong(case: Case, found: dict[str, Any]) -> list[str]:
-    """Effects named alone that are not hidden."""
-    steps = [step for step in found["steps"] if not step["whole"]]
-    sets = [_members(step) for step in steps]
-    return [own[0] for own in sets if len(own) == 1 and own[0] not in case.answers]
+    """Certain effects that are not hidden."""
+    steps = [step for step in found["steps"] if step["certain"] and not step["whole"]]
+    return [own[0] for own in map(_members, steps) if not set(own) & set(case.answers)]
 
 
 def right(case: Case, found: dict[str, Any]) -> bool:
-    """Whether all that is hidden is in a set, nothing else is named, and what is not known is
-    called so; without repeats it is enough to name nothing and to say what cannot be excluded."""
+    """Whether all that is hidden is in a set and nothing else is named.
+
+    Outside the catalogue nothing is certain, and the verdict says that something is missing, that
+    it is the geometry as a whole, or without repeats that it cannot be excluded.
+    """
     steps = found["steps"]
-    if case.outside and case.as_geometry and steps:
-        return len(steps) == 1 and bool(steps[0]["whole"])
     sets = [_members(step) for step in steps]
     if case.outside:
-        told = found["verdict"] in ("unknown", "partly") or (
+        told = found["verdict"] in ("unknown", "partly", "undecided") or (
             not case.repeats and any("cannot be excluded" in note for note in found["notes"])
         )
-        return told and not sets
+        whole = case.as_geometry and bool(steps) and bool(steps[0]["whole"])
+        return (told or whole) and not any(step["certain"] for step in steps)
     if not case.answers:
         return found["verdict"] == "adequate"
     hit = {answer for own in sets for answer in own if answer in case.answers}
@@ -192,12 +193,12 @@ def summary(rows: list[dict[str, Any]]) -> dict[str, str]:
     kinds = {
         "adequate where nothing is hidden": [r for r in rows if r["kind"] == "none"],
         "named rightly": [r for r in rows if r["kind"] == "catalogue"],
-        "unknown or partly, no name, outside the catalogue": [
+        "nothing certain and no adequate model, outside the catalogue": [
             r for r in rows if r["kind"] == "outside"
         ],
     }
     out = {k: f"{sum(r['right'] for r in v)} of {len(v)}" for k, v in kinds.items()}
-    out["a wrong effect named alone"] = f"{sum(bool(r['wrong']) for r in rows)} of {len(rows)}"
+    out["a wrong effect is certain"] = f"{sum(bool(r['wrong']) for r in rows)} of {len(rows)}"
     held = [inside for r in rows for inside in r["covered"].values()]
     out["95 % intervals that hold the truth"] = _share(held)
     return out

@@ -135,6 +135,7 @@ def answer(case: LoggerCase) -> LoggerScore:
         identifiable=bool(known and known.identifiable),
         verdict=told.get("verdict", "refused"),
         steps=tuple(tuple(step["effects"]) for step in told.get("steps", ())),
+        certain=tuple(s["effects"][0] for s in told.get("steps", ()) if s["certain"]),
         caveats=tuple(told.get("caveats", ())),
         findings=tuple(sorted({(f["code"], f["channel"]) for f in told.get("sanity", ())})),
         refusal=refusal,

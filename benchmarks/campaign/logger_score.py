@@ -46,6 +46,8 @@ class LoggerScore:
     identifiable: bool
     verdict: str
     steps: tuple[tuple[str, ...], ...]
+    certain: tuple[str, ...]
+    """Effects of certain steps."""
     caveats: tuple[str, ...]
     findings: tuple[tuple[str, str], ...]
     """Codes and channels under ``sanity``."""
@@ -59,6 +61,7 @@ class LoggerScore:
         """From JSON."""
         lists = {
             "steps": tuple(tuple(s) for s in line["steps"]),
+            "certain": tuple(line["certain"]),
             "caveats": tuple(line["caveats"]),
             "findings": tuple((code, channel) for code, channel in line["findings"]),
         }
@@ -84,13 +87,13 @@ class LoggerScore:
 
     @property
     def wrong_single_name(self) -> bool:
-        """Whether an effect is named alone that is not hidden."""
-        return any(len(step) == 1 and step[0] not in self.hidden for step in self.steps)
+        """Whether a step is certain of an effect that is not hidden."""
+        return any(name not in self.hidden for name in self.certain)
 
     @property
     def alarm(self) -> bool:
         """Whether something is said to be missing."""
-        return self.verdict != "adequate"
+        return bool(self.steps) or self.verdict not in {"adequate", "undecided"}
 
     @property
     def ok(self) -> bool:

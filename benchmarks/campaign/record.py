@@ -13,7 +13,16 @@ from campaign.files import write_run
 from campaign.truth import OUTPUTS, Hidden, show
 from winchkit.arrays import Array
 
-__all__ = ["AR", "EDGE", "Recording", "record", "record_several", "recordings", "write"]
+__all__ = [
+    "AR",
+    "EDGE",
+    "Recording",
+    "instrument_noise",
+    "record",
+    "record_several",
+    "recordings",
+    "write",
+]
 
 Random = np.random.Generator
 AR = 0.9
@@ -83,7 +92,7 @@ def _shown(
     ideal, channels = show(bench.winch, run, hidden), {"motor_angle": run.motor_angle[:: run.every]}
     count = len(channels["motor_angle"])
     for output in OUTPUTS:
-        noise = _noise(random, count, bench.noise[output], bench.colour)
+        noise = instrument_noise(random, count, bench.noise[output], bench.colour)
         channels[output] = getattr(ideal, output) + noise
     channels["cable_length"] = channels["cable_length"] + offset
     if bench.load == "load":
@@ -91,7 +100,7 @@ def _shown(
     return channels
 
 
-def _noise(random: Random, count: int, rms: float, colour: float) -> Array:
+def instrument_noise(random: Random, count: int, rms: float, colour: float) -> Array:
     """White noise, of which ``colour`` (a share of the power) is AR(1)."""
     white = random.normal(size=count)
     drive = random.normal(size=count) * np.sqrt(1 - AR**2)

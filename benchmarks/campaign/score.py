@@ -84,7 +84,7 @@ class Score:
         if self.kind == "none":
             return self.verdict == "adequate"
         if self.kind == "outside" and self.found < len(self.truth):
-            return self.verdict in {"unknown", "partly"} and not self.wrong_single_names
+            return self.verdict != "adequate" and not self.wrong_single_names
         if self.snr < 1:
             return not self.wrong_single_names
         return self.found == len(self.truth) and not self.wrong_single_names
@@ -111,13 +111,18 @@ def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) ->
         answer["unexplained"]["share"],
         p_value,
         bool(steps) and any(t in steps[0] for t in inside),
-        tuple(s[0] for s in steps if len(s) == 1 and s[0] not in inside),
+        tuple(s["effects"][0] for s in answer["steps"] if _is_certain(s, inside)),
         sum(any(t in s for s in steps) for t in inside),
         max(ratios, default=float("nan")),
         tuple(_intervals(case.hidden, answer["steps"])),
         seconds,
         case.scene,
     )
+
+
+def _is_certain(step: Mapping[str, Any], truth: Sequence[str]) -> bool:
+    """Whether a step is certain of a name that is not the truth."""
+    return bool(step["certain"]) and step["effects"][0] not in truth
 
 
 def refused(case: Case, message: str, seconds: float) -> Score:
@@ -196,7 +201,9 @@ def _figures(group: Sequence[Score]) -> dict[str, Any]:
         "truth_in_first": _mean([s.truth_in_first for s in group]),
         "all_found": _mean([s.found == len(s.truth) for s in group]),
         "wrong_single_name": _mean([bool(s.wrong_single_names) for s in group]),
-        "unknown_or_partly": _mean([s.verdict in {"unknown", "partly"} for s in group]),
+        "unknown_or_partly": _mean(
+            [s.verdict in {"unknown", "partly", "undecided"} for s in group]
+        ),
         "set_size": _mean(sizes),
         "heldout_at_noise": _mean([ratio <= 1.1 for ratio in explained]),
         "coverage": float(hits[0] / hits[1]) if hits[1] else None,

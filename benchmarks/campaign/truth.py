@@ -16,7 +16,16 @@ from campaign.memory import dahl, lag, play, stack
 from campaign.winch import Winch
 from winchkit.arrays import Array
 
-__all__ = ["OUTPUTS", "Hidden", "Shown", "Situation", "show"]
+__all__ = [
+    "OUTPUTS",
+    "G",
+    "Hidden",
+    "Shown",
+    "Situation",
+    "bearing_friction",
+    "show",
+    "wound_cable",
+]
 
 Values = Mapping[str, float]
 Hidden = Mapping[str, Values]
@@ -68,7 +77,7 @@ class _Line:
         self.motor_rate = np.gradient(run.motor_angle, run.time)
         self.drum_angle = winch.direction * (run.motor_angle - winch.motor_reference) / winch.ratio
         total = TURN * winch.wound_turns + self.drum_angle
-        self.speed = np.gradient(_wound(winch, total, 0.0, 0.0), run.time)
+        self.speed = np.gradient(wound_cable(winch, total, 0.0, 0.0), run.time)
         self.s = _way(self.speed, CREEP_SPEED)
 
     def get(self, effect: str) -> Values | None:
@@ -99,7 +108,7 @@ class _Line:
         dr = (self.get("drum-radius") or {}).get("radius_error", 0.0)
         dg = (self.get("layer-thickness") or {}).get("thickness_error", 0.0)
         total, start = TURN * winch.wound_turns + angle, TURN * winch.wound_turns
-        length = _wound(winch, total, dr, dg) - _wound(winch, np.array(start), dr, dg)
+        length = wound_cable(winch, total, dr, dg) - wound_cable(winch, np.array(start), dr, dg)
         if p := self.get("drum-eccentricity"):
             length = length + p["eccentricity"] * (np.sin(angle - p["phase"]) + np.sin(p["phase"]))
         if p := self.get("guide-offset"):
@@ -194,15 +203,15 @@ class _Line:
     def _over_pulley(self, before: Array, wrap: float, free: Array) -> Array:
         after = before
         if p := self.get("pulley-coulomb"):
-            after = _coulomb(before, self.s * p["friction"], wrap)
+            after = bearing_friction(before, self.s * p["friction"], wrap)
         if p := self.get("pulley-stribeck"):
             slow = np.exp(-((self.speed / p["stribeck_speed"]) ** 2))
             mu = p["coulomb"] + (p["static"] - p["coulomb"]) * slow
-            after = _coulomb(after, self.s * mu, wrap)
+            after = bearing_friction(after, self.s * mu, wrap)
         if p := self.get("pulley-capstan"):
             after = after * np.exp(self.s * p["friction"] * wrap)
         if p := self.get("pulley-dahl"):
-            limit = _coulomb(before, np.full_like(before, p["friction"]), wrap) - before
+            limit = bearing_friction(before, np.full_like(before, p["friction"]), wrap) - before
             after = after + dahl(-free, limit, np.full_like(limit, p["stiffness"]))
         if p := self.get("pulley-viscous"):
             after = after + p["viscosity"] * self.speed
@@ -281,7 +290,7 @@ class _Line:
         return torque
 
 
-def _wound(winch: Winch, total: Array, dr: float, dg: float) -> Array:
+def wound_cable(winch: Winch, total: Array, dr: float, dg: float) -> Array:
     """Cable on the drum at the total wound angle, by the four winding laws."""
     r, g = winch.radius + dr, winch.growth + dg
     if winch.kind == "grooved":
@@ -295,7 +304,7 @@ def _wound(winch: Winch, total: Array, dr: float, dg: float) -> Array:
     return (total - TURN * n) * (r + n * g) + TURN * (n * r + g * n * (n - 1) / 2)
 
 
-def _coulomb(before: Array, mu: Array, wrap: float) -> Array:
+def bearing_friction(before: Array, mu: Array, wrap: float) -> Array:
     """T1 = T0 + μ N(T0, T1), N the force on the pulley, by iteration."""
     after = before
     for _ in range(12):

@@ -224,8 +224,8 @@ def scored(seed: int, **changed: object) -> LoggerScore:
     told: dict[str, object] = {
         "seed": seed, "snr": 3.0, "hidden": {"cell-gain": {"gain_error": 0.01}}, "fault": "none",
         "detail": "", "channel": "", "rival": "cell-offset", "log_ratio": 9.0,
-        "identifiable": True, "verdict": "explained", "steps": (("cell-gain",),), "caveats": (),
-        "findings": (), "refusal": "", "seconds": 1.0, "scene": "",
+        "identifiable": True, "verdict": "explained", "steps": (("cell-gain",),), "certain": (),
+        "caveats": (), "findings": (), "refusal": "", "seconds": 1.0, "scene": "",
     }  # fmt: skip
     return LoggerScore.read(told | changed)
 
@@ -233,6 +233,7 @@ def scored(seed: int, **changed: object) -> LoggerScore:
 def test_an_answer_is_right_or_wrong() -> None:
     assert scored(1).ok
     assert not scored(1, steps=(("cell-offset",),)).ok
+    assert not scored(1, certain=("cell-offset",)).ok
     assert not scored(1, verdict="unknown", steps=()).ok
     assert scored(1, verdict="unknown", steps=(), identifiable=False).ok
     assert not scored(1, hidden={}, verdict="unknown", steps=()).ok

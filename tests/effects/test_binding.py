@@ -41,7 +41,7 @@ def test_shorthands_are_effects_too() -> None:
     assert found == {
         "cable-elongation-linear": {"axial_stiffness": 2e5},
         "cable-weight": {"mass_per_length": 0.14},
-        "gear-efficiency": {"efficiency": 0.8},
+        "gear-efficiency": {"efficiency": 0.8, "transition": 0.0},
     }
 
 

@@ -40,9 +40,7 @@ from winchkit.sim.record import simulate
 pytest.importorskip("pyarrow")
 ROOT = Path(__file__).parents[2]
 START = datetime(2026, 1, 5, tzinfo=UTC)
-PARTS = (
-    "verdict", "outputs", "steps", "candidates", "unexplained", "caveats", "closest", "notes",
-)  # fmt: skip
+PARTS = ("verdict", "outputs", "steps", "candidates", "unexplained", "caveats", "notes")
 
 
 def outcome(task: Task) -> Outcome:

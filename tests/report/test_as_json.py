@@ -25,7 +25,7 @@ def test_the_ladder_begins_and_ends_with_the_errors_of_the_answer() -> None:
         rungs = [rung["heldout_rms"][name] for rung in ladder["rungs"]]
         assert rungs[0] == output.heldout_rms_before
         assert rungs[-1] == output.heldout_rms_after
-    assert len(ladder["rungs"]) == 3
+    assert len(ladder["rungs"]) == 1 + len(answer.diagnosis.steps)
     assert len(ladder["first"]) == len(ladder["last"]) == 2
 
 

@@ -1,18 +1,12 @@
-"""docs/methods.md lists every numeric constant of the diagnosis with its value and reason."""
+"""docs/methods.md and the code: every numeric constant of the diagnosis has a reason beside it."""
 
 import ast
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from snippets import ROOT
-
-Constants = dict[tuple[str, str], str]
-"""File (relative to the package) and name of a constant, to its value as Python writes it."""
-_FILE = re.compile(r"### `([\w/]+\.py)`")
-_ROW = re.compile(r"\| `(\w+)` \| `([^`]+)` \| ([^|]+) \| ([^|]+) \|")
 
 PAGE = ROOT / "docs" / "methods.md"
 _MODULE = re.compile(r"`(\w+/\w+\.py)`")
@@ -26,24 +20,9 @@ def page() -> str:
     return PAGE.read_text(encoding="utf-8")
 
 
-@pytest.fixture(scope="module")
-def constants() -> Constants:
-    return numbers_of(ROOT / "winchkit" / "diagnosis")
-
-
-def test_every_constant_is_in_the_table(page: str, constants: Constants) -> None:
-    missing = sorted(constants.keys() - table_of(page).keys())
-    assert not missing, "constants without a row, with what they do and their reason"
-
-
-def test_no_row_is_of_a_constant_that_is_gone(page: str, constants: Constants) -> None:
-    assert not sorted(table_of(page).keys() - constants.keys())
-
-
-def test_values_are_those_of_the_code(page: str, constants: Constants) -> None:
-    table = table_of(page)
-    wrong = {key: (table[key], constants[key]) for key in table.keys() & constants.keys()}
-    assert not {key: pair for key, pair in wrong.items() if pair[0] != pair[1]}
+def test_every_constant_has_its_reason_in_the_line_after_it() -> None:
+    """What it does, and why it has this value."""
+    assert not without_reason(ROOT / "winchkit" / "diagnosis")
 
 
 def test_modules_that_the_page_names_exist(page: str) -> None:
@@ -63,66 +42,40 @@ def test_every_citation_is_in_the_list_of_references(page: str) -> None:
     assert not missing
 
 
-def test_numbers_of_a_module_are_found_in_every_form(tmp_path: Path) -> None:
+def test_a_constant_without_a_reason_is_found_in_every_form(tmp_path: Path) -> None:
     source = tmp_path / "room" / "file.py"
     source.parent.mkdir()
     source.write_text(
-        "A = 1\nB, C = 2.0, -3\nD: float = 1 / 3\nE = (1, 2)\nF = {'a': 1.5}\nG = True\nH = 'x'\n"
-        "I = (K(1.0), K(2))\n",
+        'A = 1\nB, C = 2.0, -3\nD: float = 1 / 3\n"""A third."""\nE = (1, 2)\nG = True\n'
+        "H = 'x'\nI = (K(1.0), K(2))\n",
         encoding="utf-8",
     )
-    found = numbers_of(tmp_path)
-    assert {name: value for (_, name), value in found.items()} == {
-        "A": "1",
-        "B": "2.0",
-        "C": "-3",
-        "D": "1 / 3",
-        "E": "(1, 2)",
-        "F": "{'a': 1.5}",
-        "I": "1 2",
-    }
+    found = [name for _, name in without_reason(tmp_path)]
+    assert found == ["A", "B", "E", "I"]
 
 
-def numbers_of(package: Path) -> Constants:
-    """Module-level assignments of a package whose value holds a number."""
-    out: Constants = {}
+def without_reason(package: Path) -> list[tuple[str, str]]:
+    """File and first name of every module-level assignment of a number without a docstring."""
+    out = []
     for path in sorted(package.rglob("*.py")):
-        place = path.relative_to(package).as_posix()
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            out |= {(place, name): value for name, value in _assigned(node)}
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        for node, after in zip(body, [*body[1:], None], strict=True):
+            name = _name_of(node)
+            if name and not (isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)):
+                out.append((path.relative_to(package).as_posix(), name))
     return out
 
 
-def table_of(page: str) -> Constants:
-    """Rows ``| `NAME` | `VALUE` | what it does | reason |`` under headings ``### `FILE` ``."""
-    out: Constants = {}
-    place = ""
-    for line in page.splitlines():
-        if heading := _FILE.fullmatch(line):
-            place = heading[1]
-        elif line.startswith("#"):
-            place = ""
-        elif place and (row := _ROW.fullmatch(line)):
-            assert (place, row[1]) not in out, f"{place} {row[1]} stands in the table twice"
-            out[place, row[1]] = row[2]
-    return out
-
-
-def _assigned(node: ast.stmt) -> Iterator[tuple[str, str]]:
-    """Names and values of one assignment, those of a tuple one by one."""
+def _name_of(node: ast.stmt) -> str:
+    """First name of an assignment of numbers; empty for any other statement."""
     if isinstance(node, ast.Assign):
-        targets, value = node.targets, node.value
+        target, value = node.targets[0], node.value
     elif isinstance(node, ast.AnnAssign) and node.value is not None:
-        targets, value = [node.target], node.value
+        target, value = node.target, node.value
     else:
-        return
-    for target in targets:
-        pairs = [(target, value)]
-        if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-            pairs = list(zip(target.elts, value.elts, strict=True))
-        for name, own in pairs:
-            if isinstance(name, ast.Name) and _numbers(own):
-                yield name.id, _written(own)
+        return ""
+    first = target.elts[0] if isinstance(target, ast.Tuple) else target
+    return first.id if isinstance(first, ast.Name) and _numbers(value) else ""
 
 
 def _numbers(value: ast.expr) -> bool:
@@ -132,12 +85,3 @@ def _numbers(value: ast.expr) -> bool:
         and not isinstance(part.value, bool)
         for part in ast.walk(value)
     )
-
-
-def _written(value: ast.expr) -> str:
-    """The value as source; of a tuple of objects, the numbers that they are made with."""
-    made = isinstance(value, ast.Tuple) and any(isinstance(e, ast.Call) for e in value.elts)
-    if not made:
-        return ast.unparse(value)
-    numbers = [n.value for n in ast.walk(value) if isinstance(n, ast.Constant)]
-    return " ".join(f"{n:g}" for n in numbers if isinstance(n, int | float))

@@ -34,7 +34,6 @@ GONE = {
     r"lean(s|t|ed|ing)? to": "likelihood-ratio test is significant",
     r"rubs?": "Coulomb friction",
     r"out of true": "runout",
-    r"doubt(s|ed)?": "specification test",
     r"imagined": "simulated",
     r"calm(s|ed|er)?": "denoised, low-passed",
     r"freedoms": "degrees of freedom",

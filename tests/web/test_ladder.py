@@ -7,9 +7,11 @@ import pytest
 pytest.importorskip("starlette")
 
 import winchkit
+from report_answers import ELASTIC, OPEN, diagnosis_of
 from winchkit.report.words.sentence import sentence
+from winchkit.report.words.vocabulary import VERDICT_NAMES
 from winchkit.web.examples import example_runs
-from winchkit.web.ladder import ladder
+from winchkit.web.ladder import VERDICT_WORDS, ladder, verdict
 
 
 @pytest.mark.slow
@@ -29,4 +31,13 @@ def test_the_named_candidate_has_the_errors_of_the_sentence() -> None:
         if falls in said:
             assert f"{falls} {after['text']} {unit}" in said
             compared += 1
-    assert compared == 2, "cable length and motor torque"
+    assert compared == 1, "the output whose error falls most"
+
+
+def test_every_verdict_has_its_word_and_steps_have_their_doubts() -> None:
+    assert set(VERDICT_WORDS) == set(VERDICT_NAMES)
+    told = verdict(diagnosis_of("undecided", ELASTIC, OPEN, unexplained_share=0.6))
+    assert (told["verdict"], told["chip"]) == ("undecided", "Undecided")
+    assert [step["effect"] for step in told["steps"]] == ["cable-elongation-linear"] * 2
+    assert [bool(step["doubts"]) for step in told["steps"]] == [False, True]
+    assert told["steps"][0]["text"].startswith("The cable is elastic: EA = 249.9 ± 7.0 kN")

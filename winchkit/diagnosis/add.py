@@ -19,12 +19,15 @@ from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Score, score
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.selection.transitions import scanned_transitions, with_fitted_transitions
 from winchkit.diagnosis.selection.weighting import Reweighted, reweighted
 from winchkit.diagnosis.verdict.decision import output_fits
+from winchkit.diagnosis.verdict.profile_values import file_model
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL, placed, variable_of
 from winchkit.effects.term import Term
+from winchkit.effects.transition import with_transitions
 from winchkit.errors import UsageError
 from winchkit.rendering import Shown
 from winchkit.runs.run import Run
@@ -42,6 +45,7 @@ __all__ = [
 ]
 
 _STARTS = 4
+"""Grid points of the effect from which `add` begins a fit; computing cost, rule of thumb."""
 _Fits = tuple[TimeSeriesSelection, tuple[Fit, Noise], tuple[Fit, Noise]]
 """Engine, and the fits before and after the addition, each with its noise."""
 
@@ -128,7 +132,7 @@ def add(
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Addition:
-    """Fit an effect beside those of a profile, all of them refitted.
+    """Fit an effect beside those of a profile, all of them refitted; one that is there too.
 
     Parameters
     ----------
@@ -151,7 +155,7 @@ def add(
     Raises
     ------
     UsageError
-        For an effect that is unknown, present already, or that the runs cannot show.
+        For an effect that is unknown, or that the runs cannot show.
     RunError
         With every fault of every run.
     """
@@ -169,7 +173,6 @@ def fitted_addition(
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")
     catalogue = catalogue or load_catalogue()
-    _require_absent(catalogue[effect_id], profile)
     dataset = prepare(runs, profile, band, decimate=True, fast=True, catalogue=catalogue)
     return fitted_addition_to(effect_id, dataset, catalogue)
 
@@ -177,7 +180,8 @@ def fitted_addition(
 def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedAddition:
     """The same as :func:`fitted_addition` on a prepared data set, as that of a diagnosis."""
     effect = catalogue[effect_id]
-    _require_absent(effect, dataset.profile)
+    if not effect.repeatable and any(t.id == effect.id for t in dataset.profile.effect):
+        return _refitted(effect_id, dataset, catalogue)
     candidates = Catalogue([*catalogue, _placed(effect, dataset)])
     engine = _engine(dataset, candidates, effect)
     lacking = engine.regression.missing_needs(effect)
@@ -199,7 +203,11 @@ def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -
     reduced = without_impacts(dataset, after[0].hypothesis)
     if reduced is not None:
         engine, before, after = fitted_on(reduced)
-    best = reweighted(engine, *after)
+    if transitions := scanned_transitions(engine, *after):
+        rounded = Catalogue(with_transitions(other, transitions) for other in candidates)
+        engine = _engine(engine.regression.dataset, rounded, effect)
+        after = _fitted(engine, effect_id)[1]
+    best = reweighted(engine, with_fitted_transitions(engine, *after), after[1])
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     outputs = output_fits(engine, before, (best.fit, best.noise))
     terms = tuple(estimates(engine.regression, best.fit, spread))
@@ -208,9 +216,26 @@ def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -
     )
 
 
-def _require_absent(effect: Effect, profile: WinchProfile) -> None:
-    if not effect.repeatable and any(table.id == effect.id for table in profile.effect):
-        raise UsageError(f"profile '{profile.name}' has the effect '{effect.id}' already")
+def _refitted(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedAddition:
+    """The profile's effects refitted, one of them last, beside their file values."""
+    engine = selection_engine(dataset, catalogue)
+    fitted, noise = engine.fit_with_noise(engine.initial_model)
+    transitions = scanned_transitions(engine, fitted, noise)
+    if transitions:
+        rounded = Catalogue(with_transitions(other, transitions) for other in catalogue)
+        again = selection_engine(dataset, rounded)
+        fitted, noise = again.fit_with_noise(again.initial_model)
+        fitted = with_fitted_transitions(again, fitted, noise)
+    best = reweighted(engine, fitted, noise)
+    before = file_model(engine, engine.initial_model, best.noise)
+    spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
+    outputs = output_fits(engine, (before, best.noise), (best.fit, best.noise))
+    terms = sorted(
+        estimates(engine.regression, best.fit, spread),
+        key=lambda pair: pair[0].effect.id == effect_id,
+    )
+    addition = Addition(outputs, tuple(terms), _notes(engine, best))
+    return FittedAddition(engine.regression, before, best.fit, addition)
 
 
 def _engine(dataset: Dataset, catalogue: Catalogue, effect: Effect) -> TimeSeriesSelection:

@@ -19,15 +19,16 @@ from winchkit.tabular import Columns, Tabular
 
 __all__ = [
     "CandidateScore",
-    "Closest",
     "Combination",
     "Comparison",
     "Detectable",
     "Diagnosis",
+    "Doubt",
     "Estimate",
     "NextRun",
     "OutputError",
     "OutputFit",
+    "Place",
     "RobotDiagnosis",
     "RunOffset",
     "Step",
@@ -37,7 +38,7 @@ __all__ = [
 ]
 
 _ORDER, _AMPLITUDE = "order", "amplitude"
-Verdict = Literal["adequate", "explained", "partly", "unknown"]
+Verdict = Literal["adequate", "explained", "partly", "unknown", "undecided"]
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,10 @@ class OutputFit:
     heldout_rms_before: float
     heldout_rms_after: float
     noise_rms: float | None
+    """From repeats or instruments; without them the white noise alone, a lower bound."""
     noise_source: str = "repeats"
+    noise_upper: float | None = None
+    """Without repeats: the whole residual, an upper bound."""
 
 
 @dataclass(frozen=True)
@@ -143,17 +147,20 @@ class Combination:
 
 
 @dataclass(frozen=True)
-class Closest:
-    """An effect that explains the residual or a part of it, and the reason why it is not named."""
+class Doubt:
+    """A reason to doubt a step, as a code and in words."""
 
-    effect: str
-    parameters: Mapping[str, Estimate]
-    reason: str
+    code: str
+    text: str
 
-    def to_json(self) -> dict[str, Any]:
-        """Dictionary that the command prints."""
-        parameters = {name: vars(estimate) for name, estimate in self.parameters.items()}
-        return {"effect": self.effect, "parameters": parameters, "reason": self.reason}
+
+@dataclass(frozen=True)
+class Place:
+    """Part of the machine, output, and variable over which a law acts there; None without one."""
+
+    part: str
+    output: str
+    variable: str | None
 
 
 @dataclass(frozen=True)
@@ -180,6 +187,21 @@ class Step:
     """Whether all effects apply together, as for a robot's geometry, instead of one of them."""
     combination: Combination | None = None
     """What the data determine of an equivalence set or of strongly correlated parameters."""
+    place: tuple[Place, ...] = ()
+    """Where the first effect acts."""
+    law: Literal["established", "open"] = "established"
+    """Established where no other law of the catalogue and no free curve explains the same better or
+    as well; else open: the place is known, the law is the closest one."""
+    certain: bool = False
+    """Whether the law is established and less is left unexplained in its outputs than a tenth of
+    what it explains."""
+    share: float = float("nan")
+    """Share of the excess over the noise that only this step explains (leave-one-out)."""
+    doubts: tuple[Doubt, ...] = ()
+    refitted: bool = False
+    """Whether it is an effect of the profile with another value than in the file."""
+    file_values: Mapping[str, float] = field(default_factory=dict)
+    """Values in the file of a refitted effect, SI."""
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""
@@ -196,6 +218,19 @@ class Step:
             "heldout_gain": self.heldout_gain,
             "angles": dict(self.angles),
             "combination": vars(self.combination) if self.combination else None,
+            **self.standing_json(),
+        }
+
+    def standing_json(self) -> dict[str, Any]:
+        """Place, law, share and doubts, as the command prints them."""
+        return {
+            "place": [vars(place) for place in self.place],
+            "law": self.law,
+            "certain": self.certain,
+            "share": self.share,
+            "doubts": [vars(doubt) for doubt in self.doubts],
+            "refitted": self.refitted,
+            "file_values": dict(self.file_values),
         }
 
 
@@ -244,11 +279,18 @@ class Detectable:
 
 @dataclass(frozen=True)
 class NextRun:
-    """A motion programme that separates two effects, with its power."""
+    """A motion programme that separates two effects, with its power, or a repeat for the noise."""
 
-    separates: tuple[str, str]
+    separates: tuple[str, ...]
+    """Two effects; empty for a repeat."""
     programme: str
-    power: float
+    power: float = float("nan")
+
+    def to_json(self) -> dict[str, Any]:
+        """Dictionary that the command prints."""
+        if not self.separates:
+            return {"repeat": self.programme}
+        return {**vars(self), "separates": list(self.separates)}
 
 
 @dataclass(frozen=True, repr=False)
@@ -272,13 +314,11 @@ class Diagnosis(Plotted, Tabular):
     used_share: Mapping[str, float] = field(default_factory=dict)
     """Share of the measured samples that is compared, by output."""
     caveats: tuple[str, ...] = ()
-    """Codes of what these runs cannot exclude; the verdict is one of four with or without them."""
+    """Codes of what these runs cannot exclude, whatever the verdict."""
     interrupted: bool = False
     """Whether the search was interrupted: errors and candidates are known, the verdict is not."""
     fit: FitStatistics | None = None
     """Statistics of the reported model's fit; None without unknowns."""
-    closest: tuple[Closest, ...] = ()
-    """Effects that are not named since their values are implausible."""
     run_offsets: tuple[RunOffset, ...] = ()
     """Offsets of instruments that have another one in every run. Those of a held-out run are its
     own in every held-out error."""
@@ -320,15 +360,12 @@ class Diagnosis(Plotted, Tabular):
                 "where": [where.to_json() for where in self.where],
                 "empirical": list(self.empirical),
             },
-            "next_runs": [
-                {**vars(run), "separates": list(run.separates)} for run in self.next_runs
-            ],
+            "next_runs": [run.to_json() for run in self.next_runs],
             "sanity": [finding.to_json() for finding in self.sanity],
             "used_share": dict(self.used_share),
             "caveats": list(self.caveats),
             "fit": None if self.fit is None else self.fit.to_json(),
             "run_offsets": [vars(offset) for offset in self.run_offsets],
-            "closest": [closest.to_json() for closest in self.closest],
             "notes": list(self.notes),
         }
 
@@ -354,7 +391,8 @@ class RobotDiagnosis(Diagnosis):
         out["candidates"] = [_placed(candidate) for candidate in out["candidates"]]
         out["detectable"] = _detectable(out["detectable"])
         for run in out["next_runs"]:
-            run["separates"] = [effect_and_line(name)[0] for name in run["separates"]]
+            if "separates" in run:
+                run["separates"] = [effect_and_line(name)[0] for name in run["separates"]]
         return out
 
 
@@ -393,7 +431,14 @@ def _step(step: Step) -> dict[str, Any]:
         "angles": dict(step.angles),
         "combination": vars(step.combination) if step.combination else None,
         "whole": step.whole,
+        **step.standing_json(),
+        "place": [{**vars(place), "line": _line_of(step)} for place in step.place],
     }
+
+
+def _line_of(step: Step) -> str | None:
+    """Line of the first effect, None for all lines or the platform."""
+    return None if step.whole else effect_and_line(step.effects[0])[1]
 
 
 def _placed(candidate: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,26 +1,46 @@
-"""Steps of a selection: every addition with its equivalence set, values and held-out gain."""
+"""Steps of a diagnosis: every effect of the final model with its values, its share and its doubts.
+
+A doubt is written on its step and never removes another. A step is certain where its law is
+established and less is left in its outputs than a tenth of what it explains.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise, zip_longest
 
 import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.regression.conditioning import value_covariance
+from winchkit.diagnosis.regression.conditioning import collinearity, value_covariance
 from winchkit.diagnosis.regression.cross_validation import held_out
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, estimates, spread_of
 from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.results import CandidateScore, Estimate, Step
+from winchkit.diagnosis.results import CandidateScore, Doubt, Estimate, OutputFit, Place, Step
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.combination import combination_of_set, combination_of_term
+from winchkit.diagnosis.verdict.curve_fits import Curve
+from winchkit.diagnosis.verdict.decision import excess
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
+from winchkit.diagnosis.verdict.laws import reduced_law
+from winchkit.diagnosis.verdict.plausibility import implausible
+from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["candidates_of", "steps_of"]
+__all__ = ["Standing", "candidates_of", "is_small", "standing_of", "steps_of", "with_standing"]
+
+_CERTAIN = 0.1
+"""Share of what a step explains that may be left unexplained in its outputs where it is certain:
+the tenth of the verdict ``explained``."""
+_MOST_ALTERNATIVES = 3
+"""Members of a set, the simplest first; more are named in a doubt. Rule of thumb: what a reader can
+compare."""
+_LARGEST_COLLINEARITY = 1e5
+"""Law and channel are accurate to 0.3 % at best: where the others imitate an effect's change to
+within that, what distinguishes it is less than their error."""
 
 
 def steps_of(
@@ -50,33 +70,197 @@ def steps_of(
     spread = spread or spread_of(regression, final, noise, regression.blocks)
     own = estimates(regression, final, spread)[engine.n_initial_terms :]
     covariance = value_covariance(regression, final, noise)
-    for equivalence, gain, (term, values) in zip(
-        sets, _gains(engine, final, noise), own, strict=True
-    ):
+    for every, gain, (term, values) in zip(sets, _gains(engine, final, noise), own, strict=True):
         parameters = {
             member.effect.id: values
             if member.effect.id == term.effect.id
-            else _values_of_rival(engine, result, fitted)
-            for member, fitted in zip(equivalence.terms, equivalence.fits, strict=True)
+            else _values_of_rival(engine, result, fitted, member.effect.id)
+            for member, fitted in zip(every.terms, every.fits, strict=True)
         }
+        equivalence = _without_reduced(every, parameters, engine.profile)
+        further = equivalence.effects[_MOST_ALTERNATIVES:]
+        equivalence = equivalence.only(equivalence.effects[:_MOST_ALTERNATIVES])
+        parameters = {name: parameters[name] for name in equivalence.effects}
         combination = combination_of_set(equivalence.terms, parameters, dataset)
         if combination is None and equivalence.term.effect.id == term.effect.id:
             combination = combination_of_term(term, covariance)
+        place = tuple(Place(*at) for at in equivalence.terms[0].effect.place)
         out.append(
-            Step(equivalence.effects, parameters, gain, equivalence.angles, combination=combination)
+            Step(
+                equivalence.effects,
+                parameters,
+                gain,
+                equivalence.angles,
+                combination=combination,
+                place=place,
+                doubts=(Doubt("further", _further_text(further)),) if further else (),
+            )
         )
     return tuple(out)
 
 
+@dataclass(frozen=True)
+class Standing:
+    """What one step explains of the excess, and what is left where it acts."""
+
+    share: float
+    """Share of the excess before that only this step explains."""
+    certain: bool
+    """Whether less is left in its outputs than a tenth of what it explains."""
+    explained: float = 0.0
+    """Excess that only this step explains."""
+
+
+def is_small(standing: Standing, others: Iterable[Standing]) -> bool:
+    """Whether another step of the same outputs explains more than ten times as much.
+
+    A law is known to a tenth of what it explains: the rest of a larger one may be this step.
+    """
+    return any(standing.explained < _CERTAIN * other.explained for other in others)
+
+
+def standing_of(
+    without: Mapping[str, float], outputs: Mapping[str, OutputFit], own: Sequence[str]
+) -> Standing:
+    """Standing of a step by the held-out errors of the model without it.
+
+    Parameters
+    ----------
+    without
+        Held-out errors without the step, by output.
+    outputs
+        Errors of the file and of the final model.
+    own
+        Outputs on which the step acts.
+    """
+    noise = {name: output.noise_rms for name, output in outputs.items()}
+    after = {name: output.heldout_rms_after for name, output in outputs.items()}
+    before = {name: output.heldout_rms_before for name, output in outputs.items()}
+    explained, whole = excess(without, noise) - excess(after, noise), excess(before, noise)
+    there = [name for name in own if name in outputs]
+    left = excess({name: after[name] for name in there}, noise)
+    share = float(np.clip(explained / whole, 0.0, 1.0)) if whole > 0.0 else float("nan")
+    return Standing(share, left <= _CERTAIN * explained, explained)
+
+
+def with_standing(
+    engine: SelectionEngine,
+    result: SelectionResult,
+    step: Step,
+    *,
+    index: int,
+    standing: Standing,
+    curve: tuple[Curve, float] | None = None,
+    small: bool = False,
+) -> Step:
+    """A step with its share, law and doubts.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    result
+        Result of the selection.
+    step
+        The step.
+    index
+        Of its term in the final model.
+    standing
+        Its standing.
+    curve
+        A free curve that explains more, and by which share of what the step explains.
+    small
+        Whether another step of the same outputs explains ten times as much.
+    """
+    doubts = list(_doubts(engine, result, step, index, curve))
+    if not standing.certain:
+        what = "more is left in its outputs than a tenth of what it explains"
+        doubts.append(Doubt("remaining", what))
+    if small:
+        what = "another step explains ten times as much there: it may be a deviation of that law"
+        doubts.append(Doubt("small", what))
+    single = len(step.effects) == 1
+    established = single and curve is None
+    return replace(
+        step,
+        law="established" if established else "open",
+        certain=established and standing.certain and not any(d.code in _SERIOUS for d in doubts),
+        share=standing.share,
+        doubts=tuple(doubts),
+    )
+
+
+_SERIOUS = frozenset({"implausible", "collinear", "undetermined", "small"})
+"""Doubts with which no step is certain."""
+
+
+def _doubts(
+    engine: SelectionEngine,
+    result: SelectionResult,
+    step: Step,
+    index: int,
+    curve: tuple[Curve, float] | None,
+) -> list[Doubt]:
+    out = []
+    regression, term = engine.regression, result.final.hypothesis.terms[index]
+    if len(step.effects) > 1:
+        others = ", ".join(step.effects[1:])
+        out.append(Doubt("alternatives", f"these data cannot distinguish it from {others}"))
+        out += step.doubts
+    if curve is not None:
+        free, share = curve
+        over = free.variable.replace("_", " ")
+        what = f"a free curve over {over} explains {share:.0%} more: the law is another one"
+        out.append(Doubt("curve", what))
+    values = step.parameters.get(term.effect.id, {})
+    if reason := implausible(term, values, engine.profile):
+        out.append(Doubt("implausible", reason))
+    if collinearity(regression, result.final, result.noise, index) > _LARGEST_COLLINEARITY:
+        what = "the others imitate its change to within 0.3 %: their values may cancel each other"
+        out.append(Doubt("collinear", what))
+    amplitudes = [e for n, e in values.items() if term.effect.parameter(n).role == "amplitude"]
+    if amplitudes and all(not _is_determined(term.effect.null, n, e) for n, e in values.items()):
+        out.append(Doubt("undetermined", "its values are not determined by these data"))
+    return out
+
+
+def _is_determined(null: Mapping[str, float], name: str, estimate: Estimate) -> bool:
+    """Whether a value differs from its null by more than its standard deviation."""
+    if np.isinf(null[name]):
+        return bool(estimate.std < abs(estimate.value))
+    return bool(estimate.std < abs(estimate.value - null[name]))
+
+
+def _further_text(effects: Sequence[str]) -> str:
+    return f"nor can they distinguish it from {', '.join(effects)}"
+
+
+def _without_reduced(
+    equivalence: EquivalenceSet,
+    parameters: Mapping[str, Mapping[str, Estimate]],
+    profile: WinchProfile | None,
+) -> EquivalenceSet:
+    """A set without richer laws whose fitted shape is that of another member."""
+    names = set(equivalence.effects)
+    kept = [
+        term.effect.id
+        for term in equivalence.terms
+        if not names & set(term.effect.reduces_to)
+        or not reduced_law(term, parameters[term.effect.id], profile)
+    ]
+    return equivalence.only(kept)
+
+
 def _values_of_rival(
-    engine: SelectionEngine, result: SelectionResult, fitted: Fit
+    engine: SelectionEngine, result: SelectionResult, fitted: Fit, effect: str
 ) -> dict[str, Estimate]:
-    """Values of the last effect of a rival's fit, with their uncertainty."""
+    """Values of a rival in its fit, with their uncertainty."""
     regression, noise = engine.regression, result.noise
     # The reported model may have other weights than those of the comparison.
     fitted = engine.refit(fitted.hypothesis, noise)
     spread = spread_of(regression, fitted, noise, regression.blocks)
-    return estimates(regression, fitted, spread)[-1][1]
+    found = estimates(regression, fitted, spread)
+    return next(values for term, values in reversed(found) if term.effect.id == effect)
 
 
 def _gains(engine: SelectionEngine, final: Fit, noise: Noise) -> list[float]:

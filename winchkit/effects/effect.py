@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.errors import UsageError
-from winchkit.model.stages import ROBOT_STAGES, At, Stage
+from winchkit.model.stages import PARTS, ROBOT_STAGES, At, Stage
 from winchkit.units import suggest
 
 __all__ = [
@@ -86,8 +86,9 @@ class Parameter:
     """Lower bound, in ``unit``."""
     high: float = float("inf")
     """Upper bound, in ``unit``."""
-    role: Literal["amplitude", "shape", "fixed"] = "amplitude"
-    """An amplitude scales the effect, a shape changes its form; a fixed one is not fitted."""
+    role: Literal["amplitude", "shape", "nuisance", "fixed"] = "amplitude"
+    """An amplitude scales the effect, a shape changes its form; a nuisance is fitted and no part of
+    the law; a fixed one is not fitted."""
     reciprocal: bool = False
     """Fitted as 1/value, since the null is infinite (stiffnesses)."""
     grid: tuple[float, ...] = ()
@@ -134,6 +135,12 @@ class Effect:
     """Group of effects of one physical cause."""
     contains: tuple[str, ...] = ()
     """Effects that are special cases of it and must not be in the same model."""
+    part: str = ""
+    """Part of the machine that has it; by default that of its stage."""
+    variable: str = ""
+    """Variable over which its law is a curve; empty with memory, or for a product of variables."""
+    reduces_to: tuple[str, ...] = ()
+    """Simpler laws that it becomes where its shape is not determined, the most usual one first."""
     needs: tuple[Need, ...] = ()
     """Channels and parts without which it is no candidate."""
     order: int = 0
@@ -182,6 +189,12 @@ class Effect:
         if self.memory and self.carry is None:
             return "it has memory and no function for its next state (Effect.carry)"
         return ""
+
+    @property
+    def place(self) -> tuple[tuple[str, str, str | None], ...]:
+        """Part, output and variable (None without one) at which it acts, for each output."""
+        part = self.part or PARTS[self.stage]
+        return tuple((part, output, self.variable or None) for output in self.outputs)
 
     @property
     def polar_pairs(self) -> tuple[tuple[str, str], ...]:

@@ -19,6 +19,9 @@ from winchkit.effects.effect import Effect, Parameter
 
 __all__ = ["Coordinates"]
 
+_FORM = frozenset({"shape", "nuisance"})
+"""Roles of parameters that, where they are positive, are fitted by their logarithm."""
+
 
 @dataclass(frozen=True)
 class Coordinates:
@@ -47,8 +50,13 @@ class Coordinates:
         )
 
     @cached_property
+    def nuisances(self) -> tuple[Parameter, ...]:
+        """Fitted parameters that are no part of the law."""
+        return tuple(p for p in self.effect.parameters if p.role == "nuisance")
+
+    @cached_property
     def _fitted(self) -> tuple[Parameter, ...]:
-        return self.amplitudes + self.shapes
+        return self.amplitudes + self.shapes + self.nuisances
 
     def __len__(self) -> int:
         return len(self._fitted)
@@ -60,8 +68,8 @@ class Coordinates:
 
     @property
     def n_parameters(self) -> int:
-        """Degrees of freedom, a scanned order included."""
-        return len(self) + sum(p.whole for p in self.effect.parameters)
+        """Degrees of freedom of the law, a scanned order included."""
+        return len(self) - len(self.nuisances) + sum(p.whole for p in self.effect.parameters)
 
     def vector(self, values: Mapping[str, float]) -> Array:
         """Coordinates of values, shape (len,)."""
@@ -146,7 +154,7 @@ def _scale(parameter: Parameter) -> float:
 def _to_coordinate(parameter: Parameter, value: float) -> float:
     if parameter.reciprocal:
         return parameter.typical / value if value else inf
-    if parameter.role == "shape" and parameter.low > 0:
+    if parameter.role in _FORM and parameter.low > 0:
         return log(value / parameter.typical) if value < inf else inf
     return (value - parameter.null) / _scale(parameter)
 
@@ -155,7 +163,7 @@ def _to_value(parameter: Parameter, x: float) -> float:
     if parameter.reciprocal:
         # A stiffness beyond the null, as at the end of an interval, is infinite.
         value = parameter.typical / x if x > 0 or (x and parameter.low < 0) else inf
-    elif parameter.role == "shape" and parameter.low > 0:
+    elif parameter.role in _FORM and parameter.low > 0:
         value = parameter.typical * exp(min(x, 700.0))
     else:
         value = parameter.null + x * _scale(parameter)

@@ -175,10 +175,19 @@ def _followed(tables: Partitions, own: Sequence[str]) -> tuple[str, ...]:
 
 
 def _named_sets(tables: Partitions) -> list[Sequence[str]]:
-    """Equivalence sets of the named effects, one per step of every diagnosis."""
-    rows = tables.read("estimates", ("key", "kind", "effect", "set")).to_pylist()
-    steps = {(row["key"], row["effect"]): row["set"] for row in rows if row["kind"] == "model"}
-    return [steps[key] for key in sorted(steps)]
+    """Effects of every step: the certain one, or all of its set and of the others at its place."""
+    columns = ("key", "kind", "effect", "set", "certain", "place")
+    rows = tables.read("estimates", columns).to_pylist()
+    steps = {(row["key"], row["effect"]): row for row in rows if row["kind"] == "model"}
+    ordered = [steps[key] for key in sorted(steps)]
+    there: dict[str, dict[str, None]] = {}
+    for row in ordered:
+        if row["place"] is not None and not row["certain"]:
+            there.setdefault(row["place"], {}).update(dict.fromkeys(row["set"]))
+    return [
+        [row["effect"]] if row["certain"] else list(there.get(row["place"], row["set"]))
+        for row in ordered
+    ]
 
 
 def _fitted(

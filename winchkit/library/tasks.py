@@ -36,13 +36,12 @@ _STORED = (
     "candidates",
     "unexplained",
     "caveats",
-    "closest",
     "notes",
 )
 """Parts of a diagnosis that a stored result keeps."""
 _LARGEST = 20_000
 """Length of a stored result, bytes."""
-_DISPENSABLE = ("candidates", "closest", "unexplained", "notes", "outputs", "steps", "caveats")
+_DISPENSABLE = ("candidates", "unexplained", "notes", "outputs", "steps", "caveats")
 """Parts that a result above this length loses, in this order; the estimates have their table."""
 
 
@@ -168,10 +167,13 @@ def _shared(task: Task) -> Row:
 
 
 def _rows(task: Task, answer: WinchAnswer) -> Outcome:
+    from winchkit.diagnosis.fleet.meta_analysis import place_text
+
     diagnosis = answer.diagnosis
     row = _shared(task) | {
         "verdict": diagnosis.verdict,
-        "effects": [step.effects[0] for step in diagnosis.steps if step.effects],
+        "effects": [step.effects[0] for step in diagnosis.steps if step.certain],
+        "places": [place_text(step) for step in diagnosis.steps if not step.certain],
         "result": stored_result(diagnosis.to_json()),
     }
     about = {
@@ -184,12 +186,18 @@ def _rows(task: Task, answer: WinchAnswer) -> Outcome:
 
 
 def _estimates(answer: WinchAnswer) -> list[Row]:
-    """Rows of the named effects, of the other members of their sets, and of combinations."""
+    """Rows of the effects of all steps, of the other members of their sets, of combinations."""
+    from winchkit.diagnosis.fleet.meta_analysis import place_text
+
     model: list[Row] = []
     others: list[Row] = []
     combinations: list[Row] = []
     for step in answer.diagnosis.steps:
-        shared = {"set": list(step.effects)}
+        shared = {
+            "set": list(step.effects),
+            "certain": step.certain,
+            "place": place_text(step) if step.place else None,
+        }
         for number, effect in enumerate(step.effects):
             kind, rows = ("alternative", others) if number else ("model", model)
             for name, estimate in step.parameters.get(effect, {}).items():

@@ -14,6 +14,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = [
     "OUTPUTS",
     "OUTPUT_UNITS",
+    "PARTS",
     "ROBOT_STAGES",
     "At",
     "LinePlace",
@@ -71,6 +72,28 @@ class Stage(IntEnum):
 
 ROBOT_STAGES = frozenset({Stage.LINE_PLACE, Stage.HOME_LENGTH, Stage.PAYLOAD, Stage.TRACKER})
 """Stages of effects that only a robot can have."""
+
+
+PARTS = {
+    Stage.DRUM_ANGLE: "gear",
+    Stage.DRUM: "drum",
+    Stage.WOUND: "drum",
+    Stage.CABLE: "cable",
+    Stage.FRAME: "frame",
+    Stage.LENGTH_INSTRUMENT: "length instrument",
+    Stage.CABLE_WEIGHT: "cable",
+    Stage.PULLEY: "pulley",
+    Stage.CELL: "cell",
+    Stage.GEARBOX: "gear",
+    Stage.TORQUE_CONSTANT: "drive",
+    Stage.MOTOR: "motor",
+    Stage.TORQUE_SIGNAL: "drive",
+    Stage.LINE_PLACE: "frame",
+    Stage.HOME_LENGTH: "drum",
+    Stage.PAYLOAD: "platform",
+    Stage.TRACKER: "tracker",
+}
+"""Part of the machine at every stage."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Detectability as text: the smallest size of each effect that the runs detect at 90 % power."""
+"""Candidates that lower an error, and the smallest size of each effect that the runs detect."""
 
 from __future__ import annotations
 
@@ -7,16 +7,19 @@ from dataclasses import dataclass, replace
 from math import ceil, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.results import Detectable
+from winchkit.diagnosis.results import CandidateScore, Detectable, Diagnosis
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.report.words.numbers import quantity
 from winchkit.report.words.vocabulary import parameter_name, parameter_unit
 
-__all__ = ["Visible", "effects_of", "smallest_shown", "untestable", "visible"]
+__all__ = ["Visible", "effects_of", "smallest_shown", "untestable",
+           "useful_candidates", "visible"]  # fmt: skip
 
 _FEW = 4
 """Effects that a sentence lists; the table has all."""
+_LOWERED = 0.99
+"""Ratio of the errors with a candidate and without it below which it lowers an error."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +89,20 @@ def untestable(answer: Answer) -> list[tuple[str, list[str]]]:
         if lacking:
             out.append((effect.id, list(lacking)))
     return out
+
+
+def useful_candidates(diagnosis: Diagnosis) -> list[CandidateScore]:
+    """Candidates with evidence that lower an error by 1 % where they were fitted, best first."""
+    before = {name: output.heldout_rms_before for name, output in diagnosis.outputs.items()}
+    return [
+        one
+        for one in diagnosis.candidates
+        if one.score > 0
+        and (
+            not one.heldout_rms
+            or any(rms < _LOWERED * before[name] for name, rms in one.heldout_rms.items())
+        )
+    ]
 
 
 def _row(item: Detectable, parameter: Parameter) -> Visible:

@@ -9,10 +9,10 @@ from math import degrees, isfinite
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect
-from winchkit.report.detectability import untestable, visible
+from winchkit.report.detectability import untestable, useful_candidates, visible
 from winchkit.report.figures.waterfall import Waterfall
 from winchkit.report.html.markup import Markup, details, element, formula, join, table
-from winchkit.report.words.headline import worst_outputs
+from winchkit.report.words.headline import noise_text, worst_outputs
 from winchkit.report.words.numbers import (
     Scale,
     grouped,
@@ -21,6 +21,8 @@ from winchkit.report.words.numbers import (
     significant,
     unbroken,
 )
+from winchkit.report.words.sentence import capital
+from winchkit.report.words.steps import alike, doubt_texts, step_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,
@@ -41,6 +43,7 @@ __all__ = [
     "fit_of",
     "named",
     "output_scale",
+    "steps",
     "waterfall",
 ]
 
@@ -56,6 +59,8 @@ def output_scale(output: OutputFit) -> Scale:
 def figures(diagnosis: Diagnosis) -> Markup:
     """Held-out error before and after, and noise, per output."""
     extended = bool(diagnosis.steps)
+    # The two bounds of a noise need the room of the last column.
+    known = all(output.noise_upper is None for output in diagnosis.outputs.values())
     head = ["output", "today" if extended else "error"]
     head += ["with it"] if extended else []
     rows = []
@@ -68,15 +73,29 @@ def figures(diagnosis: Diagnosis) -> Markup:
         if extended:
             cells.append(element("span", scale.text(last), class_="after"))
         noise = output.noise_rms
-        cells.append("unknown" if noise is None else scale.text(noise))
-        cells.append(significant(last / noise, 2) if noise else "–")
-        cells.append(quantity(output.signal_rms, output.unit))
+        cells.append(noise_text(output).removeprefix("noise "))
+        most = "" if output.noise_upper is None else "≤ "
+        cells.append(f"{most}{significant(last / noise, 2)}" if noise else "–")
+        if known:
+            cells.append(quantity(output.signal_rms, output.unit))
         rows.append(cells)
-    caption = (
-        f"Held-out error, rms: each group of {diagnosis.data} is predicted with values fitted "
-        "without it."
-    )
-    return table(caption, [*head, "noise", "÷ noise", "measured"], rows)
+    caption = f"Held-out error, rms: measured on {diagnosis.data} that the fit had not seen."
+    last_head = ["measured"] if known else []
+    return table(caption, [*head, "noise", "÷ noise", *last_head], rows)
+
+
+def steps(diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = ()) -> Markup:
+    """Every step with its doubts; ``without`` as in :func:`winchkit.report.text.step_lines`."""
+    errors = [*without, *[{}] * len(diagnosis.steps)]
+    items = []
+    for step, left in zip(diagnosis.steps, errors, strict=False):
+        doubts = [
+            element("li", capital(text), class_="doubt")
+            for text in doubt_texts(step, diagnosis.data)
+        ]
+        text = unbroken(capital(step_text(step, diagnosis.outputs, left)))
+        items.append(element("li", text, *([element("ul", *doubts)] if doubts else [])))
+    return element("ol", *items, class_="found") if items else Markup("")
 
 
 def named(
@@ -151,7 +170,7 @@ def _part(value: float, full: float) -> str:
 def candidates(answer: Answer) -> Markup:
     """Every candidate effect, the highest evidence first."""
     diagnosis = answer.diagnosis
-    ranked = diagnosis.candidates
+    ranked = useful_candidates(diagnosis)
     if not ranked:
         return Markup("")
     outputs = diagnosis.outputs
@@ -162,7 +181,8 @@ def candidates(answer: Answer) -> Markup:
     caption = (
         "Evidence: reduction of χ² minus a penalty of ln n per parameter (BIC). 1 % false-alarm "
         f"threshold: {significant(max(answer.result.threshold, 0.0), 2)}. The held-out error is "
-        "that with this effect alone, where it was fitted."
+        "that with this effect alone, where it was fitted. Candidates that lower no error are left "
+        "out."
     )
     return _shortened(caption, head, rows, "more, with lower evidence")
 
@@ -198,21 +218,20 @@ def equivalence(diagnosis: Diagnosis, effects: Mapping[str, Effect]) -> Markup:
     """Equivalence sets, with the angles between the signatures of their effects."""
     out: list[Markup] = []
     for step in diagnosis.steps:
-        if len(step.effects) < 2 or step.whole:
+        if not alike(step):
             continue
         rows = []
-        for effect_id in step.effects:
+        for effect_id, angle in {step.effects[0]: None, **alike(step)}.items():
             values = values_text(step.parameters.get(effect_id, {}))
-            angle = step.angles.get(effect_id)
             shown = "–" if angle is None else f"{degrees(angle):.1f}°"
             effect = effects.get(effect_id)
             distinguished = effect.told_apart if effect is not None else ""
             rows.append([element("code", effect_id), values, distinguished, shown])
         head = ["effect", "fitted values", "distinguished by", "angle"]
         caption = (
-            f"{listed(list(step.effects))} cannot be distinguished with these {diagnosis.data}. "
-            "The angle is that between the signatures of an effect and of the selected effect (–); "
-            "at 0° they are proportional."
+            f"Effects that cannot be distinguished with these {diagnosis.data}. The angle is that "
+            "between the signatures of an effect and of the first one (–); at 0° they are "
+            "proportional."
         )
         out.append(table(caption, head, rows, words=3))
         if step.combination is not None:

@@ -6,8 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
+from winchkit.diagnosis.design.excitation import missing_excitation
+from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset
+from winchkit.diagnosis.robot.diagnose import RobotAnswer
+from winchkit.diagnosis.robot.excitation import missing_pose_excitation
 from winchkit.effects.card import sparkline
 from winchkit.effects.placement import HOME
 from winchkit.profile_edit.history import LADDER_UNITS
@@ -18,13 +22,23 @@ from winchkit.report.comparison_rows import (
     offset_text,
     size_rows,
 )
-from winchkit.report.detectability import untestable, visible
+from winchkit.report.detectability import untestable, useful_candidates, visible
 from winchkit.report.figures.unexplained import unexplained_curve
-from winchkit.report.figures.waterfall import waterfall_of
+from winchkit.report.figures.waterfall import errors_without, waterfall_of
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.columns import aligned, hanging, paragraph
-from winchkit.report.words.numbers import Scale, grouped, percent, scale_for, significant, with_std
-from winchkit.report.words.sentence import changes_text, main_patterns, sentence, where_text
+from winchkit.report.words.headline import noise_text
+from winchkit.report.words.numbers import grouped, percent, scale_for, significant, with_std
+from winchkit.report.words.sentence import (
+    changes_text,
+    error_text,
+    headline,
+    main_patterns,
+    remaining_patterns,
+    remaining_text,
+    where_text,
+)
+from winchkit.report.words.steps import alike, doubt_texts, step_text
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VERDICT_NAMES,
@@ -37,63 +51,124 @@ from winchkit.report.words.vocabulary import (
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal
-    from winchkit.diagnosis.diagnose import Answer
 
-__all__ = ["addition_text", "compare_text", "error_lines", "report_text"]
+__all__ = [
+    "addition_text",
+    "compare_text",
+    "error_lines",
+    "head_lines",
+    "report_text",
+    "step_lines",
+]
 
-_MOST_LINES = 70
-"""Lines of a text, two or three screens."""
+_MOST_LINES = 29
+"""Lines of the short text; with the next command a screen."""
 _FEW = 3
-"""Correlations and patterns that are listed, largest first."""
+"""Correlations, candidates and next runs that are listed, largest first."""
 _SOONEST = 4
 """Most sensitive effects that are listed; ``--json`` has all."""
 _MOST_OFFSETS = 6
 """Offsets of runs that are listed."""
 _BARS = 40
 """Characters of a curve; with its scale within 80."""
+_USED = 0.95
+"""Share of the samples of an output from which practically all are compared."""
+_STEP_LINES = 12
+"""Lines of steps in the short text."""
 
 
-def report_text(answer: Answer) -> str:
+def report_text(answer: Answer, *, verbose: bool = False) -> str:
     """A diagnosis as text.
 
     Parameters
     ----------
     answer : Answer
         Of a winch or a robot.
+    verbose : bool
+        Whether to add how the result was reached: contributions, angles, correlations, scores,
+        detectable effects and further runs.
 
     Returns
     -------
     str
-        At most 70 lines of at most 80 characters.
+        Lines of at most 80 characters, at most 29 unless ``verbose``.
     """
     diagnosis = answer.diagnosis
+    limits = _limits(answer)
+    notes = [note for note in diagnosis.notes if verbose or note not in limits]
     blocks = [
-        [_head(diagnosis), *paragraph(sentence(diagnosis))],
+        head_lines(diagnosis),
+        step_lines(diagnosis, errors_without(answer), None if verbose else _STEP_LINES),
         error_lines(
             diagnosis.outputs,
             extended=bool(diagnosis.steps),
             data=diagnosis.data,
             offsets=diagnosis.run_offsets,
         ),
-        _ladder(answer),
-        _confusion(diagnosis),
-        _correlations(diagnosis),
-        _places(answer),
-        _next(diagnosis),
+        _remaining(answer, verbose=verbose),
         paragraph(changes_text(diagnosis)) if not diagnosis.interrupted else [],
-        _shown(answer),
-        _candidates(answer),
-        *_data(diagnosis),
-        _notes(diagnosis.notes),
+        *_data(diagnosis, all_shares=verbose),
+        _notes(notes),
     ]
+    if verbose:
+        blocks += [
+            _ladder(answer),
+            _confusion(diagnosis),
+            _correlations(diagnosis),
+            _next(diagnosis),
+            _shown(answer),
+        ]
+    if verbose or diagnosis.interrupted:
+        blocks.append(_candidates(answer))
     lines = [line for block in blocks if block for line in (*block, "")][:-1]
-    if len(lines) > _MOST_LINES:
-        lines = [*lines[: _MOST_LINES - 1], "… more in --json and --html"]
+    if len(lines) > _MOST_LINES and not verbose:
+        lines = [*lines[: _MOST_LINES - 1], "… more with --verbose"]
     return "\n".join(lines)
 
 
-def _head(diagnosis: Diagnosis) -> str:
-    return "INTERRUPTED" if diagnosis.interrupted else VERDICT_NAMES[diagnosis.verdict].upper()
+def _limits(answer: Answer) -> list[str]:
+    """Notes on what these data cannot show, which are no fault of them."""
+    if isinstance(answer, RobotAnswer):
+        return missing_pose_excitation(answer.selection.preparation)
+    assert isinstance(answer, WinchAnswer)
+    return missing_excitation(answer.engine.regression)
+
+
+def head_lines(diagnosis: Diagnosis) -> list[str]:
+    """Verdict, and what is missing with the error that falls."""
+    name = "INTERRUPTED" if diagnosis.interrupted else VERDICT_NAMES[diagnosis.verdict].upper()
+    return [name, *paragraph(f"{headline(diagnosis)}. {error_text(diagnosis)}".strip())]
+
+
+def step_lines(
+    diagnosis: Diagnosis, without: Sequence[Mapping[str, float]] = (), most: int | None = None
+) -> list[str]:
+    """Every step with its doubts below.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of a winch or a robot.
+    without : sequence of mapping of str to float
+        Held-out errors of the final model without each step, SI.
+    most : int, optional
+        Number of lines from which further steps are counted only.
+
+    Returns
+    -------
+    list of str
+        Lines of at most 80 characters.
+    """
+    lines: list[str] = []
+    errors = [*without, *[{}] * len(diagnosis.steps)]
+    for number, (step, left) in enumerate(zip(diagnosis.steps, errors, strict=False), start=1):
+        own = paragraph(step_text(step, diagnosis.outputs, left), f"{number}. ", "   ")
+        if doubts := "; ".join(doubt_texts(step, diagnosis.data)):
+            own += paragraph(doubts, "   ? ", "     ")
+        if most is not None and lines and len(lines) + len(own) > most:
+            return [*lines, f"… {len(diagnosis.steps) - number + 1} more with --verbose"]
+        lines += own
+    return lines
 
 
 def compare_text(comparison: Comparison) -> str:
@@ -121,7 +196,7 @@ def compare_text(comparison: Comparison) -> str:
         blocks.append(["mean error over two variables", *maps])
     if comparison.offset is not None:
         blocks.append([offset_text(comparison.offset)])
-    blocks += [*_data(comparison), _notes(comparison.notes)]
+    blocks += [*_data(comparison, all_shares=True), _notes(comparison.notes)]
     return _joined(blocks)
 
 
@@ -184,11 +259,11 @@ def error_lines(
     rows = [head if extended else [head[0], "error", "noise"]]
     for name, output in outputs.items():
         scale = scale_for(output.heldout_rms_before, output.unit)
-        noise = "unknown" if output.noise_rms is None else scale.text(output.noise_rms)
+        noise = noise_text(output).removeprefix("noise ")
         after = [scale.text(output.heldout_rms_after)] if extended else []
         before = scale.text(output.heldout_rms_before)
         rows.append([OUTPUT_NAMES.get(name, name), before, *after, noise])
-    held_out = f"held out: each group of {data} is predicted with values fitted without it"
+    held_out = f"held out: measured on {data} that the fit had not seen"
     if not offsets:
         return [*aligned(rows), f"  ({held_out})"]
     own = " and ".join(dict.fromkeys(OUTPUT_NAMES.get(o.output, o.output) for o in offsets))
@@ -198,9 +273,12 @@ def error_lines(
 
 def _offsets(offsets: Sequence[RunOffset]) -> list[str]:
     """Offsets of single runs, which are no part of the profile."""
-    rows = []
+    rows, scales = [], {}
+    for offset in offsets:
+        sizes = [o.value for o in offsets if o.output == offset.output]
+        scales[offset.output] = scale_for(sizes, offset.unit)
     for offset in offsets[:_MOST_OFFSETS]:
-        value = with_std(offset.value, offset.std, offset.unit)
+        value = with_std(offset.value, offset.std, offset.unit, scales[offset.output])
         rows.append([offset.run, OUTPUT_NAMES.get(offset.output, offset.output), value])
     more = len(offsets) - len(rows)
     last = [f"  and {more} further in --json"] if more else []
@@ -221,13 +299,8 @@ def _ladder(answer: Answer) -> list[str]:
     ]
     rows = [["held-out error, rms", *(OUTPUT_NAMES.get(name, name) for name in scales)]]
     rows += [[label, *(scales[n].text(rms[n]) for n in scales)] for label, rms in states]
-    noise = {name: output.noise_rms for name, output in outputs.items()}
-    rows.append(["noise", *(_text_or_unknown(scales[n], noise[n]) for n in scales)])
+    rows.append(["noise", *(noise_text(outputs[n]).removeprefix("noise ") for n in scales)])
     return ["contribution of each effect", *aligned(rows)]
-
-
-def _text_or_unknown(scale: Scale, value: float | None) -> str:
-    return "unknown" if value is None else scale.text(value)
 
 
 def _shown(answer: Answer) -> list[str]:
@@ -244,11 +317,11 @@ def _shown(answer: Answer) -> list[str]:
     lines = [head, *aligned(soonest, words=2)]
     large = [f"{r.effect} ({significant(r.share, 2)} ×)" for r in rows if r.share > 1.0]
     if large:
-        text = f"only at a multiple of the typical size: {', '.join(large)}"
+        text = f"visible only if larger than usual: {', '.join(large)}"
         lines += paragraph(text, "  ", "    ")
     never = [row.effect for row in rows if isnan(row.share)]
     if never:
-        lines += paragraph(f"at no size within the bounds: {', '.join(never)}", "  ", "    ")
+        lines += paragraph(f"cannot be seen in these runs: {', '.join(never)}", "  ", "    ")
     if large or never:
         lines.append("  'winchkit plan' proposes runs that detect most of them")
     if blind:
@@ -259,11 +332,11 @@ def _shown(answer: Answer) -> list[str]:
 
 
 def _confusion(diagnosis: Diagnosis) -> list[str]:
-    rows = []
-    for step in (step for step in diagnosis.steps if not step.whole):
-        own = [name for name in step.effects if name not in step.angles]
-        for effect, angle in step.angles.items() if own else ():
-            rows.append([f"{own[0]} / {effect}", f"{degrees(angle):.1f}° between signatures"])
+    rows = [
+        [f"{step.effects[0]} / {effect}", f"{degrees(angle):.1f}° between signatures"]
+        for step in diagnosis.steps
+        for effect, angle in alike(step).items()
+    ]
     head = f"cannot be distinguished with these {diagnosis.data}"
     lines = [head, *aligned(rows, words=2)] if rows else []
     determined = [
@@ -289,24 +362,26 @@ def _correlations(diagnosis: Diagnosis) -> list[str]:
     return ["correlation of fitted values", *paragraph(text + condition, "  ", "    ")]
 
 
-def _places(answer: Answer) -> list[str]:
-    """Patterns of the unexplained residual, its shape, and commands to continue."""
+def _remaining(answer: Answer, *, verbose: bool) -> list[str]:
+    """What remains and where, its shape, and commands to continue."""
     diagnosis, lines = answer.diagnosis, []
-    for where in main_patterns(diagnosis.where)[:_FEW]:
-        lines += paragraph(where_text(where), "  ", "    ")
-        if not where.frequency and diagnosis.verdict in {"partly", "unknown"}:
-            lines.append(f"    {_shape(answer, where)}")
-    if not lines:
+    told = remaining_text(diagnosis)
+    if not told and not verbose:
         return []
-    if diagnosis.empirical:
+    listed = main_patterns(diagnosis.where)
+    if not verbose:
+        listed = remaining_patterns(diagnosis)[:2] if diagnosis.verdict != "explained" else []
+    for where in listed:
+        lines += paragraph(where_text(where), "  ", "    ")
+        if not where.frequency:
+            lines.append(f"    {_shape(answer, where)}")
+    if lines and diagnosis.empirical:
         name = diagnosis.empirical[0]
-        lines += paragraph(
-            f"'winchkit add {name}' adds it as an empirical curve; 'winchkit effects new' creates "
-            "an effect of your own from it",
-            "  ",
-            "  ",
-        )
-    return ["unexplained residual", *lines]
+        text = f"'winchkit add {name}' adds it as a curve"
+        lines += paragraph(text, "  ", "    ")
+    share = told.partition(" Main pattern")[0]
+    head = "patterns of the residual" if not share or share.startswith("Main") else share
+    return [head, *lines] if lines or share else []
 
 
 def _shape(answer: Answer, where: Attribution) -> str:
@@ -322,16 +397,13 @@ def _next(diagnosis: Diagnosis) -> list[str]:
     lines = []
     for run in diagnosis.next_runs[:_FEW]:
         power = "" if isnan(run.power) else f" (power {percent(run.power)})"
-        text = f"{' / '.join(run.separates)}: {run.programme}{power}"
-        lines += paragraph(text, "  ", "    ")
+        between = f"{' / '.join(run.separates)}: " if run.separates else ""
+        lines += paragraph(f"{between}{run.programme}{power}", "  ", "    ")
     return ["next runs", *lines] if lines else []
 
 
 def _candidates(answer: Answer) -> list[str]:
-    diagnosis = answer.diagnosis
-    if diagnosis.verdict == "adequate":
-        return []
-    best = [c for c in diagnosis.candidates if c.score > 0][:_FEW]
+    best = useful_candidates(answer.diagnosis)[:_FEW]
     if not best:
         return []
     chance = significant(max(answer.result.threshold, 0.0), 2)
@@ -340,11 +412,12 @@ def _candidates(answer: Answer) -> list[str]:
     return [head, *hanging(rows)]
 
 
-def _data(result: Comparison | Diagnosis) -> list[list[str]]:
+def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]]:
     """Caveats, findings on the data, and the share of the samples that is compared."""
     caveats = [caveat_text(code) for code in result.caveats]
     findings = finding_texts(result.sanity)
-    used = used_text(result.used_share)
+    limit = 2.0 if all_shares else _USED
+    used = used_text({name: s for name, s in result.used_share.items() if s < limit})
     blocks = {"caveats": caveats, "data": [*findings, *([used] if used else [])]}
     return [
         [head, *(line for text in texts for line in paragraph(text, "  ", "    "))]
@@ -353,7 +426,7 @@ def _data(result: Comparison | Diagnosis) -> list[list[str]]:
     ]
 
 
-def _notes(notes: tuple[str, ...]) -> list[str]:
+def _notes(notes: Sequence[str]) -> list[str]:
     lines = [line for note in notes for line in paragraph(note, "  ", "    ")]
     return ["notes", *lines] if lines else []
 

@@ -10,10 +10,17 @@ from typing import Any
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.results import Diagnosis, Estimate
 from winchkit.effects.effect import Effect
-from winchkit.report.detectability import effects_of
-from winchkit.report.words.headline import headline
+from winchkit.report.detectability import effects_of, useful_candidates
 from winchkit.report.words.numbers import Scale, between, scale_for, significant, with_std
-from winchkit.report.words.sentence import capital, changes_text, sentence, where_text
+from winchkit.report.words.sentence import (
+    capital,
+    changes_text,
+    error_text,
+    headline,
+    remaining_text,
+    where_text,
+)
+from winchkit.report.words.steps import alike, doubt_texts, step_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
 
 __all__ = ["VERDICT_WORDS", "Rung", "card", "ladder", "refitted", "verdict"]
@@ -27,8 +34,9 @@ VERDICT_WORDS = {
     "explained": "Effect missing",
     "partly": "Partly explained",
     "unknown": "Unexplained",
+    "undecided": "Undecided",
 }
-"""Words of the four verdicts on a chip."""
+"""Words of the five verdicts on a chip."""
 
 
 @dataclass(frozen=True)
@@ -40,15 +48,22 @@ class Rung:
 
 
 def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
-    """Chip, headline and sentence of a diagnosis."""
-    first, _, rest = sentence(diagnosis).partition(". ")
-    head = headline(diagnosis)
-    first = capital(first.removeprefix(f"{head}: "))
+    """Chip, headline, sentence and steps of a diagnosis."""
+    parts = error_text(diagnosis), remaining_text(diagnosis)
     return {
         "verdict": diagnosis.verdict,
         "chip": VERDICT_WORDS[diagnosis.verdict],
-        "headline": head,
-        "sentence": rest if diagnosis.steps else f"{first}. {rest}".strip(". ") + ".",
+        "headline": headline(diagnosis),
+        "sentence": " ".join(part for part in parts if part),
+        "steps": [
+            {
+                "effect": step.effects[0],
+                "certain": step.certain,
+                "text": capital(step_text(step)),
+                "doubts": [capital(text) for text in doubt_texts(step, diagnosis.data)],
+            }
+            for step in diagnosis.steps
+        ],
         "changes": changes_text(diagnosis),
         "unexplained": [where_text(where) for where in diagnosis.where],
         "empirical": list(diagnosis.empirical),
@@ -61,7 +76,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def refitted(said: str) -> dict[str, Any]:
     """Chip and headline in place of a verdict while a refitted profile is diagnosed."""
-    lists = ("unexplained", "empirical", "notes", "caveats", "sanity")
+    lists = ("steps", "unexplained", "empirical", "notes", "caveats", "sanity")
     return {
         "verdict": "refitted",
         "chip": "Refitted",
@@ -96,10 +111,12 @@ def ladder(
     diagnosis = answer.diagnosis
     today = {name: out.heldout_rms_before for name, out in diagnosis.outputs.items()}
     named = [effect for step in diagnosis.steps[:1] for effect in step.effects]
-    scores = [c for c in diagnosis.candidates if c.heldout_rms]
+    same = {effect for step in diagnosis.steps[:1] for effect in alike(step)}
+    equal = {*named[:1], *same} if same else set()
+    scores = [c for c in useful_candidates(diagnosis) if c.heldout_rms]
     known = {c.effect: c for c in scores}
     first = [known[effect] for effect in named if effect in known]
-    shown = (first + [c for c in scores if c not in first and c.score > 0])[:_SHOWN]
+    shown = (first + [c for c in scores if c not in first])[:_SHOWN]
     errors_of = [today, *(rung.errors for rung in history)]
     if beside is not None:
         errors_of.append({name: out.heldout_rms_before for name, out in beside.outputs.items()})
@@ -135,7 +152,7 @@ def ladder(
                 _name(effect, item.effect),
                 errors,
                 effect=item.effect,
-                equal=item.effect in named and len(named) > 1,
+                equal=item.effect in equal,
                 named=item.effect in named,
             )
         )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.fleet.meta_analysis import place_text
 from winchkit.errors import UsageError
 from winchkit.model.variables import ANGLES
 from winchkit.profile_edit.naming import extended_name
@@ -23,15 +25,15 @@ class Judgement:
     """Verdict of a diagnosis with its cause, as the Library view lists it."""
 
     verdict: str
-    effects: Sequence[str]
-    """First effect of every addition."""
+    causes: Sequence[str]
+    """Effect of every certain step, place of every other one."""
     outputs: Mapping[str, Mapping[str, Any]]
     """Errors of every output as ``winchkit diagnose --json`` gives them."""
     profile: str
 
     def to_json(self) -> dict[str, Any]:
         """Chip, cause, and error over noise floor of every output."""
-        named = " + ".join(effect.replace("-", " ") for effect in self.effects)
+        named = " + ".join(re.sub("[-_]", " ", cause) for cause in self.causes)
         at_floor = "at the noise floor" if self.verdict == "adequate" else ""
         return {
             "verdict": self.verdict,
@@ -140,10 +142,10 @@ class State:
     def judgement(self) -> Judgement:
         """Verdict on the used runs; raises UsageError without a diagnosis."""
         found = self.diagnosed.diagnosis
-        effects = [step.effects[0] for step in found.steps if step.effects]
+        causes = [s.effects[0] if s.certain else place_text(s) for s in found.steps]
         outputs = {name: vars(out) for name, out in found.outputs.items()}
         added = [version.added for version in self.versions[1:]]
-        return Judgement(found.verdict, effects, outputs, " + ".join([self.source, *added]))
+        return Judgement(found.verdict, causes, outputs, " + ".join([self.source, *added]))
 
     def order_of(self, output: str) -> tuple[str, int] | None:
         """Angle and periods per turn of the main pattern of an output's residual, if any."""

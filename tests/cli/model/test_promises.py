@@ -177,14 +177,19 @@ def test_add_builds_on_itself_and_keeps_the_users_words(
     assert after["steps"] == []
 
 
-def test_add_refuses_what_is_there(runs: list[Path], profile: Path, tmp_path: Path) -> None:
+def test_add_refits_what_is_there(runs: list[Path], profile: Path, tmp_path: Path) -> None:
     first, second = tmp_path / "first.toml", tmp_path / "second.toml"
     answer("add", "motor-coulomb", "-p", profile, "--fit", *runs[:4], "-o", first)
-    result = invoke("add", "motor-coulomb", "-p", first, "--fit", *runs[:4], "-o", second)
-    assert result.exit_code == 2
-    assert result.stdout == ""
-    assert "has the effect 'motor-coulomb' already" in result.stderr
-    assert not second.exists()
+    right = first.read_text()
+    wrong = right.replace(read_profile(first).effect[0].values["torque"], "55 mN m")
+    assert wrong != right
+    first.write_text(wrong)
+    told = answer("add", "motor-coulomb", "-p", first, "--fit", *runs[:4], "-o", second)
+    torque = told["outputs"]["motor_torque"]
+    assert torque["heldout_rms_after"] < 0.8 * torque["heldout_rms_before"]
+    (table,) = read_profile(second).effect
+    assert table.id == "motor-coulomb"
+    assert table.values["torque"] != "55 mN m"
 
 
 def test_add_may_write_over_its_source(runs: list[Path], profile: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scipy.stats import kstest
 
 from diagnosis_runs import CATALOGUE
 from winchkit.diagnosis.fleet.meta_analysis import Pooled, alarms, pooled, shared_effects
-from winchkit.diagnosis.results import Detectable, Diagnosis, Estimate, Step
+from winchkit.diagnosis.results import Detectable, Diagnosis, Estimate, Place, Step
 from winchkit.report.pages.fleet import effect_text, shared_effects_text
 
 NAMES = "ABCDEFGH"
@@ -217,7 +218,9 @@ def test_nothing_is_shared_where_nothing_was_found() -> None:
 def test_as_json() -> None:
     (one,) = shared_effects({"A": said(step([RUBS], torque=(0.08, 0.001)))}, CATALOGUE)
     told = one.to_json()
-    assert set(told) == {"effects", "winches", "without", "unsure", "parameters"}
+    assert set(told) == {
+        "effects", "place", "by_place", "winches", "without", "unsure", "parameters",
+    }  # fmt: skip
     keys = {"apart" if name == "outlying" else name for name in vars(one.parameters["torque"])}
     assert set(told["parameters"]["torque"]) == keys
     assert isinstance(one.parameters["torque"], Pooled)
@@ -237,3 +240,50 @@ def test_an_alarm_of_one_of_eight_is_eight_times_as_likely() -> None:
     # A named effect is not an alarm, and without repeats there is no probability.
     named = said(step([RUBS], torque=(0.08, 0.001)), verdict="partly")
     assert alarms({"A": named, "B": said(verdict="unknown")}, {"A": 0.01, "B": np.nan}) == {}
+
+
+def at_motor(effect: str, *, certain: bool) -> Step:
+    place = (Place("motor", "motor_torque", "direction"),)
+    return replace(step([effect], torque=(0.08, 0.001)), place=place, certain=certain)
+
+
+def test_steps_that_are_not_certain_are_followed_by_place() -> None:
+    found = {
+        "A": said(at_motor(RUBS, certain=False)),
+        "B": said(at_motor("motor-dahl", certain=False)),
+        "C": said(at_motor("motor-dahl", certain=False)),
+    }
+    (one,) = shared_effects(found, CATALOGUE)
+    assert one.winches == ("A", "B", "C")
+    assert one.by_place
+    assert one.effects == ("motor-dahl",), "the most frequent name"
+    assert effect_text(one).startswith(
+        "effects of the motor on the motor torque over the direction, most often motor-dahl: "
+    )
+
+
+def test_certain_steps_are_followed_by_name() -> None:
+    found = {
+        "A": said(at_motor(RUBS, certain=True)),
+        "B": said(at_motor("motor-dahl", certain=True)),
+    }
+    named = shared_effects(found, CATALOGUE)
+    assert sorted((one.effects, one.winches) for one in named) == [
+        ((RUBS,), ("A",)), (("motor-dahl",), ("B",)),
+    ]  # fmt: skip
+
+
+def test_a_set_that_allows_a_certain_name_joins_it() -> None:
+    either = replace(at_motor("motor-dahl", certain=False), effects=("motor-dahl", RUBS))
+    either = replace(either, parameters={RUBS: {"torque": Estimate(0.08, 0.001, "N m")}})
+    found = {name: said(at_motor(RUBS, certain=True)) for name in "AB"} | {"C": said(either)}
+    (one,) = shared_effects(found, CATALOGUE)
+    assert (one.effects, one.winches, one.by_place) == ((RUBS,), ("A", "B", "C"), False)
+
+
+@pytest.mark.parametrize("verdict", ["partly", "unknown", "undecided"])
+def test_only_a_decided_verdict_excludes_an_effect(verdict: str) -> None:
+    found = {"A": said(at_motor(RUBS, certain=True)), "B": said(verdict=verdict)}
+    (one,) = shared_effects(found, CATALOGUE)
+    assert (one.without, one.unsure) == ((), ("B",))
+    assert set(alarms(found, {"A": 0.01, "B": 0.02})) == {"B"}

@@ -13,17 +13,20 @@ UNSURE = "an effect outside the catalogue cannot be excluded"
 
 
 def found(verdict: str, *sets: dict[str, list[str | None]], **more: Any) -> dict[str, Any]:
-    steps = [{"lines": lines, "parameters": {}, "whole": False} for lines in sets]
+    steps = [{"lines": lines, "parameters": {}, "whole": False, "certain": True} for lines in sets]
     return {"verdict": verdict, "steps": steps, "notes": [], **more}
 
 
-def test_a_set_with_the_truth_is_right_and_a_single_other_name_is_wrong() -> None:
+def test_a_set_with_the_truth_is_right_and_another_certain_effect_is_wrong() -> None:
     case = BY_NAME["exit point"]
     assert right(case, found("explained", {"exit-point": ["3"]}))
     assert right(case, found("explained", {"exit-point": ["3"], "anchor-point": ["3"]}))
     other = found("explained", {"exit-point": ["4"]})
     assert not right(case, other)
     assert wrong(case, other) == ["exit-point/4"]
+    other["steps"][0]["certain"] = False
+    assert not right(case, other)
+    assert wrong(case, other) == []
     assert not right(case, found("explained", {"exit-point": ["3"]}, {"payload-mass": [None]}))
     assert not right(case, found("unknown"))
 
@@ -36,16 +39,18 @@ def test_both_of_two_must_be_found_but_one_name_of_the_same_thing_is_enough() ->
     assert right(BY_NAME["drum radius"], found("explained", {"gear-ratio": ["2"]}))
 
 
-def test_outside_the_catalogue_a_named_effect_is_wrong_and_no_finding_needs_missing_repeats() -> (
-    None
-):
+def test_outside_the_catalogue_nothing_is_certain_and_no_finding_needs_missing_repeats() -> None:
     waves, alone = BY_NAME["outside: waves"], BY_NAME["outside: waves, no repeats"]
     assert right(waves, found("unknown"))
     assert not right(waves, found("adequate", notes=[UNSURE]))
     assert right(alone, found("adequate", notes=[UNSURE]))
     assert not right(alone, found("explained", {"exit-point": ["1"]}, notes=[UNSURE]))
+    doubted = found("partly", {"exit-point": ["1"]})
+    assert not right(waves, doubted)
+    doubted["steps"][0]["certain"] = False
+    assert right(waves, doubted)
     whole = found("explained", {"exit-point": [None], "anchor-point": [None]})
-    whole["steps"][0]["whole"] = True
+    whole["steps"][0] |= {"whole": True, "certain": False}
     assert not right(waves, whole)
     assert right(BY_NAME["outside: tracker's metre"], whole)
 

@@ -62,6 +62,52 @@ def test_what_is_hidden_is_named_and_the_held_out_error_falls(case: str, tmp_pat
     assert output["heldout_rms_after"] < 1.2 * output["noise_rms"]
     assert output["heldout_rms_before"] > 1.2 * output["heldout_rms_after"]
     assert output["noise_source"] == "repeats"
+    (step,) = found["steps"]
+    assert (step["law"], step["certain"], step["doubts"]) == ("established", True, [])
+    assert step["share"] > 0.9
+    acts = "tension" if "payload" in case else "cable_length"
+    line = BY_NAME[case].answers[0].partition("/")[2] or None
+    assert [(place["output"], place["line"]) for place in step["place"]] == [(acts, line)]
+
+
+def test_two_effects_on_different_equations_share_what_was_unexplained(tmp_path: Path) -> None:
+    """The shares of two effects that act on different equations add up to one."""
+    profile, run = files(tmp_path, "home length, payload")
+    found = answered("diagnose", run, "--profile", profile)
+    assert found["verdict"] == "explained"
+    assert sorted(named(found)) == ["home-length/4", "payload-mass"]
+    assert all(step["certain"] for step in found["steps"])
+    assert sum(step["share"] for step in found["steps"]) == pytest.approx(1.0, abs=0.05)
+
+
+def test_a_wrong_value_of_the_profile_is_a_step_beside_that_of_the_file(tmp_path: Path) -> None:
+    profile, run = files(tmp_path, "home length")
+    table = '\n[[effect]]\nid = "home-length"\nlength = { 4 = "2 mm" }\n'
+    profile.write_text(profile_text() + table)
+    found = answered("diagnose", run, "--profile", profile)
+    assert found["verdict"] == "explained"
+    (step,) = found["steps"]
+    assert (step["lines"], step["refitted"]) == ({"home-length": ["4"]}, True)
+    assert step["file_values"] == {"length": pytest.approx(2e-3)}
+    length = step["parameters"]["home-length"]["length"]
+    assert abs(length["value"] - 0.5e-3) < 4 * length["std"]
+    place = found["outputs"]["platform_position"]
+    assert place["heldout_rms_before"] > 3 * place["heldout_rms_after"]
+    profile.write_text(profile_text() + table.replace("2 mm", "0.5 mm"))
+    assert answered("diagnose", run, "--profile", profile)["verdict"] == "adequate"
+
+
+def test_without_repeats_an_error_beyond_usual_instruments_is_not_adequate(tmp_path: Path) -> None:
+    """Waves of 0.3 mm that no effect has: without repeats they are in the estimated noise."""
+    profile, run = files(tmp_path, "outside: waves, no repeats", count=40)
+    found = answered("diagnose", run, "--profile", profile)
+    assert found["verdict"] in ("undecided", "unknown")
+    assert not any(step["certain"] for step in found["steps"])
+    place = found["outputs"]["platform_position"]
+    assert place["noise_rms"] < 0.5 * place["heldout_rms_after"]
+    assert place["noise_upper"] >= place["rms_after"]
+    if found["verdict"] == "undecided":
+        assert "twice" in found["next_runs"][0]["repeat"]
 
 
 def test_nothing_is_named_where_nothing_is_hidden(tmp_path: Path) -> None:
@@ -78,7 +124,21 @@ def test_what_no_effect_explains_is_unknown(tmp_path: Path) -> None:
     profile, run = files(tmp_path, "outside: waves")
     found = answered("diagnose", run, "--profile", profile)
     assert found["verdict"] in ("unknown", "partly")
-    assert found["steps"] == []
+    assert not any(step["certain"] for step in found["steps"])
+    assert all(step["doubts"] for step in found["steps"])
+    assert found["unexplained"]["share"] > 0.1
+
+
+@pytest.mark.campaign
+def test_a_geometry_that_fits_another_cause_is_never_certain(tmp_path: Path) -> None:
+    """A tracker whose metre is 2 mm long: the geometry imitates it, and nothing is certain."""
+    profile, run = files(tmp_path, "outside: tracker's metre")
+    found = answered("diagnose", run, "--profile", profile)
+    assert found["geometry"] == "refitted"
+    step = found["steps"][0]
+    assert step["whole"]
+    assert (step["law"], step["certain"]) == ("open", False)
+    assert [doubt["code"] for doubt in step["doubts"]] == ["whole"]
 
 
 def test_calibrate_then_diagnose_names_the_elasticity_that_calibrating_hid(tmp_path: Path) -> None:

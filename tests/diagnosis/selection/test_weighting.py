@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -89,21 +87,8 @@ def test_a_missing_effect_gets_equal_weights() -> None:
     assert "the same weight" in note
 
 
-def test_add_notes_equal_weights() -> None:
+def test_add_fits_a_transition_of_a_rounded_reversal() -> None:
     addition = add("motor-coulomb", rides([warming_up(), warming_up()]), GROOVED, CATALOGUE)
-    assert any("the same weight" in note for note in addition.notes)
-    estimate = addition.added[1]["torque"]
-    assert estimate.value == pytest.approx(least_squares(), rel=0.01)
-    low, high = estimate.interval
-    assert low < least_squares() < high
-
-
-def test_noise_from_repeats_keeps_its_weights() -> None:
-    hidden = [warming_up(), warming_up()]
-    again = [replace(run, name=f"{run.name}-again") for run in rides(hidden)]
-    noisy = [
-        with_channel(r, "motor_torque", r["motor_torque"] + 1e-3 * wander(9), "N m") for r in again
-    ]
-    engine, present, noise = with_friction([*rides(hidden), *noisy])
-    assert noise.from_repeats
-    assert reweighted(engine, present, noise).fit is present
+    values = addition.added[1]
+    assert values["transition"].value > 0.0
+    assert values["torque"].value > least_squares()

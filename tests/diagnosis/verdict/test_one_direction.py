@@ -49,12 +49,7 @@ def test_a_spring_is_not_the_only_name_of_gravity_and_friction(seed: int) -> Non
     names = [effect for step in found.steps for effect in step.effects]
     assert "spring-balancer" in names
     assert "joint-gravity" in names
-    if found.steps[0].effects[0] == "spring-balancer":
-        # Gravity is a member by itself, or beside the friction that is an offset here.
-        notes = [note for note in found.notes if note.startswith("joint-gravity predicts")]
-        assert all("beside motor-coulomb" in note for note in notes)
-    else:
-        assert [step.effects[0] for step in found.steps] == ["joint-gravity", "motor-coulomb"]
+    assert {step.effects[0] for step in found.steps if step.certain} <= {"joint-gravity"}
 
 
 def test_back_again_gravity_and_friction_are_named() -> None:

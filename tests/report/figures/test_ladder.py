@@ -12,7 +12,8 @@ from report_answers import AT_NOISE, ELASTIC, FRICTIONAL, NOISY, diagnosis_of
 from report_parsed import HOSTILE, Page
 from winchkit.report.figures.ladder import error_ladder, fleet_ladders
 from winchkit.report.pages.fleet import shared_effects_html
-from winchkit.report.words.headline import headline, worst_outputs
+from winchkit.report.words.headline import worst_outputs
+from winchkit.report.words.sentence import headline
 
 OUTPUTS = {"tension": AT_NOISE, "cable_length": NOISY, "motor_torque": FRICTIONAL}
 

@@ -102,8 +102,8 @@ def test_values_of_all_effects_are_reported() -> None:
 def test_the_change_of_the_held_out_error_in_words() -> None:
     assert told(cable_length=NOISY, tension=AT_NOISE) == (
         "Added cable-elongation-linear to the profile: the cable is elastic, "
-        "EA = 249.9 ± 7.0 kN. With it, the held-out error of the cable length falls from 1.63 mm "
-        "to 0.360 mm; the noise floor is 0.300 mm."
+        "EA = 249.9 ± 7.0 kN. With it, the cable length error falls from 1.63 mm to 0.360 mm "
+        "(noise 0.300 mm)."
     )
 
 

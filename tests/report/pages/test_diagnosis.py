@@ -13,16 +13,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from report_answers import FRICTION, answer_of, answered, recorded
+from report_answers import FRICTION, OPEN, answer_of, answered, recorded
 from report_parsed import HOSTILE, Page
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.report.figures.residuals import residual_figures
+from winchkit.report.figures.unexplained import open_law_figures
 from winchkit.report.figures.waterfall import waterfall_of
 from winchkit.report.html.svg import file_svg
 from winchkit.report.pages.pages import report_figures, report_html, residuals_of
-from winchkit.report.words.headline import headline, worst_outputs
-from winchkit.report.words.sentence import cause_and_error
+from winchkit.report.words.headline import noise_text, worst_outputs
+from winchkit.report.words.sentence import capital, error_text, headline, remaining_text
+from winchkit.report.words.steps import doubt_texts
+from winchkit.report.words.vocabulary import VERDICT_NAMES
 
 
 def renamed(engine: TimeSeriesSelection) -> TimeSeriesSelection:
@@ -50,7 +53,10 @@ def test_the_page_is_whole_and_says_the_verdict(bench: str) -> None:
     text = report_html(answer, bench)
     page = Page(text)
     assert headline(answer.diagnosis) in page.text
-    assert all(part in page.text for part in cause_and_error(answer.diagnosis))
+    assert error_text(answer.diagnosis) in page.text
+    assert remaining_text(answer.diagnosis) in page.text
+    for step in answer.diagnosis.steps:
+        assert all(capital(doubt) in page.text for doubt in doubt_texts(step))
     assert len(text.encode()) < 1_000_000
     assert page.count("h1") == 1
     assert page.count("table") == page.count("caption")
@@ -195,7 +201,7 @@ def test_five_corners_are_drawn_within_a_turn() -> None:
     assert int(np.argmax(power)) + 1 == 5
 
 
-def test_nothing_named_draws_nothing_after_and_no_ladder() -> None:
+def test_no_step_draws_nothing_after_and_no_ladder() -> None:
     answer = answer_of("five-cornered-drum")
     assert waterfall_of(answer) is None
     page = page_of("five-cornered-drum")
@@ -226,20 +232,40 @@ def test_a_confusion_set_is_reported_with_angles() -> None:
     assert "0.1°" in page.text
 
 
-def test_without_repeats_the_page_says_what_cannot_be_excluded() -> None:
+def test_without_repeats_the_noise_has_two_bounds() -> None:
     first = [run for run in recorded("demo-adequate") if run.name.endswith("-1")]
     answer = answered(first)
-    assert {o.noise_source for o in answer.diagnosis.outputs.values()} == {"saturated fit"}
+    assert {o.noise_source for o in answer.diagnosis.outputs.values()} == {"white noise"}
     page = Page(report_html(answer, "x"))
-    assert "an unknown effect cannot be excluded without repeats" in page.text
+    for output in answer.diagnosis.outputs.values():
+        assert noise_text(output).removeprefix("noise ") in page.text
+    assert "≤ " in page.text, "a ratio to the lower bound is the largest one"
 
 
-def test_partly_without_a_name_shows_what_is_left() -> None:
+@pytest.mark.parametrize("verdict", ["partly", "unknown", "undecided"])
+def test_what_remains_is_shown_with_its_icon(verdict: str) -> None:
     real = answer_of("five-cornered-drum")
-    said = replace(real.diagnosis, verdict="partly", unexplained_share=0.31)
+    said = replace(real.diagnosis, verdict=verdict, steps=(OPEN,), unexplained_share=0.61)  # type: ignore[arg-type]
     page = Page(report_html(WinchAnswer(real.engine, real.result, said), "x"))
-    assert "Partly explained" in page.text
-    assert "31 % of the residual variance above the noise floor remains" in page.text
+    assert VERDICT_NAMES[verdict] in page.text
+    assert "61 % of the error above the noise remains" in page.text
+    assert any(a.get("class") == f"verdict {verdict}" for _, a in page.elements)
+
+
+def test_an_open_law_is_drawn_beside_its_curve() -> None:
+    real = answer_of("demo-elastic-rope")
+    (step,) = real.diagnosis.steps
+    said = replace(real.diagnosis, steps=(replace(OPEN, effects=step.effects),))
+    answer = WinchAnswer(real.engine, real.result, said)
+    (figure,) = open_law_figures(answer)
+    curve, law = figure.panels[0].series
+    # The effect explains nearly all of it: the closest law is the curve.
+    assert np.corrcoef(curve.y, law.y)[0, 1] > 0.99
+    assert np.ptp(law.y) == pytest.approx(np.ptp(curve.y), rel=0.05)
+    page = Page(report_html(answer, "x"))
+    assert figure.id in page.shown
+    assert "Open laws: the curve and the closest law" in page.text
+    assert open_law_figures(real) == []
 
 
 def test_story_truth_and_commands_are_reported() -> None:

@@ -13,55 +13,35 @@ from report_answers import (
     FRICTION,
     FRICTIONAL,
     NOISY,
+    REFITTED,
     diagnosis_of,
 )
-from winchkit.diagnosis.results import Attribution, Estimate, Step
+from winchkit.diagnosis.results import Attribution, Estimate, NextRun, Step
 from winchkit.effects.catalogue import load_catalogue
-from winchkit.report.words.sentence import main_patterns, sentence, where_text
+from winchkit.report.words.sentence import (
+    changes_text,
+    headline,
+    main_patterns,
+    remaining_patterns,
+    sentence,
+    where_text,
+)
 from winchkit.report.words.vocabulary import clause, estimate_text, kind, listed
+from winchkit.runs.sanity.finding import Finding
 
 
-def test_one_effect_has_its_value_and_the_change_of_the_held_out_error() -> None:
+def test_one_effect_has_the_change_of_the_error_that_falls_most() -> None:
     assert sentence(diagnosis_of("explained", ELASTIC)) == (
-        "The cable is elastic: EA = 249.9 ± 7.0 kN. With it, the held-out error of the cable "
-        "length falls from 1.63 mm to 0.360 mm; the noise floor is 0.300 mm."
+        "The cable is elastic. With it, the cable length error falls from 1.63 mm to 0.360 mm "
+        "(noise 0.300 mm)."
     )
-
-
-def test_an_equivalence_set_is_one_sentence_with_all_its_effects() -> None:
     outputs = {"cable_length": NOISY, "motor_torque": FRICTIONAL}
     text = sentence(diagnosis_of("explained", FRICTION, outputs=outputs))
     assert text.startswith(
-        "The pulleys have Coulomb friction (friction = 0.01500 ± 0.00010) or the cable slides "
-        "around a blocked pulley (capstan friction) (friction = 0.0138) – these runs cannot "
-        "distinguish them. With one of them"
+        "The pulleys have Coulomb friction or the cable slides around a blocked pulley (capstan "
+        "friction). With either, the motor torque error falls from 16.5 mN m to 3.04 mN m"
     )
-    assert "motor torque falls from 16.5 mN m to 3.04 mN m (noise 2.88 mN m)" in text
-    assert text.index("motor torque") < text.index("cable length"), "the largest fall comes first"
-
-
-def test_laws_of_one_kind_are_named_once() -> None:
-    laws = ("cable-elongation-linear", "cable-elongation-exponential", "cable-elongation-quartic")
-    stretch = replace(ELASTIC, effects=laws)
-    text = sentence(diagnosis_of("explained", stretch))
-    assert text.startswith(
-        "The cable is elastic: EA = 249.9 ± 7.0 kN; these runs cannot distinguish it from "
-        "cable-elongation-exponential and cable-elongation-quartic. With it, the held-out"
-    )
-    both = sentence(diagnosis_of("explained", stretch, FRICTION))
-    assert "the cable is elastic (EA = 249.9 ± 7.0 kN; these runs cannot distinguish it" in both
-
-
-def test_kinds_that_cannot_be_distinguished_are_joined_by_or() -> None:
-    mixed = Step(
-        ("cable-elongation-linear", "frame-compliance", "cable-elongation-quartic"),
-        ELASTIC.parameters,
-        0.95,
-    )
-    assert sentence(diagnosis_of("explained", mixed)).startswith(
-        "The cable is elastic (EA = 249.9 ± 7.0 kN, or as cable-elongation-quartic) or the frame "
-        "is compliant – these runs cannot distinguish them. With one of them"
-    )
+    assert "cable length" not in text, "another one falls more"
 
 
 def test_variants_without_the_plain_one_are_still_of_one_kind() -> None:
@@ -73,80 +53,121 @@ def test_variants_without_the_plain_one_are_still_of_one_kind() -> None:
 
 def test_several_effects_are_counted() -> None:
     text = sentence(diagnosis_of("explained", ELASTIC, FRICTION))
-    first = "(1) the cable is elastic (EA = 249.9 ± 7.0 kN)"
-    second = "(2) the pulleys have Coulomb friction ("
-    assert text.startswith(f"Two effects are missing: {first}; {second}")
-    assert "With them" in text
+    assert text.startswith("2 effects are missing; first, the cable is elastic. With them, the")
 
 
-def test_without_repeats_the_noise_is_a_residual() -> None:
-    unsure = replace(NOISY, noise_source="saturated fit")
+def test_a_value_of_the_profile_that_was_refitted_has_that_of_the_file_beside() -> None:
+    assert sentence(diagnosis_of("explained", REFITTED)) == (
+        "Axial stiffness 250 kN instead of 100 kN in the profile. Corrected, the cable length "
+        "error falls from 1.63 mm to 0.360 mm (noise 0.300 mm)."
+    )
+
+
+def test_without_repeats_the_noise_has_two_bounds() -> None:
+    unsure = replace(NOISY, noise_source="white noise", noise_upper=0.36e-3)
     text = sentence(diagnosis_of("explained", ELASTIC, outputs={"cable_length": unsure}))
-    assert "the residual that no known effect explains is 0.300 mm" in text
-    assert "noise floor" not in text
-    adequate = sentence(diagnosis_of("adequate", outputs={"cable_length": unsure}))
-    assert "an unknown effect cannot be excluded without repeats" in adequate
-    assert "too few or too short" not in adequate
-    far = replace(unsure, heldout_rms_after=2.5 * 0.3e-3)
-    adequate = sentence(diagnosis_of("adequate", outputs={"cable_length": far}))
-    assert "(cable length by a factor of 2.5): these runs are too few or too short" in adequate
+    assert text.endswith("to 0.360 mm (noise 0.300 to 0.360 mm).")
+    calm = replace(unsure, heldout_rms_before=0.36e-3)
+    adequate = sentence(diagnosis_of("adequate", outputs={"cable_length": calm}))
+    assert adequate.startswith("No known effect is missing. Held-out error: 0.360 mm rms, noise")
 
 
-def test_adequate_has_errors_with_the_noise() -> None:
+def test_adequate_has_the_largest_error_with_the_noise() -> None:
     assert sentence(diagnosis_of("adequate", outputs={"tension": AT_NOISE})) == (
-        "No effect is missing: the residual is at the noise floor. Held-out error: tension "
-        "0.753 N (noise 0.742 N)."
+        "No effect is missing. Held-out error: 0.753 N rms, about its noise of 0.742 N."
     )
 
 
 def test_no_noise_is_no_figure() -> None:
     silent = replace(NOISY, noise_rms=None)
     text = sentence(diagnosis_of("explained", ELASTIC, outputs={"cable_length": silent}))
-    assert text.endswith("falls from 1.63 mm to 0.360 mm.")
-    both = {"cable_length": silent, "motor_torque": replace(FRICTIONAL, noise_rms=None)}
-    assert "noise" not in sentence(diagnosis_of("explained", ELASTIC, outputs=both))
-    adequate = sentence(diagnosis_of("adequate", outputs={"cable_length": silent}))
-    assert adequate.endswith("Held-out error: cable length 0.360 mm.")
+    assert text.endswith("falls from 1.63 mm to 0.360 mm (noise unknown).")
 
 
 def test_an_effect_without_a_fall_of_the_error_is_reported_so() -> None:
     text = sentence(diagnosis_of("explained", ELASTIC, outputs={"tension": AT_NOISE}))
-    assert text.endswith("does not change the held-out errors.")
+    assert text.endswith("No held-out error changes.")
 
 
 def test_unknown_has_the_patterns_and_no_name() -> None:
     text = sentence(diagnosis_of("unknown", unexplained_share=0.99, where=FIVE_CORNERS))
-    assert text.startswith("Unexplained by any known effect: 99 % of the residual variance above")
-    pattern = "tension, 5 periods per drum turn (44 % of its residual variance)"
-    assert f"Main patterns: {pattern}; " in text
+    assert text.startswith("No known effect explains the cable length error. Held-out error:")
+    assert "99 % of the error above the noise remains. Main patterns: " in text
+    assert "tension, 5 periods per drum turn (44 % of its residual variance)" in text
     assert "motor torque, as a function of drum angle" in text
     assert not any(clause(effect.id) in text for effect in load_catalogue())
 
 
-def test_partly_has_both_the_name_and_the_unexplained_share() -> None:
-    text = sentence(diagnosis_of("partly", ELASTIC, unexplained_share=0.08, where=FIVE_CORNERS))
-    assert text.startswith("The cable is elastic")
-    assert "Partly unexplained: 8.0 % of the residual variance above the noise floor" in text
+def test_unknown_with_steps_does_not_hide_them_behind_no_effect() -> None:
+    text = headline(diagnosis_of("unknown", ELASTIC, unexplained_share=0.7))
+    assert text == "Known effects explain little of the cable length error"
+    assert "70 % of the error" in sentence(diagnosis_of("unknown", ELASTIC, unexplained_share=0.7))
 
 
-def test_partly_without_a_name_gives_none() -> None:
-    text = sentence(diagnosis_of("partly", unexplained_share=0.3))
-    assert text == (
-        "Partly explained by known effects, none of which is named: "
-        "30 % of the residual variance above the noise floor remains."
+def test_partly_has_both_the_effect_and_what_remains() -> None:
+    text = sentence(diagnosis_of("partly", ELASTIC, unexplained_share=0.2, where=FIVE_CORNERS))
+    assert text.startswith("The cable is elastic. With it,")
+    assert "20 % of the error above the noise remains." in text
+
+
+def test_undecided_blames_the_unknown_noise_and_asks_for_a_repeat() -> None:
+    again = NextRun((), "record the same motion again: without repeats the noise is not known")
+    unsure = replace(NOISY, noise_upper=1.63e-3, heldout_rms_after=1.63e-3)
+    more = {"outputs": {"cable_length": unsure}, "next_runs": (again,), "unexplained_share": 0.6}
+    alone = diagnosis_of("undecided", **more)
+    assert headline(alone) == "The cable length error may be noise: these runs cannot decide"
+    assert "remains" not in sentence(alone), "a share of an unknown excess is no number"
+    assert "noise 0.300 to 1.63 mm" in sentence(alone)
+    with_step = diagnosis_of("undecided", ELASTIC, **more)
+    assert headline(with_step).startswith("What remains of the cable length error may be noise")
+    assert "At most 60 % of the error above the noise remains." in sentence(with_step)
+    assert changes_text(alone).startswith("To decide: record the same motion again")
+
+
+def test_patterns_of_outputs_at_their_noise_are_not_main() -> None:
+    above = replace(FRICTIONAL, heldout_rms_after=9e-3)
+    outputs = {"tension": AT_NOISE, "motor_torque": above}
+    found = diagnosis_of("partly", ELASTIC, outputs=outputs, where=FIVE_CORNERS)
+    assert [place.output for place in remaining_patterns(found)] == ["motor_torque"]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "text"),
+    [
+        ("adequate", "To check: record other loads, strokes, speeds or temperatures."),
+        ("explained", "To check: record another load, stroke or speed."),
+        ("partly", "To explain the rest: write an effect of your own"),
+    ],
+)
+def test_what_would_change_the_verdict(verdict: str, text: str) -> None:
+    steps = () if verdict == "adequate" else (ELASTIC,)
+    assert changes_text(diagnosis_of(verdict, *steps)).startswith(text)
+
+
+def test_a_run_that_decides_comes_with_its_power() -> None:
+    run = NextRun(("pulley-coulomb", "pulley-capstan"), "full stroke, three loads", 0.93)
+    assert changes_text(diagnosis_of("explained", FRICTION, next_runs=(run,))) == (
+        "To decide between pulley-coulomb and pulley-capstan: full stroke, three loads "
+        "(power 93 %)."
     )
+
+
+def test_a_wrong_channel_precedes_everything() -> None:
+    found = Finding("inverted-sign", "run", "tension", -1.0, "its sign is inverted")
+    told = diagnosis_of("unknown", sanity=(found,), unexplained_share=1.0, where=FIVE_CORNERS)
+    assert sentence(told) == (
+        "A channel looks wrong: no effect was looked for. tension: its sign is inverted."
+    )
+    assert "--as-recorded" in changes_text(told)
 
 
 def test_no_outputs_at_all_still_make_a_sentence() -> None:
-    assert sentence(diagnosis_of("adequate", outputs={})) == (
-        "No effect is missing: the residual is at the noise floor."
-    )
+    assert sentence(diagnosis_of("adequate", outputs={})) == "No effect is missing."
 
 
 def test_an_effect_of_the_user_keeps_its_name() -> None:
     mine = Step(("my-spring",), {"my-spring": {"rate": Estimate(3.0, 0.1, "furlong")}}, 0.5)
-    text = sentence(diagnosis_of("explained", mine))
-    assert text.startswith("The effect my-spring is missing: rate = 3.00 ± 0.10 furlong.")
+    assert headline(diagnosis_of("explained", mine)) == "The effect my-spring is missing"
 
 
 def test_every_effect_of_the_catalogue_has_its_own_words() -> None:
@@ -199,5 +220,5 @@ def test_an_error_that_remains_above_the_noise_is_reported() -> None:
     text = sentence(
         diagnosis_of("explained", ELASTIC, outputs={"motor_torque": high, "tension": AT_NOISE})
     )
-    assert text.endswith("Still above the noise floor: motor torque by a factor of 5.4.")
+    assert text.endswith("Still above the noise: motor torque by a factor of 5.4.")
     assert "Still above" not in sentence(diagnosis_of("explained", ELASTIC))

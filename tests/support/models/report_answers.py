@@ -8,7 +8,15 @@ from functools import cache
 
 from winchkit.catalog import find
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
-from winchkit.diagnosis.results import Attribution, Diagnosis, Estimate, OutputFit, Step
+from winchkit.diagnosis.results import (
+    Attribution,
+    Diagnosis,
+    Doubt,
+    Estimate,
+    OutputFit,
+    Place,
+    Step,
+)
 from winchkit.runs.run import Run
 from winchkit.schema.read import read_profile, read_programme, read_simbench
 from winchkit.sim.bench import profiles_of, programme_path
@@ -30,6 +38,16 @@ FRICTION = Step(
     },
     0.9,
     {"pulley-capstan": 0.002},
+    law="open",
+    doubts=(Doubt("alternatives", "these runs cannot distinguish it from pulley-capstan"),),
+)
+REFITTED = replace(ELASTIC, refitted=True, file_values={"axial_stiffness": 100_000.0}, share=0.9)
+OPEN = replace(
+    ELASTIC,
+    law="open",
+    place=(Place("cable", "cable_length", "load"),),
+    doubts=(Doubt("curve", "a free curve over load explains 30% more: the law is another one"),),
+    share=0.4,
 )
 FIVE_CORNERS = (
     Attribution("tension", "time", 0.64, frequency=8.2),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.messages import is_verbose, note, suggest_next
 from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.core.output import echo_each, echo_json
 from winchkit.cli.core.terminal import progress_bar
@@ -74,6 +74,7 @@ def command(
 
     The noise is estimated from two runs of one programme and load: record each motion twice.
     Ctrl-C prints the errors and the candidates so far, without a verdict.
+    --verbose adds how the answer was reached: contributions, scores, detectable effects.
     Long runs are decimated as far as their signals allow; --winch all diagnoses each by
     itself and reports what they have in common.
     """
@@ -219,18 +220,17 @@ def _figures(answer: WinchAnswer, asked: Asked) -> Sequence[Figure]:
 
 
 def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
-    """Next command: add the effect that is named alone, else plan runs that distinguish or show."""
-    if diagnosis.interrupted:
+    """Next command: add or refit the first effect of one law, else plan runs or write an effect."""
+    if diagnosis.interrupted or diagnosis.verdict == "undecided":
         return
-    named = diagnosis.steps[0] if diagnosis.steps else None
-    if named is not None and len(named.effects) == 1:
+    first = next(iter(diagnosis.steps), None)
+    words = ("-p", asked.profile, *asked.options)
+    if first is not None and len(first.effects) == 1:
         from winchkit.profile_edit.naming import extended_name
 
-        file = extended_name(asked.profile, named.effects[0])
-        words = ("-p", asked.profile, *asked.options, "-o", file)
-        suggest_next("add", named.effects[0], "--fit", runs, *words)
-    elif named is None and diagnosis.verdict == "unknown" and diagnosis.data == "runs":
-        words = ("-p", asked.profile, *asked.options)
+        file = extended_name(asked.profile, first.effects[0])
+        suggest_next("add", first.effects[0], "--fit", runs, *words, "-o", file)
+    elif first is None and diagnosis.verdict == "unknown" and diagnosis.data == "runs":
         suggest_next("effects", "new", "own.py", "--fit", runs, *words)
     else:
         suggest_with("plan", asked, runs)
@@ -251,7 +251,7 @@ def _said(answer: Answer, as_json: bool) -> Any:
         return report_json(answer)
     from winchkit.report.text import report_text
 
-    text = report_text(answer)
+    text = report_text(answer, verbose=is_verbose())
     # An option of the command, read here instead of being handed through every kind of answer.
     with_fit = click.get_current_context().params["fit_report"]
     return f"{text}\n\n{answer.fit_report()}" if with_fit else text

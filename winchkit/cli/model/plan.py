@@ -233,7 +233,7 @@ def _plan_winch(
         best = found.offers[0].kind.name
         echo_json({**found.to_json(), "programme": path, "chosen": best if path else None})
     else:
-        click.echo(_text(found.offers, found.pairs, named=bool(answer.sets)))
+        click.echo(_text(found.offers, found.pairs))
         for line in _silent(found, widened=limits is not None):
             click.echo(line)
     if path is None:
@@ -294,7 +294,7 @@ def _silent(found: Plan, *, widened: bool) -> list[str]:
     return lines
 
 
-def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], *, named: bool) -> str:
+def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> str:
     """A line a kind, the best first; pairs of effects by letters."""
     from winchkit.report.words.columns import aligned, hanging, paragraph
     from winchkit.report.words.numbers import percent
@@ -309,8 +309,7 @@ def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]], *, named: 
     for offer in found:
         powers = [percent(power) for power in offer.powers[: len(letters)]]
         table.append([offer.kind.name, f"{offer.minutes:.1f}", *powers])
-    what = "" if named else " what came closest (none is named yet)"
-    head = [f"what to run next, with the power to distinguish{what}"]
+    head = ["what to run next, with the power to distinguish"]
     head += [
         f"  {letter}: {a.effect.id} / {b.effect.id}"
         for letter, (a, b) in zip(letters, pairs, strict=False)

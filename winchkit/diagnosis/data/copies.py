@@ -30,6 +30,7 @@ COPIES = "repeats-are-copies"
 _DEPENDENT = 0.1
 """Median difference over the noise of one recording; of independent ones it is 0.95."""
 _LEAST_OVERLAP = 0.5
+"""Share of the shorter run's rows from which it is left out as a copy; screened."""
 _LEAST_ROWS = 50
 """Rows that two runs must share, and different values that an output must have."""
 

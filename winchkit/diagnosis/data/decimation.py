@@ -34,6 +34,7 @@ _RELATIVE_CUT_OFF = 0.25
 LEAST_RATE = 20.0
 """Least sampling rate that is left, Hz: reversals and lags last about a tenth of a second."""
 _TAPS = 10
+"""Taps of the anti-alias filter per decimation factor; screened."""
 _BETA = 7.857
 """Shape of the Kaiser window for 80 dB stop-band attenuation."""
 _CHANNELS = ("motor_angle", "motor_torque", "tension", "load", "cable_length")

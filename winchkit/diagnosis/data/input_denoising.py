@@ -36,6 +36,7 @@ __all__ = [
 ]
 
 _FLOOR_SHARE = 1 / 3
+"""Share of the highest frequencies whose mean power is taken for white noise; screened."""
 
 
 def contrasts(aligned: Array) -> tuple[Array, Array]:

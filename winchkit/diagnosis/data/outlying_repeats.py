@@ -24,8 +24,12 @@ from winchkit.arrays import Array
 __all__ = ["Outlying", "outlying_repeat"]
 
 _LEAST_REPEATS = 3
+"""Repeats from which one can be outlying; theory: of two, neither is."""
 _LEAST_RATIO = 4.0
+"""Mean square of the difference from the nearest repeat over that of the others, below which a run
+is only noisier; screened: twice the rms."""
 _LEVEL = 1e-3
+"""Level of the F test, Bonferroni over the repeats; convention."""
 
 
 @dataclass(frozen=True)

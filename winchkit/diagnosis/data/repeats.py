@@ -20,10 +20,16 @@ from winchkit.units import GRAVITY
 __all__ = ["Repeats", "find_repeats", "mean_load"]
 
 _ANGLE_TOLERANCE = 0.02
+"""Rms difference of aligned motor angles of repeats, over their standard deviation; screened."""
 _LOAD_TOLERANCE = 0.02
+"""Relative difference of mean loads of repeats; screened."""
 _LEAST_OVERLAP = 0.8
+"""Share of the shorter run that two repeats must overlap; screened."""
 _TIE = 1e-6
+"""Relative difference of mean-square lag criteria that counts as equal; numerical: rounding of a
+correlation by FFT."""
 _RATE_TOLERANCE = 0.05
+"""Relative difference of sampling intervals of repeats; screened."""
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from winchkit.schema.profiles.axis import AxisProfile
 __all__ = ["excites", "missing_needs"]
 
 _PERIODS = 2
+"""Periods of an order that the motor must turn through; screened."""
 
 
 def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:

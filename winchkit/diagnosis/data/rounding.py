@@ -24,8 +24,13 @@ from winchkit.runs.sanity.quantisation import quantisation_noise
 __all__ = ["mean_error", "noise_before_rounding"]
 
 _HARMONICS = 8
+"""Harmonics of the mean rounding error; numerical: 93 % of its mean square without noise, all of it
+from a noise of a tenth of the step; the rest is taken as white."""
 _LARGEST = 2.0
+"""Noise over step up to which the mean error is taken into account; theory: the mean error of a
+noise of a step is 10⁻⁹ of it."""
 _GRID = 401
+"""Points of the noise over the step; numerical."""
 
 
 def mean_error(signal: Array, step: float, noise: float) -> tuple[Array, float]:

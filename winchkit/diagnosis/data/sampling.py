@@ -26,6 +26,7 @@ _BINS = 8
 _FINER = 32
 """Steps of a frequency within that spectrum's resolution."""
 _MOST_BINS = 8_000_000
+"""Bins above which no period is estimated; computing cost."""
 
 
 def bridged(values: Array) -> Array:

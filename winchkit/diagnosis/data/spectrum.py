@@ -34,14 +34,29 @@ __all__ = [
 ]
 
 _BUTTERWORTH_ORDER = 4
+"""Order of the zero-phase low-pass of the torque; convention of robot identification (forward and
+backward Butterworth filter)."""
 _TORQUE_BAND = 20.0
+"""Highest cut-off of the torque, Hz; a lower one where the sampling rate is below 200 Hz;
+convention of robot identification."""
 _BANDS = 14
+"""Logarithmic noise bands per output without repeats, and of the Wiener filter; screened."""
 _NARROW = 24
+"""Logarithmic noise bands per output with repeats, before smoothing; screened."""
 _CURVATURE_STD = 0.25
+"""Prior standard deviation of the difference of the log spectrum between bands: the second one of
+repeats, the first one of a robot in motion; rule of thumb: two thirds of it changed the set of one
+of twelve cases of the screening."""
 _ITERATIONS = 25
+"""Fisher scoring steps of the penalised Whittle fit, always all; numerical."""
 _LEAST_COEFFICIENTS = 8
+"""Coefficients that a wide band must hold; screened."""
 _LARGEST_FACTOR = 23
+"""Largest prime factor of the number of samples of a fast transform; computing cost, measured: up
+to 23 at most twice the time of powers of two."""
 _LEAST_CUT = 4000
+"""Samples of a run from which it is cut to such a number; computing cost: below it a slow transform
+takes less than 0.2 ms."""
 WHOLE_TRANSITION = 3.0
 """In units of the cut-off: beyond it the low-pass passes about 10⁻⁴ of the amplitude."""
 

@@ -22,6 +22,7 @@ Mask = NDArray[np.bool_]
 _NEIGHBOURS = 2
 """Samples to either side of a transient, besides the reach of the derivatives."""
 _MOVING = 0.9
+"""Expected direction above which the cable counts as moving; screened."""
 _LEAST_TRANSIENT = 2.0
 """In units of the white noise; a smaller transient only marks where a layer begins."""
 _NORMAL = 1.4826

@@ -24,10 +24,17 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = ["validate_runs", "without_constants"]
 
 _LEAST_SAMPLES = 50
+"""Samples that a run must have; screened."""
 _SLOPE_RANGE = 0.75, 1.3333
+"""Slope of the measured over the predicted length outside of which it is another winch;
+screened."""
 _LEAST_FINITE_SHARE = 0.5
+"""Share of samples of a column that must not be NaN; screened."""
 _LEAST_TRAVEL = 0.01
+"""Least travel of the prediction, in winding radii, with which a slope is judged; screened."""
 _LEAST_CORRELATION = 0.5
+"""Least squared correlation of the measured and the predicted length with which a slope is judged;
+below it most of the measured variance is not the motion."""
 
 
 def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:

@@ -14,6 +14,7 @@ from winchkit.effects.parametrization import Coordinates
 __all__ = ["DetectionThreshold", "detectable"]
 
 _POWER_QUANTILE = 1.2816
+"""Normal quantile of the power of detectable sizes; theory: Φ⁻¹(0.90)."""
 
 
 @dataclass(frozen=True)

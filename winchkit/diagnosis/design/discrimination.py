@@ -38,6 +38,7 @@ __all__ = [
 SEPARATED_AT = 3.841
 """95 % quantile of χ² with one degree of freedom."""
 _MOST_OFFERS = 2
+"""Programmes that are offered per pair; rule of thumb."""
 LEAST_POWER = 0.2
 """Least power of a programme or of poses that are offered."""
 

@@ -15,9 +15,13 @@ from winchkit.model.line import CREEP_SPEED
 __all__ = ["missing_excitation"]
 
 _LEAST_LOAD_RANGE = 0.05
+"""Relative range of loads below which a note says "one load only"; rule of thumb."""
 _LEAST_SHARE_OF_DIRECTION = 0.02
+"""Share of samples in one direction below which a note says "one direction only"; rule of thumb."""
 _SPEED_TOLERANCE = 0.1
+"""Relative distance from the median speed that counts as the same speed; rule of thumb."""
 _SHARE_AT_ONE_SPEED = 0.75
+"""Share of samples at the same speed above which a note says "one speed only"; rule of thumb."""
 
 
 def missing_excitation(regression: TimeSeriesRegression) -> list[str]:

@@ -35,7 +35,9 @@ _HIGH_POWER = 0.9
 _LOADING_MINUTES, _WARMING_MINUTES = 1 / 3, 20.0
 """Time of an operator to change a load, and to warm the machine, minutes."""
 _REPEATS = 2
+"""Runs of each proposed programme; theory: the smallest number that gives pure error."""
 _WEIGHT_STEP = 0.5
+"""Loads are proposed in steps of this, kg; convention: weights at hand."""
 
 
 @dataclass(frozen=True)

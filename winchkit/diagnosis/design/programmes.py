@@ -50,6 +50,8 @@ class CandidateProgramme:
 
 
 _THERE_AND_BACK = ((1.0, 1.0), (0.0, 1.0))
+"""Moves of a full stroke: position as share of the stroke, speed as share of the highest;
+convention."""
 CANDIDATE_PROGRAMMES = (
     CandidateProgramme("full stroke, one load", _THERE_AND_BACK),
     CandidateProgramme("full stroke, three loads", _THERE_AND_BACK, loads=(0.5, 1.0, 2.0)),
@@ -70,6 +72,7 @@ CANDIDATE_PROGRAMMES = (
         "full stroke, warmed up by 15 K", _THERE_AND_BACK, temperature_rises=(0.0, 15.0)
     ),
 )
+"""Six candidate programmes: moves, loads, temperatures, holds; rule of thumb."""
 
 
 @dataclass(frozen=True)

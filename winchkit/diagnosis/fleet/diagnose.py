@@ -16,6 +16,7 @@ from winchkit.schema.profiles.winch import WinchProfile
 __all__ = ["diagnose_each"]
 
 _CONCURRENT = 2
+"""Winches that are diagnosed at the same time; computing cost: memory and cores."""
 
 
 def diagnose_each(

@@ -31,7 +31,9 @@ from winchkit.diagnosis.fleet.variance_function import moderated_stds, power_of_
 __all__ = ["FleetHistory", "FleetParameter", "WinchHistory", "fleet_history"]
 
 _FALSE_DISCOVERY_RATE = 0.01
+"""False discovery rate of changes and of odd winches; convention."""
 _RIVAL_LEVEL = 0.05
+"""Level at which the other kind of change is rejected; convention."""
 Key = tuple[str, str]
 """Effect and parameter."""
 

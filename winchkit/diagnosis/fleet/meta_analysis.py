@@ -12,6 +12,7 @@ DerSimonian, R., Laird, N. (1986). Controlled Clinical Trials 7, 177-188.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.results import Diagnosis, Step
+from winchkit.diagnosis.results import Diagnosis, Place, Step
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect, Parameter
 
@@ -30,6 +31,7 @@ __all__ = [
     "Pooled",
     "SharedEffect",
     "alarms",
+    "place_text",
     "pooled",
     "shared_effects",
 ]
@@ -41,7 +43,9 @@ _LEAST_WINCHES = 3
 WINCHES_PER_OUTLYING = 4
 """At most one in this many winches may be outlying: of more, a few agree by chance."""
 Member = tuple[str, tuple[float, ...]]
-"""An effect with its orders: cogging of two orders counts as two effects."""
+"""An effect with its orders, since cogging of two orders counts as two effects, or a place."""
+_DECIDED = frozenset({"adequate", "explained"})
+"""Verdicts beside which an effect that was not found is absent."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,8 @@ class SharedEffect:
     """An effect of some winches, and its parameters over them."""
 
     effects: tuple[str, ...]
-    """Effects that remain possible for all of these winches, fewest parameters first."""
+    """Effects that remain possible for all of these winches, fewest parameters first; where
+    only their place is common, the most frequent one."""
     winches: tuple[str, ...]
     """Winches in which it was found."""
     without: tuple[str, ...]
@@ -88,6 +93,10 @@ class SharedEffect:
     """Winches about which neither can be said."""
     parameters: Mapping[str, Pooled]
     """Of the first effect."""
+    place: Place | None = None
+    """Where the steps act; None for effects without one."""
+    by_place: bool = False
+    """Whether only the place is common to these winches, and no effect."""
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""
@@ -96,6 +105,8 @@ class SharedEffect:
         }
         return {
             "effects": list(self.effects),
+            "place": None if self.place is None else vars(self.place),
+            "by_place": self.by_place,
             "winches": list(self.winches),
             "without": list(self.without),
             "unsure": list(self.unsure),
@@ -125,12 +136,12 @@ def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict
     Returns
     -------
     dict
-        1 − (1 − p)^winches of each winch with an alarm and without a named effect.
+        1 − (1 − p)^winches of each winch with an alarm and without a step.
     """
     return {
         winch: 1 - (1 - min(chances[winch], 1.0)) ** len(found)
         for winch, one in found.items()
-        if one.verdict in {"partly", "unknown"} and not one.steps and np.isfinite(chances[winch])
+        if one.verdict not in _DECIDED and not one.steps and np.isfinite(chances[winch])
     }
 
 
@@ -174,15 +185,33 @@ def _together(named: list[tuple[str, Step]]) -> Iterator[tuple[list[Member], dic
         for winch, step in left:
             if best in _members(step):
                 group.setdefault(winch, step)
-        others = [m for m in _members(next(iter(group.values()))) if m != best]
-        yield (
-            [best, *(m for m in others if all(m in _members(s) for s in group.values()))],
-            group,
-        )
+        first_names = _names(next(iter(group.values())))
+        common = [m for m in first_names if all(m in _names(s) for s in group.values())]
+        yield sorted(common, key=lambda member: member != best), group
         left = [(w, step) for w, step in left if group.get(w) is not step]
 
 
 def _members(step: Step) -> list[Member]:
+    """What a step is followed by: a certain one by its name, another one by its place first."""
+    if step.certain:
+        return _names(step)[:1]
+    places: list[Member] = [(place_text(step), ())] if step.place else []
+    return [*places, *_names(step)]
+
+
+def place_text(step: Step) -> str:
+    """``motor: motor_torque over speed``, by which a step that is not certain is followed.
+
+    The id of its first effect where it has no place.
+    """
+    if not step.place:
+        return step.effects[0]
+    first = step.place[0]
+    over = f" over {first.variable}" if first.variable else ""
+    return f"{first.part}: {', '.join(dict.fromkeys(at.output for at in step.place))}{over}"
+
+
+def _names(step: Step) -> list[Member]:
     return [
         (e, tuple(v.value for n, v in step.parameters.get(e, {}).items() if n == "order"))
         for e in step.effects
@@ -195,6 +224,11 @@ def _shared(
     found: Mapping[str, Diagnosis],
     catalogue: Catalogue,
 ) -> SharedEffect:
+    place = next((step.place[0] for step in steps.values() if step.place), None)
+    by_place = not members
+    if by_place:
+        names = Counter(_names(step)[0] for step in steps.values())
+        members = [max(names, key=names.__getitem__)]
     effect = catalogue[members[0][0]]
     parameters = {}
     for parameter in effect.parameters:
@@ -205,15 +239,17 @@ def _shared(
                 unit, reciprocal = parameter.unit, parameter.reciprocal
                 parameters[parameter.name] = pooled(known, unit, reciprocal=reciprocal)
     without: list[str] = []
-    unsure: list[str] = []
+    doubtful: list[str] = []
     for winch, diagnosis in found.items():
         if winch not in steps:
             absent = _would_detect(diagnosis, effect, parameters) and not _named_as_confusable(
                 diagnosis, effect, catalogue
             )
-            (without if absent else unsure).append(winch)
+            (without if absent else doubtful).append(winch)
     ids = tuple(name for name, _ in members)
-    return SharedEffect(ids, tuple(steps), tuple(without), tuple(unsure), parameters)
+    return SharedEffect(
+        ids, tuple(steps), tuple(without), tuple(doubtful), parameters, place, by_place
+    )
 
 
 def _known_values(
@@ -226,7 +262,7 @@ def _known_values(
 
 def _would_detect(diagnosis: Diagnosis, effect: Effect, size: Mapping[str, Pooled]) -> bool:
     """Whether the runs of a winch would have detected an effect of this size."""
-    if diagnosis.verdict in {"partly", "unknown"}:
+    if diagnosis.verdict not in _DECIDED:
         return False
     for shown in diagnosis.detectable:
         if shown.effect == effect.id and shown.parameter in size:

@@ -32,6 +32,8 @@ __all__ = ["PartialPooling", "odd_p_values", "partial_pooling"]
 LEAST_WINCHES = 4
 """Winches from which one can differ from a majority of the others."""
 _GRID = 60
+"""Variances at which the restricted likelihood is first computed; numerical: a factor of 1.5
+between neighbours."""
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from winchkit.effects.term import Term
 __all__ = ["ValueCovariance", "collinearity", "value_covariance"]
 
 _STEP = 1e-4
+"""Step of a difference of values by a fit's coordinate; numerical."""
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ __all__ = ["without_impacts"]
 
 _FORCES = ("tension", "motor_torque")
 _MOST = 0.25
+"""Share of samples beyond which impacts are not left out; screened."""
 
 
 def without_impacts(dataset: Dataset, hypothesis: Hypothesis) -> Dataset | None:

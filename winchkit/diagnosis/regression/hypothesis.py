@@ -46,6 +46,12 @@ class Hypothesis:
         """Hypothesis with another term without memory in the place of one."""
         return replace(self, terms=(*self.terms[:index], term, *self.terms[index + 1 :]))
 
+    def exchanged(self, index: int, term: Term, runs: int) -> Hypothesis:
+        """Hypothesis with another term in the place of one, its initial states at zero."""
+        starts = list(self.starts)
+        starts[index] = Hypothesis().with_term(term, runs).starts[0]
+        return replace(self.with_term_at(index, term), starts=tuple(starts))
+
     def without(self, index: int) -> Hypothesis:
         """Hypothesis with one effect less."""
         keep = [i for i in range(len(self.terms)) if i != index]

@@ -39,9 +39,13 @@ __all__ = [
 ]
 
 _KNOWN_DIFFERENCES = 6
+"""Directions that known differences between repeats may take out of the pure error; screened."""
 _NOTICEABLE = 0.02
+"""Power of a signature's difference over that of its mean from which it is taken out; screened."""
 _REWEIGHTED = 3
+"""Reweighting iterations; screened."""
 _ROWS_EACH = 4
+"""Rows per direction that is projected out of a saturated model; screened."""
 
 
 @dataclass(frozen=True)

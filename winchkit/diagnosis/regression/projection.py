@@ -13,11 +13,12 @@ __all__ = [
     "inverse_information",
     "inverse_normal",
     "orthonormal",
-    "orthonormal_of_projected",
     "partialled_out",
 ]
 
 _UNIDENTIFIABLE = 1e-12
+"""Eigenvalue of a scaled normal matrix, over the largest, below which a direction is not
+determined; numerical."""
 LEAST_EIGENVALUE = 1e-8
 """Eigenvalues of scaled inner products below this share of the largest are no direction."""
 
@@ -70,17 +71,6 @@ def orthonormal(columns: Array, most: int | None = None) -> Array:
     if most is not None:
         kept[: max(0, len(values) - most)] = False
     return np.asarray(scaled @ (vectors[:, kept] / np.sqrt(values[kept])))
-
-
-def orthonormal_of_projected(columns: Array, least: float) -> Array:
-    """The same of columns that had unit length before a projection.
-
-    Their length is then information: eigenvalues of their inner products of at most ``least`` are
-    rounding errors of the projection, whose directions are left out.
-    """
-    values, vectors = np.linalg.eigh(columns.T @ columns)
-    kept = values > least
-    return np.asarray(columns @ (vectors[:, kept] / np.sqrt(values[kept])))
 
 
 def partialled_out(columns: Array, vector: Array) -> Array:

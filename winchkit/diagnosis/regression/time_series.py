@@ -173,18 +173,26 @@ class TimeSeriesRegression(Regression):
             ]
         )
 
+    def measured_of(self, segment: Segment) -> tuple[Array, NDArray[np.bool_]]:
+        """Measured output of a segment within its band (n,), SI, and the samples compared (n,)."""
+        recording = self.dataset.recordings[segment.run]
+        band, signal = recording.bands[segment.output], recording.measured[segment.output]
+        if band.cut_off is not None:
+            signal = low_pass(signal, band.rate, band.cut_off)
+        return signal, recording.valid[segment.output]
+
+    def measured_samples(self, output: str) -> list[tuple[Array, NDArray[np.bool_]]]:
+        """The same of every run that measured an output."""
+        return [self.measured_of(s) for s in self.segments if s.output == output]
+
+    def has_run_offsets(self, output: str) -> bool:
+        """Whether the instrument of an output has an offset in every run."""
+        return any(segment.output == output for segment in self.run_offset_segments)
+
     def signal_rms(self, output: str) -> float:
         """Rms of a measured output within the band of the comparison, SI."""
-        squares, count = 0.0, 0
-        for recording in self.dataset.recordings:
-            if output in recording.measured:
-                band = recording.bands[output]
-                signal = recording.measured[output]
-                if band.cut_off is not None:
-                    signal = low_pass(signal, band.rate, band.cut_off)
-                signal = signal[recording.valid[output]]
-                squares += float(signal @ signal)
-                count += len(signal)
+        known = [signal[valid] for signal, valid in self.measured_samples(output)]
+        squares, count = sum(float(x @ x) for x in known), sum(map(len, known))
         return float(np.sqrt(squares / count)) if count else float("nan")
 
     def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:

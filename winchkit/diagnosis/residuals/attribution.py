@@ -45,10 +45,17 @@ __all__ = [
 BINS = 16
 """Bins per variable."""
 _TURN = 2 * np.pi
+"""Rad of a turn; definition."""
 _MOST_ORDERS = 1000
+"""Highest scanned order per motor or drum turn; bound of the parameter `order`."""
 _CELLS = 32
+"""Cells per shortest period in which samples are summed to find the order; phase error of at most
+π/32, loss of power below 0.4 %; the share of the order found is exact."""
 _LARGEST_CONDITION = 1e6
+"""Condition of sine and cosine from which an order is not identifiable; numerical: half of the
+digits are left."""
 _LEVEL = 0.01
+"""Probability that independent residuals have an order; convention, as the score's."""
 _OF_THE_CABLE = "cable_length", "directed_length"
 """Variables of a cable, which an axis lacks."""
 LEAST_SHARE = 0.02

@@ -37,9 +37,14 @@ PAIRS = (
 )
 """First and second variable; ``load`` is the tension where no load is known."""
 _FIRST_CELLS, _SECOND_CELLS = 16, 10
+"""_FIRST_CELLS: Cells of a residual map, first variable; rule of thumb. _SECOND_CELLS: Cells of a
+residual map, second variable; rule of thumb."""
 _LEAST_SAMPLES = 3
+"""Samples of a cell whose mean is shown; rule of thumb."""
 _TAILS = 0.002
+"""Share of samples beyond the outermost cell edges, each side; rule of thumb."""
 _DIGITS = 5
+"""Significant digits in JSON; convention."""
 _LEAST_CHANGE = {"temperature": LEAST_TEMPERATURE_RANGE}
 """A smaller range is noise of the instrument, K."""
 

@@ -36,6 +36,7 @@ __all__ = ["STD_OF_ZERO", "Adjusted", "adjusted", "instrument_zeros", "placed"]
 _FLAT = 1e3
 """Standard deviation of the prior of an effect's coordinates, which are near one in size."""
 _STEP = 1e-3
+"""Step of a forward difference by an effect's coordinate; numerical."""
 _PLACED_BY = ("closure", "position", "rotation", "tension", "statics")
 STD_OF_ZERO = {"swivel": ZERO_STD["swivel"], "gauge": ZERO_STD["cable_length"]}
 """Standard deviation of the prior of an instrument's zero, by kind of residual."""

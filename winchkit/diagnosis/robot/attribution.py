@@ -32,6 +32,7 @@ AXES = ("x", "y", "z")
 ON_PLATFORM = tuple(f"platform_{name}" for name in (*AXES, "roll", "pitch", "yaw"))
 """Variables of the pose itself."""
 _BINS = 8
+"""Bins over a variable; rule of thumb."""
 _LEAST_DEVIATIONS = 3.0
 """Standard deviations by chance that a share must exceed."""
 _LINE_SHARE = 0.5

@@ -8,11 +8,9 @@ first missing part of the model.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-
-from scipy.special import fdtri
 
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.diagnose import (
@@ -21,12 +19,20 @@ from winchkit.diagnosis.diagnose import (
     no_progress,
 )
 from winchkit.diagnosis.regression.gls import fit
-from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
-from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.residuals.attribution import MOST_PLACES, Attribution
 from winchkit.diagnosis.residuals.traces import PoseTrace, pose_traces
-from winchkit.diagnosis.results import Estimate, OutputFit, RobotDiagnosis, Step, plain_step
+from winchkit.diagnosis.results import (
+    Doubt,
+    Estimate,
+    NextRun,
+    OutputFit,
+    Place,
+    RobotDiagnosis,
+    Step,
+    Verdict,
+    plain_step,
+)
 from winchkit.diagnosis.robot.attribution import pose_attributions
 from winchkit.diagnosis.robot.candidates import GEOMETRY
 from winchkit.diagnosis.robot.engine import PoseSelection
@@ -35,21 +41,40 @@ from winchkit.diagnosis.robot.errors import (
     Errors,
     FittedModel,
     column_names,
+    errors_in_noise,
     errors_of,
+    output_fits_in_noise,
     output_fits_of,
+    refuted_outputs,
     rms,
 )
 from winchkit.diagnosis.robot.excitation import missing_pose_excitation
 from winchkit.diagnosis.robot.pose_design import next_pose_runs
-from winchkit.diagnosis.robot.preparation import Preparation, calibrated_on, prepare_selection
-from winchkit.diagnosis.robot.prior import GeometryPrior
+from winchkit.diagnosis.robot.preparation import (
+    Preparation,
+    calibrated_on,
+    own_effects,
+    prepare_selection,
+)
+from winchkit.diagnosis.robot.registration import datum_notes
 from winchkit.diagnosis.robot.regression import PoseRegression
-from winchkit.diagnosis.robot.trajectory_regression import regression_at
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
-from winchkit.diagnosis.steps import candidates_of, steps_of
-from winchkit.diagnosis.verdict.decision import Judgement, judge
+from winchkit.diagnosis.steps import (
+    Standing,
+    candidates_of,
+    standing_of,
+    steps_of,
+    with_standing,
+)
+from winchkit.diagnosis.verdict.decision import (
+    AT_NOISE,
+    remaining_share,
+    verdict_of,
+)
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
+from winchkit.diagnosis.verdict.laws import simplified, with_first_members
+from winchkit.diagnosis.verdict.profile_values import held, refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.model.stages import Stage
@@ -63,6 +88,8 @@ __all__ = [
     "diagnose_robot",
 ]
 
+_REPEAT = "drive to some ten of these poses twice: the noise of the instruments is not known"
+_WHOLE = "numbers of the geometry together may fit another cause that depends on the pose"
 _LEAST_FALL, _LARGEST_RATIO = 0.7, 1.1
 """Residuals beside a free geometry are shown where some error falls below the first ratio and none
 rises above the second one."""
@@ -86,7 +113,7 @@ class RobotAnswer(Answer):
     def __init__(
         self, selection: RobotSelection, sets: Sequence[EquivalenceSet], diagnosis: RobotDiagnosis
     ) -> None:
-        super().__init__(selection.engine, selection.judgement.reported, diagnosis, sets)
+        super().__init__(selection.engine, selection.result, diagnosis, sets)
         self.selection = selection
 
     @property
@@ -97,7 +124,7 @@ class RobotAnswer(Answer):
 
 @dataclass(frozen=True)
 class RobotSelection:
-    """A selection on poses and its judgement.
+    """A selection on poses and its verdict.
 
     Attributes
     ----------
@@ -108,16 +135,80 @@ class RobotSelection:
     file_engine : PoseSelection
         Engine with the geometry of the file; the same object where the geometry was not free.
     result : SelectionResult
-        Result of the selection.
-    judgement : Judgement
-        Verdict and named effects.
+        Result of the selection, with the simplest laws.
     """
 
     preparation: Preparation
     engine: PoseSelection
     file_engine: PoseSelection
     result: SelectionResult
-    judgement: Judgement
+
+    @classmethod
+    def of(
+        cls, preparation: Preparation, engine: PoseSelection, file_engine: PoseSelection
+    ) -> RobotSelection:
+        """Search with an engine."""
+        result = stepwise_selection(engine)
+        final, noise = simplified(engine, result.final, result.noise)
+        return cls(preparation, engine, file_engine, replace(result, final=final, noise=noise))
+
+    @cached_property
+    def outputs(self) -> dict[str, OutputFit]:
+        """Errors of every output before and after."""
+        return output_fits_of(self.initial_model, self.final, self.preparation.noise)
+
+    @property
+    def n_added(self) -> int:
+        """Number of effects that the selection added."""
+        return len(self.result.final.hypothesis.terms) - self.engine.n_initial_terms
+
+    @cached_property
+    def in_noise(self) -> dict[str, OutputFit]:
+        """Errors of every kind of equation before and after, in units of the noise."""
+        return output_fits_in_noise(self.initial_model, self.final, self.preparation.noise)
+
+    @property
+    def remaining(self) -> float:
+        """Share of the excess over the noise that the final model leaves."""
+        return remaining_share(self.in_noise)
+
+    @cached_property
+    def refuted(self) -> set[str]:
+        """Outputs that their mean over the poses predicts better than the final model."""
+        return refuted_outputs(self.final)
+
+    @cached_property
+    def deciding(self) -> set[str]:
+        """Kinds of equations of which the measured output varies by more than its noise."""
+        return {
+            name
+            for name in self.in_noise
+            if not self.outputs[name].signal_rms <= AT_NOISE * (self.outputs[name].noise_rms or 0.0)
+        }
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Verdict on the errors in units of the noise."""
+        return verdict_of(
+            self.in_noise,
+            steps=self.n_added
+            + len(self.refitted)
+            + len(self.preparation.found)
+            + self.geometry_is_free,
+            noise_known=self.preparation.noise.from_repeats,
+            deciding=self.deciding,
+            refuted=self.refuted,
+            predictable=lambda: any(w.share >= _TENTH for w in _places(self)),
+        )
+
+    @cached_property
+    def refitted(self) -> tuple[Step, ...]:
+        """Effects of the profile whose file values predict worse than fitted ones."""
+        final = self.final
+        spread = spread_of(final.regression, final.fit, final.noise, final.regression.blocks)
+        file = own_effects(self.preparation.of_file)
+        steps = refitted_steps(self.engine, self.result, file, self.in_noise, spread)
+        return tuple(map(plain_step, steps)) if file.terms else ()
 
     @property
     def geometry_is_free(self) -> bool:
@@ -126,10 +217,12 @@ class RobotSelection:
 
     @cached_property
     def initial_model(self) -> FittedModel:
-        """The profile's own effects fitted, with the geometry of the file."""
+        """The profile's own effects at their file values, with the geometry of the file."""
         start = self.file_engine.initial_model
         for index in reversed(self.preparation.found):
             start = start.without(index)
+        for index, term in enumerate(self.preparation.of_file):
+            start = start.with_term_at(index, held(term))
         first, noise = self.file_engine.fit_with_noise(start)
         return FittedModel(
             self.file_engine.regression, first, noise, self.file_engine.regression.groups
@@ -138,10 +231,8 @@ class RobotSelection:
     @cached_property
     def final(self) -> FittedModel:
         """The model with all named effects."""
-        reported, engine = self.judgement.reported, self.engine
-        return FittedModel(
-            engine.regression, reported.final, reported.noise, engine.regression.groups
-        )
+        result, engine = self.result, self.engine
+        return FittedModel(engine.regression, result.final, result.noise, engine.regression.groups)
 
     @cached_property
     def errors(self) -> tuple[Errors, Errors]:
@@ -176,47 +267,77 @@ def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     geometry
         How the geometry was taken: ``file`` or ``refitted``.
     """
-    engine, judgement, preparation = selection.engine, selection.judgement, selection.preparation
-    reported, verdict = judgement.reported, judgement.verdict
-    added = range(engine.n_initial_terms, len(reported.final.hypothesis.terms))
-    sets = [equivalence_set(engine, reported.final, reported.noise, index) for index in added]
-    steps = tuple(map(plain_step, steps_of(engine, reported, sets))) if sets else ()
-    outputs = output_fits_of(selection.initial_model, selection.final, preparation.noise)
-    if selection.geometry_is_free and verdict in ("adequate", "explained"):
-        verdict = "explained"
-        steps = (_geometry_step(engine, reported, outputs["cable_length"]), *steps)
-    if preparation.found:
-        verdict = "explained" if verdict == "adequate" else verdict
-        steps = (*_registered_steps(selection, outputs), *steps)
+    engine, preparation = selection.engine, selection.preparation
+    added = range(engine.n_initial_terms, len(selection.result.final.hypothesis.terms))
+    final, noise = selection.result.final, selection.result.noise
+    sets = [equivalence_set(engine, final, noise, index) for index in added]
+    final, sets = with_first_members(engine, final, noise, sets)
+    selection = replace(selection, result=replace(selection.result, final=final))
+    result, outputs, verdict = selection.result, selection.outputs, selection.verdict
+    steps = (
+        *selection.refitted,
+        *_registered_steps(selection),
+        *_geometry_steps(selection),
+        *_steps(selection, sets),
+    )
+    repeat = [NextRun((), _REPEAT)] if verdict == "undecided" else []
     diagnosis = RobotDiagnosis(
         verdict=verdict,
         outputs=outputs,
         steps=steps,
-        candidates=candidates_of(engine, selection.result),
+        candidates=candidates_of(engine, result),
         detectable=detectable(
-            selection.result.scores,
-            DetectionThreshold(engine.penalty_per_parameter, selection.result.threshold),
+            result.scores, DetectionThreshold(engine.penalty_per_parameter, result.threshold)
         ),
-        unexplained_share=judgement.share,
-        where=_places(selection) if selection.result.lack_of_fit else (),
-        next_runs=next_pose_runs(engine.regression, reported.final.hypothesis, pairs_of(sets)),
+        unexplained_share=selection.remaining,
+        where=_places(selection) if verdict != "adequate" else (),
+        next_runs=(
+            *repeat,
+            *next_pose_runs(engine.regression, final.hypothesis, pairs_of(sets)),
+        ),
         notes=(
             *preparation.dataset.notes,
             *missing_pose_excitation(preparation),
-            *judgement.notes,
-            *_datum_notes(steps),
+            *datum_notes({effect for step in steps for effect in step.effects}),
         ),
         geometry=geometry,
         fit=fit_statistics(
             engine.regression,
-            reported.initial_model,
-            reported.final,
-            reported.noise,
-            spread_of(engine.regression, reported.final, reported.noise, engine.regression.blocks),
+            result.initial_model,
+            result.final,
+            result.noise,
+            spread_of(engine.regression, result.final, result.noise, engine.regression.blocks),
         ),
         traces=_traces(selection, named=bool(steps)),
     )
     return RobotAnswer(selection, sets, diagnosis)
+
+
+def _steps(selection: RobotSelection, sets: Sequence[EquivalenceSet]) -> Iterator[Step]:
+    """Every addition with its share and doubts."""
+    engine, result = selection.engine, selection.result
+    steps = steps_of(engine, result, sets) if sets else ()
+    for index, step in enumerate(map(plain_step, steps), start=engine.n_initial_terms):
+        yield _with_standing(selection, step, index)
+
+
+def _with_standing(selection: RobotSelection, step: Step, index: int) -> Step:
+    """A step with its share and doubts; no free curve is compared with its law."""
+    engine, result = selection.engine, selection.result
+    final, noise = result.final, result.noise
+    without = engine.refit(final.hypothesis.without(index), noise)
+    acts = final.hypothesis.terms[index].effect.outputs
+    standing = _standing(selection, replace(selection.final, fit=without), acts)
+    return with_standing(engine, result, step, index=index, standing=standing)
+
+
+def _standing(selection: RobotSelection, without: FittedModel, acts: Sequence[str]) -> Standing:
+    """What the model without a step says of it; ``acts`` are the outputs of the step."""
+    # The tensions of a hanging platform are among the equations of its lengths.
+    own = [name for name in acts if name in selection.in_noise] or list(selection.in_noise)
+    standing = standing_of(errors_in_noise(without), selection.in_noise, own)
+    trusted = bool(selection.deciding.intersection(own)) and not selection.refuted
+    return replace(standing, certain=standing.certain and trusted)
 
 
 def _traces(selection: RobotSelection, *, named: bool) -> tuple[PoseTrace, ...]:
@@ -226,38 +347,24 @@ def _traces(selection: RobotSelection, *, named: bool) -> tuple[PoseTrace, ...]:
     return pose_traces(names, UNITS, *((after, before) if named else (before,)))
 
 
-_SAME_AS = {
-    "tracker-frame": "all exit points and the home pose moved together the other way",
-    "reflector-offset": "all anchor points and the home pose moved together the other way",
-}
-
-
-def _datum_notes(steps: Sequence[Step]) -> list[str]:
-    """The datum by which a named frame or offset is no effect of the robot, in words."""
-    named = {effect for step in steps for effect in step.effects}
-    return [
-        f"{effect}: datum is the robot's home pose with its points; {same} are the same to all "
-        "measurements. Fixed points of the frame or the platform, measured with the tracker, "
-        "distinguish the two"
-        for effect, same in _SAME_AS.items()
-        if effect in named
-    ]
-
-
-def _registered_steps(
-    selection: RobotSelection, outputs: Mapping[str, OutputFit]
-) -> tuple[Step, ...]:
+def _registered_steps(selection: RobotSelection) -> Iterator[Step]:
     """Effects of the tracker that were registered before the selection, as additions."""
-    engine, reported = selection.engine, selection.judgement.reported
-    spread = spread_of(engine.regression, reported.final, reported.noise, engine.regression.blocks)
-    own = estimates(engine.regression, reported.final, spread)
+    final, found = selection.final, selection.preparation.found
+    spread = spread_of(final.regression, final.fit, final.noise, final.regression.blocks)
+    own = estimates(final.regression, final.fit, spread)
+    gain = _gain(selection.outputs)
+    for index in found:
+        term, values = own[index]
+        place = tuple(Place(*at) for at in term.effect.place)
+        step = Step((term.effect.id,), {term.effect.id: values}, gain, place=place)
+        yield _with_standing(selection, step, index)
+
+
+def _gain(outputs: Mapping[str, OutputFit]) -> float:
+    """Relative decrease of the held-out mean square of positions, or else of lengths."""
     output = outputs.get("platform_position", outputs["cable_length"])
     before, after = output.heldout_rms_before, output.heldout_rms_after
-    gain = 1 - (after / before) ** 2 if before else 0.0
-    return tuple(
-        Step((term.effect.id,), {term.effect.id: values}, gain)
-        for term, values in (own[index] for index in selection.preparation.found)
-    )
+    return 1 - (after / before) ** 2 if before else 0.0
 
 
 def _places(selection: RobotSelection) -> tuple[Attribution, ...]:
@@ -266,28 +373,50 @@ def _places(selection: RobotSelection) -> tuple[Attribution, ...]:
     return tuple(sorted(places, key=lambda w: -w.share)[:MOST_PLACES])
 
 
-def _geometry_step(engine: PoseSelection, reported: SelectionResult, output: OutputFit) -> Step:
-    """The whole geometry as one addition."""
-    regression = engine.regression
+def _geometry_steps(selection: RobotSelection) -> Iterator[Step]:
+    """The whole geometry as one addition, where it was fitted: its law is always open."""
+    if not selection.geometry_is_free:
+        return
+    final, regression = selection.final, selection.engine.regression
     geometry = regression.point.geometry
-    std = spread_of(regression, reported.final, reported.noise, engine.regression.blocks).std
+    std = spread_of(regression, final.fit, final.noise, regression.blocks).std
     first = regression.nuisance_columns.shape[1] - len(geometry)
     values: dict[str, dict[str, Estimate]] = {}
     for index, item in enumerate(geometry):
-        by = reported.final.vector[first + index]
+        by = final.fit.vector[first + index]
         unit = item.term.effect.parameter(item.parameter).unit
         values.setdefault(item.term.effect.id, {})[item.parameter] = Estimate(
             item.value + float(by) * item.std, float(std[first + index]) * item.std, unit
         )
-    before, after = output.heldout_rms_before, output.heldout_rms_after
-    gain = 1 - (after / before) ** 2 if before else 0.0
     present = {name.partition("/")[0] for name in values}
-    return Step(tuple(name for name in GEOMETRY if name in present), values, gain, whole=True)
+    effects = tuple(name for name in GEOMETRY if name in present)
+    of_file = selection.file_engine.regression
+    beside = replace(final.fit.hypothesis, nuisances=())
+    refitted = fit(of_file, beside, final.noise.inverse_sigma(of_file))
+    without = replace(final, regression=of_file, fit=refitted, folds=of_file.groups)
+    standing = _standing(selection, without, tuple(selection.in_noise))
+    yield Step(
+        effects,
+        values,
+        _gain(selection.outputs),
+        whole=True,
+        place=tuple(Place("frame", output, None) for output in selection.in_noise),
+        law="open",
+        share=standing.share,
+        doubts=(Doubt("whole", f"{len(geometry)} {_WHOLE}"),),
+    )
 
 
-_GEOMETRY_LEVEL = 1e-3
 _SINGLE_EFFECT_SHARE = 0.4
+"""Share of the geometry's explained χ² below which no single effect replaces it; rule of thumb."""
 _FEW_EFFECTS = 4
+"""Effects in turn beside which the whole geometry is tested before the search; rule of thumb: more
+than a search names beside a right geometry."""
+_EXPLAINING = ("adequate", "explained", "partly")
+"""Verdicts with which a free geometry is reported: its many numbers lower any error a little."""
+_TENTH = 0.1
+"""Share of the excess that a free geometry must explain beyond the effects found without it, and
+share of a residual that a variable must explain for it to be no noise: the tenth of the verdict."""
 
 
 def diagnose_robot(
@@ -326,23 +455,27 @@ def diagnose_robot(
     progress("searching", 0.4)
     if calibrated_on(profile, runs):
         engine = preparation.free_geometry()
-        return _concluded(preparation, engine, engine)
+        return answer_of(RobotSelection.of(preparation, engine, engine), "refitted")
     file_engine = preparation.file_geometry()
+    free: RobotSelection | None = None
     if _geometry_explains_far_more(preparation, file_engine):
-        return _concluded(preparation, preparation.free_geometry(), file_engine)
-    result = stepwise_selection(file_engine)
-    if added := result.final.hypothesis.terms[file_engine.n_initial_terms :]:
+        free = RobotSelection.of(preparation, preparation.free_geometry(), file_engine)
+        if free.verdict in _EXPLAINING:
+            return answer_of(free, "refitted")
+    found = RobotSelection.of(preparation, file_engine, file_engine)
+    if found.n_added:
         # Poses estimated from inconsistent cable lengths are tilted, which unbalances tensions.
+        added = found.result.final.hypothesis.terms[file_engine.n_initial_terms :]
         file_engine = preparation.file_geometry(_inconsistent(added))
-        result = stepwise_selection(file_engine)
-    judgement = judge(file_engine, result)
-    if judgement.verdict in ("adequate", "explained") and not _geometry_is_off(
-        preparation, file_engine, result
+        found = RobotSelection.of(preparation, file_engine, file_engine)
+    if found.verdict in ("adequate", "explained") and not preparation.geometry_is_significant(
+        preparation.gain_of_geometry(file_engine, found.result.final.hypothesis, found.result.noise)
     ):
-        return answer_of(
-            RobotSelection(preparation, file_engine, file_engine, result, judgement), "file"
-        )
-    return _concluded(preparation, preparation.free_geometry(), file_engine)
+        return answer_of(found, "file")
+    free = free or RobotSelection.of(preparation, preparation.free_geometry(), file_engine)
+    if free.verdict in _EXPLAINING and found.remaining - free.remaining > _TENTH:
+        return answer_of(free, "refitted")
+    return answer_of(found, "file")
 
 
 def _inconsistent(added: Sequence[Term]) -> tuple[Term, ...]:
@@ -357,72 +490,14 @@ def _geometry_explains_far_more(preparation: Preparation, file_engine: PoseSelec
     of it beside the few that explain most in turn."""
     present, noise = file_engine.fit_with_noise(file_engine.initial_model)
     for _ in range(_FEW_EFFECTS):
-        gain = _gain_of_geometry(preparation, file_engine, present.hypothesis, noise)
-        if not _is_significant(preparation, gain):
+        gain = preparation.gain_of_geometry(file_engine, present.hypothesis, noise)
+        if not preparation.geometry_is_significant(gain):
             return False
         scores = file_engine.scores(present, noise)
         best = max(scores, key=lambda s: s.explained_ss, default=None)
         if best is None or best.explained_ss < _SINGLE_EFFECT_SHARE * gain:
             return True
         present = file_engine.trial(present, best, noise).fit
-    return _is_significant(
-        preparation, _gain_of_geometry(preparation, file_engine, present.hypothesis, noise)
+    return preparation.geometry_is_significant(
+        preparation.gain_of_geometry(file_engine, present.hypothesis, noise)
     )
-
-
-def _gain_of_geometry(
-    preparation: Preparation, file_engine: PoseSelection, model: Hypothesis, noise: Noise
-) -> float:
-    """Decrease of χ² by a free geometry, beyond its calibration's uncertainty."""
-    point = file_engine.regression.point
-    free = regression_at(replace(point, geometry=_from(preparation.prior, point.geometry)))
-    hypothesis = replace(model, nuisances=())
-    chi_square = [
-        fit(regression, hypothesis, noise.inverse_sigma(regression)).chi_square
-        for regression in (file_engine.regression, free)
-    ]
-    return chi_square[0] - chi_square[1]
-
-
-def _concluded(
-    preparation: Preparation, engine: PoseSelection, file_engine: PoseSelection
-) -> RobotAnswer:
-    """Answer with the geometry free."""
-    result = stepwise_selection(engine)
-    return answer_of(
-        RobotSelection(preparation, engine, file_engine, result, judge(engine, result)), "refitted"
-    )
-
-
-def _geometry_is_off(
-    preparation: Preparation, file_engine: PoseSelection, result: SelectionResult
-) -> bool:
-    """Whether the whole geometry explains a significant part of the remaining residual."""
-    return _is_significant(
-        preparation,
-        _gain_of_geometry(preparation, file_engine, result.final.hypothesis, result.noise),
-    )
-
-
-def _is_significant(preparation: Preparation, gain: float) -> bool:
-    """F test of the decrease of χ² by the geometry.
-
-    F = (Δχ²/k)/1 with k numbers of the geometry and the degrees of freedom of the noise; level 0.1
-    %.
-    """
-    count = len(preparation.prior)
-    dof = preparation.noise.dof.get("cable_length", 1.0)
-    level = float(fdtri(count, max(dof, 1.0), 1 - _GEOMETRY_LEVEL))
-    return gain / count > level
-
-
-def _from(
-    prior: Sequence[GeometryPrior], now: Sequence[GeometryPrior]
-) -> tuple[GeometryPrior, ...]:
-    """Priors with their mean at the present values."""
-    there = {(b.term.effect.id, b.parameter): b.value for b in now}
-    out = []
-    for item in prior:
-        value = there.get((item.term.effect.id, item.parameter), 0.0)
-        out.append(replace(item.moved(value / item.std), at=value))
-    return tuple(out)

@@ -73,6 +73,10 @@ __all__ = ["POSED", "Equations", "continuous", "start_pose"]
 POSED = ("closure", "position", "rotation", "swivel", "gauge", "statics")
 """Kinds that depend on the pose, in their order."""
 _NEWTON_STEPS, _FORCE_STEP, _LEAST_SLOPE, _FORCE_TOLERANCE = 8, 1e-4, 0.05, 1e-9
+"""_NEWTON_STEPS: Newton steps from a cell's reading to a force; numerical. _FORCE_STEP: Step of a
+derivative by the force, over the largest force; numerical. _LEAST_SLOPE: Smallest slope of a cell
+that is divided by; numerical. _FORCE_TOLERANCE: Relative tolerance at which an inverted length is
+taken as found; numerical."""
 
 
 @dataclass(frozen=True)

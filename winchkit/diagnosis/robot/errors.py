@@ -10,13 +10,14 @@ whitened wrench that measured cable forces and the weight leave over.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
+from winchkit.diagnosis.regression.cross_validation import held_out_rms as held_out_rows
 from winchkit.diagnosis.regression.cross_validation import left_out_steps
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
@@ -33,10 +34,14 @@ __all__ = [
     "Errors",
     "FittedModel",
     "column_names",
+    "errors_in_noise",
     "errors_of",
     "held_out_rms",
+    "least_noise",
     "noise_rms",
+    "output_fits_in_noise",
     "output_fits_of",
+    "refuted_outputs",
     "rms",
     "signal_rms",
 ]
@@ -44,6 +49,8 @@ __all__ = [
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
 _LEAST_SINGULAR_VALUE = 1e-9
+"""Singular values of a hanging pose's derivatives below this share of the largest are zero;
+numerical."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +177,7 @@ def output_fits_of(
         errors_of(s.regression, s.regression.at(s.fit.hypothesis)) for s in (begin, final)
     )
     held_before, held_after = held_out_rms(begin), held_out_rms(final)
-    least = noise_rms(final.regression, noise)
+    least = noise_rms(final.regression, replace(noise, sigma=noise.least))
     signal = signal_rms(final.regression)
     source = "repeats" if noise.from_repeats else "saturated fit"
     return {
@@ -184,10 +191,68 @@ def output_fits_of(
             heldout_rms_after=held_after[name],
             noise_rms=least[name],
             noise_source=source,
+            noise_upper=None if noise.from_repeats else max(rms(name, after[name]), least[name]),
         )
         for name in after
         if name in before
     }
+
+
+def errors_in_noise(model: FittedModel) -> dict[str, float]:
+    """Held-out rms of the whitened equations by output, in standard deviations of white noise.
+
+    Every measured coordinate has the weight of its variance component: in an error in metres the
+    least accurate angle hides what a tracker sees.
+    """
+    return held_out_rows(model.regression, model.fit, model.noise, model.folds)
+
+
+def least_noise(model: FittedModel, noise: PoseNoise) -> dict[str, float]:
+    """Noise by output that decides on a model, in the unit of :func:`errors_in_noise`.
+
+    Two standard errors above that of the repeats, which a few poses determine to some 10 %. Without
+    repeats what is beyond the noise of usual instruments may be an effect, and does not count.
+    """
+    regression, beyond = model.regression, model.noise.uncertainty(model.regression)
+    here, out = regression.residuals(()), {}
+    for output, size in model.noise.rms.items():
+        kinds = ["tension"] if output == "tension" else [k for k in POSED if k in noise.unexplained]
+        shares = [(noise.least[kind] / noise.sigma[kind]) ** 2 for kind in kinds]
+        share = np.average(shares, weights=[here[kind].shape[1] for kind in kinds])
+        out[output] = size * float(np.sqrt(share * (1 + beyond[output])))
+    return out
+
+
+def output_fits_in_noise(
+    begin: FittedModel, final: FittedModel, noise: PoseNoise
+) -> dict[str, OutputFit]:
+    """Errors of every kind of equation before and after, in standard deviations of their noise."""
+    before, after, least = errors_in_noise(begin), errors_in_noise(final), least_noise(final, noise)
+    return {
+        output: OutputFit(
+            unit="1",
+            band=None,
+            signal_rms=float("nan"),
+            rms_before=before[output],
+            rms_after=after[output],
+            heldout_rms_before=before[output],
+            heldout_rms_after=after[output],
+            noise_rms=least[output],
+        )
+        for output in after
+    }
+
+
+def refuted_outputs(model: FittedModel) -> set[str]:
+    """Outputs that their mean over the poses predicts better, beyond the standard error."""
+    signals, out = _signals(model.regression), set()
+    for name, error in _held_out(model).items():
+        signal = signals[name]
+        deviation = signal - np.nanmean(signal, axis=0) if np.isfinite(signal).any() else signal
+        loss = np.nansum(error**2, axis=1) - np.nansum(deviation**2, axis=1)
+        if np.sum(loss) > np.sqrt(len(loss)) * np.std(loss):
+            out.add(name)
+    return out
 
 
 def rms(name: str, error: Array) -> float:
@@ -200,6 +265,16 @@ def rms(name: str, error: Array) -> float:
 
 def signal_rms(regression: PoseRegression) -> dict[str, float]:
     """Rms of each output about its mean, SI."""
+    out = {}
+    for name, array in _signals(regression).items():
+        known = np.isfinite(array).all(axis=1)
+        centred = array[known] - array[known].mean(axis=0) if known.any() else array[known]
+        out[name] = rms(name, centred) if known.any() else float("nan")
+    return out
+
+
+def _signals(regression: PoseRegression) -> Errors:
+    """Measured values of every output, (p, k), SI; lengths by the drums."""
     measured = regression.dataset.measured
     length = regression.equations.residuals(regression.robot)[
         "closure"
@@ -208,17 +283,11 @@ def signal_rms(regression: PoseRegression) -> dict[str, float]:
         regression.equations.forces(regression.robot),
         regression.equations.temperature,
     )
-    values = {
+    return {
         "cable_length": length,
         "platform_position": measured.position,
         "tension": measured.tension,
     }
-    out = {}
-    for name, array in values.items():
-        known = np.isfinite(array).all(axis=1)
-        centred = array[known] - array[known].mean(axis=0) if known.any() else array[known]
-        out[name] = rms(name, centred) if known.any() else float("nan")
-    return out
 
 
 def held_out_rms(model: FittedModel) -> dict[str, float]:

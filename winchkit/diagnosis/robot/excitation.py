@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 __all__ = ["missing_pose_excitation"]
 
 _LEAST_ROTATION = np.radians(1.0)
+"""Rotation of the platform below which a note says that it never turned, rad; rule of thumb."""
 _LEAST_POSES = 40
+"""Distinct poses below which a note asks for more; rule of thumb."""
 
 
 def missing_pose_excitation(preparation: Preparation) -> list[str]:

@@ -53,11 +53,21 @@ __all__ = [
 ]
 
 _CANDIDATES = 60
+"""Random poses per kind; theory: the best of 59 is among the best 5 % with a probability of 95 %, 1
+− 0.95⁵⁹."""
 _SEED = 20
+"""Seed of the random poses; arbitrary."""
 _WIDTH_RATIO, _SHARE_OF_FRAME = 2.0, 0.85
+"""_WIDTH_RATIO: Width of "farther out" over the poses so far; rule of thumb. _SHARE_OF_FRAME: Share
+of the frame that poses stay inside of; rule of thumb."""
 _LEAST_ROTATION, _ROTATION_RATIO = np.radians(12.0), 2.0
+"""_LEAST_ROTATION: Least rotation of "turned more", rad; rule of thumb. _ROTATION_RATIO: Rotation
+of "turned more" over the poses so far; rule of thumb."""
 _LEAST_HALF_WIDTH = 0.02
+"""Least half width of "farther out", m; rule of thumb."""
 _FORCE_RATIO, _TEMPERATURE_STEP = 2.0, 15.0
+"""_FORCE_RATIO: Ratio of tensions to those so far, and its inverse; rule of thumb.
+_TEMPERATURE_STEP: Temperature difference of "warmth", K; rule of thumb."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +203,9 @@ Question = tuple[Term, Term | None]
 POSES = 12
 """Poses per offer."""
 _HIGH_POWER = 0.9
+"""Power from which one kind of poses is enough; convention."""
 _OFFERED = 2
+"""Kinds of poses that are offered per pair; rule of thumb."""
 _SUFFICIENT_MARGIN = 3.04
 """Standard deviations above the threshold beyond which more information is not counted: a power of
 99.9 %."""

@@ -12,9 +12,12 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from scipy.special import fdtri
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.robot.adjustment import adjusted
 from winchkit.diagnosis.robot.candidates import BALANCING, candidates_at, priors_of_geometry
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
@@ -51,6 +54,8 @@ __all__ = [
 ]
 
 _MOST_IMBALANCE = 0.2
+"""Unexplained imbalance over the standard deviation of tensions above which the balance is left
+out; rule of thumb."""
 
 
 def own_effects(terms: Sequence[Term]) -> Hypothesis:
@@ -171,7 +176,22 @@ def _columns(
     return {k: np.nan_to_num(np.stack(v, axis=-1)) for k, v in out.items()}
 
 
+def _from(
+    prior: Sequence[GeometryPrior], now: Sequence[GeometryPrior]
+) -> tuple[GeometryPrior, ...]:
+    """Priors with their mean at the present values."""
+    there = {(b.term.effect.id, b.parameter): b.value for b in now}
+    out = []
+    for item in prior:
+        value = there.get((item.term.effect.id, item.parameter), 0.0)
+        out.append(replace(item.moved(value / item.std), at=value))
+    return tuple(out)
+
+
 _SHORT_LIST = 3
+"""Candidates that are fitted beside a free geometry; computing cost, rule of thumb."""
+_GEOMETRY_LEVEL = 1e-3
+"""Level of the F test of a free geometry: screened."""
 
 
 @dataclass(frozen=True)
@@ -205,18 +225,20 @@ class Preparation:
     registration: Registration | None = None
 
     @cached_property
+    def of_file(self) -> tuple[Term, ...]:
+        """The profile's own effects at their file values."""
+        return tuple(robot_terms(self.dataset.robot, self.catalogue, moving=self.dataset.moves))
+
+    @cached_property
     def own(self) -> tuple[Term, ...]:
         """The profile's own effects at their file values, and those of the registration."""
-        terms = self.registration.terms if self.registration else ()
-        own = robot_terms(self.dataset.robot, self.catalogue, moving=self.dataset.moves)
-        return (*own, *terms)
+        return (*self.of_file, *(self.registration.terms if self.registration else ()))
 
     @property
     def found(self) -> range:
         """Indices of the effects that the registration found, in the initial model."""
         count = len(self.registration.found) if self.registration else 0
-        first = len(self.own) - (len(self.registration.terms) if self.registration else 0)
-        return range(first, first + count)
+        return range(len(self.of_file), len(self.of_file) + count)
 
     def engine(
         self, geometry: Sequence[GeometryPrior], beside: tuple[Term, ...] = ()
@@ -238,6 +260,36 @@ class Preparation:
     def free_geometry(self) -> PoseSelection:
         """Selection engine with the geometry free, under the priors of a calibration."""
         return self.engine(self.prior, self.guess)
+
+    def gain_of_geometry(self, engine: PoseSelection, model: Hypothesis, noise: Noise) -> float:
+        """Decrease of χ² by a free geometry, beyond its calibration's uncertainty.
+
+        Parameters
+        ----------
+        engine
+            Engine with the geometry of the file.
+        model
+            Effects beside which it is fitted.
+        noise
+            Noise beside them.
+        """
+        point = engine.regression.point
+        free = regression_at(replace(point, geometry=_from(self.prior, point.geometry)))
+        hypothesis = replace(model, nuisances=())
+        chi_square = [
+            fit(regression, hypothesis, noise.inverse_sigma(regression)).chi_square
+            for regression in (engine.regression, free)
+        ]
+        return chi_square[0] - chi_square[1]
+
+    def geometry_is_significant(self, gain: float) -> bool:
+        """F test of the decrease of χ² by the geometry.
+
+        F = (Δχ²/k)/1 with k numbers of the geometry and the degrees of freedom of the noise; level
+        0.1 %.
+        """
+        count, dof = len(self.prior), self.noise.dof.get("cable_length", 1.0)
+        return gain / count > float(fdtri(count, max(dof, 1.0), 1 - _GEOMETRY_LEVEL))
 
     def with_guess(self) -> Preparation:
         """The same with the effect that explains most beside a free geometry, and its noise.

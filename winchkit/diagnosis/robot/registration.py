@@ -10,6 +10,7 @@ that the robot's file declares unknown start in the same way, and are not report
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +32,7 @@ from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.model.robot.rotation import rotation_by, rotation_vector
 from winchkit.schema.profiles.instruments import ImuSpec
 
-__all__ = ["Registration", "registration_of"]
+__all__ = ["Registration", "datum_notes", "registration_of"]
 
 _GROSS = 10e-3
 """Rms position error above which readings are registered first, m: with cables of 0.5 m the second
@@ -44,6 +45,10 @@ _FITS_BETTER = 2.0
 """Ratio of the mean squared rotation errors above which angles are not in the tracker's frame."""
 _EFFECTS = {"frame": "tracker-frame", "reflector": "reflector-offset"}
 _DELAY = "tracker-delay"
+_SAME_AS = {
+    "tracker-frame": "all exit points and the home pose moved together the other way",
+    "reflector-offset": "all anchor points and the home pose moved together the other way",
+}
 _SUBSETS: tuple[frozenset[str], ...] = (
     frozenset({"frame"}),
     frozenset({"reflector"}),
@@ -142,6 +147,17 @@ def registration_of(
             *((Term(delay, delay.null),) if late else ()),
         ),
     )
+
+
+def datum_notes(effects: Container[str]) -> list[str]:
+    """The datum by which a named frame or offset is no effect of the robot, in words."""
+    return [
+        f"{effect}: datum is the robot's home pose with its points; {same} are the same to all "
+        "measurements. Fixed points of the frame or the platform, measured with the tracker, "
+        "distinguish the two"
+        for effect, same in _SAME_AS.items()
+        if effect in effects
+    ]
 
 
 def _may_move(name: str, own: set[str]) -> bool:

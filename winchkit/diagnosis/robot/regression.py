@@ -38,8 +38,11 @@ __all__ = ["COPIES", "LinearizationPoint", "PoseRegression"]
 COPIES = 5
 """Rows per number with a prior, distributed over the folds."""
 _GROUPS = 5
+"""Folds of poses; convention: five-fold cross-validation."""
 _BLOCKS = 24
+"""Blocks of poses for the rank test; rule of thumb."""
 _LEAST_SINGULAR_VALUE = 1e-9
+"""Singular values of a pose's derivatives below this share of the largest are zero; numerical."""
 
 
 @dataclass(frozen=True)

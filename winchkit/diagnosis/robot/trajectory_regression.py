@@ -27,7 +27,9 @@ from winchkit.diagnosis.robot.regression import COPIES, LinearizationPoint, Pose
 __all__ = ["TrajectoryRegression", "regression_at"]
 
 _BLOCKS = 24
+"""Blocks of time for the rank test and the jackknife; as for poses."""
 _GROUPS = 5
+"""Stretches of time that are held out; convention: five-fold cross-validation."""
 
 
 class TrajectoryRegression(PoseRegression):

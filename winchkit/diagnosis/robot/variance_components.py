@@ -34,9 +34,11 @@ START: Mapping[str, float] = {
 _LEAST = 1e-3
 """Lower limit of a standard deviation over its start."""
 _ROUNDS = 12
+"""Iterations at most; numerical."""
 _SETTLED = 0.01
 """Relative change of a standard deviation at which the iteration ends."""
 _LEAST_REDUNDANCY = 8.0
+"""Redundancy from which a kind's standard deviation is estimated; rule of thumb."""
 _REPEATS_LEAST = 24.0
 """Degrees of freedom of repeats from which on they are used (rule of thumb)."""
 _ROWS_EACH = 2
@@ -53,6 +55,13 @@ class PoseNoise:
     from_repeats: bool
     unexplained: Mapping[str, float]
     """Standard deviations of the saturated model by kind, SI."""
+
+    @property
+    def least(self) -> dict[str, float]:
+        """Standard deviations that instruments surely have: without repeats those of usual ones."""
+        if self.from_repeats:
+            return dict(self.sigma)
+        return {kind: min(own, START[kind]) for kind, own in self.sigma.items()}
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,6 @@ __all__ = [
     "Fitted",
     "best_accepted",
     "is_accepted",
-    "is_relevant",
     "predicts_better",
 ]
 
@@ -34,9 +33,11 @@ Fitted = tuple[SelectionEngine, Fit, Noise]
 """A fit with its noise and the engine that they are of."""
 
 _LEVEL = 0.02
+"""Level of the signed-rank test; convention."""
 MIN_GAIN = 2.0
 """Minimum decrease of the criterion for a change of the model."""
 _NO_WORSE = 1.02
+"""Ratio of held-out errors that no output may reach; screened."""
 RELEVANT_RATIO = 0.98
 """Ratio of held-out errors after and before, below which an addition is relevant."""
 
@@ -108,13 +109,6 @@ def _added(present: Fit, larger: Fit) -> int:
         for fitted in (larger, present)
     )
     return max(1, after - before)
-
-
-def is_relevant(engine: SelectionEngine, smaller: Fit, larger: Fit, noise: Noise) -> bool:
-    """Whether a larger model decreases some held-out error by 2 %, in the folds of acceptance."""
-    folds = engine.folds(larger, noise)
-    ratios = _error_ratios((engine, larger, noise), (engine, smaller, noise), folds)
-    return min(ratios) < RELEVANT_RATIO
 
 
 def predicts_better(new: Fitted, old: Fitted) -> bool:

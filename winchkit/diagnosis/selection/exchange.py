@@ -95,7 +95,9 @@ class Exchange:
 
 
 _MOST_TRIALS = 2
+"""Pairs that are fitted in an exchange; computing cost, rule of thumb."""
 _MOST_ADDITIONS = 3
+"""Additions beyond which no exchange is tried; computing cost, rule of thumb."""
 
 
 def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:

@@ -37,11 +37,20 @@ from winchkit.effects.term import Term
 __all__ = ["Periodogram", "further_orders", "has_orders", "periodogram"]
 
 _LEVEL = 0.01
+"""Probability that the largest power of all scanned orders exceeds the threshold by chance;
+convention, as the score's."""
 _MOST_IN_SERIES = 24
+"""Orders that one series may gain in one step; computing cost; later steps add further ones."""
 _LEAST_WITHIN = 0.1
+"""Share of a column's squared length within the band of the comparison, below which an order is not
+scanned; leakage from beyond the band is no longer small against it."""
 _LEAST_PERIODS = 3.0
+"""Periods within the longest motion from which an order is scanned, where it is less than a turn;
+of fewer a smooth curve, such as gravity and a spring together, is a sine."""
 _RATES = 200
+"""Classes of motor speed for the noise at the local frequency; finer than the noise bands."""
 _TURN = 2 * np.pi
+"""One turn, rad; definition."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,9 @@ from winchkit.diagnosis.selection.scores import Projected, Score
 __all__ = ["Pair", "screened_pairs"]
 
 _SUPPRESSION_RATIO = 1.5
+"""Joint over summed single explained χ² from which a pair counts as mutually masking; screened."""
 _UNIDENTIFIABLE = 1e-5
+"""Squared length left of a unit column below which a direction is not identifiable; numerical."""
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,8 @@ def shape_at_bound(term: Term) -> bool:
     coordinates = Coordinates(effect)
     at = coordinates.vector(term.values)
     low, high = coordinates.bounds()
-    shapes = slice(len(coordinates.amplitudes), None)
+    first = len(coordinates.amplitudes)
+    shapes = slice(first, first + len(coordinates.shapes))
     ends = (at <= low + 1e-6) | (at >= high - 1e-6)
     return bool(np.any(ends[shapes]))
 

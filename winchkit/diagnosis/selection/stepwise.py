@@ -20,7 +20,6 @@ from itertools import dropwhile
 import numpy as np
 
 from winchkit.diagnosis.regression.gls import Fit
-from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.acceptance import MIN_GAIN, best_accepted, is_accepted
@@ -32,21 +31,25 @@ from winchkit.effects.term import Term
 
 __all__ = [
     "SelectionResult",
-    "ended_with",
     "initial_result",
     "stepwise_selection",
-    "with_pair",
-    "without_term",
 ]
 
 _SHORT_LIST = 5
+"""Candidates that are fitted per step; computing cost; measured: the accepted
+candidate was the first by score in 15 of 17 steps, else the second."""
 _RIVALS = 2
+"""Rivals that are fitted in the place of each addition; computing cost, rule of thumb."""
 _RECONSIDERED = 3
+"""Rounds of backward elimination and exchange per step; computing cost, rule of thumb."""
 _EXCHANGED = 2
 """Largest number of additions of which one may be exchanged for a pair."""
 _PAIRS = 3
+"""Pairs that are fitted; computing cost, rule of thumb."""
 _LACK_OF_FIT_LEVEL = 0.02
+"""Level of the lack-of-fit test after Bonferroni; convention."""
 _SCORE_LEVEL = 0.99
+"""Quantile of the simulated null maximum; convention."""
 
 
 @dataclass(frozen=True)
@@ -63,8 +66,6 @@ class SelectionResult:
         Lack-of-fit test of the initial model.
     lack_of_fit_at_start : bool
         Whether the initial model has a lack of fit.
-    last_model : Hypothesis
-        Final model with additions that were dropped because they explain less than the lack of fit.
     final : Fit
         The final model.
     noise : Noise
@@ -85,7 +86,6 @@ class SelectionResult:
     initial_noise: Noise
     initial_lack_of_fit_test: LackOfFitTest
     lack_of_fit_at_start: bool
-    last_model: Hypothesis
     final: Fit
     noise: Noise
     lack_of_fit_test: LackOfFitTest
@@ -112,8 +112,7 @@ def stepwise_selection(
     start = replace(first, lack_of_fit_at_start=lacking, lack_of_fit=lacking)
     known(start)
     initial, scores, threshold = (start.final, start.noise), list(start.scores), start.threshold
-    last_model, noise, tried = _forward_selection(engine, *initial, scores, threshold)
-    final, noise = _without_minor_terms(engine, last_model, noise)
+    final, noise, tried = _forward_selection(engine, *initial, scores, threshold)
     lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
     lack_of_fit_at_start = grew or lacking
@@ -122,7 +121,6 @@ def stepwise_selection(
     return replace(
         start,
         lack_of_fit_at_start=lack_of_fit_at_start,
-        last_model=last_model.hypothesis,
         final=final,
         noise=noise,
         lack_of_fit_test=lack_of_fit_test,
@@ -140,7 +138,6 @@ def initial_result(engine: SelectionEngine) -> SelectionResult:
         initial_noise=initial_noise,
         initial_lack_of_fit_test=lack_of_fit_test,
         lack_of_fit_at_start=True,
-        last_model=initial_model.hypothesis,
         final=initial_model,
         noise=initial_noise,
         lack_of_fit_test=lack_of_fit_test,
@@ -174,6 +171,8 @@ def _forward_selection(
         engine.update_signatures(larger.hypothesis)
         present, noise = engine.fit_with_noise(larger.hypothesis, noise)
         present, noise = _exchange_and_eliminate(engine, present, noise)
+        if engine.on_step(present, noise):
+            break
         scores = engine.scores(present, noise)
     return present, noise, tried
 
@@ -182,37 +181,6 @@ def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
     """Largest score that noise alone exceeds in 1 % of cases."""
     chance = null_maxima(engine.projected(present, noise), engine.regression.n_observations)
     return max(0.0, float(np.quantile(chance, _SCORE_LEVEL)))
-
-
-def without_term(engine: SelectionEngine, result: SelectionResult, index: int) -> SelectionResult:
-    """Result as if the selection had ended without one of its additions."""
-    return ended_with(engine, result, result.final.hypothesis.without(index))
-
-
-def with_pair(engine: SelectionEngine, result: SelectionResult) -> SelectionResult | None:
-    """Result with a pair in place of the only addition; None where none is better."""
-    if len(result.final.hypothesis.terms) != engine.n_initial_terms + 1:
-        return None
-    better = _accepted_pair_exchange(engine, result.final, result.noise, result.initial_model)
-    return None if better is None else ended_with(engine, result, better.hypothesis)
-
-
-def ended_with(
-    engine: SelectionEngine, result: SelectionResult, hypothesis: Hypothesis
-) -> SelectionResult:
-    """Result as if the selection had ended with another hypothesis."""
-    present, noise = engine.fit_with_noise(hypothesis, result.noise)
-    lack_of_fit_test = engine.lack_of_fit_test(present, noise)
-    lack_of_fit = _has_lack_of_fit(
-        lack_of_fit_test, engine.scores(present, noise), result.threshold
-    )
-    return replace(
-        result,
-        final=present,
-        noise=noise,
-        lack_of_fit_test=lack_of_fit_test,
-        lack_of_fit=lack_of_fit,
-    )
 
 
 def _has_lack_of_fit(
@@ -350,21 +318,6 @@ def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
 def _another(item: Score, own: Term) -> bool:
     """Whether a candidate is another effect than a term, or the same at another minimum."""
     return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
-
-
-def _without_minor_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
-    """Model without additions that explain less than the lack of fit."""
-    left = engine.lack_of_fit_test(present, noise)
-    excess = float(np.sum(np.maximum(left.excess_power, 0.0)[left.rejected]))
-    reduced = present
-    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
-        aim = present.chi_square + excess
-        without = engine.refit(present.hypothesis.without(index), noise, aim)
-        if without.chi_square < aim:
-            reduced = engine.refit(reduced.hypothesis.without(index), noise)
-    return (
-        (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
-    )
 
 
 def _backward_elimination(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:

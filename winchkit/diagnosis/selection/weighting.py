@@ -28,6 +28,7 @@ from winchkit.diagnosis.selection.engine import SelectionEngine
 __all__ = ["Reweighted", "reweighted"]
 
 _NO_WORSE = 1.01
+"""Ratio of held-out errors that no output may exceed under equal weights; screened, decision 14."""
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,8 @@ from winchkit.model.line import Line
 __all__ = ["combination_of_set", "combination_of_term"]
 
 _STRONG = 0.9
+"""Correlation above which parameters of an effect are reported as a combination; convention:
+variance inflation factor 1/(1 − ρ²) of 5 (Belsley, Kuh & Welsch 1980)."""
 _WINDING = frozenset({"drum-radius", "gear-ratio"})
 """Effects of which the data determine the cable per motor turn."""
 

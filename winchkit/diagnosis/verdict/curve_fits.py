@@ -10,19 +10,20 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.verdict.spline_alternatives import PLACES, Columns, CurveFamily, curves
+from winchkit.diagnosis.verdict.spline_alternatives import Columns, CurveFamily, curves
 
 __all__ = [
     "BasisProducts",
     "Curve",
     "PartialRegression",
     "basis_products",
-    "explained_by",
     "ranked_curves",
 ]
 
 UNIDENTIFIABLE = 1e-7
+"""Squared length left of a unit column below which a direction is not identifiable; numerical."""
 _LEAST_SQUARED_LENGTH = 1e-300
+"""Squared length below which a curve changes nothing; numerical."""
 
 
 @dataclass(frozen=True)
@@ -147,13 +148,3 @@ def _fitted(
         gain, count, law = max(fitted, key=lambda fit: fit[0] - penalty_per_parameter * fit[1])
         net_gain = gain - penalty_per_parameter * count
         yield Curve(family.place, family.variable, net_gain, gain, law)
-
-
-def explained_by(
-    regression: TimeSeriesRegression, partial: PartialRegression, curve: Curve
-) -> float:
-    """Decrease of χ² by a curve of the same law on another residual, refitted."""
-    place = curve.place, curve.variable
-    (family,) = curves(regression, list(PLACES[curve.place]), {place})
-    basis, products = basis_products(partial, family.columns(regression), len(family.knots))
-    return basis.explained_ss(curve.law, products)

@@ -1,203 +1,232 @@
-"""Decision rule: from the unexplained share to a verdict, and the errors per output."""
+"""Verdict: the excess of every output's error over its noise, and the decision that follows.
+
+One number decides: r, the excess that the final model leaves over that of the profile's file,
+
+    E = Σ max(0, e² − n²)/n²,  r = E after / E before,
+
+summed over the outputs, with the held-out error e and the noise n of an output. The noise is the
+pure error of repeats or that of the instruments. Without either it has two bounds: below the white
+noise (:func:`white_noise`), above the whole residual.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from winchkit.diagnosis.regression.base import Folds, Regression
-from winchkit.diagnosis.regression.cross_validation import held_out_rms
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Folds
+from winchkit.diagnosis.regression.cross_validation import held_out_rms, held_out_samples
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.stop_band_leakage import StopBandLeakage
 from winchkit.diagnosis.results import OutputFit, Verdict
-from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
-from winchkit.diagnosis.selection.stepwise import SelectionResult
-from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.model.stages import OUTPUT_UNITS
 
-__all__ = ["Judgement", "judge", "named", "output_fits", "reweighted_judgement", "withheld"]
+__all__ = [
+    "AT_NOISE",
+    "Measured",
+    "excess",
+    "measured",
+    "output_fits",
+    "remaining_share",
+    "verdict_of",
+    "white_noise",
+]
 
-_UNKNOWN_SHARE = 0.5
-_HELD_OUT_SHARE = 0.15
-_EXPLAINED_SHARE = 0.025
-_EXPLAINED_SHARE_UNCERTAIN = 0.25
-_UNCERTAIN_P_VALUE = 1e-3
-_EXPLAINED_SHARE_NEAR_NOISE = 0.02
-_AT_NOISE = 1.1
-_NEAR_NOISE = 1.25
+AT_NOISE = 1.1
+"""Largest ratio of an error to its noise at which nothing is missing: 20 % of its power."""
+_EXPLAINED, _PARTLY = 0.1, 0.5
+"""Largest share that remains of an explained and of a partly explained excess. Of 127 unseen cases
+the truth leaves at most 0.075, and 0.16 where it is very weak; another effect 0.25 and more."""
+_MEANS = 3.0
+"""Standard errors at the noise, where most models are right: one output in 740 is refuted."""
+_NOISY = 0.1
+"""Noise over the rms of a signal that does not vary by more: instruments in order have 0.03."""
+_STANDS = 3.0
+"""Error of the file's model over the noise from which an output that does not vary is no measured
+one: an effect at the noise can cancel a variation by chance."""
+_LIMIT = 2.0
+"""Standard deviations from the estimate of a white noise to its upper limit, which is taken."""
+_UPPER_ROWS = 0.25
+"""Share of the highest frequencies of an output from which its white noise is taken."""
 
 
-@dataclass(frozen=True)
-class Judgement:
-    """Verdict on the result of a search."""
-
-    verdict: Verdict
-    share: float
-    """Share of the excess over the noise that the final model leaves unexplained."""
-    outputs: Mapping[str, OutputFit]
-    reported: SelectionResult
-    """Result of the search, without the effects that are not named."""
-    notes: tuple[str, ...]
-
-
-def judge(engine: SelectionEngine, result: SelectionResult) -> Judgement:
-    """Verdict on the result of a search.
+def verdict_of(
+    outputs: Mapping[str, OutputFit],
+    *,
+    steps: int,
+    noise_known: bool,
+    deciding: Collection[str],
+    refuted: Collection[str],
+    predictable: Callable[[], bool],
+) -> Verdict:
+    """Verdict by the table of the errors.
 
     Parameters
     ----------
-    engine
-        Data, candidates and folds of the search.
-    result
-        Its result.
+    outputs
+        Errors by output, of the profile's file and of the final model.
+    steps
+        Number of steps of the final model.
+    noise_known
+        Whether the noise is that of repeats or of instruments, and not a lower bound.
+    deciding
+        Outputs that vary by more than their noise.
+    refuted
+        Outputs that the final model predicts worse than each run's own mean does.
+    predictable
+        Whether a free curve or an order predicts a tenth of what remains.
+    """
+    counted = {name: output for name, output in outputs.items() if name in deciding}
+    at_noise = bool(counted) and all(map(is_at_noise, counted.values()))
+    share = remaining_share(counted) if counted else 1.0
+    if refuted:
+        share, at_noise = 1.0, False
+    if not steps and at_noise:
+        return "adequate"
+    if steps and (share <= _EXPLAINED or at_noise):
+        return "explained"
+    if steps and share <= _PARTLY:
+        return "partly"
+    above = not all(map(is_at_noise, outputs.values()))
+    return "unknown" if (noise_known and deciding) or (above and predictable()) else "undecided"
 
-    Returns
-    -------
-    Judgement
-        Effects are named where the verdict is ``explained``, or where repeats show that less than
-        1/40 of the excess is unexplained. Otherwise they are withheld, and a note lists them: an
-        effect outside the catalogue is often imitated by one inside it. See :func:`named`.
+
+def is_at_noise(output: OutputFit) -> bool:
+    return output.noise_rms is not None and output.heldout_rms_after <= AT_NOISE * output.noise_rms
+
+
+def excess(errors: Mapping[str, float], noise: Mapping[str, float | None]) -> float:
+    """Sum over the outputs of the mean square of an error beyond the noise, in units of the noise.
+
+    Outputs whose noise is unknown do not count.
+    """
+    return sum(
+        max(0.0, (error / known) ** 2 - 1.0)
+        for output, error in errors.items()
+        if (known := noise[output])
+    )
+
+
+def remaining_share(outputs: Mapping[str, OutputFit]) -> float:
+    """r of the module, 0 to 1; zero where nothing was above the noise."""
+    noise = {name: output.noise_rms for name, output in outputs.items()}
+    before = excess({name: o.heldout_rms_before for name, o in outputs.items()}, noise)
+    after = excess({name: o.heldout_rms_after for name, o in outputs.items()}, noise)
+    return min(1.0, after / before) if before > 0.0 else 0.0
+
+
+def white_noise(regression: TimeSeriesRegression, residual: Array) -> dict[str, float]:
+    """Rms of the white noise by output, SI: a lower bound of the noise without repeats.
+
+    The density of the highest quarter of the frequencies of a residual (rows,), at least that of
+    the resolution, over all its frequencies.
+    """
+    out = {}
+    for output in regression.outputs:
+        upper = power = floor = passed = count = 0.0
+        for segment in (s for s in regression.segments if s.output == output):
+            share = float(regression.share_of_row[segment.rows.start])
+            gain = np.broadcast_to(segment.band.gain, segment.rows.stop - segment.rows.start)
+            first = len(gain) - max(1, round(_UPPER_ROWS * len(gain)))
+            power += float(np.sum(residual[segment.rows][first:] ** 2))
+            upper += share * float(np.sum(gain[first:] ** 2))
+            count += share * (len(gain) - first)
+            passed += share * float(np.sum(gain**2))
+            bands = regression.band_of_row[segment.rows]
+            floor += share * float(np.sum(regression.power_floor[bands]))
+        # The variance of a mean square of n normal values is 2/n of its square.
+        limit = 1.0 + _LIMIT * np.sqrt(2.0 / max(count, 1.0))
+        total = max(limit * power / upper * passed, floor)
+        out[output] = float(np.sqrt(total / regression.n_samples(output)))
+    return out
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the outputs say of a model beside their errors."""
+
+    deciding: frozenset[str]
+    """Outputs that vary by more than their noise: only these decide on a model."""
+    refuted: frozenset[str]
+    """Outputs that the model does not predict, or that measure nothing: see :func:`measured`."""
+
+
+def measured(
+    regression: TimeSeriesRegression,
+    before: Fit,
+    final: Fit,
+    noise: Noise,
+    outputs: Mapping[str, OutputFit],
+) -> Measured:
+    """Outputs that decide on a model, and those that refute it.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    before, final
+        The profile's file and the final model.
+    noise
+        Noise variance.
+    outputs
+        Errors by output.
 
     Notes
     -----
-    The unexplained share is the ratio, final over initial model, of the mean squares beyond the
-    noise (held out) and, with repeats, of the lack of fit in the rejected bands; the larger of the
-    two.
+    An output refutes the model where each run's own mean predicts it better, beyond the standard
+    error of the difference over blocks of time. At the noise only the variation within the runs is
+    compared, since a mean knows the level of its run. An output that does not vary measures nothing
+    where the model of the file says that it must vary, or where its noise is more than a tenth of
+    its level.
     """
-    outputs = output_fits(
-        engine, (result.initial_model, result.initial_noise), (result.final, result.noise)
-    )
-    added = result.final.labels[engine.n_initial_terms :]
-    if not result.lack_of_fit_at_start:
-        return Judgement("adequate", 0.0, outputs, result, ())
-    # Without repeats the noise is what no candidate explains, below the error of any effect.
-    if result.noise.from_repeats or not added:
-        irrelevant = withheld(engine, result, 0.0, _irrelevant(result))
-        if _error_ratio(irrelevant.outputs) < 1 / RELEVANT_RATIO:
-            return replace(irrelevant, verdict="adequate")
-    share = _unexplained(engine, result)
-    verdict = _verdict(result, outputs, share) if added else "unknown"
-    # Only the effect itself explains nearly all of a residual far above the noise floor.
-    explained_but_detectable = share < _EXPLAINED_SHARE and result.noise.from_repeats
-    if verdict == "explained" or explained_but_detectable or not added:
-        return Judgement(verdict, share, outputs, result, ())
-    note = f"closest, but not named while the rest is unexplained: {', '.join(added)}"
-    return withheld(engine, result, share, note)
+    blocks = regression.blocks
+    left = held_out_samples(regression, final, noise, blocks)
+    first = regression.in_time(before.residual)
+    losses = {output: np.zeros(blocks.count) for output in regression.outputs}
+    varied, predicted = dict.fromkeys(losses, 0.0), dict.fromkeys(losses, 0.0)
+    means: dict[str, list[float]] = {output: [] for output in losses}
+    for segment, own, error, block in zip(regression.segments, first, left, blocks.of, strict=True):
+        output = segment.output
+        samples, valid = regression.measured_of(segment)
+        deviation = _centred(samples, valid)
+        varied[output] += float(deviation @ deviation)
+        predicted[output] += float(np.sum(_centred(own, valid) ** 2))
+        means[output].append(float(np.mean(samples[valid])))
+        loss = _centred(error, valid) if is_at_noise(outputs[output]) else error
+        losses[output] += np.bincount(block, weights=loss**2 - deviation**2, minlength=blocks.count)
+    deciding, refuted = set(), set()
+    for output, loss in losses.items():
+        fitted, count = outputs[output], regression.n_samples(output)
+        between = 0.0 if regression.has_run_offsets(output) else float(np.var(means[output]))
+        size = fitted.noise_rms or 0.0
+        if np.sqrt(varied[output] / count + between) > AT_NOISE * size:
+            deciding.add(output)
+        if np.sqrt(varied[output] / count) <= AT_NOISE * size and (
+            np.sqrt(predicted[output] / count) > _STANDS * size or size > _NOISY * fitted.signal_rms
+        ):
+            refuted.add(output)
+        if _is_larger(loss[loss != 0.0], _MEANS if is_at_noise(fitted) else 1.0):
+            refuted.add(output)
+    return Measured(frozenset(deciding), frozenset(refuted))
 
 
-def _irrelevant(result: SelectionResult) -> str:
-    """Note on what is significant where no error is above the noise by a relevant ratio."""
-    significant = (item for item in result.scores if item.is_significant(result.threshold))
-    best = next(significant, None)
-    what = "a lack of fit" if best is None else f"the evidence for {best.candidate.effect.id}"
-    return (
-        f"{what} is significant, but no held-out error is above the noise by "
-        f"{100 * (1 / RELEVANT_RATIO - 1):.0f} %: what it would change is not named"
-    )
+def _centred(values: Array, valid: NDArray[np.bool_]) -> Array:
+    """Values less their mean over the compared samples, zero elsewhere, (n,)."""
+    return np.where(valid, values - np.mean(values[valid]), 0.0)
 
 
-def withheld(
-    engine: SelectionEngine, result: SelectionResult, share: float, note: str
-) -> Judgement:
-    """Verdict that names no effect, with the reason as a note."""
-    verdict: Verdict = "unknown" if share > _UNKNOWN_SHARE else "partly"
-    reported = replace(result, final=result.initial_model, noise=result.initial_noise)
-    before = (result.initial_model, result.initial_noise)
-    return Judgement(verdict, share, output_fits(engine, before, before), reported, (note,))
-
-
-def named(engine: SelectionEngine, result: SelectionResult, judgement: Judgement) -> Judgement:
-    """The same verdict with the names of all additions, which explain a part."""
-    before, after = (result.initial_model, result.initial_noise), (result.final, result.noise)
-    outputs = output_fits(engine, before, after)
-    return Judgement(judgement.verdict, judgement.share, outputs, result, ())
-
-
-def reweighted_judgement(engine: SelectionEngine, judgement: Judgement) -> Judgement:
-    """The same verdict with parameters from the weights of least held-out error."""
-    reported = judgement.reported
-    best = reweighted(engine, reported.final, reported.noise)
-    if best.fit is reported.final:
-        return judgement
-    before, after = (reported.initial_model, reported.initial_noise), (best.fit, best.noise)
-    outputs = output_fits(engine, before, after)
-    return replace(
-        judgement,
-        outputs=outputs,
-        reported=replace(reported, final=best.fit, noise=best.noise),
-        notes=(*judgement.notes, *best.notes),
-    )
-
-
-def _unexplained(engine: SelectionEngine, result: SelectionResult) -> float:
-    """Share of the excess over the noise that the final model leaves, larger of two estimates."""
-    folds = engine.folds(result.final, result.noise)
-    held_out_errors = [
-        held_out_rms(engine.regression, fitted, result.noise, folds)
-        for fitted in (result.initial_model, result.final)
-    ]
-    # Without a lack of fit, an error above the noise floor may be chance.
-    expected_excess = {} if result.lack_of_fit else result.noise.uncertainty(engine.regression)
-
-    def excess(rms: Mapping[str, float], known: Mapping[str, float]) -> float:
-        """Mean squares beyond the noise and beyond what is known, in units of the noise."""
-        return sum(
-            max(0.0, (rms[o] ** 2 - known.get(o, 0.0)) / noise**2 - 1 - expected_excess.get(o, 0.0))
-            for o, noise in result.noise.rms.items()
-        )
-
-    before, after = held_out_errors
-    initial = excess(before, {})
-    share = excess(after, {}) / initial if initial > 0 else 0.0
-    if share > _HELD_OUT_SHARE:
-        # Without the discretisation error, as in the lack-of-fit test.
-        share = excess(after, engine.discretization_power(result.final, result.noise)) / initial
-    if result.noise.from_repeats:
-        # Both in units of the final noise, so that a re-estimated noise does not shift the share.
-        scale = result.initial_noise.power / result.noise.power
-        lacking = float(
-            np.sum(np.maximum(result.initial_lack_of_fit_test.excess_power * scale, 0.0))
-        )
-        left = float(
-            np.sum(
-                np.maximum(result.lack_of_fit_test.excess_power, 0.0)[
-                    result.lack_of_fit_test.rejected
-                ]
-            )
-        )
-        share = max(
-            share if share > _HELD_OUT_SHARE else 0.0, left / lacking if lacking > 0 else 0.0
-        )
-    return min(1.0, share)
-
-
-def _error_ratio(outputs: Mapping[str, OutputFit]) -> float:
-    """Held-out error of the later model over the noise, in the output where it is largest."""
-    return max(
-        fitted.heldout_rms_after / fitted.noise_rms if fitted.noise_rms else np.inf
-        for fitted in outputs.values()
-    )
-
-
-def _verdict(result: SelectionResult, outputs: Mapping[str, OutputFit], share: float) -> Verdict:
-    if share > _UNKNOWN_SHARE:
-        return "unknown"
-    if not result.lack_of_fit or not result.noise.from_repeats:
-        return "explained" if share < _HELD_OUT_SHARE else "partly"
-    # A trace below the noise, e.g. a load that bounces on its cable, is reported and has no effect.
-    error_ratio = _error_ratio(outputs)
-    # An effect that imitates an unknown one leaves a share of this size; where the lack of fit is
-    # certain, the limit is therefore small.
-    limit = 0.0
-    if error_ratio < _AT_NOISE:
-        uncertain = result.lack_of_fit_test.p_value > _UNCERTAIN_P_VALUE
-        limit = _EXPLAINED_SHARE_UNCERTAIN if uncertain else _EXPLAINED_SHARE
-    elif error_ratio < _NEAR_NOISE:
-        limit = _EXPLAINED_SHARE_NEAR_NOISE
-    return "explained" if share < limit else "partly"
+def _is_larger(losses: Array, errors: float) -> bool:
+    """Whether the sum of losses per block exceeds zero by some standard errors."""
+    if len(losses) < 2:
+        return False
+    return bool(np.sum(losses) > errors * np.sqrt(len(losses)) * np.std(losses, ddof=1))
 
 
 def output_fits(
@@ -223,6 +252,7 @@ def output_fits(
         By output; rms in SI.
     """
     regression, folds = engine.regression, folds or engine.folds(*final)
+    assert isinstance(regression, TimeSeriesRegression)
     noise, leakage = final[1], StopBandLeakage(regression)
 
     def errors(model: tuple[Fit, Noise]) -> tuple[dict[str, float], ...]:
@@ -234,7 +264,14 @@ def output_fits(
     before, held_before, leakage_before = first
     after, held_after, leakage_after = first if final is initial_model else errors(final)
     noise_leakage = leakage.noise(final[0].hypothesis)
-    source = "repeats" if noise.from_repeats else "saturated fit"
+    known = noise.from_repeats
+    size = noise.rms if known else white_noise(regression, final[0].residual)
+    if any(held_after[output] > AT_NOISE * size[output] for output in size):
+        # What coarse samples of a fast motion add to the error is known, and no effect.
+        sampled = engine.discretization_power(*final)
+        size = {
+            output: float(np.hypot(own, sampled[output] ** 0.5)) for output, own in size.items()
+        }
     return {
         output: OutputFit(
             unit=OUTPUT_UNITS[output],
@@ -244,8 +281,11 @@ def output_fits(
             rms_after=_with(after[output], leakage_after.get(output)),
             heldout_rms_before=_with(held_before[output], leakage_before.get(output)),
             heldout_rms_after=_with(held_after[output], leakage_after.get(output)),
-            noise_rms=_with(noise.rms[output], noise_leakage.get(output)),
-            noise_source=source,
+            noise_rms=_with(size[output], noise_leakage.get(output)),
+            noise_source="repeats" if known else "white noise",
+            noise_upper=None
+            if known
+            else _with(max(after[output], size[output]), leakage_after.get(output)),
         )
         for output in regression.outputs
     }
@@ -256,7 +296,7 @@ def _with(rms: float, leakage_power: float | None) -> float:
     return float(np.hypot(rms, np.sqrt(leakage_power or 0.0)))
 
 
-def _rms(regression: Regression, fitted: Fit) -> dict[str, float]:
+def _rms(regression: TimeSeriesRegression, fitted: Fit) -> dict[str, float]:
     out = {}
     for output in regression.outputs:
         own = [s for s in regression.segments if s.output == output]

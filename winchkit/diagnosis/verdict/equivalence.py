@@ -17,7 +17,7 @@ Hansen, P. R., Lunde, A., Nason, J. M. (2011). Econometrica 79, 453-497.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import chdtrc
@@ -61,9 +61,11 @@ _LEAST_SHARE = 0.5
 _SHARE_OF_SIMPLER_LAW = 0.75
 """Share of the decrease of χ² from which a simpler law of the family joins the set."""
 _LEVEL = 0.05
+"""Level of the sign-flip and of the likelihood-ratio test; convention."""
 _INCOMPLETE = 0.25
 """Level of the preliminary test that the residual of the final model does not exceed the noise."""
 _SIGN_FLIPS = 2000
+"""Sign flips; computing cost; a p-value of 5 % has a standard error of 0.5 %."""
 
 
 def is_below_noise(
@@ -134,6 +136,14 @@ class EquivalenceSet:
     """Angle between its signature and each rival's, rad."""
     beside: Mapping[str, str] = field(default_factory=dict)
     """Further effect beside which a member explains as much, for members that need one."""
+
+    def beginning_with(self, effect: str) -> EquivalenceSet:
+        """The same set with another member first, beside which the others are compared."""
+        order = sorted(range(len(self.effects)), key=lambda i: self.effects[i] != effect)
+        terms = tuple(self.terms[i] for i in order)
+        fits = tuple(self.fits[i] for i in order)
+        names = tuple(self.effects[i] for i in order)
+        return replace(self, term=terms[0], effects=names, terms=terms, fits=fits)
 
     def only(self, effects: Collection[str]) -> EquivalenceSet:
         """The same set without other members than ``effects``."""

@@ -6,7 +6,7 @@ sign or unit of a channel, the torque constant, or gravity. Such an effect is no
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from math import isfinite
 from operator import attrgetter
 
@@ -16,9 +16,10 @@ from winchkit.effects.term import Term
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["implausible", "plausible_range"]
+__all__ = ["implausible", "implausible_value", "plausible_range"]
 
 _ROUNDING = 1e-6
+"""Distance from a bound, in typical sizes, that counts as at the bound; numerical."""
 _CHECK = "check sign, unit, torque constant, gravity"
 
 
@@ -44,35 +45,38 @@ def implausible(
     its range: there the law is that of another effect, such as a spring or an offset of Dahl's. The
     inertia of an axis has no range: it includes the arm or carriage that the axis moves.
     """
-    return next(_reasons(term, values, profile), None)
+    reasons = (
+        implausible_value(term.effect.parameter(name), estimate, profile)
+        for name, estimate in values.items()
+    )
+    return next((reason for reason in reasons if reason is not None), None)
 
 
-def _reasons(
-    term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None
-) -> Iterator[str]:
-    for name, estimate in values.items():
-        parameter = term.effect.parameter(name)
-        if parameter.whole or not isfinite(estimate.value):
-            continue
-        shown = f"{name} = {_text(estimate.value, parameter)}"
-        known = plausible_range(parameter, profile)
-        if (
-            known is not None
-            and parameter.role == "shape"
-            and _is_held(estimate.value, known[:2], parameter)
-        ):
-            yield f"{shown} is at the end of the plausible range ({known[2]}): {_CHECK}"
-        if not isfinite(estimate.std):
-            continue
-        if known is None:
-            if _is_held(estimate.value, (parameter.low, parameter.high), parameter):
-                yield f"{shown} is at a bound of the fit: {_CHECK}"
-            continue
-        low, high, reason = known
-        bottom, top = estimate.interval or (estimate.value, estimate.value)
-        if max(top, estimate.value) < low or min(bottom, estimate.value) > high:
-            span = f"{_text(low, parameter)} to {_text(high, parameter)}"
-            yield f"{shown} is beyond the plausible range ({span}; {reason}): {_CHECK}"
+def implausible_value(
+    parameter: Parameter, estimate: Estimate, profile: WinchProfile | None
+) -> str | None:
+    """Reason why one value is implausible; None where it is plausible."""
+    if parameter.whole or not isfinite(estimate.value):
+        return None
+    shown = f"{parameter.name} = {_text(estimate.value, parameter)}"
+    known = plausible_range(parameter, profile)
+    if (
+        known is not None
+        and parameter.role == "shape"
+        and _is_held(estimate.value, known[:2], parameter)
+    ):
+        return f"{shown} is at the end of the plausible range ({known[2]}): {_CHECK}"
+    if not isfinite(estimate.std):
+        return None
+    if known is None:
+        held = _is_held(estimate.value, (parameter.low, parameter.high), parameter)
+        return f"{shown} is at a bound of the fit: {_CHECK}" if held else None
+    low, high, reason = known
+    bottom, top = estimate.interval or (estimate.value, estimate.value)
+    if max(top, estimate.value) < low or min(bottom, estimate.value) > high:
+        span = f"{_text(low, parameter)} to {_text(high, parameter)}"
+        return f"{shown} is beyond the plausible range ({span}; {reason}): {_CHECK}"
+    return None
 
 
 def _is_held(value: float, ends: tuple[float, float], parameter: Parameter) -> bool:

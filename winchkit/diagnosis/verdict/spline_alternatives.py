@@ -34,10 +34,15 @@ __all__ = [
 ]
 
 _KNOTS = 20
+"""Knots of the linear B-splines; screened; varied."""
 _TAILS = 0.001
+"""Share of samples beyond the outermost knots, each side; screened; varied."""
 _DEGREES = (1, 2, 3, 4)
+"""Degrees of polynomial curves; rule of thumb; varied."""
 _COARSE_KNOTS = (6, 12)
+"""Knots of coarse linear splines; screened; varied."""
 _POWERS = (1.5, 2.0, 3.0)
+"""Powers of the speed; rule of thumb; varied."""
 _EXCLUDED_VARIABLES = (*ANGLES, *COMPOUND, "direction")
 """Variables over which the catalogue has every curve already, or that are tried in a product."""
 Law = tuple[Array, int]

@@ -49,6 +49,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    reduces_to=("cable-elongation-linear",),
     what="Fibres and strands settle: strain follows the tension with a time constant.",
     formula="ε' = (T/EA_c − ε)/τ; start: ε over T/EA_c at the run's start",
     source="Kelvin-Voigt element; polymer cables creep up to 15 % (s00542-019-04554-5)",

@@ -31,6 +31,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="load",
+    reduces_to=("cable-elongation-linear",),
     what="The cable's stiffness grows in proportion to its tension.",
     formula="ℓ + ℓ_s k ln(1 + T/F0), hence T = F0 (exp(ε/k) − 1)",
     source="IPAnema 3 paper, Eq. 6, re-based to zero strain at zero tension",

@@ -29,6 +29,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="load",
     what="The cable is elastic: it is longer by its strain times its stressed length.",
     formula="ℓ + ℓ_s T / EA, ℓ_s = ℓ + dead length",
     source="Hooke; IPAnema 3 paper, Eq. 4; steel EA = 50–105 GPa × fill × area",

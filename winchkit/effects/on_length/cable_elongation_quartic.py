@@ -79,6 +79,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="load",
+    reduces_to=("cable-elongation-linear",),
     what="The stiffness of the cable depends on its strain: strands bed in.",
     formula="ℓ + ℓ_s ε with T/k1 = ε + b2 ε² + b3 ε³ + b4 ε⁴, straight where softer than k1/10",
     source="IPAnema 3 paper, Eq. 5, re-based to zero strain at zero tension",

@@ -39,6 +39,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="load",
     what="The cable's own weight bends it; the straight distance is shorter than the cable.",
     formula="ℓ − w² ℓ³ cos²(inclination) / 24 T², w weight per length",
     source="parabola for a shallow catenary (Irvine, Cable Structures)",

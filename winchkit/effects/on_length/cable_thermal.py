@@ -30,6 +30,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="temperature",
     what="The cable expands (steel) or shrinks (HMPE) as it warms.",
     formula="ℓ + ℓ_s α (temperature − 20 °C)",
     source="linear thermal expansion; steel 1.1e-5 1/K, HMPE −1.2e-5 1/K",

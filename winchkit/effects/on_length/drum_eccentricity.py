@@ -37,6 +37,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
+    variable="drum_angle",
     what="The drum's axis is not the axis of its surface.",
     formula="W + e (sin(φ − φ0) + sin φ0)",
     source="geometry of an eccentric circle, first order in e",

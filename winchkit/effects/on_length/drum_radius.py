@@ -35,6 +35,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
+    variable="cable_length",
     what="The winding radius differs from the profile: machining, cable compression, a wrong r.",
     formula="W(Φ; r + δr)",
     source="CABTIVE paper, Eq. 2 with r_w as a parameter (Table 7: 59 to 60.5 for 60 mm)",

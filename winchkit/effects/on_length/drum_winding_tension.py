@@ -68,6 +68,7 @@ EFFECT = Effect(
     parameters=(Parameter("fraction", "1", null=0.0, typical=5e-3, low=-0.05, high=0.05),),
     apply=apply,
     outputs=("cable_length",),
+    variable="load",
     what="Cable wound in under tension stays strained and flattened on the drum until paid out.",
     formula="ℓ + ∫ ε_w dW, ε_w = fraction·T/500 N when that piece was wound in",
     source="Schmidt, Mall, Pott 2015: ovalisation changes winding by 0.3 to 1.2 %",

@@ -35,6 +35,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
+    part="encoder",
+    variable="time",
     what="A coupling or a belt slipped: from then on the encoder has an error.",
     formula="φ + Δφ x²(3 − 2x), x = (t − t0) / 0.4 s from 0 to 1, t from the run's start",
     source="field experience; a smooth step, so that a fit can find its time",

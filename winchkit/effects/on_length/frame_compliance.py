@@ -31,6 +31,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="load",
     what="Mast, pulley brackets and exit point deflect towards the load.",
     formula="ℓ + T/k",
     source="Hooke",

@@ -28,6 +28,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
+    variable="cable_length",
     what="The ratio of the gearbox or belt differs from the profile: a rounded or wrong number.",
     formula="φ = θ / (i (1 + e))",
     source="kinematics of a gearbox",

@@ -23,6 +23,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
+    variable="motor_angle",
     what="Runout of teeth and shafts: the drum leads and lags within each motor turn.",
     formula="φ + a sin(k θ + p), k whole per motor turn",
     source="static transmission error of gears, one harmonic",

@@ -28,6 +28,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
+    part="guide",
+    variable="cable_length",
     what="The guide is mounted with an offset, or its lead differs from the groove pitch.",
     formula="ℓ − (√(h² + (x0 + m Φ/2π)²) − h), h = guide.distance, m per turn",
     source="Pythagoras; cable-winding device, section on the guide",

@@ -32,6 +32,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length", "motor_torque"),
+    variable="cable_length",
     what="The layer growth differs from the profile: the cable flattens or nests.",
     formula="W(Φ; g + δ)",
     source="CABTIVE paper, Eq. 2 with d_c as a parameter (Table 4: 0.42 to 0.54 mm)",

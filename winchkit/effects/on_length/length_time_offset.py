@@ -27,6 +27,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="speed",
     what="The length instrument filters, or its time stamps are later than the drive's.",
     formula="ℓ(t − δt)",
     source="definition of a delay",

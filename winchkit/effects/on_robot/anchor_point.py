@@ -22,6 +22,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    part="platform",
+    variable="pose",
     what="The anchor point of the cable on the platform differs from the profile.",
     formula="b + δb, δb in the platform frame",
     source="CABTIVE paper, Tables 3 and 6 (up to 10 mm apart, nominal to calibrated)",

@@ -22,6 +22,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="pose",
     what="The exit point of the cable differs from the profile: a pulley mounted with an offset.",
     formula="p + δp",
     source="CABTIVE paper, Tables 2 and 5 (up to 10 mm apart, nominal to calibrated)",

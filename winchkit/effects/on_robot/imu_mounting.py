@@ -29,6 +29,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="pose",
     what="The target of the tracker, or the IMU, is mounted at an angle to the platform's axes.",
     formula="R_y = R exp([m]×)",
     source="Sensor-to-body alignment of inertial measurement units",

@@ -22,6 +22,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension",),
+    variable="pose",
     what="The platform's centre of mass differs from the profile.",
     formula="Δt = A⁺ᵀ Δw, Δw = −(0, R δc × m g)",
     source="Static balance A t + w = 0; IPAnema 3 paper, Eq. 7 and 8 with the sign corrected",

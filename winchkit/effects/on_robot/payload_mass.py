@@ -18,6 +18,7 @@ EFFECT = Effect(
     parameters=(Parameter("mass_error", "kg", null=0.0, typical=0.3, low=-1e4, high=1e4),),
     apply=apply,
     outputs=("tension",),
+    variable="pose",
     what="The mass of the platform differs from the profile: a tool, a payload, a hose.",
     formula="Δt = A⁺ᵀ Δw, Δw = −(δm g, c × δm g)",
     source="Static balance A t + w = 0; IPAnema 3 paper, Eq. 7 and 8 with the sign corrected",

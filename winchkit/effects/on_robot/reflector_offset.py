@@ -23,6 +23,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="pose",
     what="The reflector or the marker set is not where the profile has it on the platform.",
     formula="y = c + R (o + δo)",
     source="Calibration of robots with laser trackers; M. Gouttefarde et al.",

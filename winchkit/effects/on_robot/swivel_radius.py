@@ -19,6 +19,7 @@ EFFECT = Effect(
     parameters=(Parameter("radius_error", "m", null=0.0, typical=4e-4, low=-0.05, high=0.05),),
     apply=apply,
     outputs=("cable_length",),
+    variable="pose",
     what="The swivel pulley's radius, to the middle of the cable, differs from the profile.",
     formula="ΔL = δr (wrap − sin wrap), to first order",
     source="A. Pott 2012, pulley kinematics; CABTIVE paper, Table 7 (7.7 to 8.5 for 8.6 mm)",

@@ -36,6 +36,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("cable_length",),
+    variable="pose",
     what="The tracker was set up anew: its frame is not that of the profile.",
     formula="y = h + t + exp([q]×)(c − h)",
     source="S. Umeyama, IEEE Trans. PAMI 13 (1991); B. K. P. Horn, J. Opt. Soc. Am. A 4 (1987)",

@@ -20,6 +20,7 @@ EFFECT = Effect(
     parameters=(Parameter("scale_error", "1", null=0.0, typical=1e-4, low=-0.1, high=0.1),),
     apply=apply,
     outputs=("cable_length",),
+    variable="pose",
     what="The tracker's scale is wrong: refractive index, or the wand of a camera system.",
     formula="(1 + s) y",
     source="ISO 10360-10 (laser trackers)",

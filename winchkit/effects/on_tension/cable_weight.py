@@ -30,6 +30,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="cable_length",
     what="The weight of the free cable adds to the tension towards the winch.",
     formula="T + m g ℓ sin(inclination)",
     source="statics; 6 mm steel cable 0.14 kg/m",

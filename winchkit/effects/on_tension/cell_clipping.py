@@ -29,6 +29,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension",),
+    variable="load",
     what="The amplifier or the converter saturates; or a stop takes over a part of the force.",
     formula="T − q max(T − limit, 0); q = 1 is a hard limit",
     source="saturation of amplifiers; overload stops of load cells",

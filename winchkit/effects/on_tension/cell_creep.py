@@ -46,6 +46,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension",),
+    reduces_to=("cell-gain",),
     what="The spring element of the cell settles under load and recovers without.",
     formula="T + f c, c' = (T − c)/τ; start: c/T at the run's start",
     source="creep of load cells, OIML R60: about 0.03 % in 30 min",

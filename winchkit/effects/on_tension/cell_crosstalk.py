@@ -16,6 +16,7 @@ EFFECT = Effect(
     parameters=(Parameter("share", "N/(N m)", null=0.0, typical=5.0, low=-1e5, high=1e5),),
     apply=apply,
     outputs=("tension",),
+    variable="motor_torque",
     what="The motor current couples into the cell's cable, or the reaction torque into its mount.",
     formula="T + c m, m the measured motor torque",
     source="electromagnetic interference and side load of load cells, first order",

@@ -16,6 +16,7 @@ EFFECT = Effect(
     parameters=(Parameter("drift", "N/s", null=0.0, typical=0.02, low=-100.0, high=100.0),),
     apply=apply,
     outputs=("tension",),
+    variable="time",
     what="The zero of the amplifier or the cell drifts linearly in time.",
     formula="T + d t, t from the run's start",
     source="load-cell practice",

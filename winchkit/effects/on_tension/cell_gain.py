@@ -30,6 +30,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension",),
+    variable="load",
     what="The cell's span is wrong: calibration, mounting angle, a parallel load path.",
     formula="(1 + g) T",
     source="load-cell practice",

@@ -20,6 +20,7 @@ EFFECT = Effect(
     parameters=(Parameter("quadratic", "N", null=0.0, typical=5.0, low=-1e4, high=1e4),),
     apply=apply,
     outputs=("tension",),
+    variable="load",
     what="The cell's sensitivity changes with the load: overload, side force, a wrong mounting.",
     formula="T + q (T/500 N)²",
     source="second-order characteristic of a load cell",

@@ -20,6 +20,7 @@ EFFECT = Effect(
     parameters=(Parameter("sensitivity", "N/K", null=0.0, typical=0.5, low=-1e3, high=1e3),),
     apply=apply,
     outputs=("tension",),
+    variable="temperature",
     what="The zero of the cell follows its temperature.",
     formula="T + k (temperature − 20 °C)",
     source="temperature effect on zero, as data sheets give it",

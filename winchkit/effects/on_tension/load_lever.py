@@ -21,6 +21,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    part="load",
+    variable="drum_angle",
     what="The load acts through a lever, whose effective arm changes with its angle.",
     formula="(1 + a sin(φ + p)) T, φ the drum angle",
     source="statics: the arm of a force on a lever is its length times the cosine of its angle",

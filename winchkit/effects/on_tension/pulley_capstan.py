@@ -2,13 +2,14 @@
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.transition import CABLE_TRANSITION, cable_direction
 from winchkit.model.friction import capstan_ratio
 from winchkit.model.stages import At, Stage
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:
     """Tension after a wrap with Euler-Eytelwein friction."""
-    return tension * capstan_ratio(at.direction * values["friction"], at.wrap)
+    return tension * capstan_ratio(cable_direction(at, values) * values["friction"], at.wrap)
 
 
 EFFECT = Effect(
@@ -24,9 +25,11 @@ EFFECT = Effect(
             high=1.0,
             plausible=Plausible(0.0, 0.6, "cables on metal and plastics 0.05 to 0.6"),
         ),
+        CABLE_TRANSITION,
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="direction",
     what="A stuck pulley or an eyelet: friction grows with the angle of wrap.",
     formula="T1 = T0 exp(s μ α)",
     source="Euler-Eytelwein; Cable-winding device, Eq. 19",

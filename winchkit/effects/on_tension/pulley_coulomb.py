@@ -2,13 +2,14 @@
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.transition import CABLE_TRANSITION, cable_direction
 from winchkit.model.friction import coulomb_ratio
 from winchkit.model.stages import At, Stage
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:
     """Tension after a pulley with friction μ N against the cable's motion."""
-    return tension * coulomb_ratio(at.direction * values["friction"], at.wrap)
+    return tension * coulomb_ratio(cable_direction(at, values) * values["friction"], at.wrap)
 
 
 EFFECT = Effect(
@@ -24,9 +25,11 @@ EFFECT = Effect(
             high=0.5,
             plausible=Plausible(0.0, 0.3, "bearings 0.001 to 0.02, a stuck sheave 0.3"),
         ),
+        CABLE_TRANSITION,
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="direction",
     what="Bearing friction in proportion to the force on the bearing, equal on all pulleys.",
     formula="T1 = T0 + s μ N, N = √(T0² − 2 T0 T1 cos α + T1²)",
     source="Cable-winding device, Eq. 20–23, solved in closed form; about 0.02 per sheave",

@@ -45,6 +45,7 @@ EFFECT = Effect(
     ),
     apply=FRICTION.apply,
     outputs=("tension", "motor_torque"),
+    reduces_to=("pulley-coulomb", "pulley-capstan"),
     what="Cable and bearing deform elastically before they slide, equally on all pulleys.",
     formula="dF/dx = σ |1 − s F/F_c|^β sgn(1 − s F/F_c), F_c = μ N; start: F/F_c at the start",
     source="Cable-winding device, Eq. 25 with absolute value; exact step for any β",

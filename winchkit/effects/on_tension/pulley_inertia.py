@@ -28,6 +28,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="acceleration",
     what="The cable accelerates the inertia of the pulleys, which are equal.",
     formula="T1 = T0 + m_eq dv/dt, m_eq = J/r²",
     source="Newton",

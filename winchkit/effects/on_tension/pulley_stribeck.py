@@ -2,6 +2,7 @@
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.transition import CABLE_TRANSITION, cable_direction
 from winchkit.model.friction import coulomb_ratio, has_fallen, stribeck
 from winchkit.model.stages import At, Stage
 
@@ -9,7 +10,7 @@ from winchkit.model.stages import At, Stage
 def apply(tension: Array, at: At, values: Values) -> Array:
     """Tension after a pulley whose friction falls from μs to μc with the speed."""
     friction = stribeck(at.speed, values["coulomb"], values["static"], values["stribeck_speed"])
-    return tension * coulomb_ratio(at.direction * friction, at.wrap)
+    return tension * coulomb_ratio(cable_direction(at, values) * friction, at.wrap)
 
 
 def _sticks(values: Values) -> bool:
@@ -38,9 +39,12 @@ EFFECT = Effect(
             role="shape",
             grid=(5e-3, 0.015, 0.05, 0.15),
         ),
+        CABLE_TRANSITION,
     ),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="speed",
+    reduces_to=("pulley-coulomb", "pulley-capstan"),
     what="Bearing friction is higher at low speed, before a film of grease builds up.",
     formula="T1 = T0 + s N (μc + (μs − μc) exp(−(v/vs)²))",
     source="Stribeck curve (Armstrong-Hélouvry et al. 1994) with Eq. 22 for N",

@@ -16,6 +16,7 @@ EFFECT = Effect(
     parameters=(Parameter("viscosity", "N s/m", null=0.0, typical=10.0, low=0.0, high=1e6),),
     apply=apply,
     outputs=("tension", "motor_torque"),
+    variable="speed",
     what="Grease and seals of every pulley have friction in proportion to the cable speed.",
     formula="T1 = T0 + c v",
     source="viscous friction",

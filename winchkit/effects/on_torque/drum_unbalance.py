@@ -21,6 +21,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    part="drum",
+    variable="drum_angle",
     what="The centre of mass of the drum is not on its axis.",
     formula="τ + a sin(φ + p), a = m g e / ratio, φ the drum angle",
     source="statics of an eccentric mass on a horizontal axis",

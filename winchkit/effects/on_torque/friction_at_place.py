@@ -4,6 +4,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.transition import MOTOR_TRANSITION, motor_direction
 from winchkit.model.stages import At, Stage
 
 _PLACES = tuple((k + 0.5) / 12 for k in range(12))
@@ -12,7 +13,7 @@ _PLACES = tuple((k + 0.5) / 12 for k in range(12))
 def apply(torque: Array, at: At, values: Values) -> Array:
     """Torque plus s c exp(−((φ − φ0)/w)²)."""
     distance = (at.drum_angle - values["place"]) / values["width"]
-    return torque + values["torque"] * at.motor_direction * np.exp(-(distance**2))
+    return torque + values["torque"] * motor_direction(at, values) * np.exp(-(distance**2))
 
 
 EFFECT = Effect(
@@ -28,9 +29,11 @@ EFFECT = Effect(
             "width", "rad", null=1.0, typical=1.0, low=1e-4, high=1e5,
             role="shape", grid=(1 / 12,), along="drum_angle",
         ),
+        MOTOR_TRANSITION,
     ),
     apply=apply,
     outputs=("motor_torque",),
+    reduces_to=("motor-coulomb",),
     what="Friction is larger around one position: a damaged tooth or bearing, dirt, a bent shaft.",
     formula="τ + s c exp(−((φ − φ0)/w)²), φ the drum angle since the reference",
     source="Coulomb friction with a smooth window",

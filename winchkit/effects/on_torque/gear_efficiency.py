@@ -2,12 +2,13 @@
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.transition import CABLE_TRANSITION, cable_direction
 from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
     """Torque τ η^(−s): more winding in, less paying out."""
-    return torque * values["efficiency"] ** -at.direction
+    return torque * values["efficiency"] ** -cable_direction(at, values)
 
 
 EFFECT = Effect(
@@ -23,9 +24,11 @@ EFFECT = Effect(
             high=1.0,
             plausible=Plausible(0.2, 1.0, "a worm gear has 0.3"),
         ),
+        CABLE_TRANSITION,
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="direction",
     what="Tooth friction in proportion to the load: more motor torque winding in, less paying out.",
     formula="τ/η winding in, τ η paying out, smooth between",
     source="Cable-winding device, Eq. 10: 0.68 over six bearings and a belt",

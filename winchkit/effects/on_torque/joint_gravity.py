@@ -21,6 +21,8 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    part="load",
+    variable="drum_angle",
     what="The axis carries a part whose centre of mass is not on it.",
     formula="τ + a sin(φ + p), a = m g l / ratio, φ the angle of the joint",
     source="statics of a pendulum; minimal parameters m l of robot dynamics (Khalil, Dombre 2002)",

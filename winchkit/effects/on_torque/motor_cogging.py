@@ -22,6 +22,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="motor_angle",
     what="Slots and poles cause a torque that depends only on the motor angle.",
     formula="τ + a sin(k θ + p), k from poles, slots and their multiples",
     source="cogging torque of permanent-magnet motors",

@@ -45,6 +45,7 @@ EFFECT = Effect(
     ),
     apply=FRICTION.apply,
     outputs=("motor_torque",),
+    reduces_to=("motor-coulomb",),
     what="Teeth, seals and bearings deform elastically before they slide.",
     formula="τ + F, dF/dθ = (c − s F)/δ, δ the distance; start: F/c at the start",
     source="Dahl 1968; presliding of a joint (Armstrong-Hélouvry et al. 1994)",

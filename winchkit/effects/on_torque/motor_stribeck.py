@@ -4,13 +4,14 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
+from winchkit.effects.transition import MOTOR_TRANSITION, motor_direction
 from winchkit.model.friction import has_fallen
 from winchkit.model.stages import At, Stage
 
 
 def apply(torque: Array, at: At, values: Values) -> Array:
     """Torque plus s b exp(−(θ'/ω_s)²)."""
-    return torque + values["torque"] * at.motor_direction * np.exp(
+    return torque + values["torque"] * motor_direction(at, values) * np.exp(
         -((at.motor_rate / values["stribeck_speed"]) ** 2)
     )
 
@@ -35,9 +36,12 @@ EFFECT = Effect(
             role="shape",
             grid=(1.0, 4.0, 15.0, 50.0),
         ),
+        MOTOR_TRANSITION,
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="speed",
+    reduces_to=("motor-coulomb",),
     what="Friction of bearings and seals is higher at low speed, before a film builds up.",
     formula="τ + s b exp(−(θ'/ω_s)²)",
     source="Stribeck curve (Armstrong-Hélouvry et al. 1994)",

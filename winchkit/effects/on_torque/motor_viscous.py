@@ -16,6 +16,7 @@ EFFECT = Effect(
     parameters=(Parameter("viscosity", "N m s", null=0.0, typical=1e-3, low=0.0, high=1e6),),
     apply=apply,
     outputs=("motor_torque",),
+    variable="speed",
     what="Losses by grease, eddy currents and windage in proportion to the speed.",
     formula="τ + b θ'",
     source="viscous friction",

@@ -20,6 +20,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="speed",
     what="Viscous friction of preloaded screws, worms and lip seals depends on the direction.",
     formula="τ + d |θ'|, d = (b₊ − b₋)/2",
     source="viscous friction, one value per direction; observed on EMPS (Janot et al. 2019)",

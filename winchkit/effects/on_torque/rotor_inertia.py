@@ -27,6 +27,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="acceleration",
     what="Inertia of rotor, brake, coupling and gearbox input; of an axis, with what it moves.",
     formula="τ + J θ''",
     source="Newton",

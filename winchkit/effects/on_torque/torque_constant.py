@@ -28,6 +28,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="load",
     what="The drive's torque constant or rated torque is wrong, or the magnets are warm.",
     formula="(1 + g) τ",
     source="motor data sheets give ±10 %",

@@ -23,6 +23,7 @@ EFFECT = Effect(
     ),
     apply=apply,
     outputs=("motor_torque",),
+    variable="motor_angle",
     what="The torque constant depends on the rotor's position, by its poles and the inverter.",
     formula="(1 + a sin(k θ + p)) τ, k from pole pairs and slots",
     source="mutual torque ripple of permanent-magnet motors (Jahns, Soong 1996)",

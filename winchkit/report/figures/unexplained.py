@@ -1,21 +1,25 @@
-"""The unexplained residual as a curve over its main variable, of winches and of robots."""
+"""The unexplained residual as a curve over its main variable, and open laws beside their curve."""
 
 from __future__ import annotations
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
+from winchkit.diagnosis.results import Step
 from winchkit.diagnosis.robot.diagnose import RobotAnswer
+from winchkit.effects.empirical import empirical_id
 from winchkit.profile_edit.history import LADDER_UNITS
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.pose_traces import trace_over
-from winchkit.report.figures.reduction import curve_of
+from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.words.numbers import scale_for
 from winchkit.report.words.sentence import capital, main_patterns, where_text
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.report.words.steps import has_other_law
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, variable_name
 
 __all__ = [
+    "open_law_figures",
     "unexplained_curve",
     "unexplained_figures",
 ]
@@ -34,7 +38,7 @@ def unexplained_curve(answer: Answer, where: Attribution) -> tuple[Array, Array]
 
 def unexplained_figures(answer: Answer, source: str = "") -> list[Figure]:
     """One figure per output; none without a residual, or where only its frequency is known."""
-    if answer.diagnosis.verdict not in {"partly", "unknown"}:
+    if answer.diagnosis.verdict not in {"partly", "unknown", "undecided"}:
         return []
     places = [w for w in main_patterns(answer.diagnosis.where) if w.frequency is None]
     return [_figure(answer, where, source) for where in places]
@@ -59,6 +63,59 @@ def _figure(answer: Answer, where: Attribution, source: str) -> Figure:
                 Axis("residual", scale.label, zero=True),
                 (Series("residual, mean", "today", how.shown(at), residual / scale.worth, "mean"),),
                 None if noise is None else noise / scale.worth,
+            ),
+        ),
+        source=source,
+    )
+
+
+def open_law_figures(answer: Answer, source: str = "") -> list[Figure]:
+    """Per step whose law is another one: what it has to explain, with the closest law."""
+    if not isinstance(answer, WinchAnswer):
+        return []
+    engine, result = answer.engine, answer.result
+    steps = answer.diagnosis.steps
+    added = len(result.final.hypothesis.terms) - engine.n_initial_terms
+    out = []
+    for place, step in enumerate(steps[max(0, len(steps) - added) :]):
+        if has_other_law(step):
+            index = engine.n_initial_terms + place
+            model = result.final.hypothesis.without(index)
+            without = engine.refit(model, result.noise).residual
+            figure = _open_law(answer, step, without, source)
+            out += [figure] if figure is not None else []
+    return out
+
+
+def _open_law(answer: WinchAnswer, step: Step, without: Array, source: str) -> Figure | None:
+    """Mean residual ``without`` the step, (rows,), over its variable, and its law there."""
+    regression = answer.engine.regression
+    known = {over.output: over for over in strongest(regression, without).values()}
+    over = next((known[place.output] for place in step.place if place.output in known), None)
+    if over is None:
+        return None
+    at = curve_of(regression, without, over)
+    law = curve_of(regression, without - answer.result.final.residual, over)
+    how = reading(over.variable, within_turn=over.order is not None)
+    scale = scale_for(3 * float(abs(at.mean).max()), LADDER_UNITS[over.output])
+    output, variable = OUTPUT_NAMES.get(over.output, over.output), variable_name(over.variable)
+    return Figure(
+        f"law-{step.effects[0]}",
+        capital(f"{output} over {variable}, and the closest law"),
+        f"Mean residual without {step.effects[0]}, and what this law explains of it; 'winchkit add "
+        f"{empirical_id(over.output, over.variable)}' adds the curve.",
+        how.axis(),
+        (
+            Panel(
+                Axis("residual", scale.label, zero=True),
+                (
+                    Series(
+                        "to explain, mean", "today", how.shown(at.x), at.mean / scale.worth, "mean"
+                    ),
+                    Series(
+                        step.effects[0], "with", how.shown(law.x), law.mean / scale.worth, "mean"
+                    ),
+                ),
             ),
         ),
         source=source,

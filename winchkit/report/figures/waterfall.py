@@ -7,13 +7,16 @@ from dataclasses import dataclass
 
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.results import Step
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 
-__all__ = ["GEOMETRY_NAME", "Waterfall", "waterfall_of"]
+__all__ = ["GEOMETRY_NAME", "REFITTED_NAME", "Waterfall", "errors_without", "waterfall_of"]
 
 GEOMETRY_NAME = "the whole geometry"
 """Name of the change of a robot's model in which all of its geometry is fitted."""
+REFITTED_NAME = "refitted values"
+"""Name of the change of a winch's model in which the values of its profile are fitted."""
 
 
 @dataclass(frozen=True)
@@ -21,15 +24,15 @@ class Waterfall:
     """Held-out rms per output, SI, at every step."""
 
     rungs: tuple[tuple[str, Mapping[str, float]], ...]
-    """The unchanged profile, then with each effect in the order of selection."""
+    """The unchanged profile, then with each effect in the order of the steps."""
     first: Mapping[str, Mapping[str, float]]
     """By effect: the profile with it alone."""
     last: Mapping[str, Mapping[str, float]]
-    """By effect: the profile with all other named effects."""
+    """By effect: the profile with all other steps."""
 
 
 def waterfall_of(answer: Answer) -> Waterfall | None:
-    """Contributions of the effects of a diagnosis; None where it names none."""
+    """Contributions of the effects of a diagnosis; None without steps."""
     diagnosis, engine, file_engine = answer.diagnosis, answer.engine, answer.file_engine
     if not diagnosis.steps:
         return None
@@ -41,24 +44,66 @@ def waterfall_of(answer: Answer) -> Waterfall | None:
     ladder = _Ladder(engine, answer.result, {added: after})
     rungs: list[tuple[str, Mapping[str, float]]] = [("unchanged profile", before)]
     first: dict[str, Mapping[str, float]] = {}
-    last: dict[str, Mapping[str, float]] = {}
-    if file_engine is engine:
-        ladder.known[()] = before
-        plain = ladder
-    else:
+    if file_engine is not engine:
         plain = _Ladder(file_engine, answer.result, {(): before})
         rungs.append((f"+ {GEOMETRY_NAME}", ladder.error()))
-        first[GEOMETRY_NAME], last[GEOMETRY_NAME] = ladder.error(), plain.error(*added)
+        first[GEOMETRY_NAME] = ladder.error()
+    else:
+        plain = ladder
+        if any(step.refitted for step in diagnosis.steps):
+            rungs.append((f"+ {REFITTED_NAME}", ladder.error()))
+            first[REFITTED_NAME] = ladder.error()
+        else:
+            ladder.known[()] = before
     rungs += [(f"+ {name}", ladder.error(*added[: n + 1])) for n, name in enumerate(names)]
-    for name, index in zip(names, added, strict=True):
-        first[name] = plain.error(index)
-        last[name] = ladder.error(*(other for other in added if other != index))
-    return Waterfall(tuple(rungs), first, last)
+    first |= {name: plain.error(index) for name, index in zip(names, added, strict=True)}
+    own = [
+        GEOMETRY_NAME if step.whole else step.effects[0]
+        for step in diagnosis.steps[: _n_own(answer)]
+    ]
+    last = dict(zip((*own, *names), errors_without(answer), strict=False))
+    return Waterfall(tuple(rungs), first, {name: rms for name, rms in last.items() if rms})
+
+
+def errors_without(answer: Answer) -> list[Mapping[str, float]]:
+    """Held-out errors of the final model without each step, refitted, by output.
+
+    A refitted value of the profile is set back to that of the file. Empty for a step that cannot be
+    taken out by itself.
+    """
+    engine, result = answer.engine, answer.result
+    hypothesis, count = result.final.hypothesis, _n_own(answer)
+    ladder = _Ladder(engine, result, {})
+    out = [_without_own(answer, step, ladder) for step in answer.diagnosis.steps[:count]]
+    indices = range(engine.n_initial_terms, len(hypothesis.terms))
+    return out + [ladder.of(hypothesis.without(index)) for index in indices]
+
+
+def _n_own(answer: Answer) -> int:
+    """Number of steps that change the model with which the search began; the others follow."""
+    added = len(answer.result.final.hypothesis.terms) - answer.engine.n_initial_terms
+    return max(0, len(answer.diagnosis.steps) - added)
+
+
+def _without_own(answer: Answer, step: Step, ladder: _Ladder) -> Mapping[str, float]:
+    engine, result = answer.engine, answer.result
+    hypothesis = result.final.hypothesis
+    terms = hypothesis.terms[: engine.n_initial_terms]
+    if step.whole:
+        added = range(engine.n_initial_terms, len(hypothesis.terms))
+        return _Ladder(answer.file_engine, result, {}).error(*added)
+    index = next((i for i, term in enumerate(terms) if term.effect.id == step.effects[0]), None)
+    if index is None:
+        return {}
+    if step.refitted:
+        held = result.initial_model.hypothesis.terms[index]
+        return ladder.of(hypothesis.with_term_at(index, held))
+    return ladder.of(hypothesis.without(index))
 
 
 @dataclass(frozen=True)
 class _Ladder:
-    """Held-out errors of a model with some of its named effects."""
+    """Held-out errors of a model with some of its effects."""
 
     engine: SelectionEngine
     result: SelectionResult
@@ -67,12 +112,15 @@ class _Ladder:
     def error(self, *terms: int) -> Mapping[str, float]:
         """Held-out error of the profile with these effects, refitted."""
         if terms not in self.known:
-            engine, noise = self.engine, self.result.noise
-            kept = _only(self.result.final.hypothesis, (*range(engine.n_initial_terms), *terms))
-            fitted = engine.refit(kept, noise)
-            folds = engine.folds(self.result.final, noise)
-            self.known[terms] = engine.held_out_errors(fitted, noise, folds)
+            first = range(self.engine.n_initial_terms)
+            self.known[terms] = self.of(_only(self.result.final.hypothesis, (*first, *terms)))
         return self.known[terms]
+
+    def of(self, model: Hypothesis) -> Mapping[str, float]:
+        """Held-out error of a model, refitted."""
+        noise = self.result.noise
+        folds = self.engine.folds(self.result.final, noise)
+        return self.engine.held_out_errors(self.engine.refit(model, noise), noise, folds)
 
 
 def _only(whole: Hypothesis, kept: tuple[int, ...]) -> Hypothesis:

@@ -38,7 +38,13 @@ __all__ = [
     "run_cell",
 ]
 
-_TONES = {"adequate": "#2b7a4b", "explained": "#2b7a4b", "partly": "#9a6a00", "unknown": "#a83232"}
+_TONES = {
+    "adequate": "#2b7a4b",
+    "explained": "#2b7a4b",
+    "partly": "#9a6a00",
+    "unknown": "#a83232",
+    "undecided": "#5c6670",
+}
 _BOX = "border-left:4px solid {tone};padding:.3em 1em;margin:.3em 0"
 _FIRST = 12
 """Rows of a table that are open: about one screen."""
@@ -78,18 +84,13 @@ def comparison_cell(comparison: Comparison) -> str:
 
 
 def diagnosis_cell(diagnosis: Diagnosis) -> str:
-    """A diagnosis: verdict, named effects with their values, and held-out errors."""
+    """A diagnosis: verdict, steps with their doubts, and held-out errors."""
     name = "Interrupted" if diagnosis.interrupted else VERDICT_NAMES[diagnosis.verdict]
     return _box(
         _TONES[diagnosis.verdict],
         element("b", name),
         element("p", unbroken(sentence(diagnosis))),
-        tables.named(
-            (None, effect, step.parameters.get(effect, {}))
-            for step in diagnosis.steps
-            if not step.whole
-            for effect in step.effects
-        ),
+        tables.steps(diagnosis),
         tables.figures(diagnosis),
     )
 

@@ -10,11 +10,10 @@ from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
 from winchkit.report.notebook.declarations import declared_rows
-from winchkit.report.text import addition_text, compare_text, error_lines
+from winchkit.report.text import addition_text, compare_text, error_lines, head_lines, step_lines
 from winchkit.report.words.columns import aligned, hanging, paragraph
 from winchkit.report.words.numbers import grouped, percent, significant
-from winchkit.report.words.sentence import sentence
-from winchkit.report.words.vocabulary import VERDICT_NAMES
+from winchkit.report.words.sentence import changes_text, remaining_text
 from winchkit.runs.run import Run
 
 if TYPE_CHECKING:
@@ -112,18 +111,20 @@ def comparison_screen(comparison: Comparison) -> str:
 
 
 def diagnosis_screen(diagnosis: Diagnosis) -> str:
-    """A diagnosis: verdict, named effects, held-out errors, and the next runs."""
-    head = "INTERRUPTED" if diagnosis.interrupted else VERDICT_NAMES[diagnosis.verdict].upper()
-    lines = [head, *paragraph(sentence(diagnosis)), ""]
-    lines += error_lines(
-        diagnosis.outputs,
-        extended=bool(diagnosis.steps),
-        data=diagnosis.data,
-        offsets=diagnosis.run_offsets,
-    )
-    if diagnosis.next_runs:
-        run = diagnosis.next_runs[0]
-        lines += ["", *paragraph(f"next: {run.programme} ({' / '.join(run.separates)})")]
+    """A diagnosis: verdict, steps with their doubts, held-out errors, and what would change it."""
+    blocks = [
+        head_lines(diagnosis),
+        step_lines(diagnosis),
+        error_lines(
+            diagnosis.outputs,
+            extended=bool(diagnosis.steps),
+            data=diagnosis.data,
+            offsets=diagnosis.run_offsets,
+        ),
+        paragraph(remaining_text(diagnosis)),
+        [] if diagnosis.interrupted else paragraph(changes_text(diagnosis)),
+    ]
+    lines = [line for block in blocks if block for line in (*block, "")][:-1]
     return screen("\n".join(lines), "; fit_report() and to_json() have all")
 
 

@@ -12,21 +12,22 @@ from winchkit.report import tables
 from winchkit.report.as_json import report_json
 from winchkit.report.detectability import effects_of, smallest_shown
 from winchkit.report.figures.figure import Figure
-from winchkit.report.figures.waterfall import waterfall_of
+from winchkit.report.figures.waterfall import errors_without, waterfall_of
 from winchkit.report.html.markup import Markup, element, folded, join, table
 from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
 from winchkit.report.reproducibility import Command, repeat
-from winchkit.report.words.headline import headline
 from winchkit.report.words.numbers import percent
-from winchkit.report.words.sentence import capital, cause_and_error, changes_text, where_text
+from winchkit.report.words.sentence import (
+    changes_text,
+    error_text,
+    headline,
+    remaining_text,
+    where_text,
+)
 from winchkit.report.words.vocabulary import VERDICT_NAMES, listed
 
 __all__ = ["sections"]
-
-_TRACE = 0.005
-"""Unexplained share from which an explained diagnosis says that something remains; 0 % when rounded
-below."""
 
 
 def sections(
@@ -38,6 +39,7 @@ def sections(
     *,
     title: str = "",
     unexplained: Sequence[Figure] = (),
+    open_laws: Sequence[Figure] = (),
     ladder: Figure | None = None,
 ) -> Markup:
     """Content of the page: summary and figures, and everything else to be opened."""
@@ -51,7 +53,7 @@ def sections(
             element("div", *figures, id="residuals"),
             folded(
                 "effects",
-                "Named effects: formula and source",
+                "Effects: formula and source",
                 _named(answer),
             ),
             folded(
@@ -61,6 +63,7 @@ def sections(
                 if diagnosis.steps
                 else Markup(""),
             ),
+            folded("open", "Open laws: the curve and the closest law", _open_laws(open_laws)),
             folded("unexplained", "Unexplained residual", _unexplained(answer, unexplained)),
             folded(
                 "confusion",
@@ -89,14 +92,15 @@ def _verdict(answer: Answer, command: Command, title: str, ladder: Figure | None
     diagnosis = answer.diagnosis
     seen = smallest_shown(answer) if diagnosis.verdict == "adequate" else []
     shown = f"Detectable with these {diagnosis.data}, among others: {listed(seen)}." if seen else ""
-    cause, error = cause_and_error(diagnosis)
+    known = not diagnosis.interrupted
     rows = [
         ("Compared", compared_text(command.dataset, command.profile)),
-        ("Cause", cause),
-        ("Error", error),
+        ("Missing", tables.steps(diagnosis, errors_without(answer))),
+        ("Error", error_text(diagnosis)),
+        ("Remains", remaining_text(diagnosis)),
         ("Detectable", shown),
-        ("Cure" if diagnosis.steps else "Next", _cure(diagnosis, command)),
-        ("Would decide", _decides(diagnosis)),
+        ("Cure" if diagnosis.steps else "Next", _cure(diagnosis, command) if known else ""),
+        ("Then", changes_text(diagnosis) if known else ""),
     ]
     return lead(
         title,
@@ -110,25 +114,11 @@ def _verdict(answer: Answer, command: Command, title: str, ladder: Figure | None
 
 
 def _cure(diagnosis: Diagnosis, command: Command) -> str:
-    """The command that adds the first named effect, or continues without one."""
-    if diagnosis.interrupted:
-        return ""
+    """The command that adds the first effect, or continues without one."""
     if diagnosis.verdict == "adequate":
         return "None is needed."
     continued = _commands(diagnosis, command)[2:]
     return code_block(continued[0]) if continued else ""
-
-
-def _decides(diagnosis: Diagnosis) -> str:
-    """The first proposed run that distinguishes effects, else what would change the verdict."""
-    if diagnosis.interrupted:
-        return ""
-    if not diagnosis.next_runs:
-        return changes_text(diagnosis)
-    first = diagnosis.next_runs[0]
-    power = "" if isnan(first.power) else f" (power {percent(first.power)})"
-    run = capital(first.programme.rstrip("."))
-    return f"{run}. It distinguishes {listed(list(first.separates))}{power}."
 
 
 def _named(answer: Answer) -> Markup:
@@ -148,17 +138,10 @@ def _story(story: Sequence[str]) -> Markup:
 
 def _unexplained(answer: Answer, figures: Sequence[Figure]) -> Markup:
     diagnosis = answer.diagnosis
-    if diagnosis.verdict == "explained" and diagnosis.unexplained_share >= _TRACE:
-        left = percent(diagnosis.unexplained_share)
-        return element(
-            "p",
-            f"{left} of the residual variance above the noise floor remains; it is below the noise "
-            "floor itself.",
-        )
-    if diagnosis.verdict not in {"partly", "unknown"}:
+    if diagnosis.verdict == "adequate" or diagnosis.interrupted:
         return Markup("")
     share = percent(diagnosis.unexplained_share)
-    left = element("p", f"{share} of the residual variance above the noise floor remains.")
+    left = element("p", f"{share} of the error above the noise remains.")
     places = bullets([where_text(where) for where in diagnosis.where])
     caption = "Its patterns; correlated variables explain the same part of the residual:"
     head = element("p", caption) if places else Markup("")
@@ -167,9 +150,15 @@ def _unexplained(answer: Answer, figures: Sequence[Figure]) -> Markup:
     return join([left, head, places, pair, _offer(diagnosis)])
 
 
+def _open_laws(figures: Sequence[Figure]) -> Markup:
+    """Curves that explain more than the closest law of the catalogue, with that law."""
+    blocks = [figure_block(one, 480) for one in figures]
+    return element("div", *blocks, class_="pair maps") if blocks else Markup("")
+
+
 def _offer(diagnosis: Diagnosis) -> Markup:
     """Commands that continue with an unexplained residual."""
-    if not diagnosis.empirical:
+    if not diagnosis.empirical or diagnosis.verdict == "explained":
         return Markup("")
     return element(
         "p",
@@ -184,7 +173,7 @@ def _next(diagnosis: Diagnosis) -> Markup:
     if not diagnosis.next_runs:
         return Markup("")
     rows = [
-        [" / ".join(r.separates), r.programme, "–" if isnan(r.power) else percent(r.power)]
+        [" / ".join(r.separates) or "–", r.programme, "–" if isnan(r.power) else percent(r.power)]
         for r in diagnosis.next_runs
     ]
     caption = (
@@ -206,11 +195,13 @@ def _commands(diagnosis: Diagnosis, command: Command) -> list[str]:
     profile = command.profile
     commands = [command.compare(profile), command.diagnose(profile)]
     for step in diagnosis.steps:
+        if step.refitted:
+            continue
         better = extended_name(profile, "calibrated" if step.whole else step.effects[0])
         more = command.calibrate(profile, better)
         commands.append(more if step.whole else command.add(step.effects[0], profile, better))
         profile = better
-    if diagnosis.empirical and diagnosis.verdict in {"partly", "unknown"}:
+    if diagnosis.empirical and diagnosis.verdict in {"partly", "unknown", "undecided"}:
         commands.append(command.add(diagnosis.empirical[0], profile, "with-curve.toml"))
         commands.append(command.begin_effect(profile, "my_effect.py"))
     return commands

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.fleet.anova import SharedAttribution, SharedError
 from winchkit.diagnosis.fleet.meta_analysis import Pooled, SharedEffect
-from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Step
+from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Place, Step
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.ladder import fleet_ladders
 from winchkit.report.html.markup import Markup, compact, element, folded, section, table
@@ -16,6 +16,7 @@ from winchkit.report.words.columns import aligned, hanging, paragraph
 from winchkit.report.words.headline import at_noise
 from winchkit.report.words.numbers import Scale, percent, quantity, scale_for, significant, unbroken
 from winchkit.report.words.sentence import capital, main_patterns, where_text
+from winchkit.report.words.steps import has_other_law
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     VARIABLE_NAMES,
@@ -24,6 +25,7 @@ from winchkit.report.words.vocabulary import (
     estimate_text,
     listed,
     values_text,
+    variable_name,
 )
 
 __all__ = [
@@ -43,7 +45,7 @@ _CAUSES = 4
 """Effects in the lead of the page; all stand below."""
 _SIDE = 560
 """px: width of a figure, of which a row has two."""
-_ORDER = ("unknown", "partly", "explained", "adequate")
+_ORDER = ("unknown", "undecided", "partly", "explained", "adequate")
 _SOME = {0: "No effect is", 1: "1 effect is"}
 _BY_CHANCE = 0.01
 """Least probability at which a false alarm of one of many winches is reported."""
@@ -115,12 +117,22 @@ def effect_text(shared: SharedEffect) -> str:
     """``the drum has runout (drum-eccentricity): only in H: amplitude = …; excluded in A``."""
     first, *others = shared.effects
     ids = f"{first}, or {listed(others, 'or')}" if others else first
-    parts = [f"{clause(first)} ({ids}): {_where(shared)}"]
+    what = f"{clause(first)} ({ids})"
+    if shared.by_place and shared.place is not None:
+        what = f"{_at(shared.place)}, most often {first}"
+    parts = [f"{what}: {_where(shared)}"]
     if shared.without:
         parts.append(f"excluded in {listed(list(shared.without))}")
     if shared.unsure:
         parts.append(f"not decidable in {listed(list(shared.unsure))} with these runs")
     return "; ".join(parts)
+
+
+def _at(place: Place) -> str:
+    """``effects of the motor on the motor torque over the speed``."""
+    over = f" over the {variable_name(place.variable)}" if place.variable else ""
+    output = OUTPUT_NAMES.get(place.output, place.output)
+    return f"effects of the {place.part} on the {output}{over}"
 
 
 def error_rows(found: Mapping[str, Comparison]) -> list[list[str]]:
@@ -184,7 +196,9 @@ def _step(step: Step) -> str:
     first, *others = step.effects
     values = values_text(step.parameters.get(first, {}))
     beside = f" (or {listed(others, 'or')})" if others else ""
-    return f"{first}{beside} {values}".strip()
+    if has_other_law(step):
+        beside = " or another law"
+    return f"{first}{beside} {values}{' (refitted)' if step.refitted else ''}".strip()
 
 
 def _where(shared: SharedEffect) -> str:

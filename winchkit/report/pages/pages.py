@@ -12,7 +12,7 @@ from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.ladder import error_ladder, present
 from winchkit.report.figures.maps import map_figures
 from winchkit.report.figures.residuals import OutputFigures, Residuals, residual_figures
-from winchkit.report.figures.unexplained import unexplained_figures
+from winchkit.report.figures.unexplained import open_law_figures, unexplained_figures
 from winchkit.report.html.markup import Markup
 from winchkit.report.html.page import page
 from winchkit.report.pages.addition import addition_sections
@@ -70,6 +70,7 @@ def report_html(
     residuals = residuals_of(answer, command.source)
     drawn, cards = _cards(residuals, size_texts(answer.diagnosis.outputs))
     patterns = unexplained_figures(answer, command.source)
+    laws = open_law_figures(answer, command.source)
     ladder = error_ladder(
         answer.diagnosis.outputs,
         extended=residuals.after is not None,
@@ -77,9 +78,17 @@ def report_html(
         source=command.source,
     )
     content = sections(
-        answer, cards, story, truth, command, title=title, unexplained=patterns, ladder=ladder
+        answer,
+        cards,
+        story,
+        truth,
+        command,
+        title=title,
+        unexplained=patterns,
+        open_laws=laws,
+        ladder=ladder,
     )
-    return page(title, [*present(ladder), *drawn, *patterns], content, headed=False)
+    return page(title, [*present(ladder), *drawn, *laws, *patterns], content, headed=False)
 
 
 def report_figures(answer: WinchAnswer, source: str = "") -> list[Figure]:
@@ -92,7 +101,8 @@ def report_figures(answer: WinchAnswer, source: str = "") -> list[Figure]:
         changed=residuals.changed,
         source=source,
     )
-    return [*present(ladder), *drawn, *unexplained_figures(answer, source)]
+    laws = open_law_figures(answer, source)
+    return [*present(ladder), *drawn, *laws, *unexplained_figures(answer, source)]
 
 
 def residuals_of(answer: WinchAnswer, source: str = "") -> Residuals:

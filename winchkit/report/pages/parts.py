@@ -29,6 +29,7 @@ _ICONS = {
         '<path d="M8 1.8L14.2 8 8 14.2 1.8 8z"/>'
         '<path d="M6.6 6.6c.2-1.8 3-1.6 2.8.1-.1 1-1.4 1-1.4 2.1M8 10.9v.1"/>'
     ),
+    "undecided": '<circle cx="8" cy="8" r="6"/><path d="M5 8h6"/>',
 }
 """Icon beside the verdict's word, by its colour."""
 _SIDE = 480
@@ -45,7 +46,7 @@ def lead(
 ) -> Markup:
     """Result of a page: a word, a headline, and a summary of the comparison and its consequences.
 
-    ``tone`` is a verdict whose colour is taken: adequate, explained, partly, unknown.
+    ``tone`` is a verdict whose colour is taken: adequate, explained, partly, unknown, undecided.
     ``rows`` are questions and their answers; empty answers are left out.
     """
     icon = Markup(f'<svg viewBox="0 0 16 16" aria-hidden="true">{_ICONS[tone]}</svg>')

@@ -11,11 +11,10 @@ from winchkit.runs.sanity.finding import Finding
 __all__ = ["caveat_text", "finding_texts", "used_text"]
 
 _CAVEATS = {
-    "inverted-sign": "the sign of a channel looks inverted: no effect is named with it; import it "
+    "inverted-sign": "the sign of a channel looks inverted: no effect is looked for; import it "
     "with a minus, --column CHANNEL=-COLUMN, or negate it",
-    "wrong-factor": "the unit or factor of a channel looks wrong: no effect is named with it",
-    "no-repeats": "no run repeats another: an effect outside the catalogue counts as noise and "
-    "cannot be excluded",
+    "wrong-factor": "the unit or factor of a channel looks wrong: no effect is looked for",
+    "no-repeats": "no run repeats another: the noise is known between two bounds only",
     "repeats-are-copies": "a run is a copy of another one and shows no noise: it was left out",
     "outlying-repeat": "a run differs from its repeats by something that is not recorded: it was "
     "left out",

@@ -1,61 +1,24 @@
-"""The result in one short line, as a page shows it first."""
+"""Errors of outputs in words, the worst first, and the headline of a comparison."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from winchkit.diagnosis.results import Comparison, Diagnosis, OutputError, OutputFit, Step
-from winchkit.report.words.numbers import quantity, significant
-from winchkit.report.words.sentence import capital, doubtful
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause, kind, listed
+from winchkit.diagnosis.results import Comparison, OutputError, OutputFit
+from winchkit.report.words.numbers import quantity, scale_for, significant
+from winchkit.report.words.vocabulary import OUTPUT_NAMES
 
-__all__ = ["at_noise", "comparison_headline", "headline", "size_texts", "worst_outputs"]
+__all__ = [
+    "AT_NOISE",
+    "at_noise",
+    "comparison_headline",
+    "noise_text",
+    "size_texts",
+    "worst_outputs",
+]
 
 AT_NOISE = 1.15
 """Largest ratio of an error to its noise at which it counts as noise."""
-
-
-def headline(diagnosis: Diagnosis) -> str:
-    """``The drum has runout``; without a full stop.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of a winch or a robot.
-
-    Returns
-    -------
-    str
-        Plain text.
-    """
-    worst = OUTPUT_NAMES.get(next(iter(worst_outputs(diagnosis.outputs)), ""), "model")
-    if diagnosis.interrupted:
-        return "The search was interrupted before a verdict"
-    if diagnosis.verdict == "unknown" and doubtful(diagnosis):
-        return "A channel looks wrong: no effect is named"
-    if diagnosis.verdict == "adequate":
-        known = all(o.noise_source == "repeats" for o in diagnosis.outputs.values())
-        return f"{'No' if known else 'No known'} effect is missing"
-    if diagnosis.steps:
-        return _missing(diagnosis.steps)
-    if diagnosis.verdict == "partly":
-        return f"Known effects explain the {worst} error in part, and none is named"
-    return f"No known effect explains the {worst} error"
-
-
-def _missing(steps: Sequence[Step]) -> str:
-    if len(steps) > 1:
-        cause = "the geometry differs as a whole" if steps[0].whole else clause(steps[0].effects[0])
-        return f"{len(steps)} effects are missing; first, {cause}"
-    (step,) = steps
-    if step.whole:
-        return "The geometry of the robot differs as a whole"
-    kinds = list(dict.fromkeys(kind(effect) for effect in step.effects))
-    return capital(listed(kinds, "or")) if len(kinds) < 3 else _one_of(len(kinds))
-
-
-def _one_of(count: int) -> str:
-    return f"One of {count} effects is missing, which these data cannot distinguish"
 
 
 def comparison_headline(comparison: Comparison) -> str:
@@ -96,12 +59,22 @@ def size_texts(outputs: Mapping[str, OutputError] | Mapping[str, OutputFit]) -> 
     for name, output in outputs.items():
         size, noise = _error(output), output.noise_rms
         text = f"{quantity(size, output.unit)} rms"
-        if noise:
+        if isinstance(output, OutputFit) and output.noise_upper is not None:
+            text += f", {noise_text(output)}"
+        elif noise:
             above = size >= AT_NOISE * noise
             times = f"{significant(size / noise, 2)} times" if above else "about"
             text += f", {times} its noise of {quantity(noise, output.unit)}"
         out[name] = text
     return out
+
+
+def noise_text(output: OutputFit) -> str:
+    """``noise 0.304 mm``; its two bounds where neither repeats nor instruments give it."""
+    if output.noise_rms is None:
+        return "noise unknown"
+    scale = scale_for(output.heldout_rms_before, output.unit)
+    return f"noise {scale.span(output.noise_rms, output.noise_upper)}"
 
 
 def _error(output: OutputError | OutputFit) -> float:

@@ -63,6 +63,11 @@ class Scale:
             return "unknown"
         return self.labelled(significant(value / self.worth, digits))
 
+    def span(self, low: float, high: float | None, digits: int = 3) -> str:
+        """Two values with one unit: ``0.084 to 0.334 N m``; one value where both are equal."""
+        first, last = self.text(low, digits), self.text(low if high is None else high, digits)
+        return last if first == last else f"{significant(low / self.worth, digits)} to {last}"
+
     def labelled(self, number: str) -> str:
         """A formatted number followed by the unit."""
         tight = self.label in {"", "°", "/K"} or self.label.startswith("·")
@@ -101,14 +106,15 @@ def quantity(value: float, unit: str, digits: int = 3) -> str:
     return scale_for(value, unit).text(value, digits)
 
 
-def with_std(value: float, std: float, unit: str) -> str:
+def with_std(value: float, std: float, unit: str, scale: Scale | None = None) -> str:
     """Value and standard deviation, the latter to two digits: ``247.4 ± 6.1 kN``.
 
-    Without a deviation (NaN or zero) the value alone, to three digits.
+    Without a deviation (NaN or zero) the value alone, to three digits. The scale is that of the
+    value unless another one is given.
     """
     if not isfinite(value) or not isfinite(std) or std <= 0:
-        return quantity(value, unit)
-    scale = scale_for(max(abs(value), std), unit)
+        return (scale or scale_for(value, unit)).text(value)
+    scale = scale or scale_for(max(abs(value), std), unit)
     shown, deviation = value / scale.worth, std / scale.worth
     decimals = 1 - floor(log10(deviation))
     if round(deviation, decimals) >= 10 ** (2 - decimals):

@@ -3,30 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isnan
 
 from winchkit.diagnosis.data.sanity import ALARMING
 from winchkit.diagnosis.residuals.attribution import Attribution
-from winchkit.diagnosis.results import Diagnosis, OutputFit, Step
-from winchkit.report.words.numbers import percent, quantity, significant
-from winchkit.report.words.vocabulary import (
-    OUTPUT_NAMES,
-    VARIABLE_NAMES,
-    clause,
-    kind,
-    listed,
-    values_text,
-)
+from winchkit.diagnosis.results import Diagnosis, OutputFit
+from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
+from winchkit.report.words.numbers import percent, scale_for, significant
+from winchkit.report.words.steps import cause
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
 
 __all__ = [
     "CLEAR_ORDER",
     "capital",
-    "cause_and_error",
     "changes_text",
-    "doubtful",
+    "error_text",
     "gain_text",
+    "headline",
     "main_patterns",
     "moved_outputs",
     "often_per_turn",
+    "remaining_patterns",
+    "remaining_text",
     "sentence",
     "still_text",
     "where_text",
@@ -40,26 +38,46 @@ CLEAR_ORDER = 0.2
 """Least share of the residual variance from which an order within a turn precedes a trend."""
 _ABOVE = 1.5
 """Ratio of error to noise from which a sentence says that an output is above its noise."""
-_WHOLE = (
-    "the geometry of the robot differs as a whole: no small set of effects explains these poses as "
-    "well as all points and radii together"
-)
-_NO_GAIN = "Adding it does not change the held-out errors."
+_NO_GAIN = "No held-out error changes."
 _CHANGES = {
-    "runs": {
-        "more": "runs at other loads, strokes, speeds or temperatures",
-        "one": "a run",
-        "other": "a run at another load, stroke or speed",
-    },
-    "poses": {
-        "more": "poses farther out or at other rotations, tensions, payloads or temperatures",
-        "one": "a set of poses",
-        "other": "poses at other positions or tensions",
-    },
+    "runs": ("other loads, strokes, speeds or temperatures", "another load, stroke or speed"),
+    "poses": (
+        "poses farther out or at other rotations, tensions, payloads or temperatures",
+        "poses at other positions or tensions",
+    ),
 }
-"""Further data that could change a verdict, by the kind of data of the diagnosis."""
+"""Further data that could refute an adequate model and an extended one, by the kind of data."""
 _CONSTANT = ("winch", "pose")
-_COUNTS = {2: "Two", 3: "Three", 4: "Four", 5: "Five", 6: "Six"}
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """The result in one line: ``The drum has runout``; without a full stop.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of a winch or a robot.
+
+    Returns
+    -------
+    str
+        Plain text.
+    """
+    worst = OUTPUT_NAMES.get(next(iter(worst_outputs(diagnosis.outputs)), ""), "model")
+    verdict, steps = diagnosis.verdict, diagnosis.steps
+    if diagnosis.interrupted:
+        return "The search was interrupted before a verdict"
+    if _wrong_channels(diagnosis):
+        return "A channel looks wrong: no effect was looked for"
+    if verdict == "adequate":
+        return f"{'No' if _noise_is_known(diagnosis) else 'No known'} effect is missing"
+    if verdict == "undecided":
+        what = f"The {worst} error" if not steps else f"What remains of the {worst} error"
+        return f"{what} may be noise: these runs cannot decide"
+    if verdict == "unknown":
+        what = "No known effect explains" if not steps else "Known effects explain little of"
+        return f"{what} the {worst} error"
+    return capital(cause(steps)) if steps else f"The {worst} error is explained in part"
 
 
 def sentence(diagnosis: Diagnosis) -> str:
@@ -75,11 +93,12 @@ def sentence(diagnosis: Diagnosis) -> str:
     str
         Plain text.
     """
-    return " ".join(part for part in cause_and_error(diagnosis) if part)
+    parts = [f"{headline(diagnosis)}.", error_text(diagnosis), remaining_text(diagnosis)]
+    return " ".join(part for part in parts if part)
 
 
-def cause_and_error(diagnosis: Diagnosis) -> tuple[str, str]:
-    """The sentence in two parts: the cause, and the error that it explains.
+def error_text(diagnosis: Diagnosis) -> str:
+    """Held-out error that falls most with the steps, or without any the worst one, in a sentence.
 
     Parameters
     ----------
@@ -88,58 +107,87 @@ def cause_and_error(diagnosis: Diagnosis) -> tuple[str, str]:
 
     Returns
     -------
-    tuple of str
-        The second is empty where the first has the figures.
+    str
+        Empty without outputs.
     """
+    outputs = diagnosis.outputs
     if diagnosis.interrupted:
-        text = "Interrupted before a verdict: errors of the profile, and candidates by evidence."
-        return text, ""
-    if diagnosis.verdict == "unknown" and (doubts := doubtful(diagnosis)):
-        return doubts, ""
-    if diagnosis.verdict == "adequate":
-        return _adequate(diagnosis)
-    if diagnosis.steps:
-        steps, outputs = diagnosis.steps, diagnosis.outputs
-        gain = gain_text(outputs, _opening(steps)) or _NO_GAIN
-        parts = [gain, still_text(outputs)]
-        if diagnosis.verdict == "partly":
-            parts += [_unexplained(diagnosis, "Partly unexplained"), _nearest(diagnosis)]
-        return _named(steps, diagnosis.data), " ".join(part for part in parts if part)
-    if diagnosis.verdict == "partly":
-        opening = "Partly explained by known effects, none of which is named"
-        return f"{_unexplained(diagnosis, opening)} {_nearest(diagnosis)}".strip(), ""
-    opening = "Nothing is named" if diagnosis.closest else "Unexplained by any known effect"
-    return _closest(diagnosis) + _unexplained(diagnosis, opening), ""
+        return ""
+    if wrong := _wrong_channels(diagnosis):
+        return f"{'; '.join(wrong)}."
+    if not diagnosis.steps:
+        name = next(iter(worst_outputs(outputs)), "")
+        return f"Held-out error: {size_texts(outputs)[name]}." if name else ""
+    first, *others = diagnosis.steps
+    either = len(first.effects) > 1 and not first.whole
+    opening = "With them" if others else "With either" if either else "With it"
+    if all(step.refitted for step in diagnosis.steps):
+        opening = "Corrected"
+    return gain_text(outputs, opening, most=1) or _NO_GAIN
+
+
+def remaining_text(diagnosis: Diagnosis) -> str:
+    """What remains unexplained, and where; empty where nothing is missing any more.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of a winch or a robot.
+
+    Returns
+    -------
+    str
+        One or two sentences.
+    """
+    if diagnosis.verdict == "adequate" or diagnosis.interrupted or _wrong_channels(diagnosis):
+        return ""
+    if diagnosis.verdict == "explained":
+        return still_text(diagnosis.outputs)
+    share, parts = percent(diagnosis.unexplained_share), []
+    if diagnosis.verdict != "undecided":
+        parts.append(f"{share} of the error above the noise remains.")
+    elif diagnosis.steps:
+        parts.append(f"At most {share} of the error above the noise remains.")
+    if places := [where_text(where) for where in remaining_patterns(diagnosis)[:2]]:
+        parts.append(f"Main pattern{'s' if len(places) > 1 else ''}: {'; '.join(places)}.")
+    return " ".join(parts)
 
 
 def changes_text(diagnosis: Diagnosis) -> str:
-    """Further data that would change the verdict, in a sentence."""
-    words = _CHANGES[diagnosis.data]
+    """What to record or to do so that the result is confirmed, refuted or decided.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+        Of a winch or a robot.
+
+    Returns
+    -------
+    str
+        One or two sentences.
+    """
+    other, beyond = _CHANGES[diagnosis.data]
+    if _wrong_channels(diagnosis):
+        return "Correct the unit or sign of the channel, or confirm it with --as-recorded."
     if diagnosis.verdict == "adequate":
+        return f"To check: record {other}. An error above the noise there refutes this result."
+    if diagnosis.next_runs:
+        run = diagnosis.next_runs[0]
+        power = "" if isnan(run.power) else f" (power {percent(run.power)})"
+        return f"To decide{_between(run.separates)}: {run.programme.rstrip('.')}{power}."
+    if diagnosis.verdict == "explained":
         return (
-            f"This result would be refuted by {words['more']} with a residual above the noise "
-            "floor."
+            f"To check: record {beyond}. If the new model misses it by more than the noise, this "
+            "result is wrong."
         )
-    if diagnosis.verdict == "unknown" and doubtful(diagnosis):
-        return (
-            f"This result would change with {words['one']} in the right unit and sign, or with the "
-            "confirmation that these are right."
-        )
-    if not diagnosis.steps:
-        return (
-            "No effect is named, since a name would be a guess with so large a residual. This "
-            "result would change with an effect of your own that explains the residual, or with "
-            f"{words['one']} that isolates its cause."
-        )
-    if any(len(step.effects) > 1 and not step.whole for step in diagnosis.steps):
-        return (
-            f"This result would change with {words['one']} in which the effects differ that these "
-            f"{diagnosis.data} cannot distinguish."
-        )
+    rest = "the rest" if diagnosis.steps else "it"
     return (
-        f"This result would be refuted by {words['other']} that the fitted model does not predict "
-        "to within the noise floor."
+        f"To explain {rest}: write an effect of your own, or record a run that isolates its cause."
     )
+
+
+def _between(effects: Sequence[str]) -> str:
+    return f" between {listed(list(effects))}" if effects else ""
 
 
 def where_text(where: Attribution) -> str:
@@ -188,6 +236,17 @@ def main_patterns(places: Sequence[Attribution]) -> list[Attribution]:
     return list(first.values())
 
 
+def remaining_patterns(diagnosis: Diagnosis) -> list[Attribution]:
+    """Main patterns of the outputs that are above their noise, of all where none is."""
+    found = main_patterns(diagnosis.where)
+    outputs = diagnosis.outputs
+    return [w for w in found if w.output in outputs and not _at_noise(outputs[w.output])] or found
+
+
+def _at_noise(output: OutputFit) -> bool:
+    return output.heldout_rms_after < AT_NOISE * (output.noise_rms or 0.0)
+
+
 def moved_outputs(outputs: Mapping[str, OutputFit]) -> list[str]:
     """Outputs whose held-out error fell by more than 5 %, the largest fall first."""
     falls = {
@@ -198,175 +257,58 @@ def moved_outputs(outputs: Mapping[str, OutputFit]) -> list[str]:
     return sorted((n for n, fall in falls.items() if fall > _MOVED), key=lambda n: -falls[n])
 
 
-def gain_text(outputs: Mapping[str, OutputFit], opening: str) -> str:
-    """``With it, the held-out error of … falls from … to …``; empty where none falls."""
-    moved = moved_outputs(outputs)
-    if not moved:
-        return ""
-    if len(moved) == 1:
-        output = outputs[moved[0]]
-        error = f"the held-out error of the {OUTPUT_NAMES.get(moved[0], moved[0])}"
-        return f"{opening}, {error} {_fall(output)}{_beside(output)}."
-    falls = [_in_one(name, outputs[name]) for name in moved]
-    return f"{opening}, the held-out error {listed(falls)}."
+def gain_text(outputs: Mapping[str, OutputFit], opening: str, most: int | None = None) -> str:
+    """``With it, the … error falls from … to … (noise …)``; empty where none falls by 5 %."""
+    falls = [
+        f"the {OUTPUT_NAMES.get(name, name)} error falls {_change(outputs[name])} "
+        f"({noise_text(outputs[name])})"
+        for name in moved_outputs(outputs)[:most]
+    ]
+    return f"{opening}, {listed(falls)}." if falls else ""
 
 
 def worse_text(outputs: Mapping[str, OutputFit]) -> str:
     """Outputs whose held-out error rose; empty where none did."""
     rises = [
-        f"of the {OUTPUT_NAMES.get(name, name)} "
-        f"from {quantity(output.heldout_rms_before, output.unit)} "
-        f"to {quantity(output.heldout_rms_after, output.unit)}"
+        f"of the {OUTPUT_NAMES.get(name, name)} {_change(output)}"
         for name, output in outputs.items()
         if output.heldout_rms_after > _MOVED * output.heldout_rms_before
     ]
     return f"It raises the held-out error {listed(rises)}." if rises else ""
 
 
+def _change(output: OutputFit) -> str:
+    """``from 0.943 mm to 0.309 mm``."""
+    scale = scale_for(output.heldout_rms_before, output.unit)
+    return f"from {scale.text(output.heldout_rms_before)} to {scale.text(output.heldout_rms_after)}"
+
+
 def still_text(outputs: Mapping[str, OutputFit]) -> str:
-    """Outputs whose error remains well above their noise floor."""
-    texts = _above_noise(outputs)
-    return f"Still above the noise floor: {listed(texts)}." if texts else ""
-
-
-def _above_noise(outputs: Mapping[str, OutputFit]) -> list[str]:
-    """Outputs whose held-out error is well above the noise, with the factor."""
-    above = {
+    """Outputs whose error remains well above their noise, with the factor."""
+    ratios = {
         name: output.heldout_rms_after / output.noise_rms
         for name, output in outputs.items()
-        if output.noise_rms
+        if output.noise_rms and output.noise_upper is None
     }
-    return [
+    texts = [
         f"{OUTPUT_NAMES.get(name, name)} by a factor of {significant(ratio, 2)}"
-        for name, ratio in above.items()
+        for name, ratio in ratios.items()
         if ratio > _ABOVE
     ]
+    return f"Still above the noise: {listed(texts)}." if texts else ""
 
 
-def doubtful(diagnosis: Diagnosis) -> str:
+def _wrong_channels(diagnosis: Diagnosis) -> list[str]:
     """Wrong signs and units, with which no effect is looked for; empty without any."""
+    if diagnosis.verdict != "unknown" or diagnosis.steps:
+        return []
     found = [f for f in diagnosis.sanity if f.code in ALARMING]
-    texts = list(dict.fromkeys(f"{f.channel}: {f.text}" for f in found))
-    return f"No effect is named with a wrong channel: {'; '.join(texts)}." if texts else ""
+    return list(dict.fromkeys(f"{f.channel}: {f.text}" for f in found))
 
 
-def _adequate(diagnosis: Diagnosis) -> tuple[str, str]:
-    figures = []
-    for name, output in diagnosis.outputs.items():
-        figure = f"{OUTPUT_NAMES.get(name, name)} {quantity(output.heldout_rms_after, output.unit)}"
-        if output.noise_rms is not None:
-            figure += f" (noise {quantity(output.noise_rms, output.unit)})"
-        figures.append(figure)
-    errors = f"Held-out error: {'; '.join(figures)}." if figures else ""
-    if _from_repeats(diagnosis):
-        return "No effect is missing: the residual is at the noise floor.", errors
-    known = "No known effect is missing; an unknown effect cannot be excluded without repeats."
-    if above := _above_noise(diagnosis.outputs):
-        known += (
-            f" The held-out error is above the residual that all known effects together leave "
-            f"({listed(above)}): these runs are too few or too short to name one."
-        )
-    return known, errors
-
-
-def _named(steps: tuple[Step, ...], data: str) -> str:
-    if len(steps) == 1:
-        return capital(_step(steps[0], data)) + "."
-    count = _COUNTS.get(len(steps), str(len(steps)))
-    numbered = [f"({n}) {_step(step, data, ' ({})')}" for n, step in enumerate(steps, start=1)]
-    return f"{count} effects are missing: {'; '.join(numbered)}."
-
-
-def _opening(steps: Sequence[Step]) -> str:
-    """Opening of the sentence on the errors with the missing effects added."""
-    if steps[0].whole:
-        return "After calibration" if len(steps) == 1 else "After calibration, with the others"
-    if len(steps) > 1:
-        return "With them"
-    return "With one of them" if len(_kinds(steps[0])) > 1 else "With it"
-
-
-def _kinds(step: Step) -> list[list[str]]:
-    """Effects of a set by kind, parsimonious ones first: there are several laws of elongation."""
-    kinds: dict[str, list[str]] = {}
-    for effect in step.effects:
-        kinds.setdefault(kind(effect), []).append(effect)
-    return list(kinds.values())
-
-
-def _step(step: Step, data: str, form: str = ": {}") -> str:
-    if step.whole:
-        return _WHOLE
-    kinds = _kinds(step)
-    if len(kinds) == 1:
-        ((first, *others),) = kinds
-        beside = f"these {data} cannot distinguish it from {listed(others)}" if others else ""
-        return _with_values(step, first, form, beside, "; ")
-    either = [
-        _with_values(step, first, " ({})", f"or as {listed(others, 'or')}" if others else "", ", ")
-        for first, *others in kinds
-    ]
-    return f"{listed(either, 'or')} – these {data} cannot distinguish them"
-
-
-def _with_values(step: Step, effect: str, form: str, beside: str, link: str) -> str:
-    """An effect in words with its values and a remark."""
-    values = step.parameters.get(effect, {})
-    fitted = values_text(values)
-    inside = link.join(part for part in (fitted, beside) if part)
-    return clause(effect) + (form.format(inside) if inside else "")
-
-
-def _fall(output: OutputFit) -> str:
-    before = quantity(output.heldout_rms_before, output.unit)
-    return f"falls from {before} to {quantity(output.heldout_rms_after, output.unit)}"
-
-
-def _beside(output: OutputFit) -> str:
-    if output.noise_rms is None:
-        return ""
-    known = output.noise_source == "repeats"
-    what = "noise floor" if known else "residual that no known effect explains"
-    return f"; the {what} is {quantity(output.noise_rms, output.unit)}"
-
-
-def _in_one(name: str, output: OutputFit) -> str:
-    text = f"of the {OUTPUT_NAMES.get(name, name)} {_fall(output)}"
-    if output.noise_rms is None:
-        return text
-    return f"{text} (noise {quantity(output.noise_rms, output.unit)})"
-
-
-def _closest(diagnosis: Diagnosis) -> str:
-    """The effects that would explain the residual, and why they are not named; or nothing."""
-    if not diagnosis.closest:
-        return ""
-    parts = [f"{clause(each.effect)}, but {each.reason}" for each in diagnosis.closest]
-    return f"Closest: {'; '.join(parts)}. "
-
-
-def _nearest(diagnosis: Diagnosis) -> str:
-    """The effects that explain a part and may imitate its cause; or nothing."""
-    if not diagnosis.closest:
-        return ""
-    parts = []
-    for each in diagnosis.closest:
-        values = values_text(each.parameters)
-        parts.append(clause(each.effect) + (f" ({values})" if values else ""))
-    which = "A further part is" if diagnosis.steps else "A part is"
-    return f"{which} explained by these effects, or they imitate its cause: {'; '.join(parts)}."
-
-
-def _unexplained(diagnosis: Diagnosis, opening: str) -> str:
-    share = percent(diagnosis.unexplained_share)
-    places = [where_text(where) for where in main_patterns(diagnosis.where)[:2]]
-    plural = "s" if len(places) > 1 else ""
-    pattern = f" Main pattern{plural}: {'; '.join(places)}." if places else ""
-    return f"{opening}: {share} of the residual variance above the noise floor remains.{pattern}"
-
-
-def _from_repeats(diagnosis: Diagnosis) -> bool:
-    return all(output.noise_source == "repeats" for output in diagnosis.outputs.values())
+def _noise_is_known(diagnosis: Diagnosis) -> bool:
+    """Whether repeats or instruments give the noise, instead of two bounds."""
+    return all(output.noise_upper is None for output in diagnosis.outputs.values())
 
 
 def capital(text: str) -> str:

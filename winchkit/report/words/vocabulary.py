@@ -23,6 +23,7 @@ __all__ = [
     "parameter_name",
     "parameter_unit",
     "values_text",
+    "variable_name",
 ]
 
 VERDICT_NAMES = {
@@ -30,6 +31,7 @@ VERDICT_NAMES = {
     "explained": "Explained",
     "partly": "Partly explained",
     "unknown": "Unknown",
+    "undecided": "Undecided",
 }
 OUTPUT_NAMES = {
     "cable_length": "cable length",
@@ -129,6 +131,11 @@ _MAIN_ORDERS = 0.1
 """Share of the largest amplitude: smaller orders do not enter the guess of poles and slots."""
 _SYMBOLS = {"axial_stiffness": "EA"}
 _SHARES = ("gain_error", "ratio_error", "efficiency", "fraction")
+
+
+def variable_name(variable: str) -> str:
+    """Name of a variable in texts."""
+    return VARIABLE_NAMES.get(variable, variable.replace("_", " "))
 
 
 def clause(effect: str) -> str:

@@ -143,12 +143,13 @@ class Library:
 
 def _judgements(tables: Partitions) -> dict[str, Judgement]:
     """Diagnoses of a library by the path of each run."""
-    columns = ("runs", "verdict", "failure", "effects", "profile_name", "result")
+    columns = ("runs", "verdict", "failure", "effects", "places", "profile_name", "result")
     out: dict[str, Judgement] = {}
     for row in tables.read("diagnoses", columns).to_pylist():
         if row["failure"] is None:
             outputs = json.loads(row["result"]).get("outputs", {})
-            found = Judgement(row["verdict"], row["effects"], outputs, row["profile_name"])
+            causes = [*row["effects"], *(row["places"] or ())]
+            found = Judgement(row["verdict"], causes, outputs, row["profile_name"])
             out |= dict.fromkeys(row["runs"], found)
     return out
 

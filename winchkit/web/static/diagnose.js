@@ -165,7 +165,13 @@ function showCommands() {
 
 function head(d) {
   return el("div", { class: "verdict" }, el("div", { class: "head" }, el("span", { class: `chip ${d.verdict}` }, icon(d.verdict), d.chip), el("h1", {}, d.headline)),
-    d.sentence ? el("p", {}, coloured(d.sentence)) : null);
+    d.sentence ? el("p", {}, coloured(d.sentence)) : null, stepList(d.steps));
+}
+
+// Every effect of the model with its values, and the doubts about it below.
+function stepList(steps) {
+  return steps.length ? el("ol", { class: "found" }, steps.map((step) => el("li", {}, step.text,
+    step.doubts.length ? el("ul", {}, step.doubts.map((text) => el("li", {}, text))) : null))) : null;
 }
 
 // The errors before and after in the colours of the ladder, and no line break before a unit.
@@ -343,7 +349,7 @@ export function clear() {
 function drawData() {
   const d = view.diagnosis, box = root.querySelector("#data");
   const items = (list) => list.length ? el("ul", {}, list.map((text) => el("li", {}, text))) : el("p", { class: "note" }, "none");
-  fill(box, el("details", { open: d.verdict === "unknown" || d.verdict === "partly" }, el("summary", {}, "Data, patterns of the residual, and what would change this result"), el("div", { class: "facts" },
+  fill(box, el("details", { open: ["unknown", "partly", "undecided"].includes(d.verdict) }, el("summary", {}, "Data, patterns of the residual, and what would change this result"), el("div", { class: "facts" },
     el("div", {}, el("h2", {}, "Patterns of the residual"), items(d.unexplained)),
     el("div", {}, el("h2", {}, "Findings on the runs"), items(d.sanity.map((f) => `${f.run}: ${f.channel}: ${f.text}`))),
     el("div", {}, el("h2", {}, "Notes"), items([...d.notes, d.changes])))));

@@ -100,7 +100,7 @@ function set(node, attributes) {
 }
 
 const PATHS = {
-  explained: "M8 5v6M5 8h6", refitted: "M8 4.8V8h2.6", adequate: "M5 8.2l2.2 2.2L11 6", partly: "M8 5v4M8 11v.4", unknown: "M6.2 6.4a1.8 1.8 0 1 1 2.6 1.7c-.6.3-.8.6-.8 1.2M8 11.2v.2",
+  explained: "M8 5v6M5 8h6", refitted: "M8 4.8V8h2.6", adequate: "M5 8.2l2.2 2.2L11 6", partly: "M8 5v4M8 11v.4", undecided: "M5 8h6", unknown: "M6.2 6.4a1.8 1.8 0 1 1 2.6 1.7c-.6.3-.8.6-.8 1.2M8 11.2v.2",
   trip: "M8 4.5v4.5M8 11v.4", watch: "M8 6.2a1.8 1.8 0 1 0 .01 0", command: "M4.8 8h6M8.4 5.4 11 8l-2.6 2.6",
 };
 const OUTLINES = { unknown: "M8 1.2 14.8 8 8 14.8 1.2 8z", trip: "M5.3 1.5h5.4l3.8 3.8v5.4l-3.8 3.8H5.3l-3.8-3.8V5.3z", watch: "M1 8c3.2-5 10.8-5 14 0-3.2 5-10.8 5-14 0z" };

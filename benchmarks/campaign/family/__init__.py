@@ -1,0 +1,1 @@
+"""Friction of many forms, recordings without information, wrong profiles, metamorphic relations."""

@@ -1,0 +1,53 @@
+"""Every shipped winch bench: what its file says that it hides is found from its two motions."""
+
+from pathlib import Path
+
+import pytest
+
+from winchkit.catalog import find
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.runs.run import Run
+from winchkit.schema.read import read_profile, read_programme, read_simbench
+from winchkit.sim.bench import profiles_of
+from winchkit.sim.record import simulate
+
+FOLDER = Path(find("sim", "programme-demo")).parent
+PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
+
+
+def hiding() -> list[str]:
+    """Benches of one winch that say what answers their hidden physics."""
+    found = []
+    for path in sorted(FOLDER.glob("*.toml")):
+        if "answers" in path.read_text() and len(read_simbench(path).bench.winch) == 1:
+            found.append(path.stem)
+    return found
+
+
+def recorded(name: str) -> list[Run]:
+    bench = read_simbench(find("sim", name))
+    profiles = profiles_of(bench)
+    return [
+        run
+        for programme in PROGRAMMES
+        for run in simulate(
+            bench, profiles, read_programme(find("sim", programme)), seed=0, rate=50.0
+        )
+    ]
+
+
+@pytest.mark.parametrize("name", hiding())
+def test_what_a_bench_hides_is_told(name: str) -> None:
+    bench = read_simbench(find("sim", name))
+    (winch,) = bench.bench.winch.values()
+    answers = {a for truth in bench.truth.values() for one in truth.hidden for a in one.answers}
+    found = diagnose(recorded(name), read_profile(find("profiles", winch.profile))).diagnosis
+    told = {effect for step in found.steps for effect in step.effects}
+    certain = {step.effects[0] for step in found.steps if step.certain}
+    if answers:
+        assert found.verdict == "explained"
+        assert answers <= told
+        assert certain <= answers
+    else:
+        assert found.verdict != "adequate"
+        assert not certain

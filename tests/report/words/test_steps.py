@@ -1,0 +1,112 @@
+"""A step in words: effect, values, the error that it lowers most, share and doubts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import radians
+
+import pytest
+
+from report_answers import AT_NOISE, ELASTIC, FRICTION, NOISY, OPEN, REFITTED
+from winchkit.diagnosis.results import Doubt, Estimate, Step
+from winchkit.report.words.steps import (
+    alike,
+    cause,
+    doubt_texts,
+    lowered_most,
+    step_text,
+    step_title,
+)
+
+OUTPUTS = {"cable_length": NOISY, "tension": AT_NOISE}
+
+
+def test_a_step_has_value_error_without_and_with_it_and_share() -> None:
+    text = step_text(replace(ELASTIC, share=0.99), OUTPUTS, {"cable_length": 1.5e-3, "tension": 1})
+    assert text == (
+        "the cable is elastic: EA = 249.9 ± 7.0 kN; cable length 1.50 → 0.360 mm; explains 99 %"
+    )
+
+
+def test_a_step_that_lowers_no_error_shows_none() -> None:
+    same = {name: output.heldout_rms_after for name, output in OUTPUTS.items()}
+    assert lowered_most(OUTPUTS, same) == ""
+    assert "→" not in step_text(ELASTIC, OUTPUTS, same)
+    assert "explains" not in step_text(ELASTIC), "an unknown share is no figure"
+
+
+@pytest.mark.parametrize("unit", ["cable_length", "tension"])
+def test_the_output_is_the_one_whose_error_rises_most_without_the_step(unit: str) -> None:
+    without = {name: output.heldout_rms_after for name, output in OUTPUTS.items()}
+    assert lowered_most(OUTPUTS, without | {unit: 2 * without[unit]}) == unit
+
+
+def test_a_set_has_the_values_of_every_kind() -> None:
+    assert step_text(FRICTION).startswith(
+        "the pulleys have Coulomb friction (friction = 0.01500 ± 0.00010) or the cable slides "
+        "around a blocked pulley (capstan friction) (friction = 0.0138)"
+    )
+
+
+def test_laws_of_one_kind_are_named_once() -> None:
+    laws = ("cable-elongation-linear", "cable-elongation-exponential", "cable-elongation-quartic")
+    doubt = Doubt("alternatives", "")
+    stretch = replace(ELASTIC, effects=laws, law="open", doubts=(doubt,))
+    assert step_text(stretch) == "the cable is elastic: EA = 249.9 ± 7.0 kN"
+    assert doubt_texts(stretch) == [
+        "these runs cannot distinguish it from cable-elongation-exponential and "
+        "cable-elongation-quartic"
+    ]
+
+
+def test_many_kinds_are_counted() -> None:
+    many = replace(
+        ELASTIC,
+        effects=("cable-elongation-linear", "frame-compliance", "drum-radius", "gear-ratio"),
+    )
+    assert step_title(many) == "one of 4 effects is missing, which these data cannot distinguish"
+
+
+def test_signatures_far_apart_are_not_called_indistinguishable() -> None:
+    angles = {"pulley-capstan": radians(85.3)}
+    apart = replace(FRICTION, angles=angles)
+    assert alike(apart) == {}
+    assert alike(FRICTION) == {"pulley-capstan": 0.002}
+    assert doubt_texts(apart) == [
+        "these runs are explained as well by pulley-capstan, in another way"
+    ]
+
+
+def test_a_refitted_value_has_that_of_the_file_in_the_same_unit() -> None:
+    assert step_title(REFITTED) == "axial stiffness 250 kN instead of 100 kN in the profile"
+    small = replace(REFITTED, file_values={"axial_stiffness": 900.0})
+    assert step_text(small) == (
+        "the cable is elastic: axial stiffness 249.9 ± 7.0 kN instead of 0.900 kN in the profile; "
+        "explains 90 %"
+    )
+
+
+def test_refitted_values_are_counted_apart_from_missing_effects() -> None:
+    old, new = replace(REFITTED, effects=("motor-viscous",)), FRICTION
+    assert cause([old, new]).startswith("the pulleys have Coulomb friction or ")
+    assert cause([old, new]).endswith("; 1 effect of the profile has other values")
+    assert cause([old, old, new, new]).startswith("2 effects are missing; first, the pulleys have")
+    assert cause([REFITTED, REFITTED]) == (
+        "2 effects of the profile have other values; first, axial stiffness 250 kN instead of 100 "
+        "kN in the profile"
+    )
+
+
+def test_an_open_law_has_its_place_and_the_closest_law() -> None:
+    assert step_title(OPEN) == (
+        "the cable changes the cable length over the load by an unknown law; closest: the cable is "
+        "elastic"
+    )
+    assert doubt_texts(OPEN) == [OPEN.doubts[0].text]
+
+
+def test_a_geometry_is_one_step_without_values() -> None:
+    values = {"exit-point": {"x": Estimate(0.1, 0.01, "m")}}
+    whole = Step(("exit-point", "anchor-point"), values, 0.9, whole=True)
+    assert step_text(whole) == "the geometry of the robot differs as a whole"
+    assert alike(whole) == {}

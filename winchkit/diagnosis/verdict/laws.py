@@ -1,0 +1,141 @@
+"""Simplification of a selected model: nested laws, and steps without which nothing is lost.
+
+A law whose shape is at a bound, beyond what a machine can have, or not determined by the runs is
+that of a simpler effect (``Effect.reduces_to``), which takes its place; so it does where the
+refitted model with it predicts every output as well, to 2 %. A step is left out where the model
+without it does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.results import Estimate
+from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.starting_values import shape_at_bound
+from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
+from winchkit.diagnosis.verdict.plausibility import implausible_value
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
+from winchkit.schema.profiles.winch import WinchProfile
+
+__all__ = ["reduced_law", "simplified", "with_first_members"]
+
+
+def simplified(
+    engine: SelectionEngine,
+    final: Fit,
+    noise: Noise,
+    settled: Callable[[Fit], Fit] = lambda fitted: fitted,
+) -> tuple[Fit, Noise]:
+    """The model with the simplest laws, and without steps by which nothing is gained.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    final, noise
+        Model with which the search ended.
+    settled
+        Fits further nuisance parameters of a model.
+
+    Returns
+    -------
+    tuple
+        Model and noise, the given ones where nothing changed.
+    """
+    present = _with_simpler_laws(engine, final, noise, settled)
+    while (without := _without_needless(engine, present, noise)) is not None:
+        present = without
+    return (final, noise) if present is final else engine.fit_with_noise(present.hypothesis, noise)
+
+
+def _with_simpler_laws(
+    engine: SelectionEngine, present: Fit, noise: Noise, settled: Callable[[Fit], Fit]
+) -> Fit:
+    """The model with every law replaced by a simpler one with which nothing is lost."""
+    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
+        term = present.hypothesis.terms[index]
+        if not term.effect.reduces_to:
+            continue
+        simpler = settled(_replaced(engine, present, noise, index))
+        spread = spread_of(engine.regression, present, noise, engine.regression.blocks)
+        values = estimates(engine.regression, present, spread)[index][1]
+        if (
+            reduced_law(term, values, engine.profile)
+            or _rise(engine, simpler, present, noise) <= 1 / RELEVANT_RATIO
+        ):
+            present = simpler
+    return present
+
+
+def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: Noise) -> float:
+    """Largest ratio of the held-out errors of a smaller model to those of the present one."""
+    folds = engine.folds(present, noise)
+    now = held_out_rms(engine.regression, present, noise, folds)
+    errors = held_out_rms(engine.regression, smaller, noise, folds)
+    return max(errors[output] / now[output] if now[output] else 1.0 for output in now)
+
+
+def reduced_law(term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None) -> bool:
+    """Whether the shape of a law is at a bound, implausible, or not determined.
+
+    A single shape is not determined where its standard deviation exceeds its value; a series of
+    coefficients where those of all do.
+    """
+    shapes = [p for p in Coordinates(term.effect).shapes if p.name in values]
+    if not shapes:
+        return False
+    if shape_at_bound(term) or any(implausible_value(p, values[p.name], profile) for p in shapes):
+        return True
+    return all(not values[p.name].std < abs(values[p.name].value) for p in shapes)
+
+
+def _replaced(engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> Fit:
+    """The model with the best of the simpler laws of a term in its place, or without it."""
+    effect = present.hypothesis.terms[index].effect
+    base = engine.refit(present.hypothesis.without(index), noise)
+    items = [s for s in engine.scores(base, noise) if s.candidate.effect.id in effect.reduces_to]
+    trials = [engine.trial(base, item, noise) for item in items if item.net_gain > 0.0]
+    fits = [trial.fit for trial in trials if np.isfinite(trial.criterion)]
+    return min(fits, key=engine.criterion, default=base)
+
+
+def _without_needless(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit | None:
+    """The model without the step whose removal raises the held-out errors least, by 2 % at most.
+
+    None where every step is needed.
+    """
+    best: tuple[float, Fit] | None = None
+    for index in range(engine.n_initial_terms, len(present.hypothesis.terms)):
+        without = engine.refit(present.hypothesis.without(index), noise)
+        rise = _rise(engine, without, present, noise)
+        if rise <= 1 / RELEVANT_RATIO and (best is None or rise < best[0]):
+            best = rise, without
+    return None if best is None else best[1]
+
+
+def with_first_members(
+    engine: SelectionEngine, final: Fit, noise: Noise, sets: Sequence[EquivalenceSet]
+) -> tuple[Fit, list[EquivalenceSet]]:
+    """The model of the first members of all sets, refitted together, and the sets beside it.
+
+    Where it predicts an output worse by more than 2 %, the given model with its own effects first.
+    """
+    hypothesis, first = final.hypothesis, engine.n_initial_terms
+    for index, each in enumerate(sets, start=first):
+        if each.effects[0] != hypothesis.terms[index].effect.id:
+            hypothesis = hypothesis.exchanged(index, each.terms[0], engine.regression.n_runs)
+    own = [term.effect.id for term in final.hypothesis.terms[first:]]
+    if hypothesis is not final.hypothesis:
+        together = engine.refit(hypothesis, noise)
+        if _rise(engine, together, final, noise) <= 1 / RELEVANT_RATIO:
+            final, own = together, [each.effects[0] for each in sets]
+    return final, [each.beginning_with(name) for each, name in zip(sets, own, strict=True)]

@@ -1,0 +1,163 @@
+"""Whether the law of a step is open: a free curve explains clearly more than it.
+
+In place of the step every curve over one variable of its outputs is fitted (polynomials, linear
+splines, kinks, powers). A curve over the law's own variable contains the law and explains about as
+much; one that explains more by a tenth shows that the law is another. The same curves tell whether
+anything in a residual is predictable at all.
+
+References
+----------
+Hart, J. D. (1997). Nonparametric Smoothing and Lack-of-Fit Tests. Springer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Folds
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
+from winchkit.diagnosis.verdict.curve_fits import Curve, PartialRegression, ranked_curves
+from winchkit.diagnosis.verdict.decision import excess
+from winchkit.diagnosis.verdict.spline_alternatives import PLACES, curves
+
+__all__ = ["better_curve", "predictable_share"]
+
+MARGIN = 0.1
+"""Share of what a step explains by which a curve must explain more; see docs/methods.md."""
+_TRIED = 3
+"""Curves that are tested on held-out data, those of the largest gain."""
+
+
+def better_curve(
+    engine: TimeSeriesSelection, final: Fit, noise: Noise, index: int
+) -> tuple[Curve, float] | None:
+    """A curve that explains more than the term at ``index``, and by which share of its excess.
+
+    None where no curve explains more by a tenth, in sample (beyond a penalty of ln n for every
+    parameter) and held out.
+    """
+    outputs: list[str] = sorted(final.hypothesis.terms[index].effect.outputs)
+    found = _screened(engine, final, noise, index, outputs)
+    if not found:
+        return None
+    regression, folds = engine.regression, engine.folds(final, noise)
+    size: Mapping[str, float | None] = {o: noise.rms[o] for o in outputs if o in noise.rms}
+    without = _without(regression, final, index)
+    errors = [
+        _errors(regression, one, noise, folds, size)
+        for one in (without, final, *(_with_curve(regression, without, c) for c in found))
+    ]
+    alone, own, *others = (excess(error, size) for error in errors)
+    explained = alone - own
+    best = min(range(len(found)), key=others.__getitem__)
+    gained = own - others[best]
+    if explained <= 0.0 or gained <= MARGIN * explained:
+        return None
+    return found[best], gained / explained
+
+
+def predictable_share(
+    engine: TimeSeriesSelection, final: Fit, noise: Noise, size: Mapping[str, float | None]
+) -> float:
+    """Largest share of what a model leaves that a free curve predicts on held-out data."""
+    regression, folds = engine.regression, engine.folds(final, noise)
+    partial = PartialRegression(final.residual, final.jacobian, noise.inverse_sigma(regression))
+    ranked = ranked_curves(regression, partial, regression.outputs, engine.penalty_per_parameter)[
+        :_TRIED
+    ]
+    left = excess(held_out_rms(regression, final, noise, folds), size)
+    if not left:
+        return 0.0
+    shares = [
+        1
+        - excess(held_out_rms(regression, _with_curve(regression, final, c), noise, folds), size)
+        / left
+        for c in ranked
+        if c.net_gain > 0.0
+    ]
+    return max(shares, default=0.0)
+
+
+def _screened(
+    engine: TimeSeriesSelection, final: Fit, noise: Noise, index: int, outputs: Sequence[str]
+) -> list[Curve]:
+    """Curves whose gain exceeds that of a term by the margin in sample, the largest first.
+
+    On the coarse regression first, where there is one: it has all frequencies of a slow curve.
+    """
+    coarse = engine.coarse
+    if coarse is not None:
+        weights = coarse.inverse_sigma(noise)
+        at = fit(coarse.regression, coarse.reduced(final.hypothesis), weights, 0)
+        found = _above(coarse.regression, at, weights, index=index, outputs=outputs, penalty=0.0)
+        if not found:
+            return []
+    weights = noise.inverse_sigma(engine.regression)
+    penalty = engine.penalty_per_parameter
+    return _above(engine.regression, final, weights, index=index, outputs=outputs, penalty=penalty)
+
+
+def _above(
+    regression: TimeSeriesRegression,
+    final: Fit,
+    weights: Array,
+    *,
+    index: int,
+    outputs: Sequence[str],
+    penalty: float,
+) -> list[Curve]:
+    without = _without(regression, final, index)
+    partial = PartialRegression(without.residual, without.jacobian, weights)
+    own = PartialRegression(final.residual, final.jacobian, weights)
+    least = (1 + MARGIN) * (partial.chi_square - own.chi_square)
+    ranked = ranked_curves(regression, partial, outputs, penalty)
+    return [curve for curve in ranked if curve.net_gain > least][:_TRIED]
+
+
+def _errors(
+    regression: TimeSeriesRegression,
+    model: Fit,
+    noise: Noise,
+    folds: Folds,
+    outputs: Container[str],
+) -> dict[str, float]:
+    errors = held_out_rms(regression, model, noise, folds)
+    return {output: error for output, error in errors.items() if output in outputs}
+
+
+def _without(regression: TimeSeriesRegression, final: Fit, index: int) -> Fit:
+    """A fit without one term, the others at their values, to be corrected in linear steps."""
+    hypothesis = final.hypothesis.without(index)
+    change = regression.change(final.hypothesis) - regression.change(hypothesis)
+    others: NDArray[np.bool_] = ~regression.unknowns_of(index, final.hypothesis)
+    jacobian = final.jacobian[:, others]
+    return replace(
+        final,
+        hypothesis=hypothesis,
+        vector=final.vector[others],
+        residual=final.residual + change,
+        derivative=lambda: jacobian,
+        n_unknowns=int(np.count_nonzero(others)),
+    )
+
+
+def _with_curve(regression: TimeSeriesRegression, model: Fit, curve: Curve) -> Fit:
+    """A fit with the columns of a curve as further unknowns, before its initial states."""
+    place = curve.place, curve.variable
+    (family,) = curves(regression, list(PLACES[curve.place]), {place})
+    columns = np.zeros((regression.n_rows, curve.law.shape[1]))
+    for rows, signal in family.columns(regression):
+        columns[rows] = (curve.law.T @ signal).T
+    states = sum(len(start) for start in model.hypothesis.starts)
+    at = model.jacobian.shape[1] - states
+    jacobian = np.hstack([model.jacobian[:, :at], columns, model.jacobian[:, at:]])
+    return replace(model, derivative=lambda: jacobian)

@@ -1,0 +1,83 @@
+"""Effects of the profile at their file values, and those whose refitted values predict better."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
+from winchkit.diagnosis.regression.gls import Fit, fit
+from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.regression.intervals import Spread, estimates
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.results import Doubt, OutputFit, Place, Step
+from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
+from winchkit.diagnosis.selection.engine import SelectionEngine
+from winchkit.diagnosis.selection.stepwise import SelectionResult
+from winchkit.diagnosis.steps import standing_of
+from winchkit.effects.term import Term
+
+__all__ = ["file_model", "held", "refitted_steps"]
+
+
+def file_model(engine: SelectionEngine, start: Hypothesis, noise: Noise) -> Fit:
+    """The profile's effects at their file values; offsets and initial states are fitted."""
+    of_file = Hypothesis(tuple(map(held, start.terms)), start.nuisances, start.starts)
+    return fit(engine.regression, of_file, noise.inverse_sigma(engine.regression))
+
+
+def held(term: Term) -> Term:
+    """A term whose values are not fitted."""
+    fixed = tuple(replace(p, role="fixed") for p in term.effect.parameters)
+    return Term(replace(term.effect, parameters=fixed, polar=None), term.values)
+
+
+def refitted_steps(
+    engine: SelectionEngine,
+    result: SelectionResult,
+    file: Hypothesis,
+    outputs: Mapping[str, OutputFit],
+    spread: Spread,
+) -> Iterator[Step]:
+    """A step for every effect of the profile whose file values predict an output worse by 2 %.
+
+    Parameters
+    ----------
+    engine
+        Selection engine.
+    result
+        Result of the selection; all values of its final model are fitted.
+    file
+        Effects of the profile at their file values.
+    outputs
+        Errors of the file and of the final model.
+    spread
+        Uncertainty of the unknowns of the final model.
+    """
+    final, noise, regression = result.final, result.noise, engine.regression
+    folds = engine.folds(final, noise)
+    now = held_out_rms(regression, final, noise, folds)
+    fitted = estimates(regression, final, spread)
+    for index, old in enumerate(file.terms):
+        start = final.hypothesis.with_term_at(index, held(old))
+        beside = fit(regression, start, noise.inverse_sigma(regression))
+        errors = held_out_rms(regression, beside, noise, folds)
+        if all(errors[name] <= error / RELEVANT_RATIO for name, error in now.items()):
+            continue
+        term, values = fitted[index]
+        standing = standing_of(errors, outputs, term.effect.outputs)
+        if not standing.explained > 0.0:
+            continue  # within the noise both values are right
+        gain = 1 - min(now[name] / errors[name] for name in now if errors[name]) ** 2
+        what = "more is left in its outputs than a tenth of what its new value explains"
+        yield Step(
+            (term.effect.id,),
+            {term.effect.id: values},
+            gain,
+            place=tuple(Place(*at) for at in term.effect.place),
+            certain=standing.certain,
+            share=standing.share,
+            doubts=() if standing.certain else (Doubt("remaining", what),),
+            refitted=True,
+            file_values={name: old.values[name] for name in values},
+        )

@@ -1,0 +1,190 @@
+"""Steps of a diagnosis in words: effect, values, error without it and with it, share, doubts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import degrees, isfinite
+
+from winchkit.diagnosis.results import OutputFit, Step
+from winchkit.report.words.numbers import percent, scale_for, significant, with_std
+from winchkit.report.words.vocabulary import (
+    OUTPUT_NAMES,
+    clause,
+    kind,
+    listed,
+    values_text,
+    variable_name,
+)
+
+__all__ = [
+    "alike",
+    "cause",
+    "doubt_texts",
+    "has_other_law",
+    "lowered_most",
+    "step_text",
+    "step_title",
+]
+
+_DISTINCT = 20.0
+"""Angle between two signatures from which the data distinguish them, °."""
+_LOWERED = 1.01
+"""Ratio of the errors without and with a step from which it lowers an output's error."""
+_LEAST = 1e-3
+"""Share below which no figure is shown."""
+_MOST_KINDS = 3
+"""Effects of a set that a title names."""
+_WHOLE = "the geometry of the robot differs as a whole"
+
+
+def cause(steps: Sequence[Step]) -> str:
+    """What is missing, as the headline of a diagnosis with steps; without a full stop."""
+    added = [step for step in steps if not step.refitted]
+    refitted = len(steps) - len(added)
+    first = step_title((added or steps)[0])
+    if len(steps) == 1:
+        return first
+    if not added:
+        return f"{refitted} effects of the profile have other values; first, {first}"
+    one = len(added) == 1
+    text = first if one else f"{len(added)} effects are missing; first, {first}"
+    if refitted:
+        have = "effect of the profile has" if refitted == 1 else "effects of the profile have"
+        text += f"; {refitted} {have} other values"
+    return text
+
+
+def step_title(step: Step) -> str:
+    """``the cable is elastic or the frame is compliant``."""
+    if step.whole:
+        return _WHOLE
+    if step.refitted:
+        return f"{_refitted_values(step, with_errors=False)} in the profile"
+    if has_other_law(step):
+        return f"{_open_law(step)}; closest: {clause(step.effects[0])}"
+    kinds = _kinds(step)
+    if len(kinds) > _MOST_KINDS:
+        return f"one of {len(kinds)} effects is missing, which these data cannot distinguish"
+    return listed([clause(effect) for effect in kinds], "or")
+
+
+def has_other_law(step: Step) -> bool:
+    """Whether a free curve explains more than its law."""
+    return step.law == "open" and (
+        len(step.effects) == 1 or any(doubt.code == "curve" for doubt in step.doubts)
+    )
+
+
+def step_text(
+    step: Step,
+    outputs: Mapping[str, OutputFit] | None = None,
+    without: Mapping[str, float] | None = None,
+) -> str:
+    """A step in one line: title, values, error of the output that it lowers most, and share.
+
+    Parameters
+    ----------
+    step : Step
+        The step.
+    outputs : mapping of str to OutputFit, optional
+        Errors of the file and of the final model.
+    without : mapping of str to float, optional
+        Held-out errors of the final model without the step, SI.
+
+    Returns
+    -------
+    str
+        ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
+    """
+    parts = [_titled_values(step)]
+    if outputs and without and (name := lowered_most(outputs, without)):
+        output = outputs[name]
+        scale = scale_for(output.heldout_rms_before, output.unit)
+        then = scale.text(output.heldout_rms_after)
+        before = significant(without[name] / scale.worth)
+        parts.append(f"{OUTPUT_NAMES.get(name, name)} {before} → {then}")
+    if isfinite(step.share):
+        share = percent(step.share) if step.share >= _LEAST else "under 0.1 %"
+        parts.append(f"explains {share}")
+    return "; ".join(parts)
+
+
+def lowered_most(outputs: Mapping[str, OutputFit], without: Mapping[str, float]) -> str:
+    """Output whose error a step lowers most; empty where it lowers none by 1 %."""
+    ratios = {
+        name: without[name] / output.heldout_rms_after
+        for name, output in outputs.items()
+        if name in without and output.heldout_rms_after > 0
+    }
+    best = max(ratios, key=ratios.__getitem__, default="")
+    return best if best and ratios[best] >= _LOWERED else ""
+
+
+def doubt_texts(step: Step, data: str = "runs") -> list[str]:
+    """Doubts of a step in words; those of a set name its members by how they differ."""
+    out = []
+    for doubt in step.doubts:
+        out += _alternatives(step, data) if doubt.code == "alternatives" else [doubt.text]
+    return out
+
+
+def alike(step: Step) -> dict[str, float]:
+    """Members of a set that the data cannot distinguish from the first, with the angle, rad."""
+    if step.whole:
+        return {}
+    angles = {effect: step.angles.get(effect, 0.0) for effect in step.effects[1:]}
+    return {effect: a for effect, a in angles.items() if degrees(a) <= _DISTINCT}
+
+
+def _alternatives(step: Step, data: str) -> list[str]:
+    same = list(alike(step))
+    others = [effect for effect in step.effects[1:] if effect not in same]
+    out = [f"these {data} cannot distinguish it from {listed(same)}"] if same else []
+    if others:
+        out.append(f"these {data} are explained as well by {listed(others)}, in another way")
+    return out
+
+
+def _titled_values(step: Step) -> str:
+    """Title with the values of the effects."""
+    if step.whole:
+        return _WHOLE
+    if step.refitted:
+        changed = _refitted_values(step, with_errors=True)
+        return f"{clause(step.effects[0])}: {changed} in the profile"
+    values = {e: values_text(step.parameters.get(e, {})) for e in _kinds(step)}
+    if has_other_law(step) or len(values) == 1:
+        return ": ".join(part for part in (step_title(step), values[step.effects[0]]) if part)
+    return listed([f"{clause(e)} ({v})" if v else clause(e) for e, v in values.items()], "or")
+
+
+def _kinds(step: Step) -> list[str]:
+    """First effect of every kind of a set: there are several laws of elongation."""
+    first: dict[str, str] = {}
+    for effect in step.effects:
+        first.setdefault(kind(effect), effect)
+    return list(first.values())
+
+
+def _refitted_values(step: Step, *, with_errors: bool) -> str:
+    """``axial stiffness 300 kN instead of 100 kN``."""
+    out = []
+    for name, estimate in step.parameters.get(step.effects[0], {}).items():
+        if name not in step.file_values:
+            continue
+        old = step.file_values[name]
+        scale = scale_for((estimate.value, old), estimate.unit)
+        std = estimate.std if with_errors else float("nan")
+        new = with_std(estimate.value, std, estimate.unit, scale)
+        out.append(f"{name.replace('_', ' ')} {new} instead of {scale.text(old)}")
+    return listed(out)
+
+
+def _open_law(step: Step) -> str:
+    """``the motor changes the motor torque over the speed by an unknown law``."""
+    if not step.place:
+        return "the law is unknown"
+    outputs = list(dict.fromkeys(OUTPUT_NAMES.get(p.output, p.output) for p in step.place))
+    part, variable = step.place[0].part, step.place[0].variable
+    over = f" over the {variable_name(variable)}" if variable else ""
+    return f"the {part} changes the {listed(outputs)}{over} by an unknown law"
