@@ -38,7 +38,7 @@ RESULTS = {
     "winchkit.diagnosis.residuals.traces": ("PoseTrace", "Trace"),
     "winchkit.diagnosis.residuals.attribution": ("Attribution",),
     "winchkit.diagnosis.results": (
-        *("CandidateScore", "Closest", "Combination", "Comparison", "Detectable", "Diagnosis"),
+        *("CandidateScore", "Combination", "Comparison", "Detectable", "Diagnosis", "Doubt"),
         *("Estimate", "NextRun", "OutputError", "OutputFit", "RobotDiagnosis", "Step"),
     ),
     "winchkit.diagnosis.robot.diagnose": ("RobotAnswer",),

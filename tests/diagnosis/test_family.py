@@ -193,7 +193,7 @@ def test_a_name_that_is_lost_replaced_or_doubtful_is_a_violation() -> None:
 
 
 @pytest.mark.slow
-def test_the_same_information_is_told_the_same_name(tmp_path: Path) -> None:
+def test_the_same_information_has_the_same_name(tmp_path: Path) -> None:
     base, told = draw_base((1, 2), 2), {}
     for name in (name for name, relation in RELATIONS.items() if relation.exact):
         files = RELATIONS[name].files(base, np.random.default_rng(1))

@@ -98,7 +98,7 @@ def test_a_joint_at_three_speeds_has_offsets_presliding_and_gravity() -> None:
     assert {"drum_angle", "motor_angle", "directed_length"} & {w.variable for w in diagnosis.where}
 
 
-def test_gravity_is_told_with_its_size() -> None:
+def test_gravity_is_a_step_with_its_size() -> None:
     """As a winch, the joint has free curves over a cable length too."""
     assert DATA is not None
     runs = runs_of("franka-q2", "case3_slow", "case3_middle", "case3_high")

@@ -37,7 +37,7 @@ def recorded(name: str) -> list[Run]:
 
 
 @pytest.mark.parametrize("name", hiding())
-def test_what_a_bench_hides_is_told(name: str) -> None:
+def test_what_a_bench_hides_is_found(name: str) -> None:
     bench = read_simbench(find("sim", name))
     (winch,) = bench.bench.winch.values()
     answers = {a for truth in bench.truth.values() for one in truth.hidden for a in one.answers}

@@ -29,9 +29,9 @@ class Truth:
     places: tuple[tuple[str, str], ...] = ()
     """Part and output of everything that is missing in the profile."""
     right: frozenset[str] = frozenset()
-    """Effects whose law is right, or not to be told from it."""
+    """Effects whose law is right, or not distinguishable from it."""
     also: frozenset[str] = frozenset()
-    """Effects that may be told beside them: filters of the instruments, parts of a law."""
+    """Effects that may be reported beside them: filters of the instruments, parts of a law."""
     detail: Mapping[str, Any] = field(default_factory=dict)
 
 

@@ -31,7 +31,7 @@ DISTANCES = {"motor": (3e-3, 0.3), "gear": (3e-3, 0.3), "pulley": (5e-5, 5e-3)}
 
 @dataclass(frozen=True)
 class Shape:
-    """Numbers of a law; those that it has not are zero."""
+    """Parameters of a law; those that it has not are zero."""
 
     scale: float = 0.0
     """Speed of the transition, in the place's unit."""
@@ -118,7 +118,7 @@ def sense(law: str, speed: Array, step: float, shape: Shape) -> Array:
 
 
 def draw_shape(random: Random, law: str, part: str, highest: float) -> Shape:
-    """Any numbers of a law at a part whose highest speed is ``highest``."""
+    """Any parameters of a law at a part whose highest speed is ``highest``."""
 
     def between(low: float, high: float) -> float:
         return float(exp(random.uniform(np.log(low), np.log(high))))

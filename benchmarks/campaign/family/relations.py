@@ -1,4 +1,4 @@
-"""Metamorphic relations: the same physics in other files, of which the same must be told.
+"""Metamorphic relations: the same physics in other files, of which the same must be reported.
 
 A relation changes what is recorded of a base case, or how it is written. ``exact`` ones leave all
 information as it is; ``more`` add information; ``same`` have other noise or less data.
@@ -145,7 +145,7 @@ class Relation:
 
     files: Callable[[Base, Random], Files]
     exact: bool = False
-    """Whether the same information is there, so that the same names must be told as certain."""
+    """Whether the same information is there, so that the same names must be certain."""
     of_size: bool = False
     """Whether names that are certain by little may become sets: other noise, less data."""
 

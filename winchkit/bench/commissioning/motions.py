@@ -61,7 +61,7 @@ class Motions:
         if limits is None:
             return True
         here = self._bench.snapshot.winch[self._name]
-        # Before the first homing nobody but the operator can say.
+        # Before the first homing only the operator can say.
         return not here.length_known or limits[0] <= here.cable_length + change <= limits[1]
 
     def go(self, change: float) -> Moved:

@@ -65,7 +65,7 @@ class PositionFile:
         return self._write(positions, closing=False)
 
     def close_with(self, positions: Mapping[str, KeptPosition]) -> None:
-        """Write the positions to the disk, before the drives are let go.
+        """Write the positions to the disk, before the drives are released.
 
         One that cannot be written leaves the one before, which no drive agrees with that has moved.
         """

@@ -160,7 +160,7 @@ def _jog_for(station: Station, winch: str | None, speed: DirectionKeyword, durat
 
 
 def _require_length(station: Station, winch: str | None) -> None:
-    """Refuse a jog that nobody holds while the cable length, and so no limit of it, is known."""
+    """Refuse a jog without a held key while the cable length is not known: no limit acts."""
     status = station.status()
     name = next(iter(status["winch"])) if winch is None else winch
     if status["tripped"]:

@@ -42,7 +42,7 @@ __all__ = [
 AT_NOISE = 1.1
 """Largest ratio of an error to its noise at which nothing is missing: 20 % of its power."""
 _EXPLAINED, _PARTLY = 0.1, 0.5
-"""Largest share that remains of an explained and of a partly explained excess. Of 127 unseen cases
+"""Largest share that remains of an explained and of a partly explained excess. Of 127 new cases
 the truth leaves at most 0.075, and 0.16 where it is very weak; another effect 0.25 and more."""
 _MEANS = 3.0
 """Standard errors at the noise, where most models are right: one output in 740 is refuted."""

@@ -2,7 +2,7 @@
 
 In place of the step every curve over one variable of its outputs is fitted (polynomials, linear
 splines, kinks, powers). A curve over the law's own variable contains the law and explains about as
-much; one that explains more by a tenth shows that the law is another. The same curves tell whether
+much; one that explains more by a tenth shows that the law is another. The same curves show whether
 anything in a residual is predictable at all.
 
 References

@@ -158,7 +158,7 @@ def commission(
 def _set_quick_stop(
     node: SdoNode, servo: ServoSpec, scale: Scale, watch: WatchSpec
 ) -> tuple[str, ...]:
-    """Write 6085h and read it back; a note where a drive keeps a ramp that nobody declared."""
+    """Write 6085h and read it back; a note where a drive keeps an undeclared ramp."""
     if not watch.quick_stop:
         return ()
     try:
