@@ -76,7 +76,7 @@ class Machine:
 
 
 def draw_machine(random: Random, part: str = "") -> Machine:
-    """Any machine on which friction at a part (or none) can be distinguished from that elsewhere."""
+    """Any machine on which friction at a part (or none) is distinguishable from that elsewhere."""
     while True:
         winch = draw_winch(random)
         apart = (part != "pulley" or winch.wraps) and (part != "gear" or winch.ratio > 1)

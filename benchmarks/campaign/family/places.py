@@ -70,7 +70,7 @@ def _of_id(effect: str) -> Place:
 
 
 def is_certain(step: Mapping[str, Any]) -> bool:
-    """Whether a name is reported as certain; of an answer that does not say it, one member alone."""
+    """Whether a name is certain; of an answer that does not say it, one member alone."""
     if step.get("certain") is not None:
         return bool(step["certain"])
     return len(step["effects"]) == 1

@@ -256,7 +256,7 @@ class ControlLoop:
         return missed
 
     def close_positions(self) -> None:
-        """Have the positions of the drives that are at rest on the disk, before they are released."""
+        """Write the positions of the drives at rest to the disk, before they are released."""
         self._positions.close_with(self._at_rest_or_open())
 
     def _at_rest_or_open(self) -> dict[str, KeptPosition]:
