@@ -53,6 +53,7 @@ class Keyboard:
         """Press the arrow, or go on holding it."""
         if not self.down:
             self.down, self._due = True, self.rig.time + _DELAY
+            self.last_down = self.rig.time
             self.waiting.append("up")
 
     def release(self) -> None:
@@ -197,6 +198,7 @@ _HAPPENS = st.lists(
 @given(_HAPPENS)
 @example([(0.3, "press", 0.0), (0.9, "stall", 4.0), (0.1, "release", 0.0)])
 @example([(0.3, "press", 0.0), (0.05, "release", 0.0), (0.2, "stall", 1.5), (0.5, "stall", 0.6)])
+@example([(0.3, "press", 0.0), (0.0, "release", 0.0)])
 @example([(0.2, "late", 1.5), (0.2, "press", 0.0), (0.05, "release", 0.0)])
 @example([(0.2, "late", 0.6), (0.2, "press", 0.0), (0.05, "release", 0.0)])
 @example([(0.3, "press", 0.0), (0.6, "stop", 0.0), (0.9, "stall", 0.25), (0.5, "end", 0.0)])
