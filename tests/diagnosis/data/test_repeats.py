@@ -13,6 +13,7 @@ from diagnosis_runs import GROOVED, Array, Ride, made, with_channel
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats, mean_load
 from winchkit.model.stages import Signals
+from winchkit.runs.run import Run
 
 
 def signals(
@@ -134,3 +135,19 @@ def test_a_dataset_sorts_runs_into_groups() -> None:
     dataset = prepare(runs[:5], GROOVED)
     assert [group.runs for group in dataset.repeats] == [(0, 2), (1, 4), (3,)]
     assert [group.runs for group in dataset.repeated] == [(0, 2), (1, 4)]
+
+
+def test_a_recording_in_two_files_repeats_the_whole_one_by_one_of_them() -> None:
+    """Both halves overlap the whole, and not each other: no sample is common to the three."""
+    whole, other = made(1, load_mass=10.0), made(2, load_mass=10.0)
+    half = len(whole) // 2
+    parts = [piece(whole, 0, half), piece(whole, half, len(whole))]
+    for runs in ([other, *parts], [*parts, other]):
+        groups = prepare(runs, GROOVED).repeats
+        assert sorted(run for group in groups for run in group.runs) == [0, 1, 2]
+        assert all(len(rows) > 0 for group in groups for rows in group.rows)
+
+
+def piece(run: Run, start: int, stop: int) -> Run:
+    channels = {n: replace(c, values=c.values[start:stop]) for n, c in run.channels.items()}
+    return Run(f"{run.name}-{start}", run.time[start:stop], channels, run.metadata)

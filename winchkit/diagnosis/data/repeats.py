@@ -58,13 +58,24 @@ def find_repeats(signals: list[Signals]) -> list[Repeats]:
     for index, run in enumerate(signals):
         for members, shifts in sets:
             shift = _shift(signals[members[0]], run)
-            if shift is not None:
+            if shift is not None and _share_time(
+                [*(signals[m] for m in members), run], [*shifts, shift]
+            ):
                 members.append(index)
                 shifts.append(shift)
                 break
         else:
             sets.append(([index], [0.0]))
     return [_aligned(members, shifts, signals) for members, shifts in sets]
+
+
+def _share_time(runs: list[Signals], shifts: list[float]) -> bool:
+    """Whether all runs have a stretch of the motion in common: two halves of one have none."""
+    ends = [
+        (run.time[0] - shift, run.time[-1] - shift) for run, shift in zip(runs, shifts, strict=True)
+    ]
+    common = min(end for _, end in ends) - max(start for start, _ in ends)
+    return bool(common >= _LEAST_OVERLAP * min(end - start for start, end in ends))
 
 
 def mean_load(run: Signals) -> float | None:
