@@ -49,6 +49,7 @@ from winchkit.diagnosis.steps import (
     with_standing,
 )
 from winchkit.diagnosis.verdict.decision import (
+    MOSTLY,
     Measured,
     measured,
     output_fits,
@@ -265,7 +266,7 @@ def diagnose_prepared(
             engine.on_trial = _Trials(progress, "without impacts, fitting")
             result = stepwise_selection(engine)
         engine.on_trial = _Trials(progress, "naming, compared with", _NAMING)
-        return _answer(engine, result, file)
+        return _answer(*_with_plain_laws(engine, result, catalogue), file)
     except KeyboardInterrupt:
         if interrupted is not None and known:
             interrupted(_known_at_interrupt(engine, known[0]))
@@ -297,6 +298,42 @@ def _searched(
     again = selection_engine(engine.regression.dataset, rounded)
     again.on_trial = trials
     return stepwise_selection(again), (again, rounded)
+
+
+def _with_plain_laws(
+    engine: TimeSeriesSelection, result: SelectionResult, catalogue: Catalogue
+) -> tuple[TimeSeriesSelection, SelectionResult]:
+    """The result with its simplest laws and fitted transitions.
+
+    A law with a degenerate shape may have imitated another effect (presliding over a whole turn is
+    a spring). Where its replacement loses by 2 %, the search is repeated without such laws.
+    """
+    plain = _simplified(engine, result)
+    before = (engine, result.final, result.noise)
+    left = {term.effect.id for term in plain.final.hypothesis.terms}
+    degenerate = {
+        term.effect.id
+        for term in result.final.hypothesis.terms[engine.n_initial_terms :]
+        if term.effect.reduces_to and term.effect.id not in left
+    }
+    if not degenerate or not predicts_better(before, (engine, plain.final, plain.noise)):
+        return engine, plain
+    others = [effect for effect in catalogue if effect.id not in degenerate]
+    again = selection_engine(engine.regression.dataset, catalogue, others)
+    again.on_trial = engine.on_trial
+    found = _simplified(again, stepwise_selection(again))
+    now, was = (again, found.final, found.noise), (engine, plain.final, plain.noise)
+    return (again, found) if predicts_better(now, was) else (engine, plain)
+
+
+def _simplified(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
+    """The result with its simplest laws, the transitions of friction fitted before and after."""
+
+    def settled(fitted: Fit) -> Fit:
+        return with_fitted_transitions(engine, fitted, result.noise)
+
+    final, noise = simplified(engine, settled(result.final), result.noise, settled)
+    return replace(result, final=with_fitted_transitions(engine, final, noise), noise=noise)
 
 
 def with_offsets_where_better(
@@ -398,14 +435,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
     ``file`` are the effects of the profile at their file values.
     """
     regression, dataset = engine.regression, engine.regression.dataset
-    rounded = with_fitted_transitions(engine, result.final, result.noise)
-    simple, noise = simplified(
-        engine,
-        rounded,
-        result.noise,
-        lambda fitted: with_fitted_transitions(engine, fitted, result.noise),
-    )
-    best = reweighted(engine, with_fitted_transitions(engine, simple, noise), noise)
+    best = reweighted(engine, result.final, result.noise)
     found = replace(result, final=best.fit, noise=best.noise)
     found = ordered_by_contribution(engine, found)
     final, noise = found.final, found.noise
@@ -484,13 +514,15 @@ def _steps(
     final, noise = result.final, result.noise
     folds, first = engine.folds(final, noise), engine.n_initial_terms
     standings: list[Standing] = []
+    counted = {name: output for name, output in outputs.items() if name in known.deciding}
+    mostly = remaining_share(counted) <= MOSTLY
     acts = [frozenset(term.effect.outputs) for term in final.hypothesis.terms[first:]]
     for place, own in enumerate(acts):
         without = engine.refit(final.hypothesis.without(first + place), noise)
         errors = engine.held_out_errors(without, noise, folds)
         standing = standing_of(errors, outputs, sorted(own))
         trusted = bool(known.deciding & own) and not known.refuted & own
-        standings.append(replace(standing, certain=standing.certain and trusted))
+        standings.append(replace(standing, certain=standing.certain and trusted and mostly))
     for place, step in enumerate(steps_of(engine, result, sets, engine.regression.dataset, spread)):
         beside = [one for one, there in zip(standings, acts, strict=True) if there & acts[place]]
         yield with_standing(

@@ -34,7 +34,7 @@ def _limited(seconds: float) -> Iterator[None]:
 def answer(runs: Sequence[Path], profile: Path, limit: float) -> dict[str, Any]:
     """What the diagnosis reports on files: what a score needs, as plain JSON.
 
-    ``verdict`` is also ``refused`` (an error that tells the user what to do), ``timeout`` or
+    ``verdict`` is also ``refused`` (an error that says what to do), ``timeout`` or
     ``crash``; ``text`` says why.
     """
     from winchkit import diagnose, read_profile, read_run

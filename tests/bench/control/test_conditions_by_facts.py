@@ -126,7 +126,7 @@ def test_the_verdict_is_that_of_every_row_in_every_cycle(seed: int) -> None:
         assert blocked == plain.check(now, items)
         assert (marked.tripped, marked.warnings) == (plain.tripped, plain.warnings)
         found |= {trip.kind for trip in (*blocked, *marked.warnings)}
-    assert {"boot-up", "fault", "emergency", "turns", "length"} <= found
+    assert {"boot-up", "fault", "emergency", "length"} <= found
 
 
 def test_a_flag_of_the_cell_counts_once_the_cell_is_there() -> None:

@@ -27,8 +27,9 @@ def test_two_of_eight_cables_may_hold_their_tension() -> None:
         with pytest.raises(NotPermitted, match=r"winch 3 .* beside 1, 2: .* leaves 2 free"):
             bench.winch["3"].hold_tension(bench.winch["3"].tension, stiffness=2e5)
         assert not bench.winch["3"].moving
-        bench.winch["1"].hold_tension(tension, stiffness=2e5)
+        bench.winch["1"].refresh()
         bench.stop()
+        clock.sleep(1.0)
         tension = bench.winch["3"].tension
         bench.winch["3"].hold_tension(tension, stiffness=2e5, duration=0.5)
 

@@ -153,9 +153,9 @@ def test_a_condition_on_the_bench_that_is_switched_off_makes_a_test_fail(
         happens(tmp_path, case)
 
 
-ELSEWHERE = {"tension control", "motion"}
-"""Conditions of a motion that is no jog, and of its end: test_tension_control.py,
-test_motor_that_does_not_turn.py."""
+ELSEWHERE = {"tension control", "motion", "owner", "position record"}
+"""Conditions of a motion that is no jog, of its end, and of records: test_tension_control.py,
+test_motor_that_does_not_turn.py, test_power_cycle.py, test_position_file.py."""
 
 
 def test_every_condition_on_the_bench_has_a_case() -> None:

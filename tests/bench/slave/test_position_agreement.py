@@ -70,7 +70,7 @@ def _unknown_until_homed(rig: Rig, bench: Bench) -> None:
         winch.jog(pay_out=0.1)
     bench.reset()
     rig.wait(1.0)
-    assert not bench.snapshot.winch["A"].turns_known
+    assert not bench.snapshot.winch["A"].length_known
     with pytest.raises(NotPermitted, match="home"):
         winch.move_by(pay_out=0.02)
     winch.home(at=2.0)

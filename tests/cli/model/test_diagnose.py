@@ -60,4 +60,4 @@ def test_a_wrong_value_of_the_profile_is_a_step_with_the_value_of_the_file(
     result = call("diagnose", *elastic, "-p", profile)
     assert result.stdout.splitlines()[0] == "EXPLAINED"
     assert "kN instead of 100 kN in the profile. Corrected, the" in " ".join(result.stdout.split())
-    assert "next: winchkit remove cable-elongation-linear" in result.stderr
+    assert "next: winchkit add cable-elongation-linear" in result.stderr

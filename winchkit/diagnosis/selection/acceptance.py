@@ -39,7 +39,7 @@ MIN_GAIN = 2.0
 _NO_WORSE = 1.02
 """Ratio of held-out errors that no output may reach; screened."""
 RELEVANT_RATIO = 0.98
-"""Ratio of held-out errors after and before, below which an addition is relevant."""
+"""Ratio of held-out errors after and before, below which an addition is relevant; screened."""
 
 
 def best_accepted(

@@ -19,6 +19,7 @@ from itertools import dropwhile
 
 import numpy as np
 
+from winchkit.diagnosis.regression.cross_validation import held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
@@ -112,7 +113,8 @@ def stepwise_selection(
     start = replace(first, lack_of_fit_at_start=lacking, lack_of_fit=lacking)
     known(start)
     initial, scores, threshold = (start.final, start.noise), list(start.scores), start.threshold
-    final, noise, tried = _forward_selection(engine, *initial, scores, threshold)
+    larger, noise, tried = _forward_selection(engine, *initial, scores, threshold)
+    final, noise = _without_minor_terms(engine, larger, noise)
     lack_of_fit_test = engine.lack_of_fit_test(final, noise)
     grew = len(final.hypothesis.terms) > engine.n_initial_terms
     lack_of_fit_at_start = grew or lacking
@@ -318,6 +320,30 @@ def _rivals_of(own: Term, scores: list[Score]) -> list[Score]:
 def _another(item: Score, own: Term) -> bool:
     """Whether a candidate is another effect than a term, or the same at another minimum."""
     return item.candidate.effect.id != own.effect.id or other_grid_point(own, item.candidate.shape)
+
+
+def _without_minor_terms(engine: SelectionEngine, present: Fit, noise: Noise) -> tuple[Fit, Noise]:
+    """Model without additions that explain less than what all of them leave, with repeats.
+
+    Beside so much that is missing they imitate a part of it. Both are excesses of the held-out
+    mean squares over the noise, in units of the noise.
+    """
+    if not noise.from_repeats:
+        return present, noise
+    folds = engine.folds(present, noise)
+
+    def excess(fitted: Fit) -> float:
+        errors = held_out_rms(engine.regression, fitted, noise, folds)
+        return sum(max(0.0, (rms / noise.rms[name]) ** 2 - 1.0) for name, rms in errors.items())
+
+    left, reduced = excess(present), present
+    for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
+        without = engine.refit(present.hypothesis.without(index), noise)
+        if excess(without) - left < left:
+            reduced = engine.refit(reduced.hypothesis.without(index), noise)
+    return (
+        (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
+    )
 
 
 def _backward_elimination(engine: SelectionEngine, present: Fit, noise: Noise) -> Fit:

@@ -30,6 +30,7 @@ from winchkit.model.stages import OUTPUT_UNITS
 
 __all__ = [
     "AT_NOISE",
+    "MOSTLY",
     "Measured",
     "excess",
     "measured",
@@ -41,7 +42,7 @@ __all__ = [
 
 AT_NOISE = 1.1
 """Largest ratio of an error to its noise at which nothing is missing: 20 % of its power."""
-_EXPLAINED, _PARTLY = 0.1, 0.5
+_EXPLAINED, MOSTLY = 0.1, 0.5
 """Largest share that remains of an explained and of a partly explained excess. Of 127 new cases
 the truth leaves at most 0.075, and 0.16 where it is very weak; another effect 0.25 and more."""
 _MEANS = 3.0
@@ -92,7 +93,7 @@ def verdict_of(
         return "adequate"
     if steps and (share <= _EXPLAINED or at_noise):
         return "explained"
-    if steps and share <= _PARTLY:
+    if steps and share <= MOSTLY:
         return "partly"
     above = not all(map(is_at_noise, outputs.values()))
     return "unknown" if (noise_known and deciding) or (above and predictable()) else "undecided"

@@ -26,7 +26,7 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.curve_fits import Curve, PartialRegression, ranked_curves
-from winchkit.diagnosis.verdict.decision import excess
+from winchkit.diagnosis.verdict.decision import AT_NOISE, excess
 from winchkit.diagnosis.verdict.spline_alternatives import PLACES, curves
 
 __all__ = ["better_curve", "predictable_share"]
@@ -43,14 +43,19 @@ def better_curve(
     """A curve that explains more than the term at ``index``, and by which share of its excess.
 
     None where no curve explains more by a tenth, in sample (beyond a penalty of ln n for every
-    parameter) and held out.
+    parameter) and held out. Where the law leaves its outputs above the noise of repeats and a curve
+    does not, the law is open as well.
     """
     outputs: list[str] = sorted(final.hypothesis.terms[index].effect.outputs)
-    found = _screened(engine, final, noise, index, outputs)
-    if not found:
-        return None
     regression, folds = engine.regression, engine.folds(final, noise)
     size: Mapping[str, float | None] = {o: noise.rms[o] for o in outputs if o in noise.rms}
+    present = _errors(regression, final, noise, folds, size)
+    lacking = noise.from_repeats and _is_above(present, size)
+    found = _screened(
+        engine, final, noise, index=index, outputs=outputs, margin=0.0 if lacking else MARGIN
+    )
+    if not found:
+        return None
     without = _without(regression, final, index)
     errors = [
         _errors(regression, one, noise, folds, size)
@@ -60,9 +65,15 @@ def better_curve(
     explained = alone - own
     best = min(range(len(found)), key=others.__getitem__)
     gained = own - others[best]
-    if explained <= 0.0 or gained <= MARGIN * explained:
+    reaches = lacking and not _is_above(errors[2 + best], size)
+    if explained <= 0.0 or (gained <= MARGIN * explained and not reaches):
         return None
     return found[best], gained / explained
+
+
+def _is_above(errors: Mapping[str, float], noise: Mapping[str, float | None]) -> bool:
+    """Whether some error is above its noise."""
+    return any(size and errors[name] > AT_NOISE * size for name, size in noise.items())
 
 
 def predictable_share(
@@ -88,7 +99,13 @@ def predictable_share(
 
 
 def _screened(
-    engine: TimeSeriesSelection, final: Fit, noise: Noise, index: int, outputs: Sequence[str]
+    engine: TimeSeriesSelection,
+    final: Fit,
+    noise: Noise,
+    *,
+    index: int,
+    outputs: Sequence[str],
+    margin: float,
 ) -> list[Curve]:
     """Curves whose gain exceeds that of a term by the margin in sample, the largest first.
 
@@ -98,12 +115,22 @@ def _screened(
     if coarse is not None:
         weights = coarse.inverse_sigma(noise)
         at = fit(coarse.regression, coarse.reduced(final.hypothesis), weights, 0)
-        found = _above(coarse.regression, at, weights, index=index, outputs=outputs, penalty=0.0)
+        found = _above(
+            coarse.regression, at, weights, index=index, outputs=outputs, penalty=0.0, margin=margin
+        )
         if not found:
             return []
     weights = noise.inverse_sigma(engine.regression)
     penalty = engine.penalty_per_parameter
-    return _above(engine.regression, final, weights, index=index, outputs=outputs, penalty=penalty)
+    return _above(
+        engine.regression,
+        final,
+        weights,
+        index=index,
+        outputs=outputs,
+        penalty=penalty,
+        margin=margin,
+    )
 
 
 def _above(
@@ -114,11 +141,12 @@ def _above(
     index: int,
     outputs: Sequence[str],
     penalty: float,
+    margin: float,
 ) -> list[Curve]:
     without = _without(regression, final, index)
     partial = PartialRegression(without.residual, without.jacobian, weights)
     own = PartialRegression(final.residual, final.jacobian, weights)
-    least = (1 + MARGIN) * (partial.chi_square - own.chi_square)
+    least = (1 + margin) * (partial.chi_square - own.chi_square)
     ranked = ranked_curves(regression, partial, outputs, penalty)
     return [curve for curve in ranked if curve.net_gain > least][:_TRIED]
 
