@@ -13,7 +13,7 @@ Miller, A. (2002). Subset Selection in Regression, 2nd ed. Chapman & Hall.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import dropwhile
 
@@ -326,20 +326,26 @@ def _without_minor_terms(engine: SelectionEngine, present: Fit, noise: Noise) ->
     """Model without additions that explain less than what all of them leave, with repeats.
 
     Beside so much that is missing they imitate a part of it. Both are excesses of the held-out
-    mean squares over the noise, in units of the noise.
+    mean squares over the noise and over what coarse samples add, in units of the noise.
     """
-    if not noise.from_repeats:
+    if not noise.from_repeats or len(present.hypothesis.terms) == engine.n_initial_terms:
         return present, noise
     folds = engine.folds(present, noise)
 
-    def excess(fitted: Fit) -> float:
+    def excess(fitted: Fit, sampled: Mapping[str, float]) -> float:
         errors = held_out_rms(engine.regression, fitted, noise, folds)
-        return sum(max(0.0, (rms / noise.rms[name]) ** 2 - 1.0) for name, rms in errors.items())
+        return sum(
+            max(0.0, (rms**2 - sampled[name]) / noise.rms[name] ** 2 - 1.0)
+            for name, rms in errors.items()
+        )
 
-    left, reduced = excess(present), present
+    if not excess(present, dict.fromkeys(noise.rms, 0.0)):
+        return present, noise
+    sampled = engine.discretization_power(present, noise)
+    left, reduced = excess(present, sampled), present
     for index in reversed(range(engine.n_initial_terms, len(present.hypothesis.terms))):
         without = engine.refit(present.hypothesis.without(index), noise)
-        if excess(without) - left < left:
+        if excess(without, sampled) - left < left:
             reduced = engine.refit(reduced.hypothesis.without(index), noise)
     return (
         (present, noise) if reduced is present else engine.fit_with_noise(reduced.hypothesis, noise)
