@@ -88,9 +88,20 @@ class Bench:
             return self.drive.state.name, self.plant.motor_velocity
 
     def owner(self, speed: float) -> subprocess.Popen[bytes]:
-        """A command that jogs for longer than its bench process will live."""
+        """A command that jogs for longer than its bench process will live.
+
+        A killed owner is a trip of the next one, which is reset.
+        """
         way = "--wind-in" if speed > 0 else "--pay-out"
-        options = ["--bench", str(self.bench_file), way, f"{abs(speed)} m/s", "--for", "60s"]
+        options = [
+            "--bench",
+            str(self.bench_file),
+            way,
+            f"{abs(speed)} m/s",
+            "--for",
+            "60s",
+            "--reset",
+        ]
         return subprocess.Popen(
             [*JOG, *options],
             stdin=subprocess.DEVNULL,
