@@ -17,6 +17,8 @@ def moves(rig: Rig, text: str, dead: Callable[[Rig], None] | None = None) -> Non
     """Jog for a while and release; then move, and let the host die."""
     slave = rig.slaves[0]
     with rig.opened(text) as bench:
+        if not bench.winch["A"].snapshot.length_known:
+            bench.winch["A"].home(at=2.0)
         key = HeldKey(rig, bench, pay_out=0.05).press()
         rig.wait(1.0)
         assert abs(slave.motor.velocity) > 1.0, key.errors

@@ -108,17 +108,17 @@ def check_homing(node: SdoNode, servo: ServoSpec, homing: HomingSpec, *, defines
 def set_homing(node: SdoNode, servo: ServoSpec, scale: Scale, homing: HomingSpec) -> None:
     """Write a homing's parameters and read them back.
 
-    Speeds and the acceleration (609Ah) are left out where the drive has none and the method needs
-    none. Raises NotPermitted, NoReply, DeviceRefused (a method that the drive lacks).
+    A method that moves nothing needs neither speeds (a drive may refuse a speed above its own
+    limit) nor the acceleration (609Ah), which any drive may lack. Raises NotPermitted, NoReply, DeviceRefused (a method that the drive lacks).
     """
     check_homing(node, servo, homing, defines=False)
     node.write_verified(0x6098, 0, homing.method)
-    for sub, speed in ((1, homing.fast), (2, homing.slow)):
-        counts = scale.velocity_counts(_positive(speed, "homing speed", "rad/s"))
-        if node.read_if_there(0x6099, sub) is not None:
+    if homing.method not in HERE:
+        for sub, speed in ((1, homing.fast), (2, homing.slow)):
+            counts = scale.velocity_counts(_positive(speed, "homing speed", "rad/s"))
             node.write_verified(0x6099, sub, counts)
-    if node.read_if_there(0x609A) is not None:
-        node.write_verified(0x609A, 0, _ramp(servo, scale, homing.acceleration))
+        if node.read_if_there(0x609A) is not None:
+            node.write_verified(0x609A, 0, _ramp(servo, scale, homing.acceleration))
     home_offset = parse_object(servo.home_offset)
     if node.read_if_there(*home_offset) is not None:
         node.write_verified(*home_offset, scale.angle_counts(homing.offset))
