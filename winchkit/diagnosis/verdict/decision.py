@@ -45,8 +45,6 @@ AT_NOISE = 1.1
 _EXPLAINED, MOSTLY = 0.1, 0.5
 """Largest share that remains of an explained and of a partly explained excess. Of 127 new cases
 the truth leaves at most 0.075, and 0.16 where it is very weak; another effect 0.25 and more."""
-_MEANS = 3.0
-"""Standard errors at the noise, where most models are right: one output in 740 is refuted."""
 _NOISY = 0.1
 """Noise over the rms of a signal that does not vary by more: instruments in order have 0.03."""
 _STANDS = 3.0
@@ -181,11 +179,11 @@ def measured(
 
     Notes
     -----
-    An output refutes the model where each run's own mean predicts it better, beyond the standard
-    error of the difference over blocks of time. At the noise only the variation within the runs is
-    compared, since a mean knows the level of its run. An output that does not vary measures nothing
-    where the model of the file says that it must vary, or where its noise is more than a tenth of
-    its level.
+    An output above its noise refutes the model where each run's own mean predicts it better, beyond
+    the standard error of the difference over blocks of time. At the noise a mean may predict
+    better: the noise of a measured input, such as the load, is in the error of the model. An output
+    that does not vary measures nothing where the model of the file says that it must vary, or where
+    its noise is more than a tenth of its level.
     """
     blocks = regression.blocks
     left = held_out_samples(regression, final, noise, blocks)
@@ -200,8 +198,8 @@ def measured(
         varied[output] += float(deviation @ deviation)
         predicted[output] += float(np.sum(_centred(own, valid) ** 2))
         means[output].append(float(np.mean(samples[valid])))
-        loss = _centred(error, valid) if is_at_noise(outputs[output]) else error
-        losses[output] += np.bincount(block, weights=loss**2 - deviation**2, minlength=blocks.count)
+        loss = error**2 - deviation**2
+        losses[output] += np.bincount(block, weights=loss, minlength=blocks.count)
     deciding, refuted = set(), set()
     for output, loss in losses.items():
         fitted, count = outputs[output], regression.n_samples(output)
@@ -213,7 +211,7 @@ def measured(
             np.sqrt(predicted[output] / count) > _STANDS * size or size > _NOISY * fitted.signal_rms
         ):
             refuted.add(output)
-        if _is_larger(loss[loss != 0.0], _MEANS if is_at_noise(fitted) else 1.0):
+        if not is_at_noise(fitted) and _is_larger(loss[loss != 0.0]):
             refuted.add(output)
     return Measured(frozenset(deciding), frozenset(refuted))
 
@@ -223,11 +221,11 @@ def _centred(values: Array, valid: NDArray[np.bool_]) -> Array:
     return np.where(valid, values - np.mean(values[valid]), 0.0)
 
 
-def _is_larger(losses: Array, errors: float) -> bool:
-    """Whether the sum of losses per block exceeds zero by some standard errors."""
+def _is_larger(losses: Array) -> bool:
+    """Whether the sum of losses per block exceeds zero by its standard error."""
     if len(losses) < 2:
         return False
-    return bool(np.sum(losses) > errors * np.sqrt(len(losses)) * np.std(losses, ddof=1))
+    return bool(np.sum(losses) > np.sqrt(len(losses)) * np.std(losses, ddof=1))
 
 
 def output_fits(
