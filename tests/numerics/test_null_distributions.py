@@ -28,7 +28,6 @@ from winchkit.diagnosis.regression.projection import explained_ss
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.scores import Projected, null_maxima, score
 from winchkit.diagnosis.selection.signatures import signatures
-from winchkit.diagnosis.verdict.equivalence import _sign_flip_p_value
 from winchkit.effects import load_catalogue
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
@@ -146,21 +145,6 @@ class TestSignedRanks:
             p_values.append(signed_rank_p_value(before, before - random.standard_t(3, 48)))
         for level in (0.02, 0.1, 0.5):
             assert within(int(np.count_nonzero(np.array(p_values) <= level)), cases, level)
-
-
-class TestSignFlips:
-    def test_the_p_value_is_the_share_of_all_assignments_of_signs(self) -> None:
-        random, flips = np.random.default_rng(7), 2000
-        for _ in range(5):
-            worse = random.standard_normal(10) + 0.3
-            sums = [np.array(signs) @ worse for signs in product([-1.0, 1.0], repeat=10)]
-            exact = float(np.mean(np.array(sums) >= worse.sum() - 1e-12))
-            assert within(round(_sign_flip_p_value(worse) * flips), flips, exact)
-
-    def test_losses_about_zero_are_significant_as_often_as_the_level(self) -> None:
-        random, cases = np.random.default_rng(8), 1000
-        count = sum(_sign_flip_p_value(random.standard_t(3, 48)) <= 0.05 for _ in range(cases))
-        assert within(count, cases, 0.05)
 
 
 class TestChiSquare:

@@ -485,7 +485,6 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
             *dataset.notes,
             *missing_excitation(regression),
             *best.notes,
-            *(note for each in sets for note in _beside_notes(each)),
         ),
         sanity=dataset.sanity,
         used_share=dataset.used_share,
@@ -549,11 +548,6 @@ def _traces(
 def _spread(engine: SelectionEngine, result: SelectionResult) -> Spread:
     """Uncertainty of the unknowns of the final model."""
     return spread_of(engine.regression, result.final, result.noise, engine.regression.blocks)
-
-
-def _beside_notes(equivalence: EquivalenceSet) -> Iterator[str]:
-    for effect, further in equivalence.beside.items():
-        yield f"{effect} predicts the runs as well as {equivalence.effects[0]} beside {further}"
 
 
 def selection_engine(

@@ -26,9 +26,7 @@ from winchkit.diagnosis.verdict.combination import combination_of_set, combinati
 from winchkit.diagnosis.verdict.curve_fits import Curve
 from winchkit.diagnosis.verdict.decision import excess
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
-from winchkit.diagnosis.verdict.laws import reduced_law
 from winchkit.diagnosis.verdict.plausibility import implausible
-from winchkit.schema.profiles.winch import WinchProfile
 
 __all__ = ["Standing", "candidates_of", "is_small", "standing_of", "steps_of", "with_standing"]
 
@@ -77,9 +75,8 @@ def steps_of(
             else _values_of_rival(engine, result, fitted, member.effect.id)
             for member, fitted in zip(every.terms, every.fits, strict=True)
         }
-        equivalence = _without_reduced(every, parameters, engine.profile)
-        further = equivalence.effects[_MOST_ALTERNATIVES:]
-        equivalence = equivalence.only(equivalence.effects[:_MOST_ALTERNATIVES])
+        further = every.effects[_MOST_ALTERNATIVES:]
+        equivalence = every.only(every.effects[:_MOST_ALTERNATIVES])
         parameters = {name: parameters[name] for name in equivalence.effects}
         combination = combination_of_set(equivalence.terms, parameters, dataset)
         if combination is None and equivalence.term.effect.id == term.effect.id:
@@ -233,22 +230,6 @@ def _is_determined(null: Mapping[str, float], name: str, estimate: Estimate) -> 
 
 def _further_text(effects: Sequence[str]) -> str:
     return f"nor can they distinguish it from {', '.join(effects)}"
-
-
-def _without_reduced(
-    equivalence: EquivalenceSet,
-    parameters: Mapping[str, Mapping[str, Estimate]],
-    profile: WinchProfile | None,
-) -> EquivalenceSet:
-    """A set without richer laws whose fitted shape is that of another member."""
-    names = set(equivalence.effects)
-    kept = [
-        term.effect.id
-        for term in equivalence.terms
-        if not names & set(term.effect.reduces_to)
-        or not reduced_law(term, parameters[term.effect.id], profile)
-    ]
-    return equivalence.only(kept)
 
 
 def _values_of_rival(

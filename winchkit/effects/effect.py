@@ -163,8 +163,6 @@ class Effect:
     """Values whose secants form the signature where single parameters have no gradient."""
     impacts: Callable[[At, Values], NDArray[np.bool_]] | None = None
     """Samples (n,) near impacts, whose force and torque the effect does not predict."""
-    visible: Callable[[At, Values], bool] | None = None
-    """Whether the range of a motion distinguishes it from the effect that it approaches."""
     possible: Callable[[Values], bool] | None = None
     """Whether a combination of values is valid, beyond the bounds of each."""
     single: Effect | None = None

@@ -23,14 +23,10 @@ __all__ = [
     "dahl",
     "dahl_constant",
     "dahl_step",
-    "has_fallen",
     "normal_force",
     "stribeck",
     "tension_after",
 ]
-
-_FALLEN = 1.5
-"""Speed over the Stribeck speed at which e^(−(v/vs)²) is a tenth."""
 
 
 def normal_force(before: Array, after: Array, wrap: float) -> Array:
@@ -129,26 +125,6 @@ def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float)
     """
     fallen = np.exp(-((speed / stribeck_speed) ** 2))
     return np.asarray(coulomb * (1 - fallen) + static * fallen)
-
-
-def has_fallen(speed: Array, stribeck_speed: float) -> bool:
-    """Whether the excess of a Stribeck curve over μc falls to a tenth within the speeds.
-
-    Where it does not, the curve cannot be distinguished from Coulomb friction.
-
-    Parameters
-    ----------
-    speed : array
-        m/s.
-    stribeck_speed : float
-        vs, m/s.
-
-    Returns
-    -------
-    bool
-        Whether the highest speed is sufficient.
-    """
-    return bool(np.max(np.abs(speed), initial=0.0) > _FALLEN * stribeck_speed)
 
 
 def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape: float) -> float:

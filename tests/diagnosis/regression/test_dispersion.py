@@ -18,7 +18,6 @@ from scipy.stats import binom, norm, t
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.dispersion import (
-    excess_p_value,
     fits_worse,
     largest_loss,
     overdispersed,
@@ -150,21 +149,6 @@ def test_a_variance_of_one_degree_of_freedom_is_replaced_by_that_of_the_residual
     taken = overdispersed(DATA, one, unknown)
     assert np.all(np.abs(np.log(taken.power)) < 4 * np.sqrt(2 / taken.dof))
     assert np.all(taken.dof > 3.0)
-
-
-@pytest.mark.parametrize(("misfit", "low", "high"), [(nothing, 0.2, 0.3), (slow, 0.99, 1.0)])
-def test_an_excess_over_the_noise_is_found_at_the_level_of_its_p_value(
-    misfit: Misfit, low: float, high: float
-) -> None:
-    random = np.random.default_rng(7)
-    column = np.where(BAND == 1, 1.0, 0.0)
-    p = []
-    for _ in range(600):
-        power = random.chisquare(NOISE.dof) / NOISE.dof
-        measured = misfit(random) + random.standard_normal(len(BAND))
-        noise = replace(NOISE, power=power)
-        p.append(excess_p_value(DATA, fitted(column, measured, noise), noise))
-    assert low <= np.mean(np.array(p) < 0.25) <= high
 
 
 def test_one_coefficient_with_all_power_counts_as_few_values() -> None:

@@ -11,7 +11,6 @@ from diagnosis_runs import CATALOGUE, Ride, engine_for, term
 from winchkit.diagnosis.selection.exchange import pair_exchange
 from winchkit.diagnosis.selection.signatures import Signatures, updated_signatures
 from winchkit.diagnosis.selection.stepwise import _exchanged_terms
-from winchkit.diagnosis.verdict.equivalence import equivalence_set
 from winchkit.effects.term import Term
 
 RIDE = Ride(samples=1200, rate=25.0, period=12.0)
@@ -47,23 +46,6 @@ def test_an_effect_that_explained_two_is_refitted_beside_the_second() -> None:
     assert set(terms) == {"cable-creep", "encoder-slip"}
     assert terms["encoder-slip"]["time"] == pytest.approx(14.7, abs=0.1)
     assert terms["cable-creep"]["time_constant"] == pytest.approx(6.0, rel=0.1)
-
-
-@pytest.mark.parametrize(("share", "alone"), [(0.9, False), (0.2, True)])
-def test_stribeck_friction_outside_the_speed_range_is_equivalent_to_coulomb_friction(
-    share: float, alone: bool
-) -> None:
-    fastest = max(
-        abs(at.motor_rate).max() for at in engine_for([], RIDE).regression.dataset.motions
-    )
-    wide = term("motor-stribeck", torque=0.1, stribeck_speed=share * fastest)
-    engine = engine_for([wide], RIDE)
-    present, noise = engine.fit_with_noise(
-        engine.initial_model.with_term(wide, engine.regression.n_runs)
-    )
-    told = equivalence_set(engine, present, noise, 0).effects
-    assert "motor-stribeck" in told
-    assert ("motor-coulomb" not in told) is alone
 
 
 def columns_of(found: Signatures) -> dict[str, np.ndarray]:

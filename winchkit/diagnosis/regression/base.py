@@ -76,9 +76,6 @@ class Regression(ABC):
     fits_discretization : bool
         Whether the last nuisance parameter is a correction of the discretisation error, which
         acts through the effects too.
-    has_known_loads : bool
-        Whether the load is an input that an experimenter chooses, rather than a result of the
-        platform's balance.
 
     Notes
     -----
@@ -91,7 +88,6 @@ class Regression(ABC):
     fits_offset: bool = False
     n_run_offsets: int = 0
     fits_discretization: bool = False
-    has_known_loads: bool = True
 
     def __init__(self, segments: Sequence[Segment], n_runs: int) -> None:
         self.segments = tuple(segments)

@@ -88,8 +88,6 @@ class PoseRegression(Regression):
         Poses, variance components and geometry.
     """
 
-    has_known_loads = False  # Tensions follow from the balance at the pose.
-
     def __init__(self, point: LinearizationPoint) -> None:
         self.point = point
         self.dataset: RobotDataset = point.dataset

@@ -3,7 +3,7 @@
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.effects.transition import CABLE_TRANSITION, cable_direction
-from winchkit.model.friction import coulomb_ratio, has_fallen, stribeck
+from winchkit.model.friction import coulomb_ratio, stribeck
 from winchkit.model.stages import At, Stage
 
 
@@ -16,11 +16,6 @@ def apply(tension: Array, at: At, values: Values) -> Array:
 def _sticks(values: Values) -> bool:
     """Whether friction at standstill is at least that in motion, as with a film of grease."""
     return values["static"] >= values["coulomb"]
-
-
-def _passed(at: At, values: Values) -> bool:
-    """Whether the speeds are high enough for the excess at low speed to fall."""
-    return has_fallen(at.speed, values["stribeck_speed"])
 
 
 EFFECT = Effect(
@@ -55,5 +50,4 @@ EFFECT = Effect(
     contains=("pulley-coulomb", "pulley-capstan"),
     needs=("pulley", "load"),
     possible=_sticks,
-    visible=_passed,
 )

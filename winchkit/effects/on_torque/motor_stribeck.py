@@ -5,7 +5,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.effects.transition import MOTOR_TRANSITION, motor_direction
-from winchkit.model.friction import has_fallen
 from winchkit.model.stages import At, Stage
 
 
@@ -14,11 +13,6 @@ def apply(torque: Array, at: At, values: Values) -> Array:
     return torque + values["torque"] * motor_direction(at, values) * np.exp(
         -((at.motor_rate / values["stribeck_speed"]) ** 2)
     )
-
-
-def _passed(at: At, values: Values) -> bool:
-    """Whether the speeds are high enough for the excess at low speed to fall."""
-    return has_fallen(at.motor_rate, values["stribeck_speed"])
 
 
 EFFECT = Effect(
@@ -49,5 +43,4 @@ EFFECT = Effect(
     confused_with=("motor-coulomb", "pulley-stribeck"),
     told_apart="Very slow ramps at several speeds.",
     family="motor friction",
-    visible=_passed,
 )
