@@ -3,8 +3,8 @@
 Each rival is refitted in the place of the named effect, under the larger of the noise and of what
 the named model leaves unexplained (quasi-likelihood). It joins the set unless it is worse in
 sample, Δχ² being above the square of a quantile of t (9 for well-known variances), and held out,
-the difference over blocks of time being above its standard error at 5 %. A law that reduces to another member leaves
-the set again where a likelihood-ratio test does not prefer it.
+the difference over blocks of time being above its standard error at 5 %. A law that reduces to
+another member leaves the set again where a likelihood-ratio test does not prefer it.
 
 References
 ----------
@@ -161,7 +161,8 @@ class _Member:
 def _predicts_worse(engine: SelectionEngine, rival: Fit, losses: Array, noise: Noise) -> bool:
     """Whether held-out losses per block exceed those of the named effect, one-sided."""
     excess = held_out(engine.regression, rival, noise, engine.regression.blocks) - losses
-    error = np.sqrt(len(excess)) * np.std(excess, ddof=1)
+    # The standard error of a single block is not known.
+    error = np.sqrt(len(excess)) * np.std(excess, ddof=1) if len(excess) > 1 else 0.0
     return bool(np.sum(excess) > -ndtri(_LEVEL) * error)
 
 
