@@ -62,8 +62,6 @@ class Ratio:
     """Whether the line differs from its profile."""
     per_turn: float
     """Cable per motor turn, mean over the poses, m."""
-    per_turn_std: float
-    """Posterior standard deviation, m, with that of the robot's size."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +120,6 @@ def ratios_of(equations: Equations, solution: Solution) -> Ratios:
     covariance = by @ posterior @ by.T
     per_turn = 2 * np.pi * np.abs(np.sum(turned * wound, axis=0)) / np.sum(turned**2, axis=0)
     chosen, others = _sets(change, covariance)
-    spread = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
     right = [i for i in range(len(names)) if i not in chosen]
     lines = []
     for i, name in enumerate(names):
@@ -137,7 +134,6 @@ def ratios_of(equations: Equations, solution: Solution) -> Ratios:
                 float(np.sqrt(max(weight @ covariance @ weight, 0.0))),
                 i in chosen,
                 float(per_turn[i]),
-                float(per_turn[i] * spread[i]),
             )
         )
     return Ratios(tuple(lines), tuple(tuple(names[i] for i in each) for each in others))

@@ -109,7 +109,8 @@ def set_homing(node: SdoNode, servo: ServoSpec, scale: Scale, homing: HomingSpec
     """Write a homing's parameters and read them back.
 
     A method that moves nothing needs neither speeds (a drive may refuse a speed above its own
-    limit) nor the acceleration (609Ah), which any drive may lack. Raises NotPermitted, NoReply, DeviceRefused (a method that the drive lacks).
+    limit) nor the acceleration (609Ah), which any drive may lack. Raises NotPermitted, NoReply,
+    DeviceRefused (a method that the drive lacks).
     """
     check_homing(node, servo, homing, defines=False)
     node.write_verified(0x6098, 0, homing.method)
