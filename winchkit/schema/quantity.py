@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pydantic_core import CoreSchema
 
 __all__ = [
-    "Acceleration",
     "Angle",
     "Count",
     "Duration",
@@ -42,7 +41,6 @@ __all__ = [
     "PositiveSpeed",
     "Quantity",
     "QuantityOrNone",
-    "Speed",
     "Temperature",
     "Torque",
     "Truth",
@@ -164,9 +162,7 @@ class Truth(Marker):
 
 Length = Annotated[float, Quantity("length")]
 PositiveLength = Annotated[float, Quantity("length", 0.0, above=True)]
-Speed = Annotated[float, Quantity("speed")]
 PositiveSpeed = Annotated[float, Quantity("speed", 0.0, above=True)]
-Acceleration = Annotated[float, Quantity("acceleration")]
 PositiveAcceleration = Annotated[float, Quantity("acceleration", 0.0, above=True)]
 Angle = Annotated[float, Quantity("angle")]
 Duration = Annotated[float, Quantity("time", 0.0)]

@@ -21,7 +21,6 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.calibration import CellCalibration, TareBook
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.mapping import ImportMapping
-from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.sizing import SizeSpec
 from winchkit.schema.profiles.winch import WinchProfile
@@ -403,61 +402,27 @@ def _read(path: PathLike, kind: str, expected: type[T]) -> T:
     return value
 
 
-def _winch(reading: Reading, tree: dict[str, Any]) -> WinchProfile | None:
-    return reading.winch(tree, reading.stem)
+def _table(
+    kind: type[T], *, with_path: bool = False
+) -> Callable[[Reading, dict[str, Any]], T | None]:
+    """Reader of a file of one table, with the file's name where it gives itself none."""
+
+    def read(reading: Reading, tree: dict[str, Any]) -> T | None:
+        named = {"name": reading.stem, **tree}
+        return reading.table(kind, _with_path(reading, named) if with_path else named)
+
+    return read
 
 
-def _axis(reading: Reading, tree: dict[str, Any]) -> AxisProfile | None:
-    return reading.axis(tree)
-
-
-def _robot(reading: Reading, tree: dict[str, Any]) -> RobotProfile | None:
-    return robots.robot(reading, tree, read_winch)
-
-
-def _bench(reading: Reading, tree: dict[str, Any]) -> BenchSpec | None:
-    return benches.bench(reading, tree, read_device, read_robot)
-
-
-def _simbench(reading: Reading, tree: dict[str, Any]) -> SimBench | None:
-    return benches.sim_bench(reading, tree, read_device, read_robot)
-
-
-def _programme(reading: Reading, tree: dict[str, Any]) -> Programme | None:
-    return reading.table(Programme, {"name": reading.stem, **tree})
-
-
-def _robot_programme(reading: Reading, tree: dict[str, Any]) -> RobotProgramme | None:
-    return reading.table(RobotProgramme, {"name": reading.stem, **tree})
-
-
-def _size(reading: Reading, tree: dict[str, Any]) -> SizeSpec | None:
-    return reading.table(SizeSpec, {"name": reading.stem, **tree})
-
-
-def _calibration(reading: Reading, tree: dict[str, Any]) -> CellCalibration | None:
-    return reading.table(CellCalibration, _named(reading, tree))
-
-
-def _tares(reading: Reading, tree: dict[str, Any]) -> TareBook | None:
-    return reading.table(TareBook, _named(reading, tree))
-
-
-def _mapping(reading: Reading, tree: dict[str, Any]) -> ImportMapping | None:
-    return reading.table(ImportMapping, _named(reading, tree))
-
-
-def _named(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
-    """With the file's name, where it gives itself none, and its path."""
+def _with_path(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
+    """A tree with the path of its file."""
     if "path" in tree:
         reading.fault(("path",), "unknown key")
-    return {"name": reading.stem, **tree, "path": reading.source.path}
+    return {**tree, "path": reading.source.path}
 
 
 def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
-    if "path" in tree:
-        reading.fault(("path",), "unknown key")
-    device = reading.table(DeviceSpec, {**tree, "path": reading.source.path})
+    device = reading.table(DeviceSpec, _with_path(reading, tree))
     for table in ("servo", "process"):
         part = getattr(device, table, None)
         if part is None:
@@ -469,18 +434,18 @@ def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
 
 
 _READERS: dict[str, Callable[[Reading, dict[str, Any]], Declared | None]] = {
-    "winch": _winch,
-    "axis": _axis,
-    "robot": _robot,
-    "bench": _bench,
-    "programme": _programme,
-    "robot-programme": _robot_programme,
-    "sim-bench": _simbench,
+    "winch": lambda reading, tree: reading.winch(tree, reading.stem),
+    "axis": Reading.axis,
+    "robot": lambda reading, tree: robots.robot(reading, tree, read_winch),
+    "bench": lambda reading, tree: benches.bench(reading, tree, read_device, read_robot),
+    "programme": _table(Programme),
+    "robot-programme": _table(RobotProgramme),
+    "sim-bench": lambda reading, tree: benches.sim_bench(reading, tree, read_device, read_robot),
     "device": _device,
-    "size": _size,
-    "calibration": _calibration,
-    "tares": _tares,
-    "mapping": _mapping,
+    "size": _table(SizeSpec),
+    "calibration": _table(CellCalibration, with_path=True),
+    "tares": _table(TareBook, with_path=True),
+    "mapping": _table(ImportMapping, with_path=True),
 }
 
 

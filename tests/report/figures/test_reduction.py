@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.report.figures.reduction import bin_means, decimated, decimated_points, filled_edges
+from winchkit.report.figures.reduction import bin_means, decimated, filled_edges
 
 
 @given(st.integers(1, 5000), st.integers(5, 100), st.integers(0, 2**32 - 1))
@@ -50,14 +50,6 @@ def test_a_single_spike_is_drawn() -> None:
     rows = decimated([values], 1000)
     assert 54_321 in rows
     assert len(rows) <= 2002
-
-
-@given(st.integers(1, 3000), st.integers(1, 300))
-def test_dots_are_few_and_sorted(count: int, points: int) -> None:
-    x = np.random.default_rng(count).normal(size=count)
-    chosen = decimated_points(x, points)
-    assert 1 <= len(chosen) <= points
-    assert np.all(np.diff(x[chosen]) >= 0)
 
 
 def test_bins_recover_a_line_through_noise() -> None:

@@ -21,7 +21,6 @@ from winchkit.runs.sanity.inspection import inspect_run
 from winchkit.runs.sanity.local_noise import local_noise, sorted_quantile
 from winchkit.runs.sanity.outliers import _chance, outlier_mask
 from winchkit.runs.sanity.quantisation import _BINS, _PADDED, _SEARCHED, _cosine_sums, resolution
-from winchkit.runs.sanity.sampling import increasing_rows
 
 Array = NDArray[np.float64]
 SEEDS = st.integers(0, 2**31)
@@ -347,16 +346,6 @@ def test_lost_samples_are_gaps_and_no_jitter_nor_resolution() -> None:
     assert set(codes) == {"gap"}
     lost = np.count_nonzero(~kept[np.flatnonzero(kept)[0] : np.flatnonzero(kept)[-1]])
     assert codes["gap"].value == pytest.approx(lost / RATE)
-
-
-@given(st.lists(st.integers(0, 60), min_size=2, max_size=60))
-def test_rows_are_kept_in_order_of_time(stamps: list[int]) -> None:
-    time = np.array(stamps, dtype=np.float64)
-    rows, findings = increasing_rows(time, "r")
-    assert np.all(np.diff(time[rows]) > 0)
-    left_out = sum(finding.value for finding in findings)
-    assert len(rows) + left_out == len(time)
-    assert time[rows[-1]] == time.max()
 
 
 @pytest.mark.parametrize(

@@ -60,10 +60,6 @@ class Ratio:
     std: float
     named: bool
     """Whether the line differs from its profile."""
-    per_turn: float
-    """Cable per motor turn, mean over the poses, m."""
-    per_turn_std: float
-    """Posterior standard deviation, m, with that of the robot's size."""
 
 
 @dataclass(frozen=True)
@@ -114,15 +110,13 @@ def ratios_of(equations: Equations, solution: Solution) -> Ratios:
     parameters, names = equations.parameters, equations.robot.names
     values, scale = solution.state.values, parameters.std
     posterior = np.linalg.inv(solution.linear.information + np.eye(len(scale)))
-    wound, by, turned = _wound(equations, values)
+    wound, by = _wound(equations, values)
     first = _wound(equations, parameters.nominal)[0]
     along = first / np.sum(first**2, axis=0)
     change = np.sum(along * wound, axis=0) - 1
     by = np.einsum("pn,pnq->nq", along, by) * scale
     covariance = by @ posterior @ by.T
-    per_turn = 2 * np.pi * np.abs(np.sum(turned * wound, axis=0)) / np.sum(turned**2, axis=0)
     chosen, others = _sets(change, covariance)
-    spread = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
     right = [i for i in range(len(names)) if i not in chosen]
     lines = []
     for i, name in enumerate(names):
@@ -136,15 +130,13 @@ def ratios_of(equations: Equations, solution: Solution) -> Ratios:
                 float(weight @ change),
                 float(np.sqrt(max(weight @ covariance @ weight, 0.0))),
                 i in chosen,
-                float(per_turn[i]),
-                float(per_turn[i] * spread[i]),
             )
         )
     return Ratios(tuple(lines), tuple(tuple(names[i] for i in each) for each in others))
 
 
-def _wound(equations: Equations, values: Array) -> tuple[Array, Array, Array]:
-    """Cable wound since home (p, n), its derivatives (p, n, q), and motor angles since home."""
+def _wound(equations: Equations, values: Array) -> tuple[Array, Array]:
+    """Cable wound since home (p, n) and its derivatives (p, n, q)."""
     known = np.isfinite(equations.measured.motor_angle)
     block, lines = equations.parameters.block, np.arange(known.shape[1])
     radius, growth = values[block["winding_radius"]], float(values[block["layer_growth"][0]])
@@ -157,9 +149,7 @@ def _wound(equations: Equations, values: Array) -> tuple[Array, Array, Array]:
         own = values[block["gear_ratio"]]
         more = equations.winding_at(values, _STEP).wound(radius, growth)
         by[:, lines, block["gear_ratio"]] = (more - wound) / (_STEP * own)
-    reference = [winch.reference.motor_angle for winch in equations.robot.winches]
-    turned = np.where(known, equations.measured.motor_angle - reference, 0.0)
-    return np.where(known, wound, 0.0), np.where(known[..., None], by, 0.0), turned
+    return np.where(known, wound, 0.0), np.where(known[..., None], by, 0.0)
 
 
 def _sets(change: Array, covariance: Array) -> tuple[tuple[int, ...], list[tuple[int, ...]]]:

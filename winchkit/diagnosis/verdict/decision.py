@@ -98,6 +98,7 @@ def verdict_of(
 
 
 def is_at_noise(output: OutputFit) -> bool:
+    """Whether the final model's held-out error is as small as the noise, in ratio ``AT_NOISE``."""
     return output.noise_rms is not None and output.heldout_rms_after <= AT_NOISE * output.noise_rms
 
 

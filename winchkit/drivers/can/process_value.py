@@ -43,7 +43,7 @@ class ProcessDecoder:
             raise FileError(Fault("is no CANopen instrument", device.path))
         self.spec = spec = device.process
         item = node.mapped(*parse_object(spec.value))
-        self._bits, self._signed = item.bits, item.signed
+        self._bits = item.bits
         if spec.type == "f32" and (item.bits, item.signed) != (_REAL32_BITS, False):
             raise FileError(
                 Fault(f"{spec.value} is no REAL32 in the EDS", device.path, key="process.type")

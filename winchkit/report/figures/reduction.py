@@ -28,7 +28,6 @@ __all__ = [
     "bin_means",
     "curve_of",
     "decimated",
-    "decimated_points",
     "filled_edges",
     "strongest",
 ]
@@ -68,13 +67,6 @@ def decimated(series: Sequence[Array], intervals: int) -> NDArray[np.intp]:
                 + np.array([np.argmin(filled[0][first:last]), np.argmax(filled[1][first:last])])
             )
     return np.unique(np.concatenate(kept))
-
-
-def decimated_points(x: Array, points: int) -> NDArray[np.intp]:
-    """Indices of at most ``points`` samples, evenly distributed over the recording, sorted by x."""
-    step = max(1, -(-len(x) // points))
-    chosen = np.arange(0, len(x), step)
-    return np.asarray(chosen[np.argsort(x[chosen], kind="stable")])
 
 
 def filled_edges(x: Array, bins: int) -> Array:

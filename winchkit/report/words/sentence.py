@@ -98,7 +98,7 @@ def sentence(diagnosis: Diagnosis) -> str:
 
 
 def error_text(diagnosis: Diagnosis) -> str:
-    """Held-out error that falls most with the steps, or without any the worst one, in a sentence.
+    """Sentence on the held-out error that falls most with the steps, without any on the worst.
 
     Parameters
     ----------

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.runs.run import Run, lost_samples
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import counted, share
 
-__all__ = ["increasing_rows", "sampling", "with_lost_samples"]
+__all__ = ["sampling", "with_lost_samples"]
 
 _JITTER = 0.05
 """Standard deviation of the intervals, relative to their mean, that is reported."""
@@ -69,36 +68,3 @@ def with_lost_samples(time: Array, values: Array) -> Array:
     if len(time) < _LEAST_SAMPLES:
         return values
     return np.insert(values, np.flatnonzero(lost_samples(time)) + 1, np.nan)
-
-
-def increasing_rows(time: Array, run: str) -> tuple[NDArray[np.intp], list[Finding]]:
-    """Rows in order of time, each later than all before, for importers of other loggers' files.
-
-    Parameters
-    ----------
-    time : (n,) array
-        Stamps as recorded, s.
-    run : str
-        Name of the run.
-
-    Returns
-    -------
-    rows : (m,) array of int
-        Rows to keep: the first of equal stamps, none that goes back or has no stamp.
-    findings : list of Finding
-        ``duplicated-stamps`` and ``backward-stamps`` (value: number of rows left out).
-    """
-    known = np.where(np.isfinite(time), time, -np.inf)
-    latest = np.concatenate([[-np.inf], np.maximum.accumulate(known)[:-1]])
-    repeated = np.isfinite(time) & (known == latest)
-    back = np.isfinite(time) & (known < latest)
-    found = []
-    for code, rows, word in (
-        ("duplicated-stamps", repeated, "repeat the time of an earlier row"),
-        ("backward-stamps", back, "go back in time"),
-    ):
-        count = int(np.count_nonzero(rows))
-        if count:
-            text = f"{count} of {len(time)} rows {word}; they are left out"
-            found.append(Finding(code, run, "time", float(count), text))
-    return np.flatnonzero(known > latest), found

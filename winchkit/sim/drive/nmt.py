@@ -63,11 +63,6 @@ class Heartbeats:
         self._failed.clear()
         self._due = now + self._period if self._period else inf
 
-    @property
-    def armed(self) -> bool:
-        """Whether the heartbeat of a node is monitored."""
-        return bool(self._deadlines)
-
     def heard(self, node: int, now: float) -> None:
         """Take a heartbeat of another node."""
         limit = self._limits().get(node)

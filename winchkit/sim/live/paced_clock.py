@@ -30,8 +30,6 @@ class PacedClock:
         self._wall = time.monotonic()
         self._time = self._wall
         self._beats: dict[str, tuple[float, float]] = {}
-        self.stood_still = 0.0
-        """Total of the skipped time, s."""
 
     def now(self) -> float:
         """Seconds since an arbitrary start."""
@@ -64,6 +62,5 @@ class PacedClock:
         waiting = [at for at, seen in self._beats.values() if wall - seen < _PATIENCE]
         allowed = min((at + self._slack for at in waiting), default=wanted)
         reached = max(self._time, min(wanted, allowed))
-        self.stood_still += wanted - reached
         self._time, self._wall = reached, wall
         return reached
