@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -45,6 +46,8 @@ def case(kind: str, **changes: object) -> Case:
         ("cell silent", False, True),
         ("computer stalls 0.5 s", True, False),
         ("exception in the loop", True, False),
+        ("counter reset", True, False),
+        ("guarding polls lost", True, False),
         pytest.param("stranger: NMT pre-operational", True, False, marks=CAMPAIGN),
         pytest.param("TPDOs lost", True, True, marks=CAMPAIGN),
         pytest.param("SYNC lost", False, False, marks=CAMPAIGN),
@@ -71,6 +74,20 @@ def test_a_winch_that_goes_on_is_found() -> None:
     assert "followed set-points" in verdict.stopped
     assert "enabled" in verdict.moved_after_trip
     assert verdict.cause == "nothing was told"
+
+
+def test_a_length_that_is_wrong_is_found() -> None:
+    """A counter that begins anew makes it unknown; shown as known it would be a failure."""
+    released = Planned("released", "A", 0.6, None)
+    reset = Planned("counter reset at rest", "A", 1.6, None)
+    record = play(case("counter reset at rest", faults=(released, reset), independent=True))
+    assert judge(record).good, judge(record)
+    shown, true = record.lengths["A"]
+    assert math.isnan(shown)
+    record.lengths["A"] = true + 0.011, true
+    assert "is shown as known" in judge(record).length
+    kept = play(case("recorder fails", independent=True)).lengths["A"]
+    assert kept[0] == pytest.approx(kept[1], abs=1e-3)
 
 
 @pytest.mark.parametrize("independent", [True, pytest.param(False, marks=CAMPAIGN)])
