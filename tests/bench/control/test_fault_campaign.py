@@ -105,6 +105,15 @@ def test_a_frame_that_no_drive_receives_is_received_by_the_host(independent: boo
         assert not ends, "the truth: it is stopped, by itself or by the host"
 
 
+def test_a_drive_that_refuses_stops_by_sdo_is_not_taken_for_two_nodes() -> None:
+    """Case 8123/35: its replies to the stops came beside those to the reset."""
+    lost, refuses = Planned("SYNC lost", "A", 1.18, None), Planned("sdo refused", "A", 1.34, 0.3)
+    both = case("SYNC lost", motion="move", speed=0.15, faults=(lost, refuses), independent=True)
+    verdict = judge(play(replace(both, resets_early=True)))
+    assert verdict.good, verdict
+    assert verdict.recovered, verdict.refusal
+
+
 def test_a_case_is_the_same_whenever_it_is_played() -> None:
     """With cells that lose connections, whose transactions start at a number of the loop's time."""
     again = case("cell: short", independent=True)

@@ -15,6 +15,8 @@ __all__ = ["sdo_client"]
 _SdoClient: Any = library.SdoClient
 _OBJECT = slice(1, 4)
 """Bytes of an SDO frame with index and sub-index (CiA 301)."""
+_STOPS = (b"\x40\x60\x00", b"\x41\x60\x00")
+"""6040h and 6041h: stops by SDO ask for these too, beside this client; two answers say nothing."""
 _REPLIES = {1: (3, 4), 2: (2, 4)}
 """Server's command specifiers that answer the client's: initiate download, upload; 4 is abort."""
 
@@ -52,7 +54,7 @@ class _WaitingSdoClient(_SdoClient):  # type: ignore[misc]
         other = bool(replies) and (answer != self._open or data[0] >> 5 not in replies)
         if answer == self._open and not other:
             self._open, self._answered, self._replies = b"", answer, ()
-        elif answer == self._answered:
+        elif answer == self._answered and answer not in _STOPS:
             self.answered_twice += 1
         if other:
             return
