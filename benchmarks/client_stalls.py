@@ -129,7 +129,7 @@ def _suspend(
     while state(bench)[1] != "operation enabled":
         if process.poll() is not None or time.monotonic() - begun > _STARTS:
             errors = process.stderr.read().decode() if process.poll() is not None else ""  # type: ignore[union-attr]
-            return f"it did not begin: {errors[-200:]}"
+            return f"it did not begin: exit code {process.poll()}: {errors[-600:]}"
         _type(master, _UP if kind == "keys" else b"")
         time.sleep(0.05)
     end = time.monotonic() + before

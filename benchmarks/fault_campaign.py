@@ -30,7 +30,7 @@ from fault_cases.case import Case, cases
 from fault_cases.judge import Verdict, judge
 from fault_cases.play import play
 
-_GOOD = ("stopped", "moved_after_trip", "over_tension", "cause", "log", "error")
+_GOOD = ("stopped", "moved_after_trip", "over_tension", "cause", "log", "length", "error")
 _LONGEST = 900.0
 """A process that has not played a case after so long is lost, s."""
 
@@ -53,6 +53,7 @@ def summary(played: list[tuple[Case, Verdict]], seconds: float) -> dict[str, Any
         "over_tension": sum(bool(v.over_tension) for v in verdicts),
         "cause_right": sum(not (v.cause or v.error) for v in verdicts),
         "log_whole": sum(not (v.log or v.error) for v in verdicts),
+        "length_right": sum(not (v.length or v.error) for v in verdicts),
         "errors": sum(bool(v.error) for v in verdicts),
         "recovered": sum(v.recovered for v in verdicts),
         "not_recovered": {

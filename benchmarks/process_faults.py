@@ -224,7 +224,8 @@ def await_motion(running: SlavesOnBus, process: subprocess.Popen[str]) -> None:
     while abs(running.slaves[0].motor.velocity) < 60:
         if process.poll() is not None or time.monotonic() > deadline:
             process.kill()
-            raise OwnerStopped(process.communicate()[1])
+            assert process.stderr is not None
+            raise OwnerStopped(process.stderr.read())
         time.sleep(0.005)
 
 
@@ -262,8 +263,9 @@ def case(bench_file: Path, text: str, port: int, fault: str, moment: float) -> S
     words = ""
     for _ in range(ATTEMPTS):
         bench_file.write_text(text, encoding="utf-8")
-        # A trip of the case before is none of this one's.
-        bench_file.with_name("bench.trip.json").unlink(missing_ok=True)
+        # A trip of the case before, or its owner that was killed in motion, is none of this one's.
+        for record in ("trip", "position"):
+            bench_file.with_name(f"bench.{record}.json").unlink(missing_ok=True)
         slaves = [Slave.from_file(GENERIC, 1)]
         with SlavesOnBus(slaves, GROUP, "udp_multicast", port=port, priority=PRIORITY) as running:
             try:

@@ -15,6 +15,8 @@ _INDEPENDENT = 0.4
 """Share of cases with the independent slave for a drive."""
 _EIGHT = 0.08
 """Share of cases with eight winches: they take eight times as long to compute."""
+_COMES_TO_REST = 1.0
+"""After the release of a key, s: dead-man, the ramp from 0.45 m/s, and a third of a second."""
 NOISE_KNOWN = 4.0
 """Rest after which the noise of a load cell is known, s: 1 s, 200 conversions at 100 Hz, and 1 s
 for the first reading to arrive. A quarter of the cases rests for so long."""
@@ -51,6 +53,16 @@ class Case:
     rest: float = 0.2
     """Between the opening of the bench and the motion, s."""
 
+    @property
+    def incremental(self) -> bool:
+        """Whether its encoders are incremental."""
+        return any(KINDS[one.kind].incremental for one in self.faults)
+
+    @property
+    def guarded(self) -> bool:
+        """Whether its drives are guarded."""
+        return any(KINDS[one.kind].guarded for one in self.faults)
+
 
 def cases(number: int, seed: int, *, real_time_share: float = 0.0) -> list[Case]:
     """Every kind of fault in turn as the first one of a case; all else is drawn."""
@@ -73,11 +85,14 @@ def _case(seed: str, name: str, *, real_time: bool) -> Case:
     first = KINDS[name]
     at = random.uniform(0.35, 1.2)
     pattern = random.choices(("single", "double", "repeated"), (6, 3, 1))[0]
+    if first.guarded or first.at_rest:
+        pattern = "single"
     winch = random.choice("ABCDEFGH"[:winches])
     lasts = bool(first.crosses) or random.random() < 0.7
     faults = [Planned(name, winch, at, None if lasts else random.choice(_SPANS))]
     if pattern == "double":
-        second = random.choice([one for one in KINDS if not KINDS[one].moving])
+        possible = [one for one, kind in KINDS.items() if not (kind.moving or kind.guarded)]
+        second = random.choice(possible)
         if not real_time or KINDS[second].real_time:
             other = random.choice("ABCDEFGH"[:winches])
             span = None if random.random() < 0.5 else random.choice(_SPANS)
@@ -89,7 +104,10 @@ def _case(seed: str, name: str, *, real_time: bool) -> Case:
         ]
     paying_out = {"in": False, "out": True}.get(first.moving, random.random() < 0.5)
     faults = [replace(one, span=None) if KINDS[one.kind].lasts else one for one in faults]
-    motion = "jog" if first.moving or name == "released" else random.choice(_MOTIONS)
+    if first.at_rest:
+        faults = [Planned("released", winch, at, None), replace(faults[0], at=at + _COMES_TO_REST)]
+    held = first.moving or first.at_rest or name == "released"
+    motion = "jog" if held else random.choice(_MOTIONS)
     return Case(
         seed,
         winches,

@@ -12,12 +12,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from winchkit.sim.clock.can_bus import SimulatedCanBus, SimulatedCanPort
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.drive.faults import FAULTS
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = ["IndependentDrive", "replace_drives"]
+__all__ = ["IndependentDrive", "carry_remote_frames", "replace_drives"]
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "support"))
 
@@ -29,6 +31,8 @@ _EDS = Path(__file__).parents[2] / "devices" / "generic-cia402" / "generic-cia40
 _DECLARED = Declared(disabled_deceleration=1000.0)
 """A holding brake closes where there is no torque."""
 _LEAST = 1e-5
+_FRAME = 50e-6
+"""Of a remote frame at 1 Mbit/s, s."""
 _NAMES = {
     "enable input open": ("enable input open",),
     "reboot": ("reboots",),
@@ -48,6 +52,7 @@ class IndependentDrive:
         self.slave = Slave.from_file(_EDS, node, declared=_DECLARED)
         self._send, self._plant, self._now = send, plant, now
         self._origin = plant.motor_angle
+        self.slave.motion.offset = round(self._origin / self.slave.motion.unit)
 
     @property
     def enabled(self) -> bool:
@@ -87,6 +92,11 @@ class IndependentDrive:
         self.advance(now)
         self._say(self.slave.receive(Frame(identifier, data)))
 
+    def poll(self, now: float) -> None:
+        """Take a remote frame of node guarding."""
+        self.advance(now)
+        self._say(self.slave.receive(Frame(0x700 + self.node, b"", True)))
+
     def listens(self, identifier: int) -> bool:
         """Whether it is one of its RPDOs."""
         return identifier in self.slave.pdos.identifiers(0x1400)
@@ -108,6 +118,39 @@ class IndependentDrive:
     def _say(self, frames: list[Any]) -> None:
         for frame in frames:
             self._send(frame.identifier, frame.data)
+
+
+class _GuardingPort(SimulatedCanPort):
+    """A port that carries remote frames, to the drives of a bench."""
+
+    def __init__(self, bus: SimulatedCanBus, clock: SimulatedClock, live: LiveBench) -> None:
+        super().__init__(bus, clock)
+        self._live = live
+
+    def send(self, message: Any, timeout: float | None = None) -> None:
+        """Send a message of python-can."""
+        if not message.is_remote_frame:
+            super().send(message, timeout)
+            return
+        node = message.arbitration_id - 0x700
+        self._clock.call_at(self._clock.now() + _FRAME, partial(self._poll, node))
+
+    def _poll(self, node: int) -> None:
+        with self._live.up_to_date():
+            for winch in self._live.winches.values():
+                if isinstance(winch.drive, IndependentDrive) and winch.drive.node == node:
+                    winch.drive.poll(self._clock.now())
+
+
+def carry_remote_frames(live: LiveBench, clock: SimulatedClock) -> None:
+    """Let the CAN buses of a bench in simulated time carry the polls of node guarding."""
+    for name, bus in live._ports.items():
+
+        def connect(bus: SimulatedCanBus = bus) -> _GuardingPort:  # type: ignore[assignment]
+            bus.ports.append(port := _GuardingPort(bus, clock, live))
+            return port
+
+        clock.serve_can(live.bench_spec.bus[name].channel or "", connect)
 
 
 def replace_drives(live: LiveBench) -> None:

@@ -41,6 +41,9 @@ _FLUSH = 0.05
 """What a closed log may lack at its end, s: the filter, conversion and poll of the load cell."""
 _NOISE = 15.0
 """Above the true tension at which the cell's noise may trip, and oscillations, N."""
+_LENGTH = 0.01
+"""By which a known length may be wrong, m: the smallest jump of 6064h that is seen in motion, and
+what passes before a trip (docs/safety.md)."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,7 @@ class Verdict:
     over_tension: str = ""
     cause: str = ""
     log: str = ""
+    length: str = ""
     error: str = ""
     reaction: float = math.nan
     """From the onset of the first fault until no drive followed set-points, s."""
@@ -69,6 +73,7 @@ class Verdict:
             or self.over_tension
             or self.cause
             or self.log
+            or self.length
             or self.error
         )
 
@@ -85,6 +90,7 @@ def judge(record: Record) -> Verdict:
         _judge_tension(record),
         _judge_cause(record, reference),
         _judge_log(record),
+        _judge_length(record),
         reaction=reaction,
         recovered=record.moved_again,
         refusal=record.late_reset,
@@ -289,6 +295,14 @@ def _enabled(record: Record) -> bool:
         if any(sample.enabled for sample in before):
             return True
     return False
+
+
+def _judge_length(record: Record) -> str:
+    """A length is right or unknown."""
+    for name, (shown, true) in record.lengths.items():
+        if abs(shown - true) > _LENGTH:
+            return f"winch {name}: {shown:.3f} m is shown as known, {true:.3f} m is true"
+    return ""
 
 
 def _judge_log(record: Record) -> str:

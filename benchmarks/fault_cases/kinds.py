@@ -51,6 +51,12 @@ class Kind:
     """Whether it goes on until it is mended, whatever span is drawn."""
     blocks: Literal["", "drive", "bus"] = ""
     """Which drives do not receive a stop in the usual way while it lasts."""
+    at_rest: bool = False
+    """Whether it comes after the key was released, to a winch at rest."""
+    incremental: bool = False
+    """Whether the encoders are incremental, homed before the motion."""
+    guarded: bool = False
+    """Whether node guarding is the host-loss mechanism."""
     part: str = ""
     """What recovers where a fault of it ends, from its other faults too: servo, cell, line."""
 
@@ -75,6 +81,19 @@ def _slave(kind: str, value: Any = None) -> Begin:
             slave = world.live.winches[winch].drive.slave  # type: ignore[attr-defined]
             slave.inject(kind, value)
         return partial(slave.mend, kind)
+
+    return begin
+
+
+def _restart(*, kept: bool) -> Begin:
+    """A power cycle of an incremental encoder: its count begins at zero, or where it stood."""
+
+    def begin(world: World, winch: str) -> Callable[[], None]:
+        with world.live.up_to_date():
+            slave = world.live.winches[winch].drive.slave  # type: ignore[attr-defined]
+            slave.inject("counter begins anew", slave.motion.counts() if kept else 0)
+            slave.inject("reboots")
+        return partial(slave.mend, "counter begins anew")
 
     return begin
 
@@ -293,8 +312,26 @@ _LYING_DRIVE = (
 )
 """From CiA 301 and 402: drives that answer, and say what is not true."""
 
+
+def _own(name: str, begin: Begin, causes: tuple[str, ...], **more: Any) -> Kind:
+    """A fault that the independent drive makes, which lasts until the reset sets it up again."""
+    return Kind(name, begin, causes, real_time=False, independent=True, lasts=True, **more)
+
+
+_FORGETFUL_DRIVE = (
+    _own("counter reset", _restart(kept=False), _WIRES, least=0.0, moving="any", incremental=True),
+    _own("counter reset at rest", _restart(kept=False), _WIRES, at_rest=True, incremental=True),
+    _own("power cycle at rest", _restart(kept=True), _WIRES, at_rest=True, incremental=True),
+    _own("set-up lost", _slave("mapping lost"), _LOST, least=0.0, moving="any", blocks="drive"),
+    _own("set-up lost at rest", _slave("mapping lost"), _LOST, at_rest=True, incremental=True),
+    _own("guarding replies lost", _slave("heartbeat lost"), ("heartbeat",), guarded=True),
+    _own("guarding polls lost", _slave("guarding unheard"), _LOST, guarded=True),
+)
+"""Drives that restart or lose their set-up, and guarded ones."""
+
 _ROWS = (
     *_LYING_DRIVE,
+    *_FORGETFUL_DRIVE,
     Kind("enable input open", _drive("enable input open"), ("state",), least=0.0, part="servo"),
     Kind("second master: 6040h = 00h", _write(0x6040, 2, 0x00), _MASTER, least=0.0),
     Kind("second master: 6040h = 06h", _write(0x6040, 2, 0x06), _MASTER, least=0.0),

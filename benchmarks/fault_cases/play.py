@@ -17,6 +17,7 @@ from fault_cases.operator import Operator
 from fault_cases.world import Sample, Strange, World, opened_world
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.recording.recorder import Recorder
+from winchkit.bench.winch import Winch
 from winchkit.runs import read_run
 from winchkit.runs.recording.rows import RowLog
 
@@ -76,6 +77,8 @@ class Record:
     log_end: float = 0.0
     """Time of the log's last row, s; NaN where it could not be read."""
     log_error: str = ""
+    lengths: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """Cable length at the end, by winch: as shown, NaN where it is unknown, and the true one, m."""
     moved_again: bool = False
     """Whether the new command at the end moved a winch."""
     error: str = ""
@@ -93,6 +96,8 @@ def play(case: Case) -> Record:
                 Path(folder),
                 real_time=case.real_time,
                 independent=case.independent,
+                incremental=case.incremental,
+                guarded=case.guarded,
             ) as world:
                 _play(world, record)
                 record.truth = world.truth
@@ -152,6 +157,7 @@ def _play(world: World, record: Record) -> None:
     record.pressed = world.now
     _press(world, case)
     record.ended = world.now
+    record.lengths = _lengths(world)
     record.logged_from = _first_row(recorder)
     try:
         recorder.close()
@@ -211,8 +217,8 @@ def _press(world: World, case: Case) -> None:
     """A new command, as a person gives one after a reset."""
     end = world.now + 0.4
     winches = world.bench.winch.values()
-    speed = {"wind_in" if case.paying_out else "pay_out": 0.1}
-    orders = [partial(winch.jog, **speed) for winch in winches]
+    way = "wind_in" if case.paying_out else "pay_out"
+    orders = [partial(winch.jog, **{way: _speed(winch)}) for winch in winches]
     while world.now < end:
         for order in orders:
             with suppress(Exception):  # judged by what moves
@@ -220,6 +226,20 @@ def _press(world: World, case: Case) -> None:
         orders = [winch.refresh for winch in winches]
         world.clock.sleep(0.05)
     world.clock.sleep(0.4)
+
+
+def _speed(winch: Winch) -> float:
+    """Of a new command, m/s: while the cable length is unknown it is slow."""
+    return 0.1 if winch.snapshot.length_known else winch.wiring.limits.speed_unhomed
+
+
+def _lengths(world: World) -> dict[str, tuple[float, float]]:
+    with world.live.up_to_date():
+        plants = {name: one.plant for name, one in world.live.winches.items()}
+        return {
+            name: (world.bench.snapshot.winch[name].cable_length, plant.cable_length)
+            for name, plant in plants.items()
+        }
 
 
 def _first_row(recorder: Recorder) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,7 +15,12 @@ from pathlib import Path
 
 import can
 
-from fault_cases.independent_drive import IndependentDrive, replace_drives
+from fault_cases.independent_drive import (
+    IndependentDrive,
+    carry_remote_frames,
+    replace_drives,
+)
+from winchkit import find
 from winchkit.bench.bench import Bench
 from winchkit.bench.open import open_bench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
@@ -174,6 +180,16 @@ def _seen(drive: SimDrive | IndependentDrive, velocity: float) -> tuple[bool, bo
     return enabled, enabled and drive._power.order is Order.FOLLOW, velocity
 
 
+def _guarded_device(folder: Path) -> Path:
+    """The generic drive, guarded."""
+    home = folder / "guarded"
+    shutil.copytree(find("devices", "generic-cia402").parent, home)
+    device = home / "device.toml"
+    text = device.read_text(encoding="utf-8")
+    device.write_text(text.replace("[servo]\n", '[servo]\nhost_loss = "guarding"\n'))
+    return device
+
+
 @contextmanager
 def opened_world(
     winches: int,
@@ -182,13 +198,19 @@ def opened_world(
     *,
     real_time: bool = False,
     independent: bool = False,
+    incremental: bool = False,
+    guarded: bool = False,
 ) -> Iterator[World]:
     """A bench of ``spiral-bench``'s winches with a heartbeat of 50 ms, opened.
 
-    ``independent``: with the slaves of ``tests/support/slave`` for drives.
+    ``independent``: with the slaves of ``tests/support/slave`` for drives; ``incremental``: their
+    encoders are, and are homed; ``guarded``: by node guarding, not heartbeat.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    bench = declared(None, {name: {} for name in "ABCDEFGH"[:winches]}, folder)
+    servo = {"encoder": "incremental"} if incremental else {}
+    if guarded:
+        servo["device"] = str(_guarded_device(folder))
+    bench = declared(None, {name: {"servo": servo} for name in "ABCDEFGH"[:winches]}, folder)
     buses = {
         name: replace(bus, heartbeat=HEARTBEAT) if bus.kind == "can" else bus
         for name, bus in bench.bench.bus.items()
@@ -204,11 +226,16 @@ def opened_world(
     with live:
         if independent:
             replace_drives(live)
+        if guarded and isinstance(clock, SimulatedClock):
+            carry_remote_frames(live, clock)
         opened = open_bench(live.bench_spec, clock)
         if isinstance(clock, PacedClock):
             opened.on_cycle(clock.control)
         world = World(clock, live, folder, opened)
         try:
+            if incremental:
+                for name, winch in opened.winch.items():
+                    winch.home(at=live.winches[name].plant.cable_length)
             world.begin_sampling()
             yield world
         finally:

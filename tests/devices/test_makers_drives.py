@@ -94,6 +94,7 @@ def test_a_drive_moves_with_guarding(tmp_path: Path) -> None:
         drive = bench.axes["A"].drive
         assert drive is not None
         assert drive.proof is not None
+        bench.winch["A"].home(at=4.0)
         bench.winch["A"].move_by(pay_out=0.02)
         assert abs(slave.motor.angle) > 1.0
         assert bench.axes["A"].objects.read(0x1017) == 0, "one error control at a time"
@@ -165,3 +166,8 @@ def test_the_page_on_an_unknown_drive_leads_to_a_jog(tmp_path: Path) -> None:
             for line in filter(None, piece.split("  ")):
                 assert line.strip() in printed, line
     moves(rig, text, stopped)
+    with rig.opened() as again:
+        again.reset()  # the process before was killed
+        winch, shaft = again.winch["A"], rig.slaves[0].motor.angle
+        arm = winch.cable.at(winch.snapshot.motor_angle)[1]
+        assert winch.cable_length == pytest.approx(2.0 - shaft * arm, abs=1e-3), "homed at 2 m"

@@ -22,7 +22,7 @@ from winchkit.bench.lifecycle import (
     await_rest,
     reset,
 )
-from winchkit.bench.ownership import Ownership
+from winchkit.bench.ownership import Ownership, unless_stopped
 from winchkit.bench.remote.commander import Commanders, NotCommander, NotReleased
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import Client, client_name
@@ -103,42 +103,46 @@ class Bench(BenchConnection):
         tell: Tell = to_stderr,
     ) -> None:
         """Open it; raises every error of opening, with nothing left open."""
-        super().__init__(
-            spec,
-            clock,
-            ownership or own(spec, name or client_name()),
-            separate=bool(realtime),
-            tell=tell,
-        )
-        self.not_commissioned = ""
-        """Why nothing may move before it is commissioned; empty where it is."""
-        self._commissioner = threading.get_ident() if commissioning else None
-        with self._stack:
-            self._look_at_record()
-            self.winch: dict[str, Winch] = {
-                name: Winch(self, name, spec.winch[name], parts, dict(self._wired.sensors[name]))
-                for name, parts in self.loop.winches.items()
-            }
-            self._platform = self._robot_platform()
-            self.commanders = Commanders(
-                self.loop.winches,
+        with unless_stopped(spec) as check:
+            super().__init__(
+                spec,
                 clock,
-                Client(name or client_name()),
-                lambda winch: self.winch[winch].run_down(),
+                ownership or own(spec, name or client_name()),
+                separate=bool(realtime),
+                tell=tell,
             )
-            """Who commands each winch."""
-            self.stopped_by = ""
-            """Who gave the last quick stop."""
-            self.stops: int = 0
-            """Quick stops that were given."""
-            self.cells = self._cell_desk()
-            """Its instruments by name, for commands and whoever looks at them one by one."""
-            self.loop.on_jog = self._jog_from_callback
-            self.loop.callbacks.append(LifeSigns(self._going_on, self._end_silent))
-            self._start(realtime)
-            self.stations = serve(self)
-            """Where other processes take part."""
-            self._stack = self._stack.pop_all()
+            self.not_commissioned = ""
+            """Why nothing may move before it is commissioned; empty where it is."""
+            self._commissioner = threading.get_ident() if commissioning else None
+            with self._stack:
+                self._look_at_record()
+                self.winch: dict[str, Winch] = {
+                    name: Winch(
+                        self, name, spec.winch[name], parts, dict(self._wired.sensors[name])
+                    )
+                    for name, parts in self.loop.winches.items()
+                }
+                self._platform = self._robot_platform()
+                self.commanders = Commanders(
+                    self.loop.winches,
+                    clock,
+                    Client(name or client_name()),
+                    lambda winch: self.winch[winch].run_down(),
+                )
+                """Who commands each winch."""
+                self.stopped_by = ""
+                """Who gave the last quick stop."""
+                self.stops: int = 0
+                """Quick stops that were given."""
+                self.cells = self._cell_desk()
+                """Its instruments by name, for commands and whoever looks at them one by one."""
+                self.loop.on_jog = self._jog_from_callback
+                self.loop.callbacks.append(LifeSigns(self._going_on, self._end_silent))
+                self._start(realtime)
+                self.stations = serve(self)
+                """Where other processes take part."""
+                check()
+                self._stack = self._stack.pop_all()
 
     def _cell_desk(self) -> CellDesk:
         wired, permit = self._wired, self._require_rest

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from winchkit.arguments import require_type
+from winchkit.bench.ownership import mark_stop
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.sdo_stop import SdoStop
 from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, state_of
@@ -45,7 +46,7 @@ def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
     """Quick-stop every drive of a bench file and wait until each confirms.
 
     All drives get 6040h = 02h first, from frames that need no EDS, whatever the others do; only
-    then each is asked.
+    then each is asked. An opening of the bench that is under way ends without motion.
 
     Parameters
     ----------
@@ -61,6 +62,7 @@ def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
     """
     require_type(spec, BenchSpec, "spec")
     clock = clock or MonotonicClock()
+    mark_stop(spec)
     with ExitStack() as stack:
         buses: dict[str, CanBus] = {}
         stops: dict[str, SdoStop] = {}

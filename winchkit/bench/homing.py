@@ -35,7 +35,8 @@ def homing(bench: WinchHost, winch: Winch, asked: HomingRequest) -> Generator[No
     """
     axis = bench.axes[winch.name]
     _check(winch, asked)
-    _check_drive(axis, asked)
+    if asked.method is not None:
+        check_homing(axis.objects, axis.servo, HomingSpec(asked.method, 1.0, 1.0, 1.0))
     if asked.method is None:
         winch.permit_at_rest()
     else:
@@ -78,19 +79,17 @@ def _check(winch: Winch, asked: HomingRequest) -> None:
         )
 
 
-def _check_drive(axis: Cia402Axis, asked: HomingRequest) -> None:
-    """Refuse before anything moves what the drive lacks, named."""
-    method = HERE[0] if asked.method is None else asked.method
-    spec = HomingSpec(method, 1.0, 1.0, 1.0)
-    check_homing(axis.objects, axis.servo, spec, defines=asked.at is not None)
-
-
 def _define(bench: WinchHost, winch: Winch, angle: float) -> Generator[None]:
-    """Let the present place have a motor angle (rad).
+    """Let the present place have a motor angle (rad), by a zero here where the drive keeps none.
 
     Drives differ in the sign of the home offset (607Ch): by the standard's text the zero lies
     that far from home, by many a drive's manual home gets that position. What came of it decides.
     """
+    axis = bench.axes[winch.name]
+    if axis.drive is not None and not axis.drive.keeps_zero:
+        axis.define_position(angle)
+        await_cycles(bench.loop, bench.clock, _SHOWN)
+        return
     wanted = winch.length_at(angle)
     for offset in (angle, -angle):
         yield from _run(bench, winch, None, None, offset)

@@ -1,4 +1,7 @@
-"""One process owns a bench: a lock that dies with its holder, and where to find the owner."""
+"""One process owns a bench: a lock that dies with its holder, and where to find the owner.
+
+A stop leaves a mark, since an owner that still opens the bench is found by nobody.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +11,26 @@ import os
 import socket
 import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import suppress
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
 from winchkit import catalog
-from winchkit.errors import ConnectionLost, NotPermitted, WinchkitError
+from winchkit.errors import ConnectionLost, MotionError, NotPermitted, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["Ownership", "connect_to_owner", "digest_of", "listen", "log_path", "owner_process"]
+__all__ = [
+    "Ownership",
+    "connect_to_owner",
+    "digest_of",
+    "listen",
+    "log_path",
+    "mark_stop",
+    "owner_process",
+    "unless_stopped",
+]
 
 _CONNECT_TIME = 2.0
 """s: an owner accepts at once; one under load within some tenths."""
@@ -75,6 +88,49 @@ def owner_process(spec: BenchSpec) -> int | None:
         return int(_owner_file(spec).read_text().splitlines()[0])
     except (OSError, ValueError, IndexError):
         return None
+
+
+def mark_stop(spec: BenchSpec) -> None:
+    """Have every opening of the bench that is under way end; before its owner is looked for.
+
+    The owner looks for the mark after it can be found: one of the two sees the other.
+    """
+    with suppress(OSError, NotPermitted):  # nothing keeps the stop from the drives
+        _stop_file(spec).write_text(f"{os.getpid()} {time.monotonic_ns()}")
+
+
+@contextmanager
+def unless_stopped(spec: BenchSpec) -> Iterator[Callable[[], None]]:
+    """Yield a check that raises MotionError where a stop has come since; errors are that one, too.
+
+    Whoever opens a bench calls it last, when the next stop would find it.
+    """
+    before = _stops(spec)
+
+    def check() -> None:
+        if _stops(spec) != before:
+            raise MotionError(
+                f"a stop came while bench '{spec.name}' was being opened: nothing was moved; give "
+                "the command again"
+            )
+
+    try:
+        yield check
+    except WinchkitError:
+        check()
+        raise
+
+
+def _stops(spec: BenchSpec) -> str:
+    """What the last stop has left."""
+    try:
+        return _stop_file(spec).read_text()
+    except OSError:
+        return ""
+
+
+def _stop_file(spec: BenchSpec) -> Path:
+    return _folder() / f"{_key(spec)}.stop"
 
 
 def _owner_file(spec: BenchSpec) -> Path:

@@ -7,6 +7,7 @@ import math
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
@@ -281,3 +282,49 @@ def test_a_winch_with_an_incremental_encoder_is_commissioned_before_its_first_ho
             if homed:
                 way = (bench.slave.motor.angle - angle) * 2.96e-3
                 assert snapshot.cable_length == pytest.approx(3.5 - way, abs=2e-3)
+
+
+@pytest.mark.parametrize("ends", ["right", "refused"])
+def test_the_record_of_positions_is_open_while_a_drive_is_enabled(
+    tmp_path: Path, ends: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process that begins after a kill finds what the killed one had written, and trips."""
+    path = write_bench(tmp_path)
+    record, killed = path.with_suffix(".position.json"), list[bytes]()
+    (tmp_path / "answers.toml").write_text(
+        ANSWERS.replace('try_in_motion = "no"', 'try_in_motion = "yes"')
+    )
+    ask = AnswerFile.ask
+
+    def closed() -> bool:
+        return bool(json.loads(record.read_bytes())["winch"]["A"]["closed"])
+
+    def asked(self: AnswerFile, key: str, *rest: Any) -> str:
+        if record.exists() and json.loads(record.read_bytes())["winch"]:
+            assert closed(), f"no drive is enabled at the question {key}"
+        if ends == "refused" and key == "A.host_loss":
+            return "no"
+        return ask(self, key, *rest)
+
+    monkeypatch.setattr(AnswerFile, "ask", asked)
+    with served(path) as bench:
+
+        def watch(slave: Slave) -> None:
+            if slave.power.state is State.ENABLED:
+                assert not closed()
+                killed[:] = [record.read_bytes()]
+
+        bench.slave.watch = watch
+        if ends == "right":
+            commissioned(bench)
+        else:
+            with pytest.raises(NotPermitted):
+                commissioned(bench)
+        assert closed()
+        bench.slave.watch = lambda _slave: None
+        with bench.open() as opened:
+            assert not opened.snapshot.tripped
+        record.write_bytes(killed[0])
+        with bench.open() as opened:
+            (trip,) = opened.snapshot.tripped
+            assert trip.kind == "owner"

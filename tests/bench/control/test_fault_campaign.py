@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -45,6 +46,8 @@ def case(kind: str, **changes: object) -> Case:
         ("cell silent", False, True),
         ("computer stalls 0.5 s", True, False),
         ("exception in the loop", True, False),
+        ("counter reset", True, False),
+        ("guarding polls lost", True, False),
         pytest.param("stranger: NMT pre-operational", True, False, marks=CAMPAIGN),
         pytest.param("TPDOs lost", True, True, marks=CAMPAIGN),
         pytest.param("SYNC lost", False, False, marks=CAMPAIGN),
@@ -73,6 +76,20 @@ def test_a_winch_that_goes_on_is_found() -> None:
     assert verdict.cause == "nothing was told"
 
 
+def test_a_length_that_is_wrong_is_found() -> None:
+    """A counter that begins anew makes it unknown; shown as known it would be a failure."""
+    released = Planned("released", "A", 0.6, None)
+    reset = Planned("counter reset at rest", "A", 1.6, None)
+    record = play(case("counter reset at rest", faults=(released, reset), independent=True))
+    assert judge(record).good, judge(record)
+    shown, true = record.lengths["A"]
+    assert math.isnan(shown)
+    record.lengths["A"] = true + 0.011, true
+    assert "is shown as known" in judge(record).length
+    kept = play(case("recorder fails", independent=True)).lengths["A"]
+    assert kept[0] == pytest.approx(kept[1], abs=1e-3)
+
+
 @pytest.mark.parametrize("independent", [True, pytest.param(False, marks=CAMPAIGN)])
 def test_a_frame_that_no_drive_receives_is_received_by_the_host(independent: bool) -> None:
     """A drive that is off the bus for 20 ms (case 172/138) stays operational; the host stops it."""
@@ -86,6 +103,15 @@ def test_a_frame_that_no_drive_receives_is_received_by_the_host(independent: boo
         assert judge(record).good, judge(record)
         ends = [s.follows for s in record.truth["A"] if s.time < record.mended][-1]
         assert not ends, "the truth: it is stopped, by itself or by the host"
+
+
+def test_a_drive_that_refuses_stops_by_sdo_is_not_taken_for_two_nodes() -> None:
+    """Case 8123/35: its replies to the stops came beside those to the reset."""
+    lost, refuses = Planned("SYNC lost", "A", 1.18, None), Planned("sdo refused", "A", 1.34, 0.3)
+    both = case("SYNC lost", motion="move", speed=0.15, faults=(lost, refuses), independent=True)
+    verdict = judge(play(replace(both, resets_early=True)))
+    assert verdict.good, verdict
+    assert verdict.recovered, verdict.refusal
 
 
 def test_a_case_is_the_same_whenever_it_is_played() -> None:

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 
-KEPT = KeptPosition(-705_799, 1 << 32, "", True, 77, {(0x1A00, 1): 0x60410010, (0x1017, 0): 50})
+KEPT = KeptPosition(-705_799, 1 << 32, -3, "", True, 77, {(0x1A00, 1): 0x60410010, (0x1017, 0): 50})
 _positions = st.builds(
     KeptPosition,
     count=st.integers(-(2**31), 2**32 - 1),
     offset=st.integers(-(2**40), 2**40),
+    zero=st.integers(-(2**40), 2**40),
     doubt=st.text(max_size=300),
     closed=st.booleans(),
     serial=st.integers(0, 2**32 - 1),

@@ -6,7 +6,10 @@ angles by forward kinematics.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +21,7 @@ from winchkit.bench.control.snapshot import BenchSnapshot, Phase
 from winchkit.bench.robot.path import Waypoint
 from winchkit.bench.robot.platform import Platform
 from winchkit.errors import MotionError, NotPermitted, UsageError
+from winchkit.model.robot import Pose
 from winchkit.schema.bench import BenchSpec
 from winchkit.sim.live.bench import LiveBench
 
@@ -91,6 +95,63 @@ def test_what_the_cables_cannot_hold_is_refused_before_anything_moves(bench: Ben
     assert bench.snapshot.winch["1"].motor_angle == pytest.approx(
         before.winch["1"].motor_angle, abs=1e-3
     )
+
+
+BAD: list[Any] = ["0.05", math.nan, math.inf, 0.0, -0.1, True, [0.1]]
+CALLS: dict[str, Callable[[Platform, Any], object]] = {
+    "speed": lambda p, x: p.move(p.robot.home, x),
+    "acceleration": lambda p, x: p.move(p.robot.home, None, x),
+    "duration": lambda p, x: p.trim(duration=x),
+    "stiffness": lambda p, x: p.trim(axial_stiffness=x),
+}
+
+
+def test_what_is_no_number_or_no_pose_is_refused_before_anything_is_sent(bench: Bench) -> None:
+    platform, seen = bench.robot, list[BenchSnapshot]()
+    remove = bench.on_cycle(_appended(seen))
+    for call in CALLS.values():
+        for value in BAD:
+            with pytest.raises(UsageError, match=r"pass a number|is not a"):
+                call(platform, value)
+    for change in (math.nan, math.inf, "0.1", None):
+        with pytest.raises(UsageError, match=r"pass a number|is not a finite"):
+            platform.moved({"x": change}, relative=True)  # type: ignore[dict-item] # the test's
+    here = platform.pose
+    goal = Pose(np.where([[True, False, False]], math.nan, here.position), here.rotation)
+    with pytest.raises(UsageError, match="not finite"):
+        platform.move(goal)
+    for nothing in (None, "home", here.position):
+        with pytest.raises(UsageError, match=r"goal is .*pass a Pose"):
+            platform.move(nothing)  # type: ignore[arg-type] # what the test is about
+    with pytest.raises(UsageError, match="keep has numbers that are not finite"):
+        platform.trim(keep=np.full(8, math.nan))
+    bench.clock.sleep(0.3)
+    remove()
+    assert {one.phase for snapshot in seen for one in snapshot.winch.values()} == {Phase.DISABLED}
+
+
+@pytest.mark.parametrize("call", ["move", "trim", "wait"])
+def test_what_waits_is_refused_in_a_callback_before_it_begins(bench: Bench, call: str) -> None:
+    platform = bench.robot
+    goal = platform.moved({"x": 0.02}, relative=True)
+    raised: list[Exception | None] = []
+
+    def function(_snapshot: BenchSnapshot) -> None:
+        if not raised:
+            try:
+                {"move": lambda: platform.move(goal), "trim": platform.trim, "wait": platform.wait}[
+                    call
+                ]()
+                raised.append(None)
+            except UsageError as error:
+                raised.append(error)
+
+    remove = bench.on_cycle(function)
+    bench.clock.sleep(0.3)
+    remove()
+    assert f"{call} waits for the control loop" in str(raised[0])
+    assert not platform.moving
+    assert bench.snapshot.at_rest
 
 
 @pytest.mark.parametrize(

@@ -89,14 +89,14 @@ class FakeAxis:
     position_doubt: str = ""
 
     @property
-    def position_mark(self) -> tuple[int, str, bool]:
-        return 0, self.position_doubt, True
+    def position_mark(self) -> tuple[int, int, str, bool]:
+        return 0, 0, self.position_doubt, True
 
     def keep_position(self, *, closed: bool) -> KeptPosition | None:
         feedback = self.feedback
         if feedback is None:
             return None
-        return KeptPosition(round(1e4 * feedback.angle), 0, self.position_doubt, closed)
+        return KeptPosition(round(1e4 * feedback.angle), 0, 0, self.position_doubt, closed)
 
     def lose_position(self, doubt: str) -> None:
         self.position_doubt = self.position_doubt or doubt

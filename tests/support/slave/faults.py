@@ -187,6 +187,7 @@ _ROWS = (
     Fault("sync unheard", "SYNC is lost", unheard=frozenset({"sync"})),
     Fault("host frames lost", "nothing from the bus comes in", unheard=_EVERYTHING),
     Fault("heartbeat unheard", "the host's heartbeat is lost", unheard=frozenset({"heartbeat"})),
+    Fault("guarding unheard", "guarding polls are lost", unheard=frozenset({"guarding"})),
     Fault("nmt unheard", "NMT commands are lost", unheard=frozenset({"nmt"})),
     Fault("sdo unheard", "SDO requests are lost", unheard=frozenset({"sdo"})),
     Fault("tpdo lost", "TPDOs are lost", unsent=frozenset({"tpdo"})),

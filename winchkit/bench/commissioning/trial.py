@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 from winchkit.bench.control.cable import CableMap
@@ -19,6 +19,7 @@ from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
 from winchkit.drivers.can.canopen.nmt import HeartbeatProducer, NmtState
 from winchkit.drivers.can.cia402.axis import Cia402Axis
+from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import (
     DISABLE_VOLTAGE,
     QUICK_STOP,
@@ -125,8 +126,7 @@ class Trials:
 
     def host_loss(self, name: str, speed: float = 0.0) -> Trial:
         """Fall silent with the drive enabled, at rest or winding in at ``speed`` (m/s)."""
-        axis = self.axes[name]
-        with self._ended(axis):
+        with self._ended(name) as axis:
             self._enable(axis)
             if speed:
                 self._require_room(name, axis, speed)
@@ -150,8 +150,7 @@ class Trials:
 
     def nmt_stopped(self, name: str) -> Trial:
         """NMT stopped with the drive enabled at rest; every other life sign goes on."""
-        axis = self.axes[name]
-        with self._ended(axis):
+        with self._ended(name) as axis:
             self._enable(axis)
             self._run(axis, 0.0, _SETTLE_TIME, name)
             start = self._clock.now()
@@ -165,8 +164,7 @@ class Trials:
 
     def brake(self, name: str) -> Trial:
         """Enable the drive at rest, disable it, and see whether the cable moves after that."""
-        axis = self.axes[name]
-        with self._ended(axis):
+        with self._ended(name) as axis:
             self._enable(axis)
             self._run(axis, 0.0, _SETTLE_TIME, name)
             angle, start = _angle(axis), self._clock.now()
@@ -177,10 +175,17 @@ class Trials:
         return Trial(_has_left(state), _BRAKE_TIME, str(state), travel)
 
     @contextmanager
-    def _ended(self, axis: Cia402Axis) -> Iterator[None]:
-        """Whatever happens, the drive is stopped, disabled, cleared and set up anew afterwards."""
+    def _ended(self, name: str) -> Iterator[Cia402Axis]:
+        """Whatever happens, the drive is stopped, disabled, cleared and set up anew afterwards.
+
+        Meanwhile its entry in the record of positions is open.
+        """
+        axis = self.axes[name]
+        for _ in range(_FRESH):
+            self._cycle(axis, RequestedState.DISABLE)
+        self._keep(name, axis.keep_position(closed=False))
         try:
-            yield
+            yield axis
         except BaseException:
             with _frames_lost():
                 axis.emergency_stop(sdo=True)
@@ -188,15 +193,21 @@ class Trials:
             # The reply to the stop by SDO is not for the confirmed client.
             self._clock.sleep(_REPLY_TIME)
             axis.end_stop()
-            self._recover(axis)
+            self._recover(name)
             raise
-        self._recover(axis)
+        self._recover(name)
+
+    def _keep(self, name: str, kept: KeptPosition | None) -> None:
+        """Write the entry of a winch; raises NotPermitted where the record cannot be written."""
+        if kept is not None and (problem := self._positions.keep({name: kept})) is not None:
+            raise NotPermitted(str(problem))
 
     def _wired_syncs(self) -> None:
         for bus, _, _ in self._beats:
             bus.sync()
 
-    def _recover(self, axis: Cia402Axis) -> None:
+    def _recover(self, name: str) -> None:
+        axis = self.axes[name]
         node = axis.objects
         # A drive that stopped (1029h:1 = 2, NMT stopped) answers SDO only when pre-operational.
         node.bus.nmt(_PRE_OPERATIONAL, node.node)
@@ -208,6 +219,9 @@ class Trials:
             one.objects.write(0x6040, 0, DISABLE_VOLTAGE)
             bring_back(one.objects, self._clock, clears=True)
             one.commission()
+        # By SDO: after SYNC and a heartbeat the drives would miss them while a question is open.
+        kept = axis.keep_position(closed=True)
+        self._keep(name, kept and replace(kept, count=node.read(0x6064)))
 
     def _enable(self, axis: Cia402Axis) -> None:
         deadline = self._clock.now() + _ENABLE_TIME

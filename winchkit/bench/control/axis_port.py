@@ -34,7 +34,7 @@ class AxisPort(Protocol):
         """Why the motor angle is not known, in words; empty where it is."""
 
     @property
-    def position_mark(self) -> tuple[int, str, bool]:
+    def position_mark(self) -> tuple[int, int, str, bool]:
         """What of the position's record changes besides the count; the same while it stays."""
 
     @property

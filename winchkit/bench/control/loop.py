@@ -120,7 +120,7 @@ class ControlLoop:
         self._clock, self._count = clock, 0
         self._latch = latch or LatchFile("")
         self._positions = positions or PositionFile("")
-        self._marks: list[tuple[bool, tuple[int, str, bool]]] = []
+        self._marks: list[tuple[bool, tuple[int, int, str, bool]]] = []
         """What of the record of positions was written last."""
         self._motion_time = 0.0
         self._kept: tuple[Trip, ...] = supervisor.tripped

@@ -97,6 +97,7 @@ def _record(positions: Mapping[str, KeptPosition]) -> str:
         name: {
             "count": kept.count,
             "offset": kept.offset,
+            "zero": kept.zero,
             "doubt": kept.doubt,
             "closed": kept.closed,
             "serial": kept.serial,
@@ -120,6 +121,7 @@ def _kept(row: Mapping[str, Any]) -> KeptPosition:
     return KeptPosition(
         count=int(row["count"]),
         offset=int(row["offset"]),
+        zero=int(row["zero"]),
         doubt=str(row["doubt"]),
         closed=row["closed"] is True,
         serial=int(row["serial"]),

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 from winchkit.arguments import path_of
 from winchkit.bench.commissioning.hardware import tell_hardware
-from winchkit.bench.ownership import digest_of
+from winchkit.bench.ownership import digest_of, unless_stopped
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.bench.remote.client import attach as attach_to_owner
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.process import can_spawn, spawn
-from winchkit.errors import ConnectionLost, NotPermitted, UsageError, WinchkitError
+from winchkit.errors import ConnectionLost, MotionError, NotPermitted, UsageError, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
@@ -113,6 +113,24 @@ def _attached(
     spec: BenchSpec, effects: Sequence[str], name: str, *, observer: bool
 ) -> RemoteStation | None:
     """A station at the owner, starting a bench process where there is none; None where none can be.
+
+    Raises MotionError where a stop came meanwhile, but for those who only look on.
+    """
+    with unless_stopped(spec) as check:
+        station = _sought(spec, effects, name, observer=observer)
+        if station is not None and not observer:
+            try:
+                check()
+            except MotionError:
+                station.close()
+                raise
+        return station
+
+
+def _sought(
+    spec: BenchSpec, effects: Sequence[str], name: str, *, observer: bool
+) -> RemoteStation | None:
+    """Seek the owner, or start a bench process.
 
     Two commands that come at once start two processes; one of them owns the bench, and both
     commands attach to it.

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from winchkit.arguments import number, positive
 from winchkit.arrays import Array
 from winchkit.bench.robot.checks import require_within_limits
 from winchkit.bench.robot.path import Waypoint, paths_through
@@ -69,9 +70,14 @@ class Planner:
 
         Raises
         ------
+        UsageError
+            For what is no pose, or no number.
         NotPermitted
             For a limit that would be exceeded on the way, or by a stop.
         """
+        for waypoint in waypoints:
+            if not all(np.isfinite(part).all() for part in (waypoint.position, waypoint.rotation)):
+                raise UsageError("move: a pose with numbers that are not finite is no goal")
         if len(self.robot.names) < 6:
             raise NotPermitted(
                 f"robot '{self.robot.profile.name}' has {len(self.robot.names)} cables, which do "
@@ -113,7 +119,7 @@ def moved(pose: Pose, change: Mapping[str, float], *, relative: bool) -> Pose:
         if name not in _COORDINATES:
             raise UsageError(f"'{name}' is no coordinate of a pose: {', '.join(_COORDINATES)}")
         index = _COORDINATES.index(name)
-        new[index] = value + (new[index] if relative else 0.0)
+        new[index] = number("move", name, value) + (new[index] if relative else 0.0)
     return Pose(new[None, :3], rotation_of(*new[3:])[None])
 
 
@@ -141,7 +147,7 @@ def _within(name: str, asked: float | None, limit: float, unit: str) -> float:
     """The asked value, or the limit; raises NotPermitted beyond it."""
     if asked is None:
         return limit
-    if not 0 < asked <= limit:
+    if positive("move", name, asked) > limit:
         raise NotPermitted(
             f"{name} {asked:g} {unit} of the platform is not within the limit {limit:g} {unit} of "
             "[robot]"

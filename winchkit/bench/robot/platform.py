@@ -11,6 +11,7 @@ import scipy.optimize  # loaded with the robot: in motion an import delays the l
 import scipy.spatial.transform  # noqa: F401
 from scipy.interpolate import CubicSpline
 
+from winchkit.arguments import positive, require_type
 from winchkit.arrays import Array
 from winchkit.bench.common_move import wait_together
 from winchkit.bench.control.motion import MotionSource, StartGate
@@ -143,7 +144,9 @@ class Platform:
         wait: bool = True,
         hold: bool = False,
     ) -> None:
-        """Move the platform on a line to a pose; raises NotPermitted before anything moves.
+        """Move the platform on a line to a pose.
+
+        Raises UsageError for numbers that cannot be meant, and NotPermitted, before anything moves.
 
         Parameters
         ----------
@@ -156,6 +159,9 @@ class Platform:
         hold : bool
             Keep the drives enabled at the end.
         """
+        require_type(goal, Pose, "goal")
+        if wait:
+            self._bench.loop.require_other_thread("move")
         waypoint = Waypoint(goal.position[0], goal.rotation[0])
         for planned in self.planner.plan([waypoint], self.pose, speed, acceleration):
             self.begin(planned, hold=hold)
@@ -190,9 +196,13 @@ class Platform:
 
         Raises
         ------
+        UsageError
+            For what is no plan, or a preload that is not finite.
         NotPermitted
             For a winch that may not move.
         """
+        require_type(planned, PlatformTrajectory, "planned")
+        _require_finite("preload", preload)
         present = self._angles()[0] - planned.motor_angle[0]
         kept: Array = present
         if preload is not None and not self.planner.wiring.tension_trim:
@@ -262,12 +272,14 @@ class Platform:
             Where there is no force distribution within the limits, or a winch may not move or has
             no load cell.
         """
-        numbers = (duration, travel, speed, 1.0 if axial_stiffness is None else axial_stiffness)
-        if not all(0 < number < np.inf for number in numbers):
-            raise UsageError(
-                f"a trim for {duration} s with {travel} m of travel at {speed} m/s cannot be "
-                "meant; all are above zero"
-            )
+        given = {"duration": duration, "travel": travel, "speed": speed}
+        if axial_stiffness is not None:
+            given["axial_stiffness"] = axial_stiffness
+        for name, value in given.items():
+            positive("trim", name, value)
+        _require_finite("keep", keep)
+        if wait:
+            self._bench.loop.require_other_thread("trim")
         pose = self.pose
         force = self._forces(pose)[0]
         if not force.any():
@@ -390,6 +402,7 @@ class Platform:
 
     def wait(self) -> None:
         """Return at the end of the motion; raises what ended it before."""
+        self._bench.loop.require_other_thread("wait")
         wait_together(self._bench.loop, self._winches, self._bench.clock)
 
     def _scale_quick_stops(self, planned: PlatformTrajectory) -> None:
@@ -428,3 +441,9 @@ class Platform:
             self.robot.structure(pose)[0], self.robot.weight(pose)[0], self.planner.tension
         )
         return (found.value if found.feasible else np.zeros_like(found.value))[None]
+
+
+def _require_finite(name: str, values: Array | None) -> None:
+    """Raise UsageError for numbers that are not finite, such as those of a cell without reading."""
+    if values is not None and not np.isfinite(values).all():
+        raise UsageError(f"{name} has numbers that are not finite: {values}")

@@ -76,9 +76,10 @@ def command(
 ) -> None:
     """Home WINCH: by a method of its drive, or by telling it the present cable length.
 
-    The drive keeps the zero for as long as it is powered, one with an absolute encoder perhaps
-    longer. A search moves the cable by the drive's own means; speed, tension and faults are
-    supervised meanwhile, and Ctrl-C stops. Lengths are by the winch's profile.
+    The drive keeps the zero for as long as it is powered, one with an absolute encoder longer; the
+    record of positions keeps that of --here where the drive cannot. A search moves the cable by the
+    drive's own means; speed, tension and faults are supervised meanwhile, and Ctrl-C stops. Lengths
+    are by the winch's profile.
     """
     from winchkit.cli.core.dry_run import station_for
     from winchkit.cli.core.quantities import optional

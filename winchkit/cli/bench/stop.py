@@ -37,10 +37,12 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
     """Quick-stop every winch of a bench and wait until each drive confirms.
 
     Goes through the process that owns the bench where there is one, else straight to the drives
-    on their bus; it never energises anything. Ends with 0 only when every drive has confirmed.
-    This is no emergency stop in the sense of EN 60204-1: that one takes the power away.
+    on their bus; it never energises anything. A command that is still opening the bench moves
+    nothing and ends with 5. Ends with 0 only when every drive has confirmed. This is no emergency
+    stop in the sense of EN 60204-1: that one takes the power away.
     """
     from winchkit.bench.emergency_stop import Stopped
+    from winchkit.bench.ownership import mark_stop
     from winchkit.bench.remote.client import attach
     from winchkit.bench.remote.identity import client_name
     from winchkit.schema.read import read_bench
@@ -49,6 +51,7 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
     if dry_run:
         _show(spec, as_json=as_json)
         return
+    mark_stop(spec)
     try:
         station = attach(spec, patience=_PATIENCE, name=client_name("stop"))
         if station is not None:

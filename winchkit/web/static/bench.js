@@ -257,6 +257,7 @@ const tabs = () => [...(lastTrip ? ["Trip"] : []), "Charts", "Bus frames", "Driv
 
 function hold(sign) {
   if (refused()) return;
+  if (!jogSpeed()) { alarm(`The cable length of winch ${winch} is unknown, and limits.unhomed = "none" forbids jogs: home it first, winchkit home ${winch} --here LENGTH.`, "refused", () => !jogSpeed()); return; }
   alarm("", "bench");
   release();
   held = sign;
@@ -274,7 +275,7 @@ const platform = {
   step: (axis, change, speed) => { if (refused()) return; send("move_pose", { axis, change, speed }); watchMotion("all"); },
 };
 
-// Faster jogs are refused while the cable length is unknown (limits.unhomed).
+// Faster jogs are refused while the cable length is unknown (limits.unhomed); 0: all are.
 function jogSpeed() {
   const state = now();
   return state && state.length_known === false ? Math.min(speed, declared.winch[winch].limits.unhomed) : speed;
@@ -283,6 +284,7 @@ function jogSpeed() {
 // The press begins a jog, and what follows only refreshes it.
 function beat(what) {
   if (!held) return;
+  if (!jogSpeed()) { release(); return; }
   const at = performance.now();
   if (at - beaten > 1000 * declared.dead_man) { release(); alarm("Jog ended: the browser was too slow. Release and press again.", "bench"); return; }
   beaten = at;
@@ -331,9 +333,9 @@ function mark() {
   for (const button of document.querySelectorAll(".jog")) {
     const own = held === Number(button.dataset.sign), moving = state && MOVING.has(state.phase) && Math.abs(state.cable_speed) > 0.0005;
     button.className = `jog ${own ? (moving ? "held" : "pressed") : !held && state && state.phase === "running down" ? "ramping" : ""}`;
-    button.disabled = !commands() || tripped().length > 0;
+    button.disabled = !commands() || tripped().length > 0 || !jogSpeed();
     button.querySelector("kbd").hidden = button.disabled;
-    button.querySelector("small").textContent = own ? (moving ? "held: moving" : "pressed") : button.disabled ? (old() ? "no values" : tripped().length ? "tripped" : "watching") : "hold to move";
+    button.querySelector("small").textContent = own ? (moving ? "held: moving" : "pressed") : button.disabled ? (old() ? "no values" : tripped().length ? "tripped" : jogSpeed() ? "watching" : "home first") : "hold to move";
   }
 }
 
@@ -380,7 +382,7 @@ function refresh() {
   const cell = (name, value, digits, unit, low, high, limits) => el("div", {}, el("span", { class: "note" }, name, aged), el("div", { class: "value" }, value === null || value === undefined ? "–" : value.toFixed(digits).replace("-", "−"), el("small", {}, unit)), gauge(value, low, high, limits, unit));
   const length = own.length || [null, null], tension = own.tension, top = tension[1] || 500, net = Boolean(tensions().gross !== null && picture.status.tare[winch]), winding = state.cable_speed === null ? null : -state.cable_speed;
   const kind = tripped().length ? "tripped" : MOVING.has(state.phase) ? "moving" : state.phase === "stopping" ? "stopping" : "";
-  renew(values, cell(state.length_known === false ? "Cable length unknown: home the winch; held jogs only" : "Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell(net ? `Tension, net; gross ${tensions().gross.toFixed(1).replace("-", "−")} N` : "Tension", state.tension, 1, "N", 0, top * 1.05, tension),
+  renew(values, cell(state.length_known === false ? `Cable length unknown: home the winch; ${own.unhomed ? "held jogs only" : "no jogs"}` : "Cable length", state.cable_length, 3, "m", 0, (length[1] || 5) * 1.06, length), cell(net ? `Tension, net; gross ${tensions().gross.toFixed(1).replace("-", "−")} N` : "Tension", state.tension, 1, "N", 0, top * 1.05, tension),
     cell("Speed, + winds in", winding, 3, "m/s", -own.speed * 1.05, own.speed * 1.05, [-own.speed, own.speed]),
     el("div", {}, el("span", { class: "note" }, "State", aged), el("div", { class: `state ${kind}` }, kind === "tripped" ? icon("trip") : SENSE[words(state)] || "", el("span", {}, words(state))), el("span", { class: "note" }, `${state.state}${state.commander ? `; ${state.commander} commands` : ""}`)));
   renew(document.getElementById("drawing"), drawn(winch, declared.winch[winch], state, drum(winch), tripped().length > 0));

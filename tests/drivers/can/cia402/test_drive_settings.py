@@ -221,7 +221,7 @@ def test_a_homing_is_written_in_the_drive_s_units() -> None:
     ]
     del objects.values[0x607C, 0]
     objects.written.clear()
-    with pytest.raises(NotPermitted, match=r"607C.*no such object.*home_offset"):
+    with pytest.raises(NotPermitted, match=r"607C.*no such object.*--here"):
         set_homing(objects, SERVO, SCALE, HomingSpec(18, 5.0, 0.5, 30.0, offset=1.0))  # type: ignore[arg-type]
     with pytest.raises(NotPermitted, match="no homing method 300"):
         set_homing(objects, SERVO, SCALE, HomingSpec(300, 5.0, 0.5, 30.0))  # type: ignore[arg-type]

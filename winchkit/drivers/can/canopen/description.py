@@ -374,8 +374,8 @@ def _differences(
         yield "603Fh (error code) cannot be mapped: leave it out of the TPDOs, EMCY reports it"
     if 0x607C not in dictionary:
         yield (
-            "607Ch (home offset) is missing: `winchkit home --here` needs the maker's own object, "
-            "home_offset in the device file"
+            "607Ch (home offset) is missing: name the maker's own object as home_offset in the "
+            "device file; else `winchkit home --here` keeps the zero in the record of positions"
         )
     consumer = declared(dictionary, 0x1016, 1)
     if consumer is not None and consumer.max is not None and consumer.max < 1 << 16:

@@ -135,6 +135,8 @@ class Cia402Axis:
             drive = dataclasses.replace(drive, proof=proof, host_loss=loss)
         self.host.arm()
         counter = self._position.begin(drive, self._boot_ups)
+        if counter.zero:
+            self._require_unlimited()
         commander = Commander(self.name, drive, self._node.node, drive.mode, counter)
         gathering = self._listen(drive)
         self.drive = drive
@@ -249,7 +251,7 @@ class Cia402Axis:
         return position.after_boot_up() if self.mapping_lost else position.doubt
 
     @property
-    def position_mark(self) -> tuple[int, str, bool]:
+    def position_mark(self) -> tuple[int, int, str, bool]:
         """What of the position's record changes besides the count."""
         return self._position.mark
 
@@ -271,6 +273,15 @@ class Cia402Axis:
         The status word does not say it later: some drives clear bits 10 and 12 when disabled.
         """
         self._position.note_zero(doubt)
+
+    def define_position(self, angle: float) -> None:
+        """Let the disabled motor have an angle (rad), by a zero that the record keeps.
+
+        Raises NotPermitted while it moves, and where the drive itself limits its position.
+        """
+        self._disabled_drive("define its position")
+        self._require_unlimited()
+        self._position.define(angle)
 
     @property
     def position_jump(self) -> str:
@@ -495,6 +506,14 @@ class Cia402Axis:
         self._quick_stop = math.nan  # unknown where the transfer fails
         set_quick_stop(self._node, self.servo, self.drive.scale, wanted)
         self._quick_stop = wanted
+
+    def _require_unlimited(self) -> None:
+        """Raise NotPermitted where 607Dh of the drive would limit by another zero than its own."""
+        if self._watch.limits.angle is not None:
+            raise NotPermitted(
+                f"{self.name}: the zero of its position is kept here and not in the drive, whose "
+                "own length limits (607Dh) do not know it; set limits.in_drive = false"
+            )
 
     def _note_life_sign(self) -> bool:
         """Whether the drive has had a life sign of the host since it was commissioned."""

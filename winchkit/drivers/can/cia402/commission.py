@@ -15,7 +15,7 @@ from winchkit.drivers.can.cia402.limits import DriveLimits, LimitsAtShaft, set_l
 from winchkit.drivers.can.cia402.mode_change import change_mode, supported_modes
 from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.cia402.option_codes import OptionCode, merged, set_options
-from winchkit.drivers.can.cia402.profile_parameters import set_profile, set_quick_stop
+from winchkit.drivers.can.cia402.profile_parameters import keeps_zero, set_profile, set_quick_stop
 from winchkit.drivers.can.cia402.standstill import PolledStandstill
 from winchkit.drivers.can.cia402.state_machine import QUICK_STOP, State, state_of
 from winchkit.drivers.can.cia402.units import Scale, read_scale
@@ -111,6 +111,8 @@ class Commissioned:
     """Whether it was seen to leave operation enabled on NMT stopped; False where unknown."""
     heartbeat: int | None = None
     """1017h, ms; None where it has none."""
+    keeps_zero: bool = True
+    """Whether a homing can give its position a zero: HM, 6098h and the home offset are there."""
     notes: tuple[str, ...] = ()
     """Findings and changes, for the user who opens the bench."""
 
@@ -151,6 +153,7 @@ def commission(
         host_loss=loss,
         stops_on_nmt=stops,
         heartbeat=node.read_if_there(0x1017),
+        keeps_zero="HM" in modes and keeps_zero(node, servo),
         notes=notes,
     )
 

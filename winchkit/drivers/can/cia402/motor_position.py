@@ -39,6 +39,8 @@ class KeptPosition:
     """6064h as the drive showed it."""
     offset: int = 0
     """Whole ranges of the counter that were crossed, in counts."""
+    zero: int = 0
+    """Of a drive that keeps none itself, in counts: position less count and offset."""
     doubt: str = ""
     """Why the position was not known, in words; empty where it was."""
     closed: bool = False
@@ -103,12 +105,12 @@ class MotorPosition:
         return "" if self.counter is None else self.counter.doubt
 
     @property
-    def mark(self) -> tuple[int, str, bool]:
-        """What of the record changes besides the count: ranges crossed, doubt, no homing runs."""
+    def mark(self) -> tuple[int, int, str, bool]:
+        """What of the record changes besides the count: ranges, zero, doubt, no homing runs."""
         counter = self.counter
         if counter is None:
-            return 0, "", False
-        return counter.offset, counter.doubt, counter.settled
+            return 0, 0, "", False
+        return counter.offset, counter.zero, counter.doubt, counter.settled
 
     @property
     def jump(self) -> str:
@@ -148,7 +150,10 @@ class MotorPosition:
         closed = closed and counter.settled
         last = int(counter.last)
         return KeptPosition(
-            last, counter.offset, counter.doubt, closed, self._serial, self._objects
+            *(last, counter.offset, counter.zero, counter.doubt),
+            closed=closed,
+            serial=self._serial,
+            objects=self._objects,
         )
 
     def look(self, node: SdoNode) -> None:
@@ -171,7 +176,7 @@ class MotorPosition:
         if counter is None:
             low, high = self._wraps or counter_range(drive.tpdo)
             counter = PositionCounter(low, high, self._fastest / drive.scale.angle)
-            self._resume(counter, found, drive.scale.angle, booted=booted)
+            self._resume(counter, found, drive, booted=booted)
         elif booted or found.restarted:
             evidence = _RESTARTED if booted else found.restarted
             counter.restart(evidence if self._incremental else "")
@@ -198,6 +203,13 @@ class MotorPosition:
         """The drive has set its zero; ``doubt`` says why the position by it is not known yet."""
         self._zero = doubt
 
+    def define(self, angle: float) -> None:
+        """Let the motor at rest have an angle (rad), by a zero that is kept in the record."""
+        if self.counter is not None:
+            self.agreement.suspend()
+            self.counter.define(round(angle / self._angle))
+            self.agreement.resume()
+
     def changed_mode(self, before: str, mode: str) -> None:
         """While it homes, the drive's count jumps to the new zero: it is taken as it is."""
         if self.counter is None or before == mode:
@@ -215,11 +227,12 @@ class MotorPosition:
         return self.doubt or (_RESTARTED if self._incremental else "")
 
     def _resume(
-        self, counter: PositionCounter, found: _Found, unit: float, *, booted: bool
+        self, counter: PositionCounter, found: _Found, drive: Commissioned, *, booted: bool
     ) -> None:
         """Go on from the record where the drive's counter has gone on since.
 
-        Without it the count of an absolute encoder is the position, unless it had left its range.
+        Without it the count of an absolute encoder is the position, unless it had left its range,
+        or its zero is in the record.
         """
         kept = self._kept
         if kept is not None and kept.serial != found.serial:
@@ -228,10 +241,11 @@ class MotorPosition:
                 f"{kept.serial}"
             )
             return
-        doubt = self._break(kept, found, counter.span, unit, booted=booted)
+        counter.zero = 0 if kept is None else kept.zero
+        doubt = self._break(kept, found, counter.span, drive.scale.angle, booted=booted)
         if kept is not None and (kept.doubt or not doubt):
             counter.offset, counter.doubt = kept.offset, kept.doubt
-        elif self._incremental:
+        elif self._incremental or (kept is None and not drive.keeps_zero):
             counter.doubt = doubt
         elif kept is not None and kept.offset:
             counter.doubt = f"6064h had wrapped in an earlier process, and {doubt}"
@@ -241,7 +255,7 @@ class MotorPosition:
     ) -> str:
         """Why the counter may not have gone on since the record, in words; empty where it has."""
         if kept is None:
-            return "there is no record of where its incremental encoder stood"
+            return "there is no record of where it stood, or of its zero"
         if booted:
             return _RESTARTED
         if found.restarted:

@@ -24,7 +24,7 @@ class PositionCounter:
 
     __slots__ = (
         "_fastest", "_kept", "_step", "doubt", "gap", "half", "high", "jump", "last", "low",
-        "offset", "span", "time",
+        "offset", "span", "time", "zero",
     )  # fmt: skip
 
     def __init__(self, low: int, high: int, fastest: float = 0.0) -> None:
@@ -41,11 +41,13 @@ class PositionCounter:
         self.time = -inf
         self.offset = 0
         """Whole ranges that were crossed, in counts: to be added to what the drive shows."""
+        self.zero = 0
+        """Of a drive that keeps none itself, in counts: to be added too."""
         self.doubt = ""
         """Why the position is not known, in words; empty while it is."""
         self.jump = 0.0
         """Change between two successive values that no motion explains, in counts; 0 for none."""
-        self._kept: tuple[int, str] | None = None
+        self._kept: tuple[int, int, str] | None = None
 
     def take(self, count: int, time: float) -> int:
         """Take a count of the drive and the time of its sampling (s); returns it unwrapped."""
@@ -55,7 +57,7 @@ class PositionCounter:
         if time - self.time > self.gap and self.time > -inf:
             self.lose("6064h may have wrapped while nothing was heard of the drive")
         self.last, self.time = count, time
-        return count + self.offset
+        return count + self.offset + self.zero
 
     def _far(self, change: float, time: float) -> None:
         """Count a crossing of the counter's end, or note a jump; the first value of all is none."""
@@ -89,8 +91,8 @@ class PositionCounter:
 
     def suspend(self) -> None:
         """Take the drive's counts as they are: while it homes, they jump to the new zero."""
-        self._kept = (self.offset, self.doubt)
-        self.offset, self.half, self.doubt = 0, inf, ""
+        self._kept = (self.offset, self.zero, self.doubt)
+        self.offset, self.zero, self.half, self.doubt = 0, 0, inf, ""
         self._step = inf
 
     def resume(self, zero: str | None) -> None:
@@ -100,8 +102,12 @@ class PositionCounter:
         if zero is not None:
             self.doubt = zero
         elif self._kept is not None:
-            self.offset, self.doubt = self._kept
+            self.offset, self.zero, self.doubt = self._kept
         self._kept = None
+
+    def define(self, position: int) -> None:
+        """Let the present count be ``position``."""
+        self.offset, self.zero, self.doubt = 0, position - int(self.last), ""
 
     def target(self, counts: int, name: str) -> int:
         """Counter value for an unwrapped target; raises NotPermitted beyond its end.
@@ -109,7 +115,7 @@ class PositionCounter:
         No drive is sent across the end of its counter: whether it then takes the short way or the
         long one is proved by nothing that it declares.
         """
-        shown = counts - self.offset
+        shown = counts - self.offset - self.zero
         if not self.low <= shown <= self.high:
             raise NotPermitted(
                 f"{name}: a target position of {shown} counts is beyond the end of the drive's "

@@ -11,7 +11,15 @@ from winchkit.drivers.can.cia402.units import Scale
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["HERE", "HomingSpec", "check_homing", "set_homing", "set_profile", "set_quick_stop"]
+__all__ = [
+    "HERE",
+    "HomingSpec",
+    "check_homing",
+    "keeps_zero",
+    "set_homing",
+    "set_profile",
+    "set_quick_stop",
+]
 
 _RAMP_SPEED = 3000 * 2 * pi / 60
 """Speed that a ramp declared as a time reaches from standstill, rad/s."""
@@ -22,15 +30,6 @@ HERE = (37, 35)
 """Methods that take the present position for the zero: the present number and the old one."""
 _BY_RAMP = (2, 6)
 """Values of 605Ah with which a quick stop uses 6085h."""
-_INSTEAD = {
-    0x6098: "it cannot home; set reference.motor_angle in the winch's profile",
-    0x6099: "use method 37, or a method of the drive's own tools",
-}
-"""What to do without an object."""
-_NO_OFFSET = (
-    "home without a length (`winchkit home --method`) and set reference.motor_angle in the winch's "
-    "profile, or name the maker's object as home_offset in the device file"
-)
 
 
 @dataclass(frozen=True)
@@ -84,24 +83,32 @@ def set_quick_stop(node: SdoNode, servo: ServoSpec, scale: Scale, acceleration: 
     node.write_verified(0x6085, 0, _ramp(servo, scale, acceleration))
 
 
-def check_homing(node: SdoNode, servo: ServoSpec, homing: HomingSpec, *, defines: bool) -> None:
+def keeps_zero(node: SdoNode, servo: ServoSpec) -> bool:
+    """Whether a drive has the objects by which a homing gives the present place a position.
+
+    Raises NoReply, DeviceRefused.
+    """
+    needed = ((0x6098, 0), parse_object(servo.home_offset))
+    return all(node.read_if_there(*key) is not None for key in needed)
+
+
+def check_homing(node: SdoNode, servo: ServoSpec, homing: HomingSpec) -> None:
     """Read every object that a homing needs, before anything is written or moves.
 
-    ``defines`` says that the zero is to get a position (the home offset). Raises NotPermitted
-    naming what the drive lacks, NoReply, DeviceRefused.
+    Raises NotPermitted naming what the drive lacks, NoReply, DeviceRefused.
     """
     if homing.method not in METHODS:
         raise NotPermitted(f"{node.place(0x6098)}: there is no homing method {homing.method}")
     needed = [(0x6098, 0)]
     if homing.method not in HERE:
         needed += [(0x6099, 1), (0x6099, 2)]
-    if homing.offset or defines:
+    if homing.offset:
         needed.append(parse_object(servo.home_offset))
     for index, sub in needed:
         if node.read_if_there(index, sub) is None:
             raise NotPermitted(
                 f"{node.place(index, sub)}: the drive has no such object, which this homing needs; "
-                f"{_INSTEAD.get(index, _NO_OFFSET)}"
+                "move the winch to a known place and give its length there (`winchkit home --here`)"
             )
 
 
@@ -112,7 +119,7 @@ def set_homing(node: SdoNode, servo: ServoSpec, scale: Scale, homing: HomingSpec
     limit) nor the acceleration (609Ah), which any drive may lack. Raises NotPermitted, NoReply,
     DeviceRefused (a method that the drive lacks).
     """
-    check_homing(node, servo, homing, defines=False)
+    check_homing(node, servo, homing)
     node.write_verified(0x6098, 0, homing.method)
     if homing.method not in HERE:
         for sub, speed in ((1, homing.fast), (2, homing.slow)):
