@@ -5,6 +5,7 @@ the named model leaves unexplained (quasi-likelihood). It joins the set if Δχ�
 of a quantile of t, 9 for well-known variances, or if its held-out losses per block are not
 significantly larger by a sign-flip test at 5 %; a law with more parameters if a likelihood-ratio
 test is significant although BIC prefers the simpler one, or if its curvature is not detectable.
+Waves over the motor angle join where they differ by the load alone and the runs have one.
 
 References
 ----------
@@ -35,6 +36,7 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.exchange import Exchange
+from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Projected
 from winchkit.diagnosis.selection.signatures import Candidate
 from winchkit.effects.effect import Effect
@@ -60,6 +62,10 @@ _LEAST_SHARE = 0.5
 """Share of the named effect's decrease of χ² that a rival must reach."""
 _SHARE_OF_SIMPLER_LAW = 0.75
 """Share of the decrease of χ² from which a simpler law of the family joins the set."""
+_TORQUE = {"motor_torque"}
+_ONE_LOAD = 0.2
+"""Range of the cable's force over its median up to which the runs have one load: less changes a
+wave by less than the tenth that establishes a law."""
 _LEVEL = 0.05
 """Level of the sign-flip and of the likelihood-ratio test; convention."""
 _INCOMPLETE = 0.25
@@ -222,9 +228,11 @@ def equivalence_set(
             continue
         joins = _richer_law_joins(engine, own_fit, dispersed, index, fitted)
         if joins is None:
-            joins = not fits_worse(
-                engine.regression, fitted, own_fit, dispersed
-            ) or _predicts_as_well(engine, fitted, own_losses, dispersed)
+            joins = (
+                _waves_of_one_load(engine, own.effect, rival.candidate.effect)
+                or not fits_worse(engine.regression, fitted, own_fit, dispersed)
+                or _predicts_as_well(engine, fitted, own_losses, dispersed)
+            )
         if joins or _reduces_to(engine, fitted, own_fit, base, index):
             compared.append(fitted)
         else:
@@ -335,6 +343,21 @@ def _richer_law_joins(
             nearly_linear and is_below_noise(engine, final, noise, index, rival)
         )
     return None
+
+
+def _waves_of_one_load(engine: SelectionEngine, own: Effect, rival: Effect) -> bool:
+    """Whether two waves over the motor angle differ by the load only, of which the runs have one.
+
+    A cogging is constant, a ripple of the torque constant and a transmission error are in
+    proportion to the torque. What friction and inertia make of that under one load depends on the
+    side on which they act, which nobody knows.
+    """
+    known, waves = set(engine.regression.outputs), (own, rival)
+    if not all(has_orders(e.single or e) and {*e.outputs} & known == _TORQUE for e in waves):
+        return False
+    forces = np.concatenate([at.tension for at in engine.regression.motions])
+    low, middle, high = np.quantile(np.abs(forces), [0.05, 0.5, 0.95])
+    return bool(high - low < _ONE_LOAD * middle)
 
 
 def _reduces_to(engine: SelectionEngine, fitted: Fit, final: Fit, base: Fit, index: int) -> bool:

@@ -1,0 +1,50 @@
+"""stribeck-of-torque: friction in proportion to the torque of the motor, higher at low speed."""
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.transition import MOTOR_TRANSITION, motor_direction
+from winchkit.model.friction import has_fallen
+from winchkit.model.stages import At, Stage
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque τ/(1 − s μ exp(−(θ'/ω_s)²) sgn τ)."""
+    fallen = np.exp(-((at.motor_rate / values["stribeck_speed"]) ** 2))
+    return torque / (1.0 - values["share"] * motor_direction(at, values) * fallen * np.sign(torque))
+
+
+def _passed(at: At, values: Values) -> bool:
+    """Whether the speeds are high enough for the excess at low speed to fall."""
+    return has_fallen(at.motor_rate, values["stribeck_speed"])
+
+
+EFFECT = Effect(
+    id="stribeck-of-torque",
+    stage=Stage.MOTOR,
+    parameters=(
+        Parameter(
+            "share", "1", null=0.0, typical=0.1, low=0.0, high=0.95,
+            plausible=Plausible(0.0, 0.9, "a worm gear loses two thirds"),
+        ),
+        Parameter(
+            "stribeck_speed", "rad/s", null=5.0, typical=5.0, low=0.05, high=1e3,
+            role="shape", grid=(0.2, 1.0, 4.0, 15.0, 50.0),
+        ),
+        MOTOR_TRANSITION,
+    ),
+    apply=apply,
+    outputs=("motor_torque",),
+    reduces_to=("friction-of-torque",),
+    what="Friction of teeth in proportion to the torque of the motor is higher at low speed.",
+    formula="τ/(1 − s μ exp(−(θ'/ω_s)²) sgn τ), τ the torque with all other terms",
+    source="directional load-dependent Stribeck friction of servos (Duclusaud et al. 2024)",
+    looks_like="Additional torque against the motion at low speed, in proportion to the load.",
+    confused_with=("friction-of-torque", "motor-stribeck"),
+    told_apart="Slow ramps at several speeds with two loads.",
+    needs=("ungeared",),
+    family="load friction",
+    visible=_passed,
+    order=1,
+)  # fmt: skip
