@@ -43,18 +43,16 @@ def swung(law: str) -> list[Run]:
     time = np.arange(0, 40, 0.01)
     angle = 1.3 * np.sin(2 * np.pi * time / 9) + 0.5 * np.sin(2 * np.pi * time / 3.7 + 1)
     rate = np.gradient(angle, time)
-    load = 6.0 * np.sin(angle) + 0.08 * np.gradient(rate, time)
+    load = 6.0 * np.sin(angle)
     direction = np.tanh(rate / 0.02)
-    friction = 0.15 * direction + 0.08 * rate
-    torque = load + friction
+    transmitted = load
     if law == "load":
-        torque = torque + SHARE * direction * np.abs(load)
+        transmitted = load + SHARE * direction * np.abs(load)
     if law == "motor":
         # τ_m = τ + s μ |τ_m|, by iteration; a contraction since μ < 1.
-        motor = torque
         for _ in range(60):
-            motor = torque + SHARE * direction * np.abs(motor)
-        torque = motor
+            transmitted = load + SHARE * direction * np.abs(transmitted)
+    torque = transmitted + 0.08 * np.gradient(rate, time) + 0.15 * direction + 0.08 * rate
     return [run_of(time, angle, torque, 0.03, seed) for seed in range(2)]
 
 

@@ -1,4 +1,8 @@
-"""friction-of-load: friction in proportion to the torque of the load."""
+"""friction-of-load: friction in proportion to the torque of the load.
+
+The load is weight, springs and a cable. The inertia is none: which part of it the gear transmits,
+and which is the rotor's, no recording of the motor tells.
+"""
 
 import numpy as np
 
@@ -26,7 +30,7 @@ EFFECT = Effect(
     apply=apply,
     outputs=("motor_torque",),
     what="Friction of teeth and bearings in proportion to the torque of the load.",
-    formula="τ + s μ |τ|, τ the torque of load and inertia",
+    formula="τ + s μ |τ|, τ the torque of the load",
     source="load-dependent friction of robot joints (Bittencourt, Gunnarsson 2012) and of servos "
     "(Duclusaud et al. 2024)",
     looks_like="A step of the torque error with the direction, in proportion to the load.",

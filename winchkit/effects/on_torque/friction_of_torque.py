@@ -26,7 +26,7 @@ EFFECT = Effect(
     apply=apply,
     outputs=("motor_torque",),
     what="Friction of teeth and bearings in proportion to the torque of the motor.",
-    formula="τ/(1 − s μ sgn τ): τ_m = τ + s μ |τ_m|, τ the torque with all other terms",
+    formula="τ/(1 − s μ sgn τ): τ_m = τ + s μ |τ_m|, τ the torque of the load",
     source="directional load-dependent friction of servos (Duclusaud et al. 2024)",
     looks_like="A step of the torque error with the direction, larger where the motor drives the "
     "load than where the load drives the motor.",
@@ -34,5 +34,5 @@ EFFECT = Effect(
     told_apart="Two loads in both directions, one of them near zero.",
     needs=("ungeared",),
     family="load friction",
-    order=1,
+    order=-1,
 )  # fmt: skip

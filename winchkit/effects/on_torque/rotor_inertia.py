@@ -34,5 +34,4 @@ EFFECT = Effect(
     looks_like="Torque in proportion to the motor's acceleration, at any load.",
     confused_with=("torque-lag", "pulley-inertia"),
     told_apart="Fast and slow moves without load.",
-    order=-2,
 )

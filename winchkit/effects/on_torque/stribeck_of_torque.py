@@ -38,7 +38,7 @@ EFFECT = Effect(
     outputs=("motor_torque",),
     reduces_to=("friction-of-torque",),
     what="Friction of teeth in proportion to the torque of the motor is higher at low speed.",
-    formula="τ/(1 − s μ exp(−(θ'/ω_s)²) sgn τ), τ the torque with all other terms",
+    formula="τ/(1 − s μ exp(−(θ'/ω_s)²) sgn τ), τ the torque of the load",
     source="directional load-dependent Stribeck friction of servos (Duclusaud et al. 2024)",
     looks_like="Additional torque against the motion at low speed, in proportion to the load.",
     confused_with=("friction-of-torque", "motor-stribeck"),
@@ -46,5 +46,5 @@ EFFECT = Effect(
     needs=("ungeared",),
     family="load friction",
     visible=_passed,
-    order=1,
+    order=-1,
 )  # fmt: skip
