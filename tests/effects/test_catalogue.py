@@ -97,11 +97,6 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
         "stribeck_speed": ("rad/s", SHAPE),
         "transition": ("rad/s", 0),
     },
-    "stribeck-of-torque": {
-        "share": ("1", 0),
-        "stribeck_speed": ("rad/s", SHAPE),
-        "transition": ("rad/s", 0),
-    },
     "friction-at-place": {
         "torque": ("N m", 0),
         "place": ("rad", SHAPE),
@@ -157,7 +152,7 @@ def test_numbers_of_parameters_are_sane(effect: Effect) -> None:
         "gear-ratio gear-backlash encoder-slip",
         "pulley-coulomb cell-gain",
         "joint-gravity friction-of-load motor-coulomb",
-        "spring-balancer stribeck-of-torque rotor-inertia",
+        "spring-balancer stribeck-of-load rotor-inertia",
         "gear-efficiency torque-constant motor-coulomb torque-lag",
         "cable-elongation-linear frame-compliance length-time-offset",
     ],

@@ -332,10 +332,6 @@ CASES: dict[str, Case] = {
         {"share": 0.2, "stribeck_speed": 20},
         lambda: _torque(0.2 * X.sm * X.T * X.arm * np.exp(-(X.rate**2) / 400)),
     ),
-    "stribeck-of-torque": (
-        {"share": 0.2, "stribeck_speed": 20},
-        lambda: {"motor_torque": X.T * X.arm / (1 - 0.2 * X.sm * np.exp(-(X.rate**2) / 400))},
-    ),
     "friction-growth": ({"rate": 3e-4}, lambda: _torque(3e-4 * X.t * X.sm)),
     "friction-at-place": (
         {"torque": 0.05, "place": 3.0, "width": 2.0},

@@ -30,7 +30,7 @@ EFFECT = Effect(
     source="directional load-dependent friction of servos (Duclusaud et al. 2024)",
     looks_like="A step of the torque error with the direction, larger where the motor drives the "
     "load than where the load drives the motor.",
-    confused_with=("friction-of-load", "motor-coulomb", "stribeck-of-torque"),
+    confused_with=("friction-of-load", "motor-coulomb"),
     told_apart="Two loads in both directions, one of them near zero.",
     needs=("ungeared",),
     family="load friction",

@@ -30,7 +30,7 @@ EFFECT = Effect(
         ),
         Parameter(
             "stribeck_speed", "rad/s", null=5.0, typical=5.0, low=0.05, high=1e3,
-            role="shape", grid=(0.2, 1.0, 4.0, 15.0, 50.0),
+            role="shape", grid=(0.3, 3.0, 30.0),
         ),
         MOTOR_TRANSITION,
     ),

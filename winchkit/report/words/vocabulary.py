@@ -123,7 +123,6 @@ _CLAUSES = {
     "rotor-inertia": "the inertia on the motor side is not negligible",
     "spring-balancer": "the torque is linear in the position (a spring or a weight)",
     "stribeck-of-load": "the friction in proportion to the load is higher at low speed",
-    "stribeck-of-torque": "the friction in proportion to the motor torque is higher at low speed",
     "torque-constant": "the torque constant of the drive is wrong",
     "torque-lag": "the torque signal of the drive is delayed",
     "torque-ripple": "the torque constant depends on the rotor position",
