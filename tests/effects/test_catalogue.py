@@ -90,6 +90,13 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "spring-balancer": {"stiffness": ("N m/rad", 0), "torque": ("N m", 0)},
     "torque-ripple": {"amplitude": ("1", 0), "phase": ("rad", SHAPE), "order": ("1", SHAPE)},
     "friction-growth": {"rate": ("N m/s", 0), "transition": ("rad/s", 0)},
+    "friction-of-load": {"share": ("1", 0), "transition": ("rad/s", 0)},
+    "friction-of-torque": {"share": ("1", 0), "transition": ("rad/s", 0)},
+    "stribeck-of-load": {
+        "share": ("1", 0),
+        "stribeck_speed": ("rad/s", SHAPE),
+        "transition": ("rad/s", 0),
+    },
     "friction-at-place": {
         "torque": ("N m", 0),
         "place": ("rad", SHAPE),
@@ -144,6 +151,8 @@ def test_numbers_of_parameters_are_sane(effect: Effect) -> None:
         "cell-gain cell-offset cell-nonlinearity cell-drift cell-thermal cell-lag",
         "gear-ratio gear-backlash encoder-slip",
         "pulley-coulomb cell-gain",
+        "joint-gravity friction-of-load motor-coulomb",
+        "spring-balancer stribeck-of-load rotor-inertia",
         "gear-efficiency torque-constant motor-coulomb torque-lag",
         "cable-elongation-linear frame-compliance length-time-offset",
     ],

@@ -322,6 +322,16 @@ CASES: dict[str, Case] = {
         {"amplitude": 0.04, "phase": 0.3, "order": 5},
         lambda: {"motor_torque": X.T * X.arm * (1 + 0.04 * np.sin(5 * X.theta + 0.3))},
     ),
+    "friction-of-load": ({"share": 0.2}, lambda: _torque(0.2 * X.sm * X.T * X.arm)),
+    "friction-of-torque": (
+        {"share": 0.2},
+        # τ_m = τ + s μ τ_m under a positive torque.
+        lambda: {"motor_torque": X.T * X.arm / (1 - 0.2 * X.sm)},
+    ),
+    "stribeck-of-load": (
+        {"share": 0.2, "stribeck_speed": 20},
+        lambda: _torque(0.2 * X.sm * X.T * X.arm * np.exp(-(X.rate**2) / 400)),
+    ),
     "friction-growth": ({"rate": 3e-4}, lambda: _torque(3e-4 * X.t * X.sm)),
     "friction-at-place": (
         {"torque": 0.05, "place": 3.0, "width": 2.0},

@@ -121,7 +121,7 @@ def test_without_growth_all_laws_are_one() -> None:
 def test_a_profile_makes_its_drum_and_layers_grow_by_the_cable_by_default() -> None:
     def made(spec: DrumSpec) -> object:
         return drum_of(
-            WinchProfile("w", spec, GearboxSpec(10.0), ReferenceSpec(), CableSpec(diameter=0.006))
+            WinchProfile("w", spec, ReferenceSpec(), GearboxSpec(10.0), CableSpec(diameter=0.006))
         )
 
     assert made(DrumSpec("spiral", 0.06)) == Spiral(0.06, 0.006)

@@ -82,10 +82,6 @@ __all__ = [
     "with_offsets_where_better",
 ]
 
-_UNSEARCHED = (
-    "no effect was looked for, since a sign or unit looks wrong: correct the file, or confirm it "
-    "with --as-recorded"
-)
 _PREDICTED = 0.1
 """Share of a residual that a curve or an order must predict for it to be a missing effect."""
 _REPEAT = "record the same motion again: without repeats the noise is not known"
@@ -420,7 +416,7 @@ def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
         unexplained_share=1.0,
         where=(),
         next_runs=(),
-        notes=(*dataset.notes, _UNSEARCHED),
+        notes=dataset.notes,
         sanity=dataset.sanity,
         used_share=dataset.used_share,
         caveats=dataset.caveats,

@@ -33,7 +33,7 @@ __all__ = [
 Values = Mapping[str, float]
 Need = Literal[
     "cable", "layers", "guide", "pulley", "temperature", "load", "cable_force", "gearing", "robot",
-    "axis", "whole_turns", "torque",
+    "axis", "ungeared", "whole_turns", "torque",
 ]  # fmt: skip
 NEED_WORDS: Mapping[Need, str] = {
     "cable": "a cable in the profile ([cable], [[pulley]] or reference.cable_length)",
@@ -43,9 +43,10 @@ NEED_WORDS: Mapping[Need, str] = {
     "temperature": "a temperature channel in every run",
     "load": "a load channel or load_mass",
     "cable_force": "a load, load_mass or tension",
-    "gearing": "a gearbox",
+    "gearing": "a [gearbox] with another ratio than 1",
     "robot": "a robot's profile",
     "axis": "a profile of kind 'axis', or runs without any force in a cable",
+    "ungeared": "a profile of kind 'axis', or a winch without a gearbox",
     "whole_turns": "a run in which the drum turns once at least",
     "torque": "a motor_torque channel",
 }

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
+from winchkit.diagnosis.data.sanity import ALARMING
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
@@ -414,8 +415,10 @@ def _candidates(answer: Answer) -> list[str]:
 
 def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]]:
     """Caveats, findings on the data, and the share of the samples that is compared."""
-    caveats = [caveat_text(code) for code in result.caveats]
-    findings = finding_texts(result.sanity)
+    # The headline has wrong channels where nothing was searched.
+    told = ALARMING if isinstance(result, Diagnosis) and not result.candidates else frozenset()
+    findings = finding_texts([f for f in result.sanity if f.code not in told])
+    caveats = [caveat_text(code) for code in result.caveats if code not in told]
     limit = 2.0 if all_shares else _USED
     used = used_text({name: s for name, s in result.used_share.items() if s < limit})
     blocks = {"caveats": caveats, "data": [*findings, *([used] if used else [])]}

@@ -151,7 +151,7 @@ def test_the_reduced_fit_is_the_minimum_of_the_whole_one() -> None:
 
 def winch(drum: DrumSpec) -> WinchProfile:
     return WinchProfile(
-        "w", drum, GearboxSpec(3.0, -1), ReferenceSpec(motor_angle=0.7, wound_turns=4.2)
+        "w", drum, ReferenceSpec(motor_angle=0.7, wound_turns=4.2), GearboxSpec(3.0, -1)
     )
 
 

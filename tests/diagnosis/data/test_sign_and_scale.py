@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from diagnosis_runs import GROOVED, SPIRAL, Ride, made, recorded, term, with_channel, without
 from winchkit.diagnosis.compare import compare
-from winchkit.diagnosis.data.sign_and_scale import sign_and_scale
+from winchkit.diagnosis.data.sign_and_scale import mending_column, sign_and_scale
 from winchkit.diagnosis.data.validation import validate_runs
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -166,6 +166,40 @@ def joint(seed: int, sign: float) -> tuple[Run, WinchProfile]:
 def test_friction_and_inertia_determine_the_sign_without_a_load(seed: int) -> None:
     assert codes([joint(seed, 1.0)[0]]) == []
     assert codes([joint(seed, -1.0)[0]]) == [("motor_torque", "inverted-sign")]
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_friction_of_runs_in_one_direction_each_determines_the_sign(sign: float) -> None:
+    """A ladder of speeds: the friction of a run is an offset that follows its direction."""
+    random = np.random.default_rng(3)
+    runs = []
+    for index, speed in enumerate((0.2, 0.5, 1.0, 2.0, -0.2, -0.5, -1.0, -2.0)):
+        time = np.arange(600) / 100
+        torque = np.full(600, 0.5 * np.sign(speed) + 0.2 * speed) + random.normal(0, 0.05, 600)
+        run = replace(made(0, load_mass=None), time=time, metadata={"load_mass": "0 kg"})
+        run = with_channel(replace(run, channels={}), "motor_angle", speed * time, "rad")
+        run = with_channel(run, "motor_torque", sign * torque, "N m")
+        runs.append(replace(run, name=f"rung-{index}"))
+    found = sign_and_scale(runs, GROOVED)
+    assert {f.code for f in found} == (set() if sign > 0 else {"inverted-sign"})
+    assert len({f.text for f in found}) == (sign < 0)
+
+
+def test_a_sign_and_a_factor_are_found_where_inertia_follows_the_angle() -> None:
+    """One sine: gravity, inertia and angle are nearly collinear, and no slope is determined."""
+    known = replace(GROOVED, effect=(EffectTable("motor-cogging", GRAVITY),))
+    run, time = joint(4, 1.0)[0], np.arange(4000) / 100
+    angle = 0.8 * np.sin(0.7 * time) - np.pi / 2
+    torque = -0.28 * (4 * np.cos(angle) + 0.1 * np.sign(np.gradient(angle)))
+    run = with_channel(
+        with_channel(run, "motor_angle", angle, "rad"), "motor_torque", torque, "N m"
+    )
+    (found,) = sign_and_scale([run], known)
+    assert (found.code, found.channel) == ("inverted-sign", "motor_torque")
+    assert found.value == pytest.approx(-0.28, rel=0.05)
+    column = mending_column(found)
+    assert column.startswith("motor_torque=-motor_torque*3.")
+    assert column.endswith(" [N m]")
 
 
 def test_the_inertia_in_the_profile_is_a_prediction() -> None:

@@ -156,7 +156,7 @@ def test_a_wrong_channel_precedes_everything() -> None:
     found = Finding("inverted-sign", "run", "tension", -1.0, "its sign is inverted")
     told = diagnosis_of("unknown", sanity=(found,), unexplained_share=1.0, where=FIVE_CORNERS)
     assert sentence(told) == (
-        "A channel looks wrong: no effect was looked for. tension: its sign is inverted."
+        "A channel looks wrong: no effect was looked for. tension of run: its sign is inverted."
     )
     assert "--as-recorded" in changes_text(told)
 

@@ -134,9 +134,13 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
 def _run(file: str) -> Verdict:
     from winchkit.runs import read_run
     from winchkit.runs.info import summary_of
+    from winchkit.runs.sanity.ground import ground_mask, load_on_ground
 
     run = read_run(file)
-    notes = tuple(Fault(note, file) for note in run.notes)
+    every = [run.of_winch(winch) for winch in run.winches()]
+    grounded = [found for own in every for found in load_on_ground(own, ground_mask(own))]
+    told = [f"{found.channel} {found.text}" for found in grounded]
+    notes = tuple(Fault(note, file) for note in (*run.notes, *told))
     return Verdict(file, "run", run.name, summary_of(run).text, warnings=notes)
 
 

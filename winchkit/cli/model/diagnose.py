@@ -223,6 +223,9 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
     """Next command: add or refit the first effect of one law, else plan runs or write an effect."""
     if diagnosis.interrupted or diagnosis.verdict == "undecided":
         return
+    if column := _mending(diagnosis):
+        suggest_next("import", runs, "--column", column, "-o", "corrected")
+        return
     first = next(iter(diagnosis.steps), None)
     words = ("-p", asked.profile, *asked.options)
     if first is not None and len(first.effects) == 1:
@@ -234,6 +237,16 @@ def _suggest(diagnosis: Diagnosis, runs: Sequence[str], asked: Asked) -> None:
         suggest_next("effects", "new", "own.py", "--fit", runs, *words)
     else:
         suggest_with("plan", asked, runs)
+
+
+def _mending(diagnosis: Diagnosis) -> str:
+    """Column of an import that corrects the first wrong channel, where nothing was searched."""
+    from winchkit.diagnosis.data.sanity import ALARMING
+    from winchkit.diagnosis.data.sign_and_scale import mending_column
+
+    if diagnosis.steps or diagnosis.candidates:
+        return ""
+    return next((mending_column(f) for f in diagnosis.sanity if f.code in ALARMING), "")
 
 
 def _page(answer: WinchAnswer, title: str, asked: Asked) -> str:

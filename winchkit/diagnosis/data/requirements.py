@@ -43,9 +43,10 @@ def missing_needs(effect: Effect, dataset: Dataset) -> list[str]:
         "temperature": all(r.signals.temperature is not None for r in recordings),
         "load": any(r.raw.load is not None for r in recordings),
         "cable_force": cable_force,
-        "gearing": True,
+        "gearing": profile.gearbox.ratio != 1,
         "robot": False,
         "axis": is_axis or is_joint,
+        "ungeared": is_axis or profile.gearbox.ratio == 1,
         "whole_turns": turns_whole,
         "torque": "motor_torque" in dataset.outputs,
     }

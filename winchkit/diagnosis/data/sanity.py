@@ -26,7 +26,7 @@ def findings(
     inspected: Sequence[Inspection], profile: WinchProfile, catalogue: Catalogue | None = None
 ) -> tuple[Finding, ...]:
     """Findings on runs: sign and scale against the profile first, then of every channel."""
-    runs = [_with_derived_velocity(one) for one in inspected]
+    runs = [usable(one) for one in inspected]
     found = sign_and_scale(runs, profile, catalogue)
     found += [f for one in inspected for f in one.findings]
     # A constant angle is that of a run at rest, which has a note.
@@ -51,14 +51,18 @@ def resolutions(inspected: Sequence[Inspection]) -> dict[str, float]:
 def usable(inspected: Inspection) -> Run:
     """The run without what findings exclude.
 
-    Single spikes are NaN, so that they are not compared. A velocity that is not the derivative of
-    the motor angle is left out: the rate is then that of the angle.
+    Single spikes are NaN, so that they are not compared, as are the outputs where the load does not
+    hang on the cable. A velocity that is not the derivative of the motor angle is left out: the
+    rate is then that of the angle.
     """
     run = _with_derived_velocity(inspected)
     channels: dict[str, Channel] = dict(run.channels)
-    for name, mask in inspected.outliers.items():
+    held = [(name, inspected.on_ground) for name in OUTPUTS if inspected.on_ground.any()]
+    for name, mask in (*inspected.outliers.items(), *held):
         if name in channels:
-            channels[name] = replace(channels[name], values=np.where(mask, np.nan, run[name]))
+            channels[name] = replace(
+                channels[name], values=np.where(mask, np.nan, channels[name].values)
+            )
     return replace(run, channels=channels)
 
 

@@ -5,7 +5,8 @@ of a winch, but a wrong unit, factor or sign of a channel. The standard deviatio
 that of a block jackknife. Friction and inertia, which the profile may lack, are fitted beside; a
 run whose motion does not separate them from the load, as one in one direction, has the slope of all
 runs together. A prediction that is friction and inertia alone, as of an axis without a load, has no
-slope of its own: a wrong unit and another inertia are the same there. A factor is the same in all
+slope of its own: a wrong unit and another inertia are the same there, but a correlation below −0.9
+is an inverted sign. A factor is the same in all
 runs, or in some and the others have none: where the slopes of the others differ from each other, as
 with an offset for every run, none is suspected. Without a load the prediction of the torque may
 vanish: then the work of its dissipative part must not be negative (passivity).
@@ -30,14 +31,14 @@ from winchkit.diagnosis.data.sampling import bridged, bridged_channel
 from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.model.line import Line
-from winchkit.model.stages import OUTPUTS, Signals
+from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS, Signals
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.factors import KNOWN_FACTORS, Slope, named_factor, slope_text
 from winchkit.runs.sanity.finding import Finding
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["MOST_SAMPLES", "length_words", "sign_and_scale"]
+__all__ = ["MOST_SAMPLES", "length_words", "mending_column", "sign_and_scale"]
 
 _LARGEST = 1.8
 """Slope of measured over predicted, or its reciprocal, beyond which a unit is wrong; below the
@@ -58,6 +59,9 @@ _LEAST_SAMPLES = 50
 _LARGEST_INFLATION = 10.0
 """Variance inflation of the prediction by friction and inertia above which its slope is not judged;
 the textbook limit of a column that others explain to nine tenths (Marquardt 1970)."""
+_OPPOSITE = -0.9
+"""Correlation of measured and predicted below which the sign is inverted although friction or
+inertia could explain the prediction: four fifths of the variance, with the wrong sign."""
 _NEAR = 0.05
 """Difference from one of the slope of the length with the angle in another unit; as the tolerance
 of a constant in `runs/sanity/factors.py`."""
@@ -97,9 +101,8 @@ def sign_and_scale(
         known = named_factor(mean) if _outside(abs(mean.value)) else ""
         text = _text(channel, code, known, mean, other)
         out += [Finding(code, name, channel, slope.value, text) for name, slope in found]
-    for run in runs:
-        out += _passivity(run, profile)
-    return out
+    told = {f.run for f in out if f.channel == "motor_torque"}
+    return [*out, *_passivity([run for run in runs if run.name not in told], profile)]
 
 
 def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
@@ -133,6 +136,31 @@ def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
         if _outside(abs(slope))
         else ""
     )
+
+
+def mending_column(finding: Finding) -> str:
+    """Value of ``import --column`` that corrects a channel with a wrong sign or unit.
+
+    Parameters
+    ----------
+    finding
+        Of :func:`sign_and_scale`.
+
+    Returns
+    -------
+    str
+        ``motor_torque=-motor_torque*0.1 [N m]``; empty for the load, which may be metadata.
+    """
+    channel, slope = finding.channel, finding.value
+    if channel not in OUTPUT_UNITS:
+        return ""
+    sign = "-" if finding.code == "inverted-sign" else ""
+    factor = ""
+    if np.isfinite(slope) and _outside(abs(slope)):
+        exact = min(KNOWN_FACTORS, key=lambda known: abs(known * abs(slope) - 1))
+        wrong = abs(exact * abs(slope) - 1) < _NEAR
+        factor = f"*{exact if wrong else 1 / abs(slope):.4g}"
+    return f"{channel}={sign}{channel}{factor} [{OUTPUT_UNITS[channel]}]"
 
 
 def _outside(size: float) -> bool:
@@ -253,7 +281,11 @@ def _slope(measured: Array, columns: Array) -> Slope | None:
     x = x / np.maximum(np.sqrt(np.mean(x**2, axis=0)), 1e-300)
     own = x[:, 0] - x[:, 1:] @ np.linalg.lstsq(x[:, 1:], x[:, 0], rcond=None)[0]
     if _LARGEST_INFLATION * float(np.mean(own**2)) < 1:
-        return None
+        if not np.ptp(x[:, 0]) or not np.ptp(y) or np.corrcoef(x[:, 0], y)[0, 1] > _OPPOSITE:
+            return None
+        # Whatever else acts, nothing turns a prediction round.
+        x = np.column_stack([x[:, 0], np.ones(len(y))])
+        own = x[:, 0] - np.mean(x[:, 0])
     scale = float(np.sqrt(np.mean(columns[rows, 0] ** 2)))
     without = _jackknifed(x, y)[:, 0] / scale
     # The coefficient of what the other columns leave of the first (Frisch, Waugh).
@@ -282,37 +314,48 @@ def _jackknife_std(without: Array) -> float:
     return float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
 
 
-def _passivity(run: Run, profile: WinchProfile) -> Iterator[Finding]:
-    """A torque whose dissipative part does negative work although no load is known."""
-    if "motor_torque" not in run:
+def _passivity(runs: Sequence[Run], profile: WinchProfile) -> Iterator[Finding]:
+    """A torque whose dissipative part does negative work, where no load is known.
+
+    The runs have one friction: of runs in one direction each it is an offset that follows the
+    direction, and of the wrong sign where the angle's is inverted.
+    """
+    free = [run for run in runs if "motor_torque" in run and _has_no_load(run, profile)]
+    if not free:
         return
-    motion = Line(profile).motion(_signals(run, profile))
-    if motion.load is not None and np.any(motion.load):
-        return
-    if motion.load is None and motion.drum_tension is not None:
-        return
-    at = motion.at
-    angle = at.motor_angle - at.motor_angle.mean()
-    shape = angle / max(float(np.abs(angle).max()), 1e-300)
-    conservative = [np.ones_like(shape), shape, shape**2, shape**3, np.sin(at.motor_angle)]
-    conservative += [np.cos(at.motor_angle), at.motor_acceleration]
-    columns = np.column_stack([np.sign(at.motor_rate), at.motor_rate, *conservative])
-    measured = run["motor_torque"]
+    motions = [Line(profile).motion(_signals(run, profile)).at for run in free]
+    angle, rate, acceleration = (
+        np.concatenate([getattr(at, name) for at in motions])
+        for name in ("motor_angle", "motor_rate", "motor_acceleration")
+    )
+    shape = angle - angle.mean()
+    shape = shape / max(float(np.abs(shape).max()), 1e-300)
+    conservative = [np.ones_like(shape), shape, shape**2, shape**3, np.sin(angle), np.cos(angle)]
+    columns = np.column_stack([np.sign(rate), rate, *conservative, acceleration])
+    measured = np.concatenate([run["motor_torque"] for run in free])
     rows = _complete_rows(measured, columns)
-    if len(rows) < _LEAST_SAMPLES or not np.any(at.motor_rate):
+    if len(rows) < _LEAST_SAMPLES or not np.any(rate):
         return
-    x = columns[rows]
+    x, rate = columns[rows], rate[rows]
     scale = np.maximum(np.sqrt(np.mean(x**2, axis=0)), 1e-300)
     without = _jackknifed(x / scale, measured[rows]) / scale
-    rate = at.motor_rate[rows]
     power = without[:, 0] * np.mean(np.abs(rate)) + without[:, 1] * np.mean(rate**2)
     mean, std = float(power.mean()), _jackknife_std(power)
-    if mean < -_SIGMAS * std and float(without[:, 8].mean()) <= 0:
+    inertia = without[:, -1]
+    if mean < -_SIGMAS * std and float(inertia.mean()) <= _SIGMAS * _jackknife_std(inertia):
         text = (
-            f"the sign looks inverted: friction would do work on the motor, {mean:.2g} ± "
-            f"{std:.1g} W, and the inertia is negative"
+            "the sign looks inverted: friction would do work on the motor, "
+            f"{slope_text(Slope(mean, std))} W"
         )
-        yield Finding("inverted-sign", run.name, "motor_torque", mean, text)
+        for run in free:
+            yield Finding("inverted-sign", run.name, "motor_torque", np.nan, text)
+
+
+def _has_no_load(run: Run, profile: WinchProfile) -> bool:
+    motion = Line(profile).motion(_signals(run, profile))
+    if motion.load is None:
+        return motion.drum_tension is None
+    return not np.any(motion.load)
 
 
 def _signals(run: Run, profile: WinchProfile) -> Signals:
@@ -345,6 +388,8 @@ def _text(channel: str, code: str, known: str, slope: Slope, other: str) -> str:
     beside = f"{what} is {slope_text(slope)}"
     if code == "inverted-sign":
         unit = f", and the unit wrong by {known}" if known else ""
+        if not known and _outside(abs(slope.value)):
+            unit = ", and the factor wrong by no known constant"
         return f"the sign looks inverted{unit}: {beside}"
     why = f"that is {known}" if known else "no known constant explains it"
     return f"the unit or factor looks wrong: {beside}; {why}"

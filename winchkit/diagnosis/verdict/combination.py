@@ -105,6 +105,8 @@ def combination_of_term(term: Term, covariance: ValueCovariance) -> Combination 
         return None
     weights = weights / weights[0]
     names = [known[i] for i in chosen]
+    if len({term.effect.parameter(name).unit for name in names}) > 1:
+        return None  # A sum of unlike units depends on the choice of the units.
     own = covariance.matrix[np.ix_([rows[i] for i in chosen], [rows[i] for i in chosen])]
     formula = names[0] + "".join(
         f" {'+' if weight > 0 else '−'} {abs(weight):.3g} · {name}"

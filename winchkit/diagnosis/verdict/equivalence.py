@@ -4,7 +4,8 @@ Each rival is refitted in the place of the named effect, under the larger of the
 the named model leaves unexplained (quasi-likelihood). It joins the set unless it is worse in
 sample, Δχ² being above the square of a quantile of t (9 for well-known variances), and held out,
 the difference over blocks of time being above its standard error at 5 %. A law that reduces to
-another member leaves the set again where a likelihood-ratio test does not prefer it.
+another member leaves the set again where a likelihood-ratio test does not prefer it. Waves over
+the motor angle join where they differ by the load alone and the runs have one.
 
 References
 ----------
@@ -27,7 +28,9 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.exchange import Exchange
+from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Projected
+from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
@@ -39,6 +42,10 @@ _SCORE_MARGIN = 40.0
 """Explained χ² below that of the named effect, within which a rival is refitted."""
 _LEAST_SHARE = 0.5
 """Share of the named effect's decrease of χ² that a rival must reach."""
+_TORQUE = {"motor_torque"}
+_ONE_LOAD = 0.2
+"""Range of the cable's force over its median up to which the runs have one load: less changes a
+wave by less than the tenth that establishes a law."""
 _LEVEL = 0.05
 """Level of the likelihood-ratio test and of a difference held out; convention."""
 
@@ -132,8 +139,10 @@ def equivalence_set(
         fitted = trial.fit
         if not np.isfinite(trial.criterion) or fitted.chi_square > least:
             continue
-        worse = fits_worse(engine.regression, fitted, own_fit, dispersed)
-        if not (worse and _predicts_worse(engine, fitted, losses, dispersed)):
+        worse = fits_worse(engine.regression, fitted, own_fit, dispersed) and _predicts_worse(
+            engine, fitted, losses, dispersed
+        )
+        if not worse or _waves_of_one_load(engine, own.effect, rival.candidate.effect):
             members.append(_Member(fitted.hypothesis.terms[-1], fitted, fitted))
     members = [m for m in members if not any(_adds_nothing(m, other) for other in members)]
     members = _ordered(engine, members, dispersed)
@@ -164,6 +173,21 @@ def _predicts_worse(engine: SelectionEngine, rival: Fit, losses: Array, noise: N
     # The standard error of a single block is not known.
     error = np.sqrt(len(excess)) * np.std(excess, ddof=1) if len(excess) > 1 else 0.0
     return bool(np.sum(excess) > -ndtri(_LEVEL) * error)
+
+
+def _waves_of_one_load(engine: SelectionEngine, own: Effect, rival: Effect) -> bool:
+    """Whether two waves over the motor angle differ by the load only, of which the runs have one.
+
+    A cogging is constant, a ripple of the torque constant and a transmission error are in
+    proportion to the torque. What friction and inertia make of that under one load depends on the
+    side on which they act, which nobody knows.
+    """
+    known, waves = set(engine.regression.outputs), (own, rival)
+    if not all(has_orders(e.single or e) and {*e.outputs} & known == _TORQUE for e in waves):
+        return False
+    forces = np.concatenate([at.tension for at in engine.regression.motions])
+    low, middle, high = np.quantile(np.abs(forces), [0.05, 0.5, 0.95])
+    return bool(high - low < _ONE_LOAD * middle)
 
 
 def _adds_nothing(rich: _Member, simple: _Member) -> bool:

@@ -32,4 +32,5 @@ EFFECT = Effect(
     "the same period.",
     needs=("whole_turns",),
     polar=("amplitude", "phase"),
+    order=-2,
 )

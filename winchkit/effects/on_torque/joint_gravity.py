@@ -31,4 +31,5 @@ EFFECT = Effect(
     told_apart="A stroke of at least a quarter turn: a short one is a straight line.",
     needs=("axis",),
     polar=("amplitude", "phase"),
+    order=-2,
 )

@@ -30,4 +30,5 @@ EFFECT = Effect(
     told_apart="The tension: the weight of the cable is in it, a spring at the drum is not.",
     family="motor friction",
     contains=("motor-coulomb-asymmetry",),
+    order=-2,
 )

@@ -140,6 +140,8 @@ class Figure:
     x: Axis
     panels: tuple[Panel, ...]
     marks: tuple[RunMark, ...] = ()
+    left_out: tuple[tuple[float, float], ...] = ()
+    """Intervals of x that are shaded: samples that are not compared."""
     zoom: bool = False
     """Whether a part of the x axis can be selected on the page."""
     source: str = ""

@@ -250,6 +250,9 @@ def _panel(
             Shape("band", "cells", (np.array([[0.0, 0.0, at, 1.0]]),)),
             Shape("limit", "line", (np.array([[at, 0.0], [at, 1.0]]),)),
         ]
+    if figure.left_out:
+        shaded = [(x.share(low), 0.0, x.share(high), 1.0) for low, high in figure.left_out]
+        shapes.append(Shape("band", "cells", (np.array(shaded),)))
     for at, text in _y_ticks(panel.y, y, height):
         down = top + (1 - y.share(at)) * height
         if not y.logarithmic and abs(at) < 1e-6 * (y.high - y.low):

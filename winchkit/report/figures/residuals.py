@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isclose
 from re import compile as pattern
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
@@ -43,6 +44,8 @@ _TAILS = 0.001
 """Quantile at which the axis of frequencies begins: single low values would fill half of it."""
 _EMPTY = 0.1
 """Part of the range of a variable that is a gap of its mean where it holds no sample."""
+_SHOWN = 100.0
+"""Part of a run from which an interval without compared samples is shaded: about 2 px."""
 _SAME = 1e-3
 """Relative: two errors that differ by less are drawn as one."""
 _SPREAD = 0.2
@@ -170,6 +173,7 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves, labels: Sequen
     recordings = regression.dataset.recordings
     share = max(4, _INTERVALS // len(curves.runs))
     times, kept, marks, start = [], [], [], 0.0
+    left_out: list[tuple[float, float]] = []
     label = ""
     first = {labels[run]: position for position, run in reversed(list(enumerate(curves.runs)))}
     order = sorted(range(len(curves.runs)), key=lambda n: first[labels[curves.runs[n]]])
@@ -181,6 +185,8 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves, labels: Sequen
         shown = "" if labels[run] == label else labels[run]
         label = labels[run]
         marks.append(RunMark(start, recordings[run].name, shown))
+        gaps = _left_out(time, recordings[run].valid[curves.output])
+        left_out += [(start + low, start + high) for low, high in gaps]
         times.append(start + time[rows])
         kept.append(rows)
         start += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
@@ -213,19 +219,29 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves, labels: Sequen
         else ""
     )
     band = "" if noise is None else " The band is the noise floor, ± its rms."
+    shaded = " Shaded: samples that are not compared." if left_out else ""
     return Figure(
         f"time-{curves.output}",
         f"{name} over time",
         f"Measured and predicted {name.lower()}{filtered}, and below them the residual, measured "
-        f"less predicted; all runs in sequence.{band}{short}",
+        f"less predicted; all runs in sequence.{band}{shaded}{short}",
         Axis("time", "s", limits=(0.0, start)),
         (
             Panel(Axis(f"measured and predicted{filtered}", size.label), tuple(signals), share=0.9),
             Panel(Axis("residual", curves.scale.label, zero=True), tuple(errors), noise, share=1.1),
         ),
         tuple(marks),
+        tuple(left_out),
         zoom=True,
     )
+
+
+def _left_out(time: Array, compared: NDArray[np.bool_]) -> Iterator[tuple[float, float]]:
+    """Intervals without a compared sample, of a hundredth of the run at least."""
+    edges = np.flatnonzero(np.diff(compared, prepend=True, append=True))
+    for first, end in zip(edges[::2], edges[1::2], strict=True):
+        if end - first >= len(time) / _SHOWN:
+            yield float(time[first]), float(time[end - 1])
 
 
 def _filtered(regression: TimeSeriesRegression, curves: _Curves) -> str:

@@ -8,6 +8,7 @@ from math import isnan
 from winchkit.diagnosis.data.sanity import ALARMING
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, OutputFit
+from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
 from winchkit.report.words.numbers import percent, scale_for, significant
 from winchkit.report.words.steps import cause
@@ -168,7 +169,7 @@ def changes_text(diagnosis: Diagnosis) -> str:
     """
     other, beyond = _CHANGES[diagnosis.data]
     if _wrong_channels(diagnosis):
-        return "Correct the unit or sign of the channel, or confirm it with --as-recorded."
+        return "Correct the channel by an import, or confirm it with --as-recorded."
     if diagnosis.verdict == "adequate":
         return f"To check: record {other}. An error above the noise there refutes this result."
     if diagnosis.next_runs:
@@ -302,8 +303,7 @@ def _wrong_channels(diagnosis: Diagnosis) -> list[str]:
     """Wrong signs and units, with which no effect is looked for; empty without any."""
     if diagnosis.verdict != "unknown" or diagnosis.steps:
         return []
-    found = [f for f in diagnosis.sanity if f.code in ALARMING]
-    return list(dict.fromkeys(f"{f.channel}: {f.text}" for f in found))
+    return finding_texts([f for f in diagnosis.sanity if f.code in ALARMING])
 
 
 def _noise_is_known(diagnosis: Diagnosis) -> bool:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.consistency import velocity_consistency
 from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.ground import ground_mask, load_on_ground
 from winchkit.runs.sanity.low_pass import low_pass
 from winchkit.runs.sanity.outliers import outlier_masks, outliers
 from winchkit.runs.sanity.quantisation import quantised, resolutions
@@ -36,6 +37,8 @@ class Inspection:
     """Resolution of every channel of the model, in its unit; 0 where none is found."""
     outliers: Mapping[str, NDArray[np.bool_]]
     """Spikes of the channels that have some, (n,)."""
+    on_ground: NDArray[np.bool_]
+    """Samples in which the cable does not carry the load, (n,)."""
 
 
 def inspect_run(run: Run) -> Inspection:
@@ -59,9 +62,13 @@ def inspect_run(run: Run) -> Inspection:
         if kind in CHANNEL_DIMENSIONS and np.isfinite(run[name]).any():
             out += _channel(run, name, steps[name], is_instrument=kind in _INSTRUMENTS)
     out += outliers(run, masks)
+    held = np.zeros(len(run), dtype=bool)
     for winch in run.winches():
         out += velocity_consistency(run, winch)
-    return Inspection(run, tuple(out), steps, masks)
+        own = run.of_winch(winch)
+        held = ground_mask(own)
+        out += load_on_ground(own, held)
+    return Inspection(run, tuple(out), steps, masks, held)
 
 
 def _channel(run: Run, name: str, step: float, *, is_instrument: bool) -> Iterator[Finding]:

@@ -32,7 +32,7 @@ class AxisProfile(WinchProfile):
     """
 
     drum: DrumSpec = field(default=_UNIT_DRUM, init=False, compare=False)
-    gearbox: GearboxSpec = field(default_factory=lambda: GearboxSpec(1.0))
+    gearbox: GearboxSpec = field(default_factory=GearboxSpec)
     reference: ReferenceSpec = field(default_factory=ReferenceSpec)
     cable: CableSpec = field(default_factory=CableSpec, init=False, compare=False)
     path: PathSpec = field(default_factory=PathSpec, init=False, compare=False)

@@ -133,8 +133,8 @@ class GearboxSpec(Table):
 
     ratio: Annotated[
         float, Quantity("ratio", 1e-3, 1e5, why="gearboxes of winches have 1 to some thousands")
-    ]
-    """Motor turns per drum turn."""
+    ] = 1.0
+    """Motor turns per drum turn; 1 is a direct drive."""
     direction: Literal[1, -1] = 1
     efficiency: Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)] | None = None
     """Shorthand for the effect gear-efficiency."""
@@ -197,8 +197,8 @@ class WinchProfile(Plotted, Table):
 
     name: str
     drum: DrumSpec
-    gearbox: GearboxSpec
     reference: ReferenceSpec
+    gearbox: GearboxSpec = field(default_factory=GearboxSpec)
     cable: CableSpec = field(default_factory=CableSpec)
     path: PathSpec = field(default_factory=PathSpec)
     motor: MotorSpec = field(default_factory=MotorSpec)
