@@ -400,6 +400,7 @@ def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> 
         notes=engine.regression.dataset.notes,
         sanity=engine.regression.dataset.sanity,
         used_share=engine.regression.dataset.used_share,
+        removed=engine.regression.dataset.removed,
         caveats=engine.regression.dataset.caveats,
         interrupted=True,
         traces=_traces(engine, start, named=False),
@@ -423,6 +424,7 @@ def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
         notes=(*dataset.notes, _UNSEARCHED),
         sanity=dataset.sanity,
         used_share=dataset.used_share,
+        removed=dataset.removed,
         caveats=dataset.caveats,
         traces=_traces(engine, result, named=False),
     )
@@ -489,6 +491,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         ),
         sanity=dataset.sanity,
         used_share=dataset.used_share,
+        removed=dataset.removed,
         caveats=dataset.caveats,
         fit=fit_statistics(
             regression, found.initial_model, final, noise, spread, profile=dataset.profile

@@ -416,6 +416,8 @@ def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]
     """Caveats, findings on the data, and the share of the samples that is compared."""
     caveats = [caveat_text(code) for code in result.caveats]
     findings = finding_texts(result.sanity)
+    quiet = [band for band in result.removed if all_shares and not band.above_noise]
+    findings += [f"{OUTPUT_NAMES[band.output]}: {band.text}" for band in quiet]
     limit = 2.0 if all_shares else _USED
     used = used_text({name: s for name, s in result.used_share.items() if s < limit})
     blocks = {"caveats": caveats, "data": [*findings, *([used] if used else [])]}
