@@ -445,6 +445,8 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
     sets = [equivalence_set(engine, final, noise, index) for index in added]
     final, sets = with_first_members(engine, final, noise, sets)
     final = with_fitted_transitions(engine, final, noise)
+    if not final.converged:
+        final = engine.refit(final.hypothesis, noise)
     found = replace(found, initial_model=file_model(engine, file, noise), final=final)
     outputs = output_fits(engine, (found.initial_model, noise), (final, noise))
     size = {name: output.noise_rms for name, output in outputs.items()}

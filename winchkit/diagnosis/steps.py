@@ -221,6 +221,10 @@ def _doubts(
     if collinearity(regression, result.final, result.noise, index) > _LARGEST_COLLINEARITY:
         what = "the others imitate its change to within 0.3 %: their values may cancel each other"
         out.append(Doubt("collinear", what))
+    if not result.final.converged:
+        steps = result.final.iterations
+        what = f"the fit did not converge in {steps} steps: its values may change"
+        out.append(Doubt("not-converged", what))
     for code, check in (("oversized", oversized), ("short-travel", short_travel)):
         if reason := check(regression, result.final, index):
             out.append(Doubt(code, reason))
