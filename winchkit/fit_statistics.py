@@ -87,6 +87,12 @@ class FitStatistics(Shown, Tabular):
     initial_chi_square: float = nan
     """χ² at the profile's values."""
     parameters: tuple[FittedParameter, ...] = ()
+    converged: bool = True
+    """Whether the iteration ended at a minimum to its tolerance."""
+    iterations: int | None = None
+    """Steps of the last fit; None where it is not known."""
+    rank: int | None = None
+    """Unknowns less the directions that the data do not determine; None where it is not known."""
 
     @property
     def dof(self) -> int:
@@ -132,6 +138,9 @@ class FitStatistics(Shown, Tabular):
         return {
             "correlations": [vars(pair) for pair in self.correlations],
             "condition": self.condition,
+            "converged": self.converged,
+            "iterations": self.iterations,
+            "rank": self.rank,
             "method": self.method,
             "data": self.data,
             "n_observations": self.n_observations,
@@ -169,6 +178,9 @@ class FitStatistics(Shown, Tabular):
             ("AIC = chi-square + 2 p", f"{self.aic:.7g}"),
             ("BIC = chi-square + p ln n", f"{self.bic:.7g}"),
             ("condition number", f"{self.condition:.3g}"),
+            ("converged", "yes" if self.converged else "no: the values may change"),
+            ("iterations", "" if self.iterations is None else f"{self.iterations}"),
+            ("rank", "" if self.rank is None else f"{self.rank}"),
         ]
         for name, value in rows:
             if value:

@@ -123,6 +123,17 @@ def test_nonlinear_regressions_reach_six_certified_digits_from_the_far_start(nam
     assert digits(fitted(data, data.starts[0]).vector, data.certified) >= CERTIFIED
 
 
+@pytest.mark.parametrize("name", NONLINEAR)
+def test_a_fit_that_misses_the_minimum_has_not_converged(name: str) -> None:
+    """From the far start, with the steps of a diagnosis and with many."""
+    data = NONLINEAR[name]
+    for steps in (None, STEPS):
+        found = fitted(data, data.starts[0], steps=steps)
+        right = digits(found.vector, data.certified) >= CERTIFIED
+        assert right or not found.converged or found.rank < len(found.vector)
+        assert not right or steps is None or found.converged
+
+
 @pytest.mark.parametrize("name", sets(SLOW))
 def test_residuals_of_unit_variance_are_fitted_to_the_tolerance_of_chi_square(name: str) -> None:
     """As in a diagnosis: the usual number of steps, and 0.02 of χ² to spare."""

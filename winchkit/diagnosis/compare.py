@@ -124,6 +124,7 @@ def compared(
         maps,
         sanity=dataset.sanity,
         used_share=dataset.used_share,
+        removed=dataset.removed,
         caveats=dataset.caveats,
         traces=traces_of(regression, residual),
     )

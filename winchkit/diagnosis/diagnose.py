@@ -396,6 +396,7 @@ def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> 
         notes=engine.regression.dataset.notes,
         sanity=engine.regression.dataset.sanity,
         used_share=engine.regression.dataset.used_share,
+        removed=engine.regression.dataset.removed,
         caveats=engine.regression.dataset.caveats,
         interrupted=True,
         traces=_traces(engine, start, named=False),
@@ -419,6 +420,7 @@ def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
         notes=dataset.notes,
         sanity=dataset.sanity,
         used_share=dataset.used_share,
+        removed=dataset.removed,
         caveats=dataset.caveats,
         traces=_traces(engine, result, named=False),
     )
@@ -439,6 +441,8 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
     sets = [equivalence_set(engine, final, noise, index) for index in added]
     final, sets = with_first_members(engine, final, noise, sets)
     final = with_fitted_transitions(engine, final, noise)
+    if not final.converged:
+        final = engine.refit(final.hypothesis, noise)
     found = replace(found, initial_model=file_model(engine, file, noise), final=final)
     outputs = output_fits(engine, (found.initial_model, noise), (final, noise))
     size = {name: output.noise_rms for name, output in outputs.items()}
@@ -484,6 +488,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         ),
         sanity=dataset.sanity,
         used_share=dataset.used_share,
+        removed=dataset.removed,
         caveats=dataset.caveats,
         fit=fit_statistics(
             regression, found.initial_model, final, noise, spread, profile=dataset.profile

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from math import isnan
 from typing import Any, ClassVar, Literal
 
+from winchkit.diagnosis.data.low_pass import RemovedBand
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.maps import ResidualMap
 from winchkit.diagnosis.residuals.traces import PoseTrace, Trace, trace_columns
@@ -87,6 +88,8 @@ class Comparison(Plotted, Tabular):
     """Codes of what these runs cannot exclude."""
     traces: tuple[Trace | PoseTrace, ...] = field(default=(), compare=False)
     """Measured and predicted outputs of every run, or errors of every pose."""
+    removed: tuple[RemovedBand, ...] = ()
+    """What the low-pass of every output that has one removes."""
 
     def _columns(self) -> Columns:
         return trace_columns(self.traces)
@@ -102,6 +105,7 @@ class Comparison(Plotted, Tabular):
             "sanity": [finding.to_json() for finding in self.sanity],
             "used_share": dict(self.used_share),
             "caveats": list(self.caveats),
+            "removed": [vars(band) for band in self.removed],
             "notes": list(self.notes),
         }
 
@@ -324,6 +328,8 @@ class Diagnosis(Plotted, Tabular):
     own in every held-out error."""
     traces: tuple[Trace | PoseTrace, ...] = field(default=(), compare=False)
     """Measured and predicted outputs of every run, or errors of every pose."""
+    removed: tuple[RemovedBand, ...] = ()
+    """What the low-pass of every output that has one removes."""
 
     def fit_report(self) -> str:
         """Return the report of the fit of the reported model, in the layout of lmfit's.
@@ -364,6 +370,7 @@ class Diagnosis(Plotted, Tabular):
             "sanity": [finding.to_json() for finding in self.sanity],
             "used_share": dict(self.used_share),
             "caveats": list(self.caveats),
+            "removed": [vars(band) for band in self.removed],
             "fit": None if self.fit is None else self.fit.to_json(),
             "run_offsets": [vars(offset) for offset in self.run_offsets],
             "notes": list(self.notes),

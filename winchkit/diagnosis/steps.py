@@ -12,6 +12,7 @@ from itertools import pairwise, zip_longest
 
 import numpy as np
 
+from winchkit.diagnosis.credibility import oversized, short_travel
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.conditioning import collinearity, value_covariance
 from winchkit.diagnosis.regression.cross_validation import held_out
@@ -187,7 +188,9 @@ def with_standing(
     )
 
 
-_SERIOUS = frozenset({"implausible", "collinear", "undetermined", "small"})
+_SERIOUS = frozenset(
+    {"implausible", "collinear", "undetermined", "small", "oversized", "short-travel"}
+)
 """Doubts with which no step is certain."""
 
 
@@ -215,8 +218,15 @@ def _doubts(
     if collinearity(regression, result.final, result.noise, index) > _LARGEST_COLLINEARITY:
         what = "the others imitate its change to within 0.3 %: their values may cancel each other"
         out.append(Doubt("collinear", what))
-    amplitudes = [e for n, e in values.items() if term.effect.parameter(n).role == "amplitude"]
-    if amplitudes and all(not _is_determined(term.effect.null, n, e) for n, e in values.items()):
+    if not result.final.converged:
+        steps = result.final.iterations
+        what = f"the fit did not converge in {steps} steps: its values may change"
+        out.append(Doubt("not-converged", what))
+    for code, check in (("oversized", oversized), ("short-travel", short_travel)):
+        if reason := check(regression, result.final, index):
+            out.append(Doubt(code, reason))
+    sizes = {n: e for n, e in values.items() if term.effect.parameter(n).role == "amplitude"}
+    if sizes and not any(_is_determined(term.effect.null, n, e) for n, e in sizes.items()):
         out.append(Doubt("undetermined", "its values are not determined by these data"))
     return out
 

@@ -419,6 +419,8 @@ def _data(result: Comparison | Diagnosis, *, all_shares: bool) -> list[list[str]
     told = ALARMING if isinstance(result, Diagnosis) and not result.candidates else frozenset()
     findings = finding_texts([f for f in result.sanity if f.code not in told])
     caveats = [caveat_text(code) for code in result.caveats if code not in told]
+    quiet = [band for band in result.removed if all_shares and not band.above_noise]
+    findings += [f"{OUTPUT_NAMES[band.output]}: {band.text}" for band in quiet]
     limit = 2.0 if all_shares else _USED
     used = used_text({name: s for name, s in result.used_share.items() if s < limit})
     blocks = {"caveats": caveats, "data": [*findings, *([used] if used else [])]}

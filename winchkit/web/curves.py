@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.data.harmonics import half_of_samples_per_turn, strongest_harmonic
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import (
     Attribution,
     binned_share,
-    half_of_samples_per_turn,
     kept_rows,
-    strongest_harmonic,
     variables_of,
 )
 from winchkit.diagnosis.residuals.traces import traces_of

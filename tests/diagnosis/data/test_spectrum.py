@@ -15,7 +15,6 @@ from winchkit.diagnosis.data.spectrum import (
     low_pass,
     to_frequency,
     to_time,
-    torque_cut_off,
 )
 
 
@@ -79,28 +78,6 @@ def test_bands_of_noise_are_in_order_and_hold_enough(count: int, copies: int) ->
     assert inside.sum() == count
     if len(edges) > 2:
         assert inside.min() * copies >= 8
-
-
-def test_the_torque_is_compared_up_to_20_hz_or_a_tenth_of_the_rate() -> None:
-    assert torque_cut_off([], 1000.0) == 20.0
-    assert torque_cut_off([], 50.0) == 5.0
-
-
-def test_the_cut_off_follows_cogging_that_a_tenth_of_the_rate_would_filter_away() -> None:
-    """A sine of a fifth of the slow residual's amplitude, at 4 Hz of 25 Hz."""
-    random, time = np.random.default_rng(1), np.arange(4000) / 25
-    slow = np.sin(2 * np.pi * 0.05 * time) + 0.05 * random.standard_normal(4000)
-    assert torque_cut_off([slow, slow], 25.0) == 2.5
-    cogging = slow + 0.2 * np.sin(2 * np.pi * 4.0 * time)
-    assert 4.0 < torque_cut_off([slow, cogging], 25.0) < 5.0
-    assert torque_cut_off([cogging + 0.2 * np.sin(2 * np.pi * 12.0 * time)], 25.0) == 10.0
-
-
-def test_noise_alone_raises_the_cut_off_in_few_of_many_cases() -> None:
-    """White noise in four short runs: nominally 1 %, of 1000 other cases 1.7 %."""
-    random = np.random.default_rng(2)
-    raised = [torque_cut_off(list(random.standard_normal((4, 1500))), 20.0) for _ in range(300)]
-    assert np.count_nonzero(np.array(raised) > 2.0) <= 12
 
 
 def test_a_fast_length_is_the_largest_with_small_factors_only() -> None:

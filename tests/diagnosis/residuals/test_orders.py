@@ -7,8 +7,9 @@ import pytest
 
 from diagnosis_runs import GROOVED, Ride, length_problem
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.harmonics import half_of_samples_per_turn
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
-from winchkit.diagnosis.residuals.attribution import half_of_samples_per_turn, harmonics
+from winchkit.diagnosis.residuals.attribution import harmonics
 
 RIDE = Ride(samples=3000, rate=100.0)
 

@@ -70,10 +70,9 @@ def test_a_candidate_of_well_known_bands_is_held_to_its_own_quantile() -> None:
         (item.candidate.effect.id, item.candidate.shape.get("order")): item
         for item in engine.scores_at_all_points(first.initial_model, first.initial_noise)
     }
-    assert min(first.initial_noise.dof) < 2.0
-    assert first.threshold > 1000.0
+    assert first.threshold < 100.0
     assert by_effect["motor-cogging", 24].by_chance < 30.0
-    assert by_effect["motor-coulomb", None].by_chance > 1000.0
+    assert by_effect["motor-coulomb", None].by_chance < 100.0
 
 
 @pytest.mark.parametrize(("size", "steps"), [(0.1, 0), (0.2, 1)])

@@ -6,7 +6,7 @@ derivatives and effects with memory stay defined; the interpolated samples are n
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,12 +17,18 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.copies import COPIES, without_copies
 from winchkit.diagnosis.data.decimation import Decimation, decimation_for
 from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
+from winchkit.diagnosis.data.low_pass import (
+    Compared,
+    RemovedBand,
+    cut_off_of,
+    removed_by_low_pass,
+)
 from winchkit.diagnosis.data.motor_current import with_torques
 from winchkit.diagnosis.data.outlying_repeats import outlying_repeat
 from winchkit.diagnosis.data.repeats import Repeats, find_repeats
-from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, even_instants
+from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, evenly_stamped
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
-from winchkit.diagnosis.data.spectrum import Band, fast_count, torque_cut_off
+from winchkit.diagnosis.data.spectrum import Band, fast_count
 from winchkit.diagnosis.data.standstill import standstill_findings, standstill_mask
 from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
@@ -108,6 +114,8 @@ class Dataset:
     """Outputs whose instrument has another offset in every run."""
     decimation_factor: int = 1
     """Samples of the recording per sample of the data set."""
+    removed: tuple[RemovedBand, ...] = ()
+    """What the low-pass of every output that has one removes."""
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -218,10 +226,13 @@ def prepare(
     if "cable_length" not in {finding.channel for finding in zeroed}:
         zeroed += angles_from_zero(runs)
     factor = 1 if decimation is None else decimation.factor
+    removed = tuple(_removed(runs, dataset))
     return replace(
         dataset,
+        removed=removed,
         notes=tuple(notes),
         sanity=(
+            *(finding for band in removed for finding in band.findings),
             *copied,
             *left_out,
             *coarse,
@@ -238,6 +249,32 @@ def prepare(
         resolution=resolution,
         decimation_factor=factor,
     )
+
+
+def _removed(runs: Sequence[Run], dataset: Dataset) -> Iterator[RemovedBand]:
+    """What the low-pass of every output removes; of decimated runs from the measured output."""
+    for output in dataset.outputs:
+        own = [r for r in dataset.recordings if output in r.measured]
+        cut_off = own[0].bands[output].cut_off
+        if cut_off is None:
+            continue
+        if own[0].decimated:
+            compared = [
+                Compared(bridged(run["motor_angle"]), run[output], run[output], 1 / run.interval)
+                for run in runs
+                if output in run
+            ]
+        else:
+            compared = [
+                Compared(
+                    r.signals.motor_angle,
+                    r.measured[output],
+                    np.where(r.valid[output], r.measured[output] - r.nominal[output], np.nan),
+                    r.bands[output].rate,
+                )
+                for r in own
+            ]
+        yield removed_by_low_pass(compared, output, cut_off)
 
 
 def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Finding]:
@@ -361,7 +398,7 @@ def assemble(
         else np.zeros(len(run), dtype=bool)
         for run, predicted, motion in zip(runs, nominal, raw, strict=True)
     ]
-    cut_off = _torque_cut_off(runs, nominal, stands, filtering)
+    cut_off = filtering.band or cut_off_of(runs, nominal, stands, raw)
     outputs = ("motor_torque",) if isinstance(profile, AxisProfile) else OUTPUTS
     recordings = tuple(
         Recording(
@@ -385,21 +422,6 @@ def assemble(
         for shown in ([output for output in outputs if output in run and output in predicted],)
     )
     return Dataset(profile, recordings, tuple(repeats))
-
-
-def evenly_stamped(runs: Sequence[Run]) -> tuple[list[Run], list[str]]:
-    """Runs at even sampling instants where their stamps jitter about them, and notes on these."""
-    out, notes = [], []
-    for run in runs:
-        instants = even_instants(run.time, bridged(run["motor_angle"]))
-        if instants is not None:
-            jitter = float(np.std(run.time - instants))
-            notes.append(
-                f"{run.name}: the stamps jitter by {jitter:.2g} s about even sampling instants, at "
-                "which the motor angle is a smoother motion; these are used"
-            )
-        out.append(run if instants is None else replace(run, time=instants))
-    return out, notes
 
 
 def _of_fast_count(run: Run, factor: int) -> Run:
@@ -445,27 +467,7 @@ def _signals(run: Run, profile: WinchProfile, clock: Clock | None = None) -> Sig
     )
 
 
-def _torque_cut_off(
-    runs: Sequence[Run],
-    nominal: Sequence[Mapping[str, Array]],
-    stands: Sequence[Mask],
-    filtering: Filtering,
-) -> float:
-    """Cut-off of the torque's low-pass for all runs, Hz; residuals are zero at standstills."""
-    if filtering.band is not None:
-        return filtering.band
-    rate = 1 / max(run.interval for run in runs)
-    if filtering.decimation is not None:
-        return torque_cut_off([], rate * filtering.decimation.factor)
-    residuals = [
-        np.where(still, 0.0, run["motor_torque"] - own["motor_torque"])
-        for run, own, still in zip(runs, nominal, stands, strict=True)
-        if "motor_torque" in run
-    ]
-    return torque_cut_off(residuals, rate)
-
-
-def _band(run: Run, output: str, filtering: Filtering, torque_cut_off: float) -> Band:
+def _band(run: Run, output: str, filtering: Filtering, torque_cut_off: float | None) -> Band:
     cut_off = torque_cut_off if output == "motor_torque" else None
     if filtering.decimation is not None:
         cut_off = min(cut_off or np.inf, filtering.decimation.cut_off)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,7 +13,14 @@ from winchkit.model.derivatives import Clock
 from winchkit.model.smoothing_spline import SmoothingSpline
 from winchkit.runs.run import Run
 
-__all__ = ["away_from", "bridged", "bridged_channel", "even_instants", "gaps"]
+__all__ = [
+    "away_from",
+    "bridged",
+    "bridged_channel",
+    "even_instants",
+    "evenly_stamped",
+    "gaps",
+]
 
 Mask = NDArray[np.bool_]
 
@@ -135,3 +145,18 @@ def away_from(unknown: Mask, reach: int) -> Mask:
     """
     padded = np.pad(unknown, reach, constant_values=True).astype(float)
     return np.convolve(padded, np.ones(2 * reach + 1), mode="valid") < 0.5
+
+
+def evenly_stamped(runs: Sequence[Run]) -> tuple[list[Run], list[str]]:
+    """Runs at even sampling instants where their stamps jitter about them, and notes on these."""
+    out, notes = [], []
+    for run in runs:
+        instants = even_instants(run.time, bridged(run["motor_angle"]))
+        if instants is not None:
+            jitter = float(np.std(run.time - instants))
+            notes.append(
+                f"{run.name}: the stamps jitter by {jitter:.2g} s about even sampling instants, at "
+                "which the motor angle is a smoother motion; these are used"
+            )
+        out.append(run if instants is None else replace(run, time=instants))
+    return out, notes

@@ -7,7 +7,6 @@ their variance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -30,15 +29,11 @@ __all__ = [
     "smoothed",
     "to_frequency",
     "to_time",
-    "torque_cut_off",
 ]
 
 _BUTTERWORTH_ORDER = 4
 """Order of the zero-phase low-pass of the torque; convention of robot identification (forward and
 backward Butterworth filter)."""
-_TORQUE_BAND = 20.0
-"""Highest cut-off of the torque, Hz; a lower one where the sampling rate is below 200 Hz;
-convention of robot identification."""
 _BANDS = 14
 """Logarithmic noise bands per output without repeats, and of the Wiener filter; screened."""
 _NARROW = 24
@@ -69,35 +64,12 @@ _BLOCKS = 8
 """Least number of blocks of a Welch spectrum, overlapping by half."""
 _LEVEL = 0.01
 """Level of the test of a spectrum against its noise, all frequencies together."""
-_HIGHEST_CUT_OFF = 0.4
-"""In units of the sampling rate."""
 
 
-def torque_cut_off(residuals: Sequence[Array], rate: float) -> float:
-    """Cut-off of the torque's low-pass, Hz, the same for all runs.
-
-    Parameters
-    ----------
-    residuals
-        Measured minus predicted torque of every run, (n,) each.
-    rate
-        Lowest sampling rate of the runs, Hz.
-
-    Returns
-    -------
-    float
-        20 Hz, or less where the sampling rate is below 200 Hz: a tenth of the rate, or the highest
-        frequency at which a residual exceeds its noise.
-    """
-    needed = rate / 10
-    if needed < _TORQUE_BAND:
-        highest = [highest_frequency(r, rate, len(residuals)) for r in residuals]
-        needed = max(needed, min(max(highest, default=0.0), _HIGHEST_CUT_OFF * rate))
-    return min(_TORQUE_BAND, needed)
-
-
-def highest_frequency(values: Array, rate: float, signals: int = 1) -> float:
-    """Frequency above which less than 1 % of a signal's power beyond its white noise lies, Hz.
+def highest_frequency(
+    values: Array, rate: float, signals: int = 1, lost: float = LOST_POWER
+) -> float:
+    """Frequency above which no more than a share of a signal's power beyond its white noise is, Hz.
 
     Parameters
     ----------
@@ -107,6 +79,8 @@ def highest_frequency(values: Array, rate: float, signals: int = 1) -> float:
         Samples per second.
     signals
         Number of signals that are tested together.
+    lost
+        That share; 1 % by default, 0 for the highest frequency that exceeds the noise.
 
     Returns
     -------
@@ -137,7 +111,7 @@ def highest_frequency(values: Array, rate: float, signals: int = 1) -> float:
     power_above = np.cumsum(np.where(power > limit, power - noise, 0.0)[::-1])[::-1]
     if not power_above[0]:
         return 0.0
-    last = int(np.flatnonzero(power_above >= LOST_POWER * power_above[0])[-1])
+    last = int(np.flatnonzero(power_above > lost * power_above[0])[-1])
     return float(frequency[min(last + 1, len(frequency) - 1)])
 
 

@@ -107,6 +107,14 @@ class Fit:
         Number of unknowns.
     abandoned : bool
         Whether the fit was given up far from its target.
+    converged : bool
+        Whether the iteration ended since the next step promised, or the last one brought, no
+        decrease of χ² that counts.
+    iterations : int
+        Number of steps that were tried.
+    rank : int
+        Number of unknowns, less the directions that the data do not determine at the last
+        linearisation.
     """
 
     hypothesis: Hypothesis
@@ -116,6 +124,9 @@ class Fit:
     chi_square: float
     n_unknowns: int
     abandoned: bool = False
+    converged: bool = False
+    iterations: int = 0
+    rank: int = 0
 
     @cached_property
     def jacobian(self) -> Array:
@@ -164,8 +175,8 @@ def fit(
     Returns
     -------
     Fit
-        The best point reached; the fit has converged unless the number of iterations was the limit
-        or the aim is out of reach.
+        The best point reached, and whether the fit has converged: not where the number of
+        iterations was the limit, no step decreased χ², or the aim is out of reach.
 
     Notes
     -----
@@ -180,10 +191,12 @@ def fit(
     local: _LocalModel | None = None
     failures, latest = 0, np.inf
     limit = (_iterations(start) if most is None else most) if len(x) else 0
+    converged, iterations, rank = not len(x), 0, 0
     for iteration in range(limit):
         if local is None:
             jacobian = regression.jacobian(x, start)
             local = _LocalModel(jacobian, residual, inverse_sigma, x, (low, high))
+            rank = local.rank
             promised = _STEPS_LEFT * local.step(_TrustRegion()).decrease
             if iteration >= _SETTLED:
                 promised = min(promised, 2 * (limit - iteration) * latest)
@@ -192,7 +205,9 @@ def fit(
         least = max(_LEAST_DECREASE, tolerance * (chi_square - len(residual)))
         step = local.step(region)
         if step.decrease < least:
+            converged = True
             break
+        iterations += 1
         trial = np.clip(x + step.change, low, high)
         residual_there = regression.residual(regression.hypothesis(trial, start))
         new = _chi_square(residual_there, inverse_sigma)
@@ -205,10 +220,21 @@ def fit(
             failures, latest = 0, chi_square - new
             x, residual, chi_square, local = trial, residual_there, new, None
             if latest < least:
+                converged = True
                 break
     fitted = regression.hypothesis(x, start)
     known = None if local is None else jacobian
-    return Fit(fitted, x, residual, _derivative(regression, x, start, known), chi_square, len(x))
+    return Fit(
+        fitted,
+        x,
+        residual,
+        _derivative(regression, x, start, known),
+        chi_square,
+        len(x),
+        converged=converged,
+        iterations=iterations,
+        rank=rank,
+    )
 
 
 def _derivative(
@@ -395,8 +421,9 @@ def _iterations(start: Hypothesis) -> int:
 
 
 def _chi_square(residual: Array, inverse_sigma: Array) -> float:
-    whitened = residual * inverse_sigma
-    return float(whitened @ whitened)
+    with np.errstate(over="ignore"):  # Infinite far from the minimum: the step has failed.
+        whitened = residual * inverse_sigma
+        return float(whitened @ whitened)
 
 
 @dataclass(frozen=True)
@@ -455,6 +482,7 @@ class _LocalModel:
         # Linearly dependent unknowns stay where they are: truncated eigenvalues.
         values, vectors = np.linalg.eigh(scaled) if len(scaled) else (np.zeros(0), scaled)
         kept = values > _LEAST_EIGENVALUE * np.max(values, initial=0.0)
+        self.rank = int(np.count_nonzero(kept) + np.count_nonzero(at_bound & (np.diag(normal) > 0)))
         self._values, self._vectors = values[kept], vectors[:, kept]
         self._along = self._vectors.T @ (gradient[self._free] / self._scale)
 

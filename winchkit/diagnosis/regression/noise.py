@@ -42,6 +42,9 @@ _KNOWN_DIFFERENCES = 6
 """Directions that known differences between repeats may take out of the pure error; screened."""
 _NOTICEABLE = 0.02
 """Power of a signature's difference over that of its mean from which it is taken out; screened."""
+_LEAST_DOF = 4.0
+"""Degrees of freedom that candidates must leave a band for its own variance: half of the rows of a
+wide band."""
 _REWEIGHTED = 3
 """Reweighting iterations; screened."""
 _ROWS_EACH = 4
@@ -196,6 +199,8 @@ def noise_saturated(
     leverage = np.sum((gram @ through) * through, axis=(1, 2)) / power
     dof = np.maximum(total - leverage, 1.0)
     power = _power(regression, left, bands, dof)
+    # Of a band that the candidates explain whole, the neighbours say how large its variance can be.
+    dof = np.where(dof < _LEAST_DOF, np.maximum(dof, _smooth(regression, power, dof)[1]), dof)
     return Noise(power, dof, _rms(regression, power), from_repeats=False)
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
+from winchkit.diagnosis.data.harmonics import half_of_samples_per_turn, strongest_harmonic
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLES
 from winchkit.schema.profiles.axis import AxisProfile
@@ -32,28 +33,15 @@ __all__ = [
     "attributions",
     "binned_share",
     "chance_share",
-    "half_of_samples_per_turn",
     "harmonics",
     "kept_rows",
     "quantile_bins",
     "ranked",
-    "strongest_harmonic",
-    "sums_by_order",
     "variables_of",
 ]
 
 BINS = 16
 """Bins per variable."""
-_TURN = 2 * np.pi
-"""Rad of a turn; definition."""
-_MOST_ORDERS = 1000
-"""Highest scanned order per motor or drum turn; bound of the parameter `order`."""
-_CELLS = 32
-"""Cells per shortest period in which samples are summed to find the order; phase error of at most
-π/32, loss of power below 0.4 %; the share of the order found is exact."""
-_LARGEST_CONDITION = 1e6
-"""Condition of sine and cosine from which an order is not identifiable; numerical: half of the
-digits are left."""
 _LEVEL = 0.01
 """Probability that independent residuals have an order; convention, as the score's."""
 _OF_THE_CABLE = "cable_length", "directed_length"
@@ -237,101 +225,3 @@ def quantile_bins(variable: Array) -> NDArray[np.intp]:
 def quantile_edges(values: Array, bins: int) -> Array:
     """Inner edges, sorted, of at most ``bins`` bins of equal counts as far as ties allow."""
     return np.unique(np.quantile(values, np.linspace(0, 1, bins + 1)[1:-1]))
-
-
-def half_of_samples_per_turn(angles: Iterable[Array]) -> int:
-    """Highest order that samples of an angle resolve where it turns most slowly.
-
-    Parameters
-    ----------
-    angles : iterable of (n,) arrays
-        One for each run, rad.
-
-    Returns
-    -------
-    int
-        Half of the samples of the slowest whole turn (of the slowest motion where there is no
-        whole turn), at most 1000; 0 where nothing moves.
-    """
-    step = np.sort(np.abs(np.concatenate([np.zeros(1), *(np.diff(angle) for angle in angles)])))
-    step = step[step > 0]
-    if not len(step):
-        return 0
-    last = min(int(np.searchsorted(np.cumsum(step), _TURN)), len(step) - 1)
-    return int(min(_TURN / step[last] / 2, _MOST_ORDERS))
-
-
-def sums_by_order(
-    angle: Array, values: Array, resolved: int, highest: int
-) -> NDArray[np.complex128]:
-    """Sums Σ x exp(ikθ) over samples, for the orders k from 1 to ``highest``, (highest,).
-
-    Parameters
-    ----------
-    angle, values : (n,) arrays
-        Angles θ, rad, and what is summed, x.
-    resolved : int
-        Order of whose period a cell is a thirty-second.
-    highest : int
-        Highest order.
-
-    Notes
-    -----
-    The samples are summed within equal cells of the turn, and these by one Fourier transform; the
-    phase of a sample is that of the middle of its cell.
-    """
-    cells = _CELLS * resolved
-    cell = np.floor(angle * (cells / _TURN)).astype(np.int64) % cells
-    middle = np.exp(0.5j * _TURN / cells * np.arange(1, highest + 1))
-    sums = np.fft.rfft(np.bincount(cell, values, cells))[1 : highest + 1]
-    return np.asarray(np.conj(sums) * middle)
-
-
-def strongest_harmonic(angle: Array, error: Array, orders: int) -> tuple[int, float] | None:
-    """The order from 1 to ``orders`` whose sine explains most of a residual, and its share.
-
-    Parameters
-    ----------
-    angle, error : (n,) arrays
-        Angle, rad, and what is explained.
-    orders : int
-        Highest order.
-
-    Returns
-    -------
-    tuple of int and float, or None
-        None where there is no residual, or no order is identifiable: the angle hardly moves.
-
-    Notes
-    -----
-    All orders are compared by :func:`sums_by_order`; the share of the best one is exact.
-    """
-    total = float(error @ error)
-    if total == 0.0 or not orders:
-        return None
-    toward, sums = (
-        sums_by_order(angle, values, orders, 2 * orders) for values in (error, np.ones(len(error)))
-    )
-    explained = _explained(toward[:orders], sums[1::2], len(angle))
-    best = int(np.argmax(explained))
-    if explained[best] <= 0.0:
-        return None
-    first = np.exp(1j * (best + 1) * angle)
-    exact = _explained(np.array([first @ error]), np.array([np.sum(first**2)]), len(angle))
-    return best + 1, float(exact[0]) / total
-
-
-def _explained(toward: NDArray[np.complex128], twice: NDArray[np.complex128], count: int) -> Array:
-    """Sum of squares that cosine and sine of each order explain; zero where not identifiable.
-
-    From the sums of e exp(ikθ) and of exp(2ikθ) over ``count`` samples, complex, (orders,).
-    """
-    normal = np.empty((len(twice), 2, 2))
-    normal[:, 0, 0], normal[:, 1, 1] = (count + twice.real) / 2, (count - twice.real) / 2
-    normal[:, 0, 1] = normal[:, 1, 0] = twice.imag / 2
-    identifiable = np.linalg.cond(normal) <= _LARGEST_CONDITION
-    gradient = np.stack([toward.real, toward.imag], axis=1)[identifiable]
-    out = np.zeros(len(twice))
-    solved = np.linalg.solve(normal[identifiable], gradient[:, :, None])[:, :, 0]
-    out[identifiable] = np.sum(gradient * solved, axis=1)
-    return out

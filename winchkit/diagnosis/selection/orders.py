@@ -21,13 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.harmonics import half_of_samples_per_turn, sums_by_order
 from winchkit.diagnosis.data.spectrum import to_time
 from winchkit.diagnosis.regression.base import Segment
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
-from winchkit.diagnosis.residuals.attribution import half_of_samples_per_turn, sums_by_order
 from winchkit.effects.effect import MOTOR_ORDERS, Effect
 from winchkit.effects.empirical import EMPIRICAL
 from winchkit.effects.parametrization import Coordinates

@@ -73,6 +73,9 @@ def fit_statistics(
             *_nuisances(regression, fit, spread),
             *_values(regression, initial, fit, spread, profile),
         ),
+        converged=fit.converged,
+        iterations=fit.iterations,
+        rank=fit.rank + scanned,
     )
 
 

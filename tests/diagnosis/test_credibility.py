@@ -1,0 +1,58 @@
+"""What an effect implies must be of the size of what was measured, on a joint of known motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis_runs import term
+from winchkit.diagnosis.credibility import oversized, short_travel
+from winchkit.diagnosis.data.dataset import prepare
+from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.effects.catalogue import load_catalogue
+from winchkit.runs.run import Channel, Run
+from winchkit.schema.profiles.axis import AxisProfile
+
+JOINT = AxisProfile(name="joint")
+INERTIA, STIFFNESS = 2.0, -310.0
+RATE, SECONDS = 100.0, 40.0
+
+
+def joint(half_range: float, seed: int = 1) -> Run:
+    """Two harmonics within ± half_range, rad; inertia, a slope over the angle and white noise."""
+    time = np.arange(0.0, SECONDS, 1 / RATE)
+    angle, acceleration = np.zeros(len(time)), np.zeros(len(time))
+    for amplitude, frequency in ((0.7 * half_range, 0.4), (0.3 * half_range, 0.91)):
+        wave = amplitude * np.sin(2 * np.pi * frequency * time)
+        angle, acceleration = angle + wave, acceleration - (2 * np.pi * frequency) ** 2 * wave
+    torque = INERTIA * acceleration + STIFFNESS * angle
+    torque += 0.1 * np.random.default_rng(seed).standard_normal(len(time))
+    channels = {"motor_angle": Channel(angle, "rad"), "motor_torque": Channel(torque, "N m")}
+    return Run("joint", time, channels, {})
+
+
+@pytest.mark.parametrize(("inertia", "too_large"), [(INERTIA, False), (1420.0, True)])
+def test_an_inertia_is_bounded_by_torque_and_acceleration(inertia: float, too_large: bool) -> None:
+    engine = selection_engine(prepare([joint(0.5)], JOINT), load_catalogue())
+    noise = engine.fit_with_noise(engine.initial_model)[1]
+    hypothesis = engine.initial_model.with_term(term("rotor-inertia", inertia=inertia), 1)
+    reason = oversized(engine.regression, engine.fixed(hypothesis, noise), 0)
+    assert (reason is not None) == too_large
+    assert reason is None or "other effects cancel it" in reason
+
+
+@pytest.mark.parametrize(("half_range", "short"), [(np.radians(1.3), True), (0.5, False)])
+def test_a_law_over_a_degree_of_travel_is_not_certain(half_range: float, short: bool) -> None:
+    engine = selection_engine(prepare([joint(half_range)], JOINT), load_catalogue())
+    noise = engine.fit_with_noise(engine.initial_model)[1]
+    spring = term("spring-balancer", stiffness=STIFFNESS, torque=0.0)
+    fitted = engine.fixed(engine.initial_model.with_term(spring, 1), noise)
+    assert (short_travel(engine.regression, fitted, 0) is not None) == short
+
+
+def test_a_slope_over_a_degree_is_a_step_with_a_doubt() -> None:
+    found = diagnose([joint(np.radians(1.3))], JOINT).diagnosis
+    smooth = [s for s in found.steps if {"spring-balancer", "joint-gravity"} & set(s.effects)]
+    assert smooth
+    assert not any(step.certain for step in smooth)
+    assert all("short-travel" in [doubt.code for doubt in step.doubts] for step in smooth)

@@ -1,0 +1,76 @@
+"""Reasons why a fitted effect is not certain although it fits: what it implies cannot be seen.
+
+The plausible range of an axis follows its torque and acceleration: what an effect contributes to an
+output must be of the size of that output, and a law must be seen over a part of its variable in
+which it differs from a straight line.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.regression.base import Regression
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.runs.sanity.text import size
+
+__all__ = ["oversized", "short_travel"]
+
+_LARGEST_RATIO = 2.0
+"""Range of an effect's change over that of the output itself, from which other effects must cancel
+it; rule of thumb: a balancer cancels most of a weight."""
+_ENDS = 0.01, 0.99
+"""Quantiles that are a range: single samples are none."""
+_LEAST_TRAVEL = 0.5
+"""Range of an angle, rad, below which a sine differs from a straight line by less than 1 %
+(h²/6 for half a range h): any smooth law fits there."""
+
+
+def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
+    """Whether an effect changes an output by far more than that varies, in words.
+
+    Parameters
+    ----------
+    regression
+        The data and the model.
+    fit
+        The fitted model.
+    index
+        Of the effect.
+    """
+    if not isinstance(regression, TimeSeriesRegression):
+        return None
+    hypothesis = fit.hypothesis
+    change = regression.change(hypothesis) - regression.change(hypothesis.without(index))
+    for output in regression.outputs:
+        own = _range(regression.compared_samples(change, output))
+        samples = regression.measured_samples(output)
+        whole = _range(np.concatenate([values[valid] for values, valid in samples]))
+        if own > _LARGEST_RATIO * whole:
+            unit, name = OUTPUT_UNITS[output], output.replace("_", " ")
+            return (
+                f"it changes the {name} by {size(own, unit)}, which varies by {size(whole, unit)}: "
+                "other effects cancel it"
+            )
+    return None
+
+
+def short_travel(regression: Regression, fit: Fit, index: int) -> str | None:
+    """Whether a smooth law over the angle was seen over too small a part of a turn, in words."""
+    effect = fit.hypothesis.terms[index].effect
+    if not isinstance(regression, TimeSeriesRegression) or effect.variable != "drum_angle":
+        return None
+    travel = max(float(np.ptp(motion.drum_angle)) for motion in regression.motions)
+    if travel >= _LEAST_TRAVEL:
+        return None
+    return (
+        f"the axis turned by {np.degrees(travel):.2g}° only, over which any smooth law is a "
+        "straight line"
+    )
+
+
+def _range(values: Array) -> float:
+    low, high = np.quantile(values, _ENDS)
+    return float(high - low)

@@ -1,0 +1,187 @@
+"""Low-pass of the torque: its cut-off, and what it removes.
+
+Accelerations by differences of a measured angle are mostly noise at high frequencies: the torque is
+compared below a cut-off, as in the identification of robots. Cogging of a fast motor is far above
+the usual one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.harmonics import half_of_samples_per_turn, strongest_harmonic
+from winchkit.diagnosis.data.sampling import bridged
+from winchkit.diagnosis.data.spectrum import (
+    LOST_POWER,
+    Band,
+    highest_frequency,
+    to_frequency,
+    to_time,
+)
+from winchkit.effects.effect import MOTOR_ORDERS
+from winchkit.model.line import Motion
+from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.runs.run import Run
+from winchkit.runs.sanity.finding import Finding
+from winchkit.runs.sanity.text import size
+
+__all__ = ["Compared", "RemovedBand", "cut_off_of", "removed_by_low_pass", "torque_cut_off"]
+
+_TORQUE_BAND = 20.0
+"""Usual cut-off of the torque, Hz; a tenth of a sampling rate below 200 Hz; convention of robot
+identification."""
+_HIGHEST_CUT_OFF = 0.4
+"""In units of the sampling rate."""
+_ABOVE_ORDER = 1.5
+"""Cut-off over the frequency of the highest order of a candidate: the filter passes 96 % there."""
+_AT_NOISE = 1.1
+"""Ratio of an rms to that of the noise from which it is more than noise; as in the verdict."""
+_LEVEL = 0.01
+"""Probability that the strongest order of noise is named; convention, as the score's."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One output of one run before the low-pass."""
+
+    angle: Array
+    """Of the motor, rad, (n,)."""
+    measured: Array
+    """(n,), SI."""
+    error: Array
+    """Measured less predicted, (n,), SI; NaN where it is not compared."""
+    rate: float
+    """Samples per second."""
+
+    def highest_frequency(self, runs: int, lost: float = 0.0) -> float:
+        """Highest frequency at which both the measured output and its error exceed white noise, Hz.
+
+        Noise of a measured angle makes the predicted inertial torque, and so the error alone,
+        exceed white noise at high frequencies.
+        """
+        return min(
+            highest_frequency(values, self.rate, runs, lost)
+            for values in (self.measured, self.error)
+        )
+
+
+def torque_cut_off(runs: Sequence[Compared], speed: float, lost: float = 0.0) -> float:
+    """Cut-off of the torque's low-pass, Hz, the same for all runs.
+
+    Parameters
+    ----------
+    runs
+        Torque of every run, at least one.
+    speed
+        Highest speed of the motor, rad/s.
+    lost
+        Share of the power above the noise that may lie above the cut-off.
+
+    Returns
+    -------
+    float
+        1.5 times the frequency of the highest order of a candidate at that speed, 20 Hz at least
+        and 0.4 of the lowest sampling rate at most. Where all above it is white noise, the highest
+        frequency at which a torque exceeds its noise, or 20 Hz or a tenth of the rate.
+    """
+    rate = min(run.rate for run in runs)
+    usual = min(_TORQUE_BAND, rate / 10)
+    order = _ABOVE_ORDER * MOTOR_ORDERS[-1] * speed / (2 * np.pi)
+    highest = max(run.highest_frequency(len(runs), lost) for run in runs)
+    return min(max(usual, highest), max(_TORQUE_BAND, order), _HIGHEST_CUT_OFF * rate)
+
+
+def cut_off_of(
+    runs: Sequence[Run],
+    nominal: Sequence[Mapping[str, Array]],
+    stands: Sequence[NDArray[np.bool_]],
+    motions: Sequence[Motion],
+) -> float | None:
+    """Cut-off of the torque's low-pass for all runs, Hz; None where no run has a torque.
+
+    The acceleration of a known weight by differences of samples is too small at high frequencies:
+    1 % of the power may lie above the cut-off there.
+    """
+    compared = [
+        Compared(
+            motion.at.motor_angle,
+            run["motor_torque"],
+            np.where(still, 0.0, run["motor_torque"] - own["motor_torque"]),
+            1 / run.interval,
+        )
+        for run, own, still, motion in zip(runs, nominal, stands, motions, strict=True)
+        if "motor_torque" in run
+    ]
+    speed = max(float(np.max(np.abs(motion.at.motor_rate))) for motion in motions)
+    weighed = any(motion.load_mass is not None for motion in motions)
+    return torque_cut_off(compared, speed, weighed * LOST_POWER) if compared else None
+
+
+@dataclass(frozen=True)
+class RemovedBand:
+    """What the low-pass of an output removes from measured less predicted, SI."""
+
+    output: str
+    cut_off: float
+    """Hz."""
+    rms: float
+    above_noise: bool
+    """Whether it contains more than white noise."""
+    order: int | None
+    """Its strongest order of the motor angle; None where that is within white noise."""
+    amplitude: float | None
+    """Amplitude of that order."""
+
+    @property
+    def text(self) -> str:
+        """One sentence without a full stop."""
+        unit = OUTPUT_UNITS[self.output]
+        text = f"the low-pass at {self.cut_off:.3g} Hz removes {size(self.rms, unit)} rms"
+        if not self.above_noise:
+            return f"{text}, which is white noise"
+        if self.order is not None and self.amplitude is not None:
+            own = size(self.amplitude, unit)
+            text = f"{text}, of it {own} at {self.order} periods per motor turn"
+        return f"{text}: more than white noise; --band HZ sets another cut-off"
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Finding where it is more than white noise; value: its rms, SI."""
+        found = Finding("low-passed", "", self.output, self.rms, self.text)
+        return (found,) if self.above_noise else ()
+
+
+def removed_by_low_pass(runs: Sequence[Compared], output: str, cut_off: float) -> RemovedBand:
+    """What a low-pass with a cut-off in Hz removes from the errors of an output in all runs.
+
+    Notes
+    -----
+    The density of the white noise is that of the upper half of the frequencies, from the median of
+    the squared coefficients of the cosine transform.
+    """
+    angles, removed, noise = [], [], 0.0
+    for run in runs:
+        known, band = np.isfinite(run.error), Band(len(run.error), run.rate, cut_off, np.inf)
+        coefficients = to_frequency(bridged(run.error), replace(band, cut_off=None))
+        removed.append(to_time((1 - band.gain) * coefficients, band)[known])
+        angles.append(run.angle[known])
+        white = np.median(coefficients[band.count // 2 :] ** 2) / chdtri(1, 0.5)
+        noise += float(white * np.mean((1 - band.gain) ** 2) * np.count_nonzero(known))
+    lost = np.concatenate(removed)
+    mean_square = float(np.mean(lost**2))
+    above = mean_square > _AT_NOISE**2 * noise / len(lost) and any(
+        run.highest_frequency(len(runs)) > cut_off for run in runs
+    )
+    orders = max(half_of_samples_per_turn(angles), int(MOTOR_ORDERS[-1]))
+    found = strongest_harmonic(np.concatenate(angles), lost, orders)
+    order, share = found if above and found is not None else (None, 0.0)
+    if share <= 2 * np.log(orders / _LEVEL) / len(lost):
+        order = None
+    amplitude = None if order is None else float(np.sqrt(2 * share * mean_square))
+    return RemovedBand(output, cut_off, float(np.sqrt(mean_square)), above, order, amplitude)
