@@ -33,7 +33,7 @@ from winchkit.diagnosis.data.standstill import standstill_findings, standstill_m
 from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs, without_constants
-from winchkit.diagnosis.data.zeroing import angles_from_zero, zeroed_anew
+from winchkit.diagnosis.data.zeroing import angles_from_zero, as_noise, is_setting, zeroed_anew
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.model.derivatives import Clock
@@ -222,7 +222,12 @@ def prepare(
         runs = [run for index, run in enumerate(runs) if index != outlying[0]]
         dataset = assemble(runs, profile, filtering)
     anew = [zeroed_anew(output, *_repeat_differences(dataset, output)) for output in OUTPUTS]
-    zeroed = [finding for finding in anew if finding is not None]
+    at_speeds = is_setting([motion.motor_rate for motion in dataset.motions])
+    zeroed = [
+        as_noise(finding) if at_speeds and finding.channel != "cable_length" else finding
+        for finding in anew
+        if finding is not None
+    ]
     if "cable_length" not in {finding.channel for finding in zeroed}:
         zeroed += angles_from_zero(runs)
     factor = 1 if decimation is None else decimation.factor
@@ -245,7 +250,7 @@ def prepare(
             ),
             *rounded_alike(dataset, resolution),
         ),
-        zeroed_anew=frozenset(finding.channel for finding in zeroed),
+        zeroed_anew=frozenset(f.channel for f in zeroed if f.code == "zeroed-anew"),
         resolution=resolution,
         decimation_factor=factor,
     )

@@ -33,7 +33,9 @@ __all__ = [
     "BLOCKS",
     "LEVEL",
     "angles_from_zero",
+    "as_noise",
     "is_random_walk",
+    "is_setting",
     "zeroed_anew",
     "zeroed_finding",
 ]
@@ -125,6 +127,29 @@ def zeroed_finding(output: str, spread: float, p_value: float, between: str) -> 
         f"and an offset per run is fitted{limit}"
     )
     return Finding("zeroed-anew", "", output, spread, text)
+
+
+def is_setting(values: Sequence[Array]) -> bool:
+    """Whether a variable, (n,) per run, varies more between runs than within them.
+
+    Variance components of a one-way classification. An offset per run would take what depends on
+    such a variable, as friction does on the speed and direction of runs at constant speed.
+    """
+    if len(values) < 2:
+        return False
+    within = float(np.mean([np.var(own) for own in values]))
+    return float(np.var([np.mean(own) for own in values])) > within
+
+
+def as_noise(finding: Finding) -> Finding:
+    """The finding on an offset of a force or torque where the speed is a setting of the runs."""
+    spread = size(finding.value, OUTPUT_UNITS[finding.channel])
+    text = (
+        f"the offset differs between repeats by {spread} (standard deviation): the runs differ in "
+        "speed or direction, on which friction depends, so that no offset per run is fitted; it "
+        "counts as noise"
+    )
+    return Finding("offset-as-noise", "", finding.channel, finding.value, text)
 
 
 def angles_from_zero(runs: Sequence[Run]) -> list[Finding]:

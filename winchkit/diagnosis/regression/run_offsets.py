@@ -25,7 +25,13 @@ from scipy.special import fdtrc
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import mean_load
-from winchkit.diagnosis.data.zeroing import BLOCKS, LEVEL, is_random_walk, zeroed_finding
+from winchkit.diagnosis.data.zeroing import (
+    BLOCKS,
+    LEVEL,
+    is_random_walk,
+    is_setting,
+    zeroed_finding,
+)
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import Spread
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -85,9 +91,12 @@ def offset_between_runs(regression: TimeSeriesRegression, fit: Fit, output: str)
     Finding or None
         None with fewer than two runs, or where the offsets are within the variation over eight
         blocks of time of every run, F(k, 7 G) for k contrasts of G runs, or no larger than a random
-        walk from a common zero makes them.
+        walk from a common zero makes them. None also of a force or torque where the speed is a
+        setting of the runs: friction that depends on it would be taken for offsets.
     """
     dataset = regression.dataset
+    if output != "cable_length" and is_setting([motion.motor_rate for motion in dataset.motions]):
+        return None
     own = [s for s in regression.segments if s.output == output]
     own = [s for s in own if not (output == "cable_length" and dataset.recordings[s.run].zeroed)]
     if len(own) < 2 or output in dataset.zeroed_anew:
