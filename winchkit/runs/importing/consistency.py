@@ -136,12 +136,12 @@ def _apply_ratio(
             if item.factor is None and len(options) == 1:
                 unit, factor = options.pop()
                 text = f"ratio of angle and velocity (correlation {abs(ratio.correlation):.4f})"
-                item.settle(factor, unit, "derived", text)
+                item.settle(factor / item.size, unit, "derived", text)
         if velocity.factor is None and angle.factor is not None and clock.factor is not None:
             measured = ratio.value * angle.factor / clock.factor
             work.measured[velocity.column.source] = measured
-    if None not in (angle.factor, velocity.factor) and ratio.value * (velocity.factor or 1) < 0:
-        velocity.factor = -(velocity.factor or 1)
+    if angle.factor and velocity.factor and ratio.value * angle.factor * velocity.factor < 0:
+        velocity.factor = -velocity.factor
         velocity.reason += "; sense reversed: it is opposite to the angle"
         work.notes.append(
             f"'{velocity.column.source}' has the opposite sense of '{angle.column.source}'; its "
@@ -159,14 +159,17 @@ def _matches(
     for speed in speeds:
         for stamp in clocks:
             if angle.factor is None and counted:
-                counts = likely_counts(_TURN * abs(ratio.value) / (speed[1] * stamp[1]))
+                turn = _TURN * angle.size
+                counts = likely_counts(turn * abs(ratio.value / (speed[1] * stamp[1])))
                 if counts:
-                    yield (f"1/{counts} turn", _TURN / counts), speed, stamp
+                    yield (f"1/{counts} turn", turn / counts), speed, stamp
                 continue
-            for turn in _options(angle, _ANGLES):
-                if ratio.agrees(abs(speed[1] * stamp[1] / turn[1])):
-                    yield turn, speed, stamp
+            for unit in _options(angle, _ANGLES):
+                if ratio.agrees(abs(speed[1] * stamp[1] / unit[1])):
+                    yield unit, speed, stamp
 
 
 def _options(item: ChosenColumn, units: dict[str, float]) -> list[tuple[str, float]]:
-    return [(item.unit, item.factor)] if item.factor is not None else list(units.items())
+    if item.factor is not None:
+        return [(item.unit, item.factor)]
+    return [(unit, value * item.size) for unit, value in units.items()]
