@@ -15,8 +15,11 @@ __all__ = [
     "CHANNELS",
     "DATE",
     "EXCEL",
+    "MAGNITUDE",
     "MATRIX",
+    "MODULO",
     "STAMP",
+    "TWOS",
     "ImportMapping",
     "MappedColumn",
     "MappedLog",
@@ -28,6 +31,8 @@ DATE = "date"
 """Channel of a column with the date, beside one with the time of day."""
 MATRIX = tuple(f"platform_r{row}{column}" for row in "123" for column in "123")
 """Elements of a platform's rotation matrix, which become its quaternion."""
+MODULO, TWOS, MAGNITUDE = "modulo", "two's complement", "sign and magnitude"
+"""How numbers are stored that wrap or have lost their sign."""
 
 _OF_A_WINCH = {
     **{"motor_angle": "angle", "motor_velocity": "angular speed"},
@@ -62,6 +67,9 @@ class MappedColumn(Table):
     """SI value of 1; by default that of ``unit``."""
     offset: Number = 0.0
     """SI value of 0."""
+    stored: str = ""
+    """``modulo 360`` for numbers that wrap there, ``two's complement 65536`` or ``sign and
+    magnitude 65536`` for ones without their sign, with the number of values of the field."""
 
     def rules(self) -> Iterator[Rule]:
         """The channel exists, and the factor is known."""
@@ -82,6 +90,10 @@ class MappedColumn(Table):
             yield "unit", f"'{self.unit}' has no known SI value; give `factor`, the SI value of 1"
         if self.factor is not None and (self.factor == 0 or not math.isfinite(self.factor)):
             yield "factor", f"{self.factor:g} is not a scale"
+        kind, _, size = self.stored.rpartition(" ")
+        is_known = kind in {MODULO, TWOS, MAGNITUDE} and _is_positive(size)
+        if self.stored and not is_known:
+            yield "stored", f"'{self.stored}' is none of '{MODULO} N', '{TWOS} N', '{MAGNITUDE} N'"
 
     @property
     def si(self) -> float | None:
@@ -92,6 +104,13 @@ class MappedColumn(Table):
             return 1.0 if self.unit == STAMP else 86_400.0
         dimension = dimension_of(self.unit)
         return None if dimension is None else UNITS[dimension][self.unit]
+
+
+def _is_positive(text: str) -> bool:
+    try:
+        return 0 < float(text) < math.inf
+    except ValueError:
+        return False
 
 
 @dataclass(frozen=True)

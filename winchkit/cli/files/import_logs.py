@@ -104,6 +104,18 @@ _NO_ANGLE = (
     metavar="COLUMN",
     help="Column that has no sign, where one seems to be lost; may be given several times.",
 )
+@click.option(
+    "--signed",
+    multiple=True,
+    metavar="COLUMN",
+    help="Column whose sign is lost: it is restored; may be given several times.",
+)
+@click.option(
+    "--modulo",
+    multiple=True,
+    metavar="COLUMN=NUMBER",
+    help="Number at which a column wraps, e.g. 'Position=65536'; 0 where it does not.",
+)
 @click.option("--body", metavar="NAME", help="Body or marker of a tracker's export.")
 @click.option(
     "--load-mass",
@@ -185,6 +197,7 @@ def command(
             lag=_lag(lag),
         )
         report["joints"], report["mapping_id"] = joints, _identity(mapping_file)
+        targets = _targets_of(results, targets, overwrite=overwrite)
         report["sanity"] = _inspected([run for _, run in results])
     for joint in joints:
         note(f"{joint.path}: {joint.text}")
@@ -212,7 +225,13 @@ def _may_ask(yes: bool, as_json: bool) -> bool:
 
 def _answers(options: Mapping[str, Any]) -> Answers:
     """Answers of the command line in SI; raises UsageError."""
-    from winchkit.runs.importing.answers import CONSTANTS, Answers, read_column, read_constant
+    from winchkit.runs.importing.answers import (
+        CONSTANTS,
+        Answers,
+        read_column,
+        read_constant,
+        read_modulo,
+    )
 
     constants: dict[str, Any] = {
         key: read_constant(key, str(options[key])) for key in CONSTANTS if options[key] is not None
@@ -226,6 +245,8 @@ def _answers(options: Mapping[str, Any]) -> Answers:
         body=options["body"],
         axis=options["axis"],
         unsigned=tuple(options["unsigned"]),
+        signed=tuple(options["signed"]),
+        modulo=tuple(map(read_modulo, options["modulo"])),
     )
     return replace(own, **constants)
 
@@ -288,10 +309,15 @@ def _guesses(
         guesses.append(guess)
     if faults:
         raise RunError(faults)
-    for name in answers.unsigned:
+    named = {
+        "--unsigned": answers.unsigned,
+        "--signed": answers.signed,
+        "--modulo": [name for name, _ in answers.modulo],
+    }
+    for option, name in [(option, name) for option, names in named.items() for name in names]:
         if not any(guess.file.column(name) for guess in guesses):
             has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
-            raise UsageError(f"--unsigned: there is no column '{name}'; there are {has}")
+            raise UsageError(f"{option}: there is no column '{name}'; there are {has}")
     if declared is None and _lack_angle(guesses):
         guesses = [replace(guess, notes=(*guess.notes, _NO_ANGLE)) for guess in guesses]
     return guesses, declared
@@ -411,6 +437,22 @@ def _targets(files: Sequence[str], folder: Path, *, overwrite: bool, is_joined: 
     return targets
 
 
+def _targets_of(
+    results: Sequence[tuple[int, Run]], targets: Sequence[Path], *, overwrite: bool
+) -> list[Path]:
+    """File of each run; pieces of one recording have ``-piece1`` and so on behind its name."""
+    from winchkit.runs.overwriting import refuse_existing
+
+    found = []
+    for index, run in results:
+        target = targets[index] if len(targets) > index else targets[0]
+        if piece := run.metadata.get("piece", "").partition(" ")[0]:
+            target = target.with_stem(f"{target.stem}-piece{piece}")
+            refuse_existing(target, overwrite)
+        found.append(target)
+    return found
+
+
 @dataclass(frozen=True)
 class _Metadata:
     guesses: Sequence[Guess]
@@ -444,7 +486,7 @@ def _runs(
 ) -> tuple[list[tuple[int, Run]], tuple[Joint, ...]]:
     """Runs with the index of their file; files without a motor angle are joined to the one with."""
     from winchkit.runs.importing.clocks.joint import joined
-    from winchkit.runs.importing.runs import has_angle, run_of, with_angle
+    from winchkit.runs.importing.runs import has_angle, with_angle
 
     if not any(has_angle(part) for part in parts):
         parts = [with_angle(part) for part in parts]
@@ -462,7 +504,7 @@ def _runs(
         results = []
         for index, part in enumerate(parts):
             try:
-                results.append((index, run_of(part, metadata.of([index]))))
+                results += [(index, run) for run in _pieces(part, metadata.of([index]))]
             except RunError as error:
                 faults += error.faults
         if faults:
@@ -472,7 +514,25 @@ def _runs(
     whole, joints = joined([parts[index] for index in order], lag)
     texts = metadata.of(order)
     texts["joined"] = "; ".join(joint.text.replace(":", " ") for joint in joints)
-    return [(order[0], run_of(whole, texts))], joints
+    return [(order[0], run) for run in _pieces(whole, texts)], joints
+
+
+def _pieces(streams: Streams, metadata: Mapping[str, str]) -> list[Run]:
+    """The run of a file, or those before and after every jump of its motor angle."""
+    from winchkit.runs.importing.pieces import jumps_of, pieces_of
+    from winchkit.runs.importing.runs import run_of
+
+    jumps = jumps_of(streams)
+    for jump in jumps:
+        text = f"{jump.text}; the pieces before and after it are runs of their own"
+        click.echo(f"{one_line(streams.path)}: {text} (warning)", err=True)
+    pieces = pieces_of(streams, jumps)
+    if len(pieces) == 1:
+        return [run_of(pieces[0], metadata)]
+    return [
+        run_of(piece, {**metadata, "piece": f"{number} of {len(pieces)}"})
+        for number, piece in enumerate(pieces, start=1)
+    ]
 
 
 def _inspected(runs: Sequence[Run]) -> list[dict[str, Any]]:
@@ -495,8 +555,7 @@ def _written(
     except OSError as error:
         raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
     entries = []
-    for index, run in results:
-        target = targets[index] if len(targets) > index else targets[0]
+    for (_, run), target in zip(results, targets, strict=True):
         write_run(run, target)
         summary = summary_of(run)
         for remark in run.notes:

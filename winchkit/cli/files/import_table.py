@@ -111,6 +111,7 @@ def entry_of(guess: Guess) -> dict[str, Any]:
                 "offset": item.offset if item.channel else None,
                 "confidence": item.confidence,
                 "reason": item.reason,
+                "stored": item.stored,
                 "first": list(columns[item.source].values[:_FIRST]),
             }
             for item in guess.assignments

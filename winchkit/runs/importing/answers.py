@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ __all__ = [
     "permitted",
     "read_column",
     "read_constant",
+    "read_modulo",
 ]
 
 _COLUMN = re.compile(
@@ -147,6 +149,10 @@ class Answers:
     """Column that names the axis of each row; empty for a table whose rows are of all axes."""
     unsigned: tuple[str, ...] = ()
     """Columns whose numbers have no sign, although they look like signed ones that lost it."""
+    signed: tuple[str, ...] = ()
+    """Columns whose sign is lost and restored."""
+    modulo: tuple[tuple[str, float], ...] = ()
+    """Columns with the number at which they wrap; 0 for one that does not."""
 
 
 def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answers:
@@ -174,6 +180,18 @@ def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answe
         return not item.source or not having or any(t is table for t in having)
 
     return replace(answers, columns=tuple(item for item in answers.columns if is_own(item)))
+
+
+def read_modulo(text: str) -> tuple[str, float]:
+    """Read ``Position=65536``: a column and the number at which it wraps; raises UsageError."""
+    name, _, size = text.rpartition("=")
+    try:
+        value = float(size)
+    except ValueError:
+        value = math.nan
+    if not name or not 0 <= value < math.inf:
+        raise UsageError(f"--modulo: '{text}' is not COLUMN=NUMBER, e.g. 'Position=65536'")
+    return name.strip(), value
 
 
 def read_column(text: str) -> ColumnAnswer:

@@ -29,6 +29,8 @@ class ChosenColumn:
     unit: str = ""
     confidence: Confidence = "named"
     reason: str = ""
+    stored: str = ""
+    """How its numbers are stored, where they wrap or have lost their sign."""
 
     @property
     def column(self) -> Column:

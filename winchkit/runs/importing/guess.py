@@ -13,9 +13,10 @@ from winchkit.runs.importing.answers import Answers, ColumnAnswer
 from winchkit.runs.importing.assignment import Assignment, Guess, Question
 from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of
-from winchkit.runs.importing.consistency import from_velocity
+from winchkit.runs.importing.consistency import beyond_rating, from_velocity
 from winchkit.runs.importing.long_table import axes_of, likely_axis
-from winchkit.runs.importing.questions import ask_columns, ask_signs, ask_units, axis_question
+from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
+from winchkit.runs.importing.stored.settling import settle_stored
 from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
 from winchkit.schema.mapping import DATE
@@ -51,6 +52,7 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     work = Work(table, answers, questions=[*unknown, *choice.questions], notes=[*choice.notes])
     for candidate in choice.chosen:
         work.columns.append(started(work, candidate, given.get(candidate.column.source)))
+    settle_stored(work)
     as_others(work)
     from_velocity(work)
     by_convention(work)
@@ -58,8 +60,8 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     from_velocity(work)
     as_others(work)
     _drop_clocks(work)
+    beyond_rating(work)
     ask_units(work)
-    ask_signs(work)
     rate = _rate(work)
     ask_columns(work, choice)
     assigned = {item.column.source: _assignment(item) for item in work.columns}
@@ -141,4 +143,5 @@ def _assignment(item: ChosenColumn) -> Assignment:
         item.offset,
         confidence,
         reason,
+        item.stored,
     )

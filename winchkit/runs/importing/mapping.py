@@ -36,7 +36,9 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
     logs: list[MappedLog] = []
     for title, guess in guesses:
         columns = tuple(
-            MappedColumn(item.source, item.channel, item.unit, item.factor, item.offset)
+            MappedColumn(
+                item.source, item.channel, item.unit, item.factor, item.offset, item.stored
+            )
             for item in guess.used
         )
         own = (columns, guess.sample_rate, guess.axis)
@@ -96,6 +98,8 @@ def write_mapping(mapping: ImportMapping, path: Path) -> None:
                 column["factor"] = float(item.factor)
             if item.offset:
                 column["offset"] = float(item.offset)
+            if item.stored:
+                column["stored"] = item.stored
             columns.append(column)
         table["column"] = columns
         logs.append(table)
@@ -139,6 +143,7 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
                 item.offset,
                 "given",
                 f"mapping '{mapping.name}'",
+                item.stored,
             )
             for item, column in found
             if column is not None

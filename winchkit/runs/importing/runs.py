@@ -17,6 +17,7 @@ from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.mapping import guess_by, mapping_id
+from winchkit.runs.importing.pieces import jumps_of
 from winchkit.runs.importing.streams import Stream, Streams, merged, streams_of
 from winchkit.runs.run import ANGLE_INTEGRATED, Run
 from winchkit.schema.mapping import ImportMapping
@@ -64,6 +65,9 @@ def read_mapped(path: str | Path, mapping: str | Path | ImportMapping) -> Run:
     guess = guess_by(read_table(path), read)
     streams = streams_of(guess)
     streams = streams if has_angle(streams) else with_angle(streams)
+    if jumps := jumps_of(streams):
+        advice = "; winchkit import writes the pieces before and after it as runs of their own"
+        raise RunError([Fault(f"{jump.text}{advice}", streams.path) for jump in jumps])
     return run_of(streams, metadata_of(guess, {"imported_mapping": mapping_id(read)}))
 
 

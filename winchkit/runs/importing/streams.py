@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
+from winchkit.runs.importing.stored.numbers import range_of, restored
 from winchkit.runs.importing.table import Column, Table
 from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
 
@@ -69,6 +70,8 @@ class Streams:
     line_of: Callable[[int], int | None]
     faults: tuple[Fault, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    wraps: Mapping[str, float] = field(default_factory=dict)
+    """Range in SI of every channel whose numbers wrap."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -111,7 +114,7 @@ def streams_of(guess: Guess) -> Streams:
         clock = _clock_of(clocks, column)
         key = clock.source if clock is not None else f"\0{len(column)}"
         with np.errstate(over="ignore"):
-            values = column.values * item.factor + item.offset
+            values = restored(column.values, item.stored) * item.factor + item.offset
         blocks.setdefault(key, {})[item.channel] = values
     streams = []
     for key, channels in blocks.items():
@@ -140,6 +143,7 @@ def streams_of(guess: Guess) -> Streams:
         table.line_of,
         tuple(faults),
         tuple(notes),
+        {item.channel: range_of(item.stored) * abs(item.factor) for item in guess.used},
     )
 
 
@@ -167,6 +171,7 @@ def _of_axes(guess: Guess) -> Streams:
         line_of=guess.file.line_of,
         faults=tuple(dict.fromkeys(fault for part in parts.values() for fault in part.faults)),
         notes=tuple(dict.fromkeys(note for part in parts.values() for note in part.notes)),
+        wraps={f"{n}.{c}": size for n, part in parts.items() for c, size in part.wraps.items()},
     )
 
 
