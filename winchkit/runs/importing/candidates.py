@@ -20,6 +20,7 @@ from winchkit.runs.importing.pose_columns import (
     quaternion_names,
     vector_names,
 )
+from winchkit.runs.importing.source_stamps import SOURCE_STAMP
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
@@ -274,16 +275,26 @@ def _blocks(table: Table, clocks: Sequence[Candidate]) -> list[list[Candidate]]:
     return blocks
 
 
-def _quality(item: Candidate) -> tuple[bool, bool, int]:
-    """An absolute clock with distinct stamps first, then one with a unit, then the finest."""
+def _quality(item: Candidate) -> tuple[bool, bool, bool, int]:
+    """That of the source first, an absolute one, one with a unit, then the finest.
+
+    All but the finest have distinct stamps that increase.
+    """
+    values = item.column.values
     if item.column.texts is not None:
         stamps = read_stamps(item.column.texts)
-        distinct, absolute = len(np.unique(stamps.values)), stamps.has_date
+        values, absolute = stamps.values, stamps.has_date
     else:
-        distinct = len(np.unique(item.column.values))
-        absolute = epoch_unit(item.column.values) is not None
-    complete = distinct >= 0.99 * len(item.column)
-    return complete and absolute, complete and item.unit is not None, distinct
+        absolute = epoch_unit(values) is not None
+    distinct, steps = len(np.unique(values)), np.diff(values[np.isfinite(values)])
+    complete = distinct >= 0.99 * len(values) and not (np.any(steps < 0) and np.any(steps > 0))
+    is_source = item.column.name == SOURCE_STAMP
+    return (
+        complete and is_source,
+        complete and absolute,
+        complete and item.unit is not None,
+        distinct,
+    )
 
 
 def _needs_date(item: Candidate) -> bool:

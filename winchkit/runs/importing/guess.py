@@ -16,6 +16,7 @@ from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of
 from winchkit.runs.importing.consistency import beyond_rating, from_velocity
 from winchkit.runs.importing.long_table import axes_of, likely_axis
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
+from winchkit.runs.importing.source_stamps import delays, has_two_clocks, without_stamps
 from winchkit.runs.importing.stored.settling import settle_stored
 from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
@@ -60,6 +61,11 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     from_velocity(work)
     as_others(work)
     _drop_clocks(work)
+    if has_two_clocks(work):
+        logged, note = without_stamps(table)
+        again = guess_columns(logged, answers)
+        return replace(again, notes=(note, *again.notes))
+    work.notes += delays(work)
     beyond_rating(work)
     ask_units(work)
     rate = _rate(work)
