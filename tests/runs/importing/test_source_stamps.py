@@ -73,7 +73,7 @@ def bag(path: Path, log: Clock, stamp: Clock | None, cell: Clock | None) -> Gues
         (real, real, real, "header.stamp; the log time is later by 0"),
         (lambda t: real(t) + 0.02, real, real, "later by 20 ms"),
         (back, real, real, "goes back by up to 2.9937 s"),
-        (lambda t: real(t), lambda t: t + 0.5, lambda t: t + 0.5, "time is header.stamp"),
+        (real, lambda t: t + 0.5, lambda t: t + 0.5, "time is header.stamp"),
         (real, zero_first, zero_first, "50 of 1000 stamps are 0; none is used"),
         (real, lambda _t: 0.0, lambda _t: 0.0, "1000 of 1000 stamps are 0; none is used"),
         (real, real, None, "log time is the time of all topics: no usable header.stamp in /cell"),
