@@ -72,6 +72,9 @@ def _with_value(question: Question, answers: Answers) -> Answers:
         if click.confirm("  restore the sign?", default=True, err=True):
             return replace(answers, signed=(*answers.signed, *names))
         return replace(answers, unsigned=(*answers.unsigned, *names))
+    if question.key == "orientation":
+        picked = _picked([option.rpartition(" ")[2] for option in question.options])
+        return replace(answers, orientation=picked)
     if question.key == "modulo":
         name, _, size = example.rpartition("=")
         number = float(click.prompt("  modulo (0: none)", default=size, type=float, err=True))

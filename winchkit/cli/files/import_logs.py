@@ -116,6 +116,11 @@ _NO_ANGLE = (
     metavar="COLUMN=NUMBER",
     help="Number at which a column wraps, e.g. 'Position=65536'; 0 where it does not.",
 )
+@click.option(
+    "--orientation",
+    type=click.Choice(("vector", "angles", "wxyz", "xyzw")),
+    help="What rx, ry, rz are (rotation vector or fixed angles), or the order of q0 to q3.",
+)
 @click.option("--body", metavar="NAME", help="Body or marker of a tracker's export.")
 @click.option(
     "--load-mass",
@@ -243,6 +248,7 @@ def _answers(options: Mapping[str, Any]) -> Answers:
     own = Answers(
         columns=columns,
         body=options["body"],
+        orientation=options["orientation"] or "",
         axis=options["axis"],
         unsigned=tuple(options["unsigned"]),
         signed=tuple(options["signed"]),

@@ -151,6 +151,9 @@ class Answers:
     """Columns whose numbers have no sign, although they look like signed ones that lost it."""
     signed: tuple[str, ...] = ()
     """Columns whose sign is lost and restored."""
+    orientation: str = ""
+    """``vector`` or ``angles`` for ``rx``, ``ry``, ``rz``; ``wxyz`` or ``xyzw`` for ``q0`` to
+    ``q3``; empty where the values say it."""
     modulo: tuple[tuple[str, float], ...] = ()
     """Columns with the number at which they wrap; 0 for one that does not."""
 

@@ -13,6 +13,7 @@ from winchkit.runs.importing.answers import permitted
 from winchkit.runs.importing.assignment import Candidate, Choice, Question
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of
+from winchkit.runs.importing.orientation import quaternion_order
 from winchkit.runs.importing.pose_columns import (
     body_of,
     chosen_body,
@@ -59,7 +60,11 @@ _UNEVEN = 0.5
 
 
 def choose(
-    table: Table, given: Mapping[str, str], body: str | None, without: Collection[str] = ()
+    table: Table,
+    given: Mapping[str, str],
+    body: str | None,
+    without: Collection[str] = (),
+    orientation: str = "",
 ) -> Choice:
     """Choose the columns of all channels.
 
@@ -73,6 +78,8 @@ def choose(
         Body of a tracker's export.
     without : collection of str
         Channels that the file does not have, as the user says.
+    orientation : str, optional
+        Convention of the orientation, as the user says.
 
     Returns
     -------
@@ -80,7 +87,7 @@ def choose(
         Every column is in ``chosen`` or in ``unused``.
     """
     choice = Choice()
-    numbered = quaternion_names([item.name for item in table.columns])
+    numbered = _numbered(table, given, orientation, choice)
     vectors = vector_names([item.name for item in table.columns])
     free: list[Candidate] = []
     longest = max((len(item) for item in table.columns), default=0)
@@ -117,6 +124,26 @@ def choose(
     others = _left_after({item.channel for item in choice.chosen}, others, choice)
     choose_channels(others, choice, without)
     return choice
+
+
+def _numbered(
+    table: Table, given: Mapping[str, str], orientation: str, choice: Choice
+) -> dict[str, str]:
+    """Channels of a numbered quaternion, whose order its values say or which is asked."""
+    names = [item.name for item in table.columns]
+    found = list(quaternion_names(names))
+    columns = [item for name in found for item in table.columns if item.name == name]
+    if not found or any(item.source in given for item in columns):
+        return quaternion_names(names)
+    order = orientation if orientation in {"wxyz", "xyzw"} else ""
+    order = order or quaternion_order(columns[0].values, columns[-1].values)
+    if not order:
+        text = f"'{found[0]}' to '{found[-1]}' are a quaternion: is its first or last part real?"
+        options = ("--orientation wxyz", "--orientation xyzw")
+        choice.questions.append(Question(text, options, "orientation"))
+    elif not orientation:
+        choice.notes.append(f"'{found[0]}' to '{found[-1]}' are {', '.join(order)} by their values")
+    return quaternion_names(names, order or "wxyz")
 
 
 def _left_after(

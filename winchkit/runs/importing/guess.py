@@ -15,6 +15,7 @@ from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of
 from winchkit.runs.importing.consistency import beyond_rating, from_velocity
 from winchkit.runs.importing.long_table import axes_of, likely_axis
+from winchkit.runs.importing.orientation import settle_orientation
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
 from winchkit.runs.importing.source_stamps import delays, has_two_clocks, without_stamps
 from winchkit.runs.importing.stored.settling import settle_stored
@@ -49,7 +50,7 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     given, unknown = _given(table, answers)
     channels = {source: item.channel for source, item in given.items()}
     without = {item.channel for item in answers.columns if not item.source}
-    choice = choose(table, channels, answers.body, without)
+    choice = choose(table, channels, answers.body, without, answers.orientation)
     work = Work(table, answers, questions=[*unknown, *choice.questions], notes=[*choice.notes])
     for candidate in choice.chosen:
         work.columns.append(started(work, candidate, given.get(candidate.column.source)))
@@ -67,6 +68,7 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
         return replace(again, notes=(note, *again.notes))
     work.notes += delays(work)
     beyond_rating(work)
+    settle_orientation(work)
     ask_units(work)
     rate = _rate(work)
     ask_columns(work, choice)

@@ -12,14 +12,14 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault
-from winchkit.model.robot.rotation import quaternion_of
+from winchkit.model.robot.rotation import quaternion_of, rotation_by
 from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.stored.numbers import range_of, restored
 from winchkit.runs.importing.table import Column, Table
-from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
+from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP, VECTOR
 
 __all__ = ["Stream", "Streams", "merged", "streams_of"]
 
@@ -35,6 +35,7 @@ _EXCEL_EPOCH = 25_569.0
 """1970-01-01 in days since 1899-12-30."""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(\.\d{3}){2,}|(,\d{3}){2,})")
 """Whole numbers with separators of thousands: one separator alone may be a decimal sign."""
+_ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
 _QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
 
 
@@ -116,6 +117,7 @@ def streams_of(guess: Guess) -> Streams:
         with np.errstate(over="ignore"):
             values = restored(column.values, item.stored) * item.factor + item.offset
         blocks.setdefault(key, {})[item.channel] = values
+    is_vector = any(item.stored == VECTOR for item in guess.used)
     streams = []
     for key, channels in blocks.items():
         first, time, _ = read.get(key, (0.0, None, False))
@@ -129,6 +131,9 @@ def streams_of(guess: Guess) -> Streams:
             continue
         else:
             time = time + (first - origin)
+        if is_vector and all(name in channels for name in _ANGLES):
+            vector = np.stack([channels.pop(name) for name in _ANGLES], axis=-1)
+            channels |= _quaternion(rotation_by(vector))
         stream = Stream(time, _with_quaternion(channels), np.arange(count))
         stream, note = _without_copies(_forward(stream))
         notes += note
@@ -242,10 +247,15 @@ def _with_quaternion(channels: dict[str, Array]) -> dict[str, Array]:
         return {name: values for name, values in channels.items() if name not in MATRIX}
     matrix = np.stack([channels[name] for name in MATRIX], axis=-1).reshape(-1, 3, 3)
     others = {name: values for name, values in channels.items() if name not in MATRIX}
+    return {**others, **_quaternion(matrix)}
+
+
+def _quaternion(matrix: Array) -> dict[str, Array]:
+    """Quaternion of rotation matrices (n, 3, 3), NaN where one has a NaN."""
     known = np.isfinite(matrix).all(axis=(1, 2))
     quaternion = np.full((len(matrix), 4), np.nan)
     quaternion[known] = quaternion_of(matrix[known])
-    return {**others, **dict(zip(_QUATERNION, quaternion.T, strict=True))}
+    return dict(zip(_QUATERNION, quaternion.T, strict=True))
 
 
 def _forward(stream: Stream) -> Stream:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.schema.mapping import MAGNITUDE, MODULO, TWOS
+from winchkit.schema.mapping import MAGNITUDE, MODULO, TWOS, VECTOR
 
 __all__ = ["Wrap", "range_of", "restored", "wrap_of"]
 
@@ -51,7 +51,7 @@ def restored(values: Array, stored: str) -> Array:
         ``modulo 360``, ``two's complement 65536``, ``sign and magnitude 2048``; empty for numbers
         that are stored as they are.
     """
-    if not stored:
+    if stored in {"", VECTOR}:
         return values
     kind, _, text = stored.rpartition(" ")
     modulus = float(text)
