@@ -14,8 +14,7 @@ from winchkit.runs.importing.answers import Answers
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
-from winchkit.runs.importing.mapping import mapping_of
-from winchkit.runs.importing.runs import read_mapped
+from winchkit.runs.importing.mapping import guess_by, mapping_of
 from winchkit.runs.importing.streams import streams_of
 
 TIME = np.arange(300) / 50
@@ -64,8 +63,8 @@ def test_a_pitch_beyond_a_right_angle_is_of_a_rotation_vector(tmp_path: Path) ->
     guess = guessed(tmp_path / "a.csv", "rx [rad],ry [rad],rz [rad]", values)
     assert turned(guess) == pytest.approx(true, abs=1e-7)
     assert any("rotation vector" in note for note in guess.notes)
-    run = read_mapped(tmp_path / "a.csv", mapping_of("m", [("a", guess)]))
-    assert "platform_qw" in run
+    mapped = guess_by(read_table(tmp_path / "a.csv"), mapping_of("m", [("a", guess)]))
+    assert turned(mapped) == pytest.approx(true, abs=1e-7)
 
 
 def test_the_continuous_convention_is_taken(tmp_path: Path) -> None:

@@ -129,7 +129,8 @@ def quaternion_names(names: Sequence[str], order: str = "wxyz") -> dict[str, str
     Returns
     -------
     dict
-        Channel by name, from ``q0`` to ``q3``; empty where the four names are not there, or no positions.
+        Channel by name, from ``q0`` to ``q3``; empty where the four names are not there,
+        or no positions.
     """
     words = {words_of(name).replace(" ", ""): name for name in names}
     axes = all(any(key in words for key in (axis, f"pos{axis}", f"p{axis}")) for axis in "xyz")

@@ -131,10 +131,7 @@ def streams_of(guess: Guess) -> Streams:
             continue
         else:
             time = time + (first - origin)
-        if is_vector and all(name in channels for name in _ANGLES):
-            vector = np.stack([channels.pop(name) for name in _ANGLES], axis=-1)
-            channels |= _quaternion(rotation_by(vector))
-        stream = Stream(time, _with_quaternion(channels), np.arange(count))
+        stream = Stream(time, _with_quaternion(channels, is_vector=is_vector), np.arange(count))
         stream, note = _without_copies(_forward(stream))
         notes += note
         streams += _by_rate(stream)
@@ -241,8 +238,12 @@ def _clock_of(clocks: Sequence[Column], column: Column) -> Column | None:
     return before[-1] if before else own[0] if own else None
 
 
-def _with_quaternion(channels: dict[str, Array]) -> dict[str, Array]:
-    """A quaternion in place of the elements of a rotation matrix."""
+def _with_quaternion(channels: dict[str, Array], *, is_vector: bool) -> dict[str, Array]:
+    """A quaternion in place of a rotation vector or of the elements of a rotation matrix."""
+    if is_vector and all(name in channels for name in _ANGLES):
+        vector = np.stack([channels[name] for name in _ANGLES], axis=-1)
+        others = {name: values for name, values in channels.items() if name not in _ANGLES}
+        return {**others, **_quaternion(rotation_by(vector))}
     if not all(name in channels for name in MATRIX):
         return {name: values for name, values in channels.items() if name not in MATRIX}
     matrix = np.stack([channels[name] for name in MATRIX], axis=-1).reshape(-1, 3, 3)
