@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Annotated
 
-from winchkit.errors import suggest
-from winchkit.schema.quantity import Frequency, Number
+from winchkit.errors import UsageError, suggest
+from winchkit.schema.quantity import Frequency, Marker, Number
 from winchkit.schema.table import Rule, Table
 from winchkit.units import UNITS, dimension_of
 
@@ -57,10 +58,26 @@ CHANNELS: dict[str, str] = {
 
 
 @dataclass(frozen=True)
+class NameOrNumber(Marker):
+    """Marks a text that may be written as a number without quotes."""
+
+    @property
+    def wanted(self) -> str:
+        """Description of the expected value."""
+        return 'the name of a column in quotes, such as "Torque", or its number'
+
+    def read(self, raw: object) -> str:
+        """Convert a value of a file; raises UsageError with the reason."""
+        if isinstance(raw, str) or (isinstance(raw, int) and not isinstance(raw, bool)):
+            return str(raw)
+        raise UsageError(f"expected {self.wanted}, not {raw!r}")
+
+
+@dataclass(frozen=True)
 class MappedColumn(Table):
     """One column: SI value = factor × number + offset."""
 
-    source: str
+    source: Annotated[str, NameOrNumber()]
     """Name of the column in the file, or its number from 1."""
     channel: str
     """Channel of a run, with a winch's name before it where there are several: ``A.tension``."""

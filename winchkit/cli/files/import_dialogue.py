@@ -66,19 +66,11 @@ def _answered(guess: Guess, answers: Answers) -> Answers:
 
 def _with_value(question: Question, answers: Answers) -> Answers:
     """Answer to a question on a field of the answers: a constant, columns, or the axis."""
+    from winchkit.runs.importing.answers import STORAGE, with_options
+
+    if question.key in STORAGE:
+        return with_options(answers, [_picked(question.options)])
     example = re.sub(r'^--\S+ |"', "", question.options[0])
-    if question.key == "signed":
-        names = tuple(re.findall('"([^"]*)"', question.options[0]))
-        if click.confirm("  restore the sign?", default=True, err=True):
-            return replace(answers, signed=(*answers.signed, *names))
-        return replace(answers, unsigned=(*answers.unsigned, *names))
-    if question.key == "orientation":
-        picked = _picked([option.rpartition(" ")[2] for option in question.options])
-        return replace(answers, orientation=picked)
-    if question.key == "modulo":
-        name, _, size = example.rpartition("=")
-        number = float(click.prompt("  modulo (0: none)", default=size, type=float, err=True))
-        return replace(answers, modulo=(*answers.modulo, (name, number)))
     if question.key == "axis":
         is_long = click.confirm("  separate the axes?", default=True, err=True)
         return replace(answers, axis=example if is_long else "")

@@ -67,13 +67,11 @@ _NO_ANGLE = (
 @click.option(
     "--rated-torque",
     metavar="TORQUE",
-    type=Quantity("torque", example="2.4 N m"),
     help="Torque of 100 %, e.g. '2.4 N m'.",
 )
 @click.option(
     "--torque-constant",
     metavar="CONSTANT",
-    type=Quantity("torque constant", example="0.12 N m/A"),
     help="Torque constant of the motor, e.g. '0.12 N m/A'.",
 )
 @click.option("--counts-per-turn", type=float, metavar="N", help="Counts in a turn of the motor.")
@@ -83,13 +81,11 @@ _NO_ANGLE = (
 @click.option(
     "--capacity",
     metavar="FORCE",
-    type=Quantity("force", example="500 N"),
     help="Rated load of the load cell, e.g. '500 N'.",
 )
 @click.option(
     "--sample-rate",
     metavar="RATE",
-    type=Quantity("frequency", example="1 kHz"),
     help="Rate of the rows, in place of times, e.g. '1 kHz'; of several files, of those that have "
     "none.",
 )
@@ -245,6 +241,10 @@ def _answers(options: Mapping[str, Any]) -> Answers:
         columns = tuple(read_column(text) for text in options["columns"])
     except UsageError as error:
         raise UsageError(f"--column: {error}") from None
+    pairs = [(item.channel, item.source) for item in columns if item.source]
+    for channel, source in dict.fromkeys(pairs):
+        if pairs.count((channel, source)) > 1:
+            raise UsageError(f"--column: {channel}={source} is given twice; give it once")
     own = Answers(
         columns=columns,
         body=options["body"],

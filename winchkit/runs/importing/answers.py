@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from winchkit.errors import UsageError
@@ -17,6 +18,7 @@ from winchkit.units import UNITS, suggest
 
 __all__ = [
     "CONSTANTS",
+    "STORAGE",
     "Answers",
     "ColumnAnswer",
     "answers_of",
@@ -24,11 +26,12 @@ __all__ = [
     "read_column",
     "read_constant",
     "read_modulo",
+    "with_options",
 ]
 
 _COLUMN = re.compile(
     r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"
-    r"(?:\*\s*(?:(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
+    r"(?:\*\s*(?:(?P<factor>[-+]?\d*[.,]?\d+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
     r"(?:(?!(?<=\S)\[\d+\]\s*$)\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
 )
 """A number in brackets at the end of a name is an index of it: ``tau[0]``."""
@@ -99,15 +102,30 @@ def read_constant(key: str, text: str) -> float:
         For a wrong unit, or a number that is not above zero.
     """
     dimension = CONSTANTS[key]
-    plain = _COUNTED.sub("", text) if dimension == "ratio" else text
     option = f"--{key.replace('_', '-')}"
+    plain = _with_point(option, _COUNTED.sub("", text) if dimension == "ratio" else text)
     try:
-        value = typed_quantity(plain, dimension)
+        value = typed_quantity(_our_spelling(plain, dimension), dimension)
     except UsageError as error:
         raise UsageError(f"{option}: {error}") from None
     if value <= 0:
         raise UsageError(f"{option} '{text}' must be above 0")
     return value
+
+
+def _with_point(option: str, text: str) -> str:
+    """A decimal point in place of a comma; raises UsageError where it may separate thousands."""
+    if re.match(r"\s*[1-9]\d{0,2},\d{3}(?!\d)", text):
+        raise UsageError(f"{option}: the comma of '{text}' may separate thousands; write a point")
+    return re.sub(r"^(\s*\d+),(?=\d)", r"\1.", text)
+
+
+def _our_spelling(text: str, dimension: str) -> str:
+    """A quantity with the unit as winchkit spells it: ``2.4 Nm`` is ``2.4 N m``."""
+    number = re.match(r"\s*[\d.]+\s*", text)
+    unit = read_unit(text[number.end() :]) if number else None
+    is_ours = unit is not None and unit.text in UNITS[dimension]
+    return f"{number[0]} {unit.text}" if number and unit and is_ours else text
 
 
 @dataclass(frozen=True)
@@ -197,6 +215,42 @@ def read_modulo(text: str) -> tuple[str, float]:
     return name.strip(), value
 
 
+STORAGE = ("signed", "modulo", "orientation")
+"""Keys of the questions that an option as it stands answers."""
+
+
+def with_options(answers: Answers, options: Iterable[str]) -> Answers:
+    """Answers with options of the command line that answer a question of :data:`STORAGE`.
+
+    Raises UsageError for another option.
+
+    Parameters
+    ----------
+    answers : Answers
+        Other answers.
+    options : iterable of str
+        ``--signed "speed 3" --signed "speed 5"``, ``--modulo "Position=65536"``,
+        ``--orientation vector``.
+    """
+    for text in options:
+        try:
+            words = shlex.split(text)
+        except ValueError:
+            words = []
+        for option, value in zip(words[::2], words[1::2], strict=False):
+            if option == "--signed":
+                answers = replace(answers, signed=(*answers.signed, value))
+            elif option == "--unsigned":
+                answers = replace(answers, unsigned=(*answers.unsigned, value))
+            elif option == "--modulo":
+                answers = replace(answers, modulo=(*answers.modulo, read_modulo(value)))
+            elif option == "--orientation":
+                answers = replace(answers, orientation=value)
+            else:
+                raise UsageError(f"'{text}' is no option that answers a question of a file")
+    return answers
+
+
 def read_column(text: str) -> ColumnAnswer:
     """Read ``motor_angle=Pos [deg]``, ``motor_torque=u*35.15`` or ``motor_torque=-u``.
 
@@ -234,6 +288,6 @@ def read_column(text: str) -> ColumnAnswer:
             f"'{unit}' in '{text}' is a unit of {spelled.dimension}, not of {dimension}; use "
             + ", ".join(UNITS[dimension or "ratio"])
         )
-    factor = float(found["factor"]) if found["factor"] else None
+    factor = float(_with_point("factor", found["factor"])) if found["factor"] else None
     constant, sign = found["constant"] or "", -1.0 if found["minus"] else 1.0
     return ColumnAnswer(channel, found["source"], unit, factor, constant, sign)

@@ -7,6 +7,7 @@ ratio of angle and velocity; conventions. A unit that none of these gives is ask
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from winchkit.runs.importing.answers import Answers, ColumnAnswer
@@ -19,7 +20,7 @@ from winchkit.runs.importing.orientation import settle_orientation
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
 from winchkit.runs.importing.source_stamps import delays, has_two_clocks, without_stamps
 from winchkit.runs.importing.stored.settling import settle_stored
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
 from winchkit.schema.mapping import DATE
 
@@ -97,9 +98,10 @@ def _of_axes(table: Table, answers: Answers, by: str) -> Guess:
 def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], list[Question]]:
     """Answers by the unique name of their column; a question for a column that is not there."""
     found: dict[str, ColumnAnswer] = {}
-    missing = []
+    missing: list[Question] = []
     for item in answers.columns:
         column = table.column(item.source) if item.source else None
+        missing += _contradictions(found, column, item)
         if column is not None and item.constant and item.constant not in table.constants:
             known = ", ".join(f"{k} = {v:g}" for k, v in table.constants.items()) or "none"
             text = f"there is no constant '{item.constant}'; the file has {known}"
@@ -111,6 +113,23 @@ def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], lis
             text = f"there is no column '{item.source}'; the file has {names}"
             missing.append(Question(text, (f"--column {item.channel}=COLUMN",)))
     return found, missing
+
+
+def _contradictions(
+    found: Mapping[str, ColumnAnswer], column: Column | None, item: ColumnAnswer
+) -> Iterator[Question]:
+    """Questions for a column that is given twice, and for a channel of two columns."""
+    if column is None:
+        return
+    before = found.get(column.source)
+    own = f'--column "{item.channel}={item.source}"'
+    if before is not None and before.channel != item.channel:
+        text = f"column '{column.source}' is given as {before.channel} and as {item.channel}"
+        yield Question(text, (f'--column "{before.channel}={before.source}"', own))
+    others = [s for s, o in found.items() if o.channel == item.channel and s != column.source]
+    if others and item.channel not in {"time", DATE}:
+        text = f"{item.channel} is given as column '{others[0]}' and as '{column.source}'"
+        yield Question(text, (f'--column "{item.channel}={others[0]}"', own))
 
 
 def _rate(work: Work) -> float | None:

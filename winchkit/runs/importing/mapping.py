@@ -13,7 +13,7 @@ from winchkit.runs.files import write_whole
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.table import Table
-from winchkit.schema.mapping import ImportMapping, MappedColumn, MappedLog
+from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedLog
 
 __all__ = ["guess_by", "mapping_id", "mapping_of", "write_mapping"]
 
@@ -31,13 +31,24 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
     Returns
     -------
     ImportMapping
-        Files with the same columns are one log.
+        Files with the same columns are one log; a counter that wraps in one of them does in all.
     """
     logs: list[MappedLog] = []
+    wraps = {
+        (item.source, item.channel): item.stored
+        for _, guess in guesses
+        for item in guess.used
+        if item.stored.startswith(MODULO)
+    }
     for title, guess in guesses:
         columns = tuple(
             MappedColumn(
-                item.source, item.channel, item.unit, item.factor, item.offset, item.stored
+                item.source,
+                item.channel,
+                item.unit,
+                item.factor,
+                item.offset,
+                item.stored or wraps.get((item.source, item.channel), ""),
             )
             for item in guess.used
         )
@@ -115,7 +126,8 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     whole : Table
         The file.
     mapping : ImportMapping
-        Its first log whose columns the file has is used.
+        Its first log whose columns the file has is used; of logs with the same columns the one
+        with the name of the file.
 
     Returns
     -------
@@ -125,15 +137,12 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     Raises
     ------
     RunError
-        With the columns that the file lacks, where no log fits.
+        With the columns that the file lacks, where no log fits, and where several logs with the
+        same columns do.
     """
-    for log in mapping.log:
-        if log.axis and whole.column(log.axis) is None:
-            continue
+    for log in _fitting(whole, mapping)[:1]:
         table = next(iter(axes_of(whole, log.axis).values())) if log.axis else whole
         found = [(item, table.column(item.source)) for item in log.column]
-        if any(column is None for _, column in found):
-            continue
         by_source = {
             column.source: Assignment(
                 column.source,
@@ -165,8 +174,31 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     )
 
 
+def _fitting(whole: Table, mapping: ImportMapping) -> list[MappedLog]:
+    """Logs whose columns a file has, the one that is used first."""
+    logs = [
+        log
+        for log in mapping.log
+        if all(whole.column(n) is not None for n in _names(log)) and log.column
+    ]
+    alike = [log for log in logs if set(_names(log)) == set(_names(logs[0]))]
+    named = [log for log in alike if log.name == Path(whole.path).stem]
+    if len(alike) > 1 and len(named) != 1:
+        names = " and ".join(f"'{log.name}'" for log in alike)
+        message = (
+            f"fits the logs {names} of the mapping '{mapping.path or mapping.name}', which have "
+            "the same columns; leave one of them, or give it the name of this file"
+        )
+        raise RunError(Fault(message, whole.path))
+    return named if len(alike) > 1 else logs
+
+
+def _names(log: MappedLog) -> list[str]:
+    return [item.source for item in log.column] + [log.axis] * bool(log.axis)
+
+
 def _lacking(table: Table, log: MappedLog, mapping: ImportMapping) -> str:
-    names = [item.source for item in log.column] + [log.axis] * bool(log.axis)
+    names = _names(log)
     lacking = [repr(name) for name in names if table.column(name) is None]
     has = ", ".join(repr(column.source) for column in table.columns[:20])
     return (

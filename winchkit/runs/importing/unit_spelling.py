@@ -117,7 +117,7 @@ _FOREIGN: dict[str, dict[float, str]] = {
     BRIDGE: {1.0: "mV/V", 1e-3: "uV/V"},
 }
 _OTHER_OFFSET = {
-    "F": SpelledUnit("F", "temperature", 5 / 9, -160 / 9),
+    "F": SpelledUnit("°F", "temperature", 5 / 9, -160 / 9),
     "K": SpelledUnit("K", "temperature", 1.0, -273.15),
 }
 _DROPPED = re.compile(r"[\s·⋅*×•^_.]")
