@@ -80,7 +80,9 @@ _FOREIGN: dict[str, dict[float, str]] = {
         1e6: "MN",
         GRAVITY: "kgf kp",
         GRAVITY * 1e-3: "gf p",
-        _LB: "lbf lb lbs",
+        _LB: "lbf lb lbs pound pounds",
+        1e3 * _LB: "kip kips klbf klb",
+        _LB / 16: "ozf oz",
     },
     "mass": {1.0: "Kilogramm kilogram kilograms kilos", 1e-3: "Gramm gram grams gr"},
     "length": {
