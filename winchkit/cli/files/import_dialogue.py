@@ -37,7 +37,7 @@ def asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
     from winchkit.runs.importing.guess import guess_columns
 
     if guess.questions:
-        click.echo(tables_text(replace(guess, questions=())), err=True)
+        click.echo(tables_text([replace(guess, questions=())]), err=True)
     while guess.questions:
         answers = _answered(guess, answers)
         guess = guess_columns(guess.file, answers)

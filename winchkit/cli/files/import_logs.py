@@ -17,6 +17,7 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
+from winchkit.cli.files.import_table import shortened
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:
@@ -61,8 +62,8 @@ _NO_ANGLE = (
     multiple=True,
     metavar="CHANNEL=COLUMN",
     help="Column of a channel, by name or number, e.g. 'motor_angle=Pos [deg]', "
-    "'motor_torque=u*35.1', '-Iq [A]' with the other sign; nothing after = for none. May be given "
-    "several times.",
+    "'motor_torque=u*35.1', '-Iq [A]' with the other sign, 'tau_a-tau_b' of several columns, "
+    "'FILE:tension=2 [N]' of one file; nothing after = for none. May be given several times.",
 )
 @click.option(
     "--rated-torque",
@@ -157,7 +158,7 @@ def command(
     that it saves makes the next import silent. A FILE without a motor angle is joined to the one
     that has it, by its time stamps or by cross-correlation (docs/howto/logger.md).
     """
-    from winchkit.cli.files.import_table import entry_of, tables_text
+    from winchkit.cli.files.import_table import alike, entry_of, tables_text
     from winchkit.runs.importing.streams import streams_of
 
     masses = _masses(load_masses, len(files))
@@ -172,7 +173,7 @@ def command(
         "runs": [],
         "sanity": [],
     }
-    shown = "\n\n".join(tables_text(guess) for guess in guesses)
+    shown = "\n\n".join(tables_text(group) for group in alike(guesses))
     if is_new and not as_json and (output is None or not is_quiet()):
         click.echo(shown, err=output is not None)
     elif is_new and not as_json:
@@ -202,8 +203,11 @@ def command(
         report["sanity"] = _inspected([run for _, run in results])
     for joint in joints:
         note(f"{joint.path}: {joint.text}")
+    told: dict[str, list[str]] = {}
     for finding in report["sanity"]:
-        click.echo(f"{finding['run']}: {finding['channel']}: {finding['text']}", err=True)
+        told.setdefault(f"{finding['channel']}: {finding['text']}", []).append(finding["run"])
+    for text, names in told.items():
+        click.echo(f"{shortened(names)}: {text}", err=True)
     report["runs"] = _written(results, targets, Path(output), as_json=as_json)
     if is_new or save_mapping:
         report["mapping"] = _saved(mapping_file, save_mapping or str(Path(output) / _MAPPING))
@@ -213,10 +217,13 @@ def command(
 
 
 def _warn(guesses: Sequence[Guess]) -> None:
-    """Notes on what was read, without the table."""
+    """Notes on what was read, without the table; what several files have, once."""
+    found: dict[str, list[str]] = {}
     for guess in guesses:
         for text in (*guess.table.notes, *guess.notes):
-            click.echo(f"{one_line(guess.table.path)}: {text} (warning)", err=True)
+            found.setdefault(text, []).append(one_line(guess.table.path))
+    for text, paths in found.items():
+        click.echo(f"{shortened(paths)}: {text} (warning)", err=True)
 
 
 def _may_ask(yes: bool, as_json: bool) -> bool:
@@ -241,9 +248,10 @@ def _answers(options: Mapping[str, Any]) -> Answers:
         columns = tuple(read_column(text) for text in options["columns"])
     except UsageError as error:
         raise UsageError(f"--column: {error}") from None
-    pairs = [(item.channel, item.source) for item in columns if item.source]
-    for channel, source in dict.fromkeys(pairs):
-        if pairs.count((channel, source)) > 1:
+    pairs = [(item.channel, item.source, item.file) for item in columns if item.source]
+    for pair in dict.fromkeys(pairs):
+        channel, source, _ = pair
+        if pairs.count(pair) > 1:
             raise UsageError(f"--column: {channel}={source} is given twice; give it once")
     own = Answers(
         columns=columns,
@@ -383,7 +391,7 @@ def _unanswered(guesses: Sequence[Guess]) -> str:
         ]
         for text in texts:
             asking.setdefault(text, []).append(one_line(guess.table.path))
-    lines = [f"  {_shortened(paths)}: {text}" for text, paths in asking.items()]
+    lines = [f"  {shortened(paths)}: {text}" for text, paths in asking.items()]
     if any(_NO_ANGLE in guess.notes for guess in guesses):
         lines.append(f"  {_NO_ANGLE}")
     if any(guess.questions for guess in guesses):
@@ -392,13 +400,6 @@ def _unanswered(guesses: Sequence[Guess]) -> str:
         lines.append("  no column has the motor angle: it is the integral of motor_velocity from 0")
     accept = 'accept the guess by --yes, or correct it by --column "CHANNEL=COLUMN [UNIT]":'
     return "\n".join([accept, *lines])
-
-
-def _shortened(paths: Sequence[str]) -> str:
-    """``a.csv``, ``a.csv and b.csv`` or ``5 files, a.csv to e.csv``."""
-    if len(paths) < 3:
-        return " and ".join(paths)
-    return f"{len(paths)} files, {paths[0]} to {paths[-1]}"
 
 
 def _mapping_of(files: Sequence[str], guesses: Sequence[Guess]) -> ImportMapping:

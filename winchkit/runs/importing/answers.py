@@ -7,9 +7,11 @@ import re
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from winchkit.errors import UsageError
 from winchkit.runs.columns import column_dimension
+from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE, read_unit
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
@@ -30,7 +32,7 @@ __all__ = [
 ]
 
 _COLUMN = re.compile(
-    r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"
+    r"\s*(?:(?P<file>[^=]+):)?\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"
     r"(?:\*\s*(?:(?P<factor>[-+]?\d*[.,]?\d+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
     r"(?:(?!(?<=\S)\[\d+\]\s*$)\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
 )
@@ -142,6 +144,8 @@ class ColumnAnswer:
     """Name of a variable of the file that is the multiplier."""
     sign: float = 1.0
     """-1 for a column of the other sign."""
+    file: str = ""
+    """Name of the only file that it is of, with or without folder and suffix; empty for all."""
 
 
 @dataclass(frozen=True)
@@ -192,15 +196,32 @@ def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answe
     -------
     Answers
         A column is that of the files that have its name; where none has, of those that have its
-        number; where none has that either, of all, so that each says so.
+        number; where none has that either, of all, so that each says so. An answer with the name
+        of a file is of that file only.
+
+    Raises
+    ------
+    UsageError
+        For the name of a file that is none of them.
     """
+    for item in answers.columns:
+        if item.file and not any(_is_named(t, item.file) for t in tables):
+            has = ", ".join(t.path for t in tables)
+            raise UsageError(f"--column: there is no file '{item.file}'; there are {has}")
 
     def is_own(item: ColumnAnswer) -> bool:
+        if item.file:
+            return _is_named(table, item.file)
         having = [t for t in tables if any(c.source == item.source for c in t.columns)]
+        having = having or [t for t in tables if with_derived(t, [item.source]) is not t]
         having = having or [t for t in tables if t.column(item.source) is not None]
         return not item.source or not having or any(t is table for t in having)
 
     return replace(answers, columns=tuple(item for item in answers.columns if is_own(item)))
+
+
+def _is_named(table: Table, name: str) -> bool:
+    return name in {table.path, Path(table.path).name, Path(table.path).stem}
 
 
 def read_modulo(text: str) -> tuple[str, float]:
@@ -261,7 +282,7 @@ def read_column(text: str) -> ColumnAnswer:
     text : str
         ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; the factor is a number or a
         variable of the file; a minus before the column changes its sign; nothing after ``=`` for a
-        channel that the file does not have.
+        channel that the file does not have; ``FILE:`` before it for one of several files.
 
     Returns
     -------
@@ -290,4 +311,5 @@ def read_column(text: str) -> ColumnAnswer:
         )
     factor = float(_with_point("factor", found["factor"])) if found["factor"] else None
     constant, sign = found["constant"] or "", -1.0 if found["minus"] else 1.0
-    return ColumnAnswer(channel, found["source"], unit, factor, constant, sign)
+    file = (found["file"] or "").strip()
+    return ColumnAnswer(channel, found["source"], unit, factor, constant, sign, file)

@@ -15,6 +15,7 @@ from winchkit.runs.importing.assignment import Assignment, Guess, Question
 from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of
 from winchkit.runs.importing.consistency import beyond_rating, from_velocity
+from winchkit.runs.importing.formats.arithmetic import is_expression, with_derived
 from winchkit.runs.importing.long_table import axes_of, likely_axis
 from winchkit.runs.importing.orientation import settle_orientation
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
@@ -48,6 +49,8 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     if answers.axis is None and (axis := likely_axis(table)) is not None:
         open_yet = [Assignment(item.source, "", item.unit) for item in table.columns]
         return Guess(table, tuple(open_yet), (axis_question(table, axis.source),))
+    answers = replace(answers, columns=tuple(_whole(item, table) for item in answers.columns))
+    table = with_derived(table, [item.source for item in answers.columns])
     given, unknown = _given(table, answers)
     channels = {source: item.channel for source, item in given.items()}
     without = {item.channel for item in answers.columns if not item.source}
@@ -113,6 +116,15 @@ def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], lis
             text = f"there is no column '{item.source}'; the file has {names}"
             missing.append(Question(text, (f"--column {item.channel}=COLUMN",)))
     return found, missing
+
+
+def _whole(item: ColumnAnswer, table: Table) -> ColumnAnswer:
+    """An answer with its sign and factor as parts of its expression, which they are of a sum."""
+    if table.column(item.source) is not None or not is_expression(item.source):
+        return item
+    factor = item.constant or ("" if item.factor is None else f"{item.factor!r}")
+    source = "-" * (item.sign < 0) + item.source + (f"*{factor}" if factor else "")
+    return replace(item, source=source, factor=None, constant="", sign=1.0)
 
 
 def _contradictions(

@@ -11,6 +11,7 @@ from pathlib import Path
 from winchkit.errors import Fault, RunError
 from winchkit.runs.files import write_whole
 from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.table import Table
 from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedLog
@@ -140,6 +141,7 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
         With the columns that the file lacks, where no log fits, and where several logs with the
         same columns do.
     """
+    whole = with_derived(whole, [item.source for log in mapping.log for item in log.column])
     for log in _fitting(whole, mapping)[:1]:
         table = next(iter(axes_of(whole, log.axis).values())) if log.axis else whole
         found = [(item, table.column(item.source)) for item in log.column]

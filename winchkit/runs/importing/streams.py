@@ -25,6 +25,10 @@ __all__ = ["Stream", "Streams", "merged", "streams_of"]
 
 _STILL = 0.01
 """Share of repeated stamps that are left out; with more of them the clock is too coarse."""
+_FEWEST = 20
+"""Rows below which a time that goes back is no exception."""
+_ALONE = 0.5
+"""Intervals by which the rows beside a single one may differ from two intervals."""
 _PADDED = 0.67
 """Share of rows with a value below which a column has a rate of its own: half the rate or less."""
 _BRIDGED = 2.5
@@ -132,8 +136,9 @@ def streams_of(guess: Guess) -> Streams:
         else:
             time = time + (first - origin)
         stream = Stream(time, _with_quaternion(channels, is_vector=is_vector), np.arange(count))
-        stream, note = _without_copies(_forward(stream))
-        notes += note
+        stream, early = _in_order(_forward(stream), table.line_of)
+        stream, note = _without_copies(stream)
+        notes += [*early, *note]
         streams += _by_rate(stream)
     is_absolute = bool(absolute) and len(absolute) == len(read)
     return Streams(
@@ -266,6 +271,36 @@ def _forward(stream: Stream) -> Stream:
         return stream
     channels = {name: values[::-1] for name, values in stream.channels.items()}
     return Stream(stream.time[::-1], channels, stream.rows[::-1])
+
+
+def _in_order(stream: Stream, line_of: Callable[[int], int | None]) -> tuple[Stream, list[str]]:
+    """Without a few single rows whose stamps are out of order, with a note.
+
+    A row is out of order where the times before and after it are two intervals apart and it is not
+    between them; a clock that is set back shifts all later rows as well.
+    """
+    time = stream.time
+    steps = np.diff(time)
+    if len(steps) < _FEWEST or not np.any(steps < 0) or not np.all(np.isfinite(steps)):
+        return stream, []
+    usual = float(np.median(steps))
+    wrong = []
+    for step in np.flatnonzero(steps < 0):
+        for row in (int(step) + 1, int(step)):
+            if 0 < row < len(time) - 1:
+                around = time[row + 1] - time[row - 1]
+                if abs(around / usual - 2) < _ALONE and row not in wrong:
+                    wrong.append(row)
+                    break
+    kept = np.ones(len(time), dtype=bool)
+    kept[wrong] = False
+    if len(wrong) > _STILL * len(time) or np.any(np.diff(time[kept]) < 0):
+        return stream, []
+    lines = [line for row in sorted(wrong) if (line := line_of(int(stream.rows[row])))]
+    where = f" (line {', '.join(map(str, lines))})" if lines else ""
+    count = f"{len(wrong)} of {len(time)} rows"
+    note = f"{count}{where} have a time that is out of order and are left out"
+    return _rows_of(stream, kept), [note]
 
 
 def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
