@@ -113,7 +113,9 @@ def _format_of(path: str | Path) -> str:
         raise RunError(Fault(message, str(path)))
     if suffix not in SUFFIXES:
         known = ", ".join(SUFFIXES)
-        message = (
+        from winchkit.runs.importing.formats.can_trace import trace_advice
+
+        message = trace_advice(Path(path)) or (
             f"'{suffix}' is no format of a run; use one of {known}, or `winchkit import` for files "
             "of other programs"
         )

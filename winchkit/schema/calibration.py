@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import date, datetime
-from typing import Literal
+from typing import Annotated, Literal
 
 from winchkit.schema.quantity import (
     Count,
     Force,
     Length,
+    Marker,
     Number,
     PositiveForce,
     Temperature,
     WholeNumber,
 )
 from winchkit.schema.table import Rule, Table
+from winchkit.units import parse
 
 __all__ = ["CalibrationPoint", "CellCalibration", "HostTare", "TareBook", "tare_book_path"]
 
@@ -24,13 +26,29 @@ LoadDirection = Literal["tension", "compression"]
 
 
 @dataclass(frozen=True)
+class Reading(Marker):
+    """Marks a reading: a force with its unit, or a number in a unit of its own (counts, mV/V)."""
+
+    @property
+    def wanted(self) -> str:
+        """Description of the expected value."""
+        return 'a force such as "12 N", or a number in the unit of the calibration'
+
+    def read(self, raw: object) -> float:
+        """Convert a value of a file; raises UsageError with the reason."""
+        if isinstance(raw, int | float) and not isinstance(raw, bool):
+            return parse(raw, "ratio")
+        return parse(raw, "force")
+
+
+@dataclass(frozen=True)
 class CalibrationPoint(Table):
     """One applied load and the device's reading."""
 
     load: Force
-    indicated: Force
-    """Mean of the device's gross value."""
-    std: Force = 0.0
+    indicated: Annotated[float, Reading()]
+    """Mean of the device's gross value, in the unit of the calibration."""
+    std: Annotated[float, Reading()] = 0.0
     """Standard deviation of that mean."""
     going: Literal["up", "down"] = "up"
     """Direction of loading: ``up`` after a smaller load, ``down`` after a larger one."""
@@ -39,12 +57,14 @@ class CalibrationPoint(Table):
 
 @dataclass(frozen=True)
 class CellCalibration(Table):
-    """True force from the indicated one: c0 + c1 x + c2 x^2, x and the result in N."""
+    """True force in N from the reading x: c0 + c1 x + c2 x^2."""
 
     name: str
     date: date
     coefficients: tuple[Number, ...]
-    """c0 in N, c1 without a unit, c2 in 1/N."""
+    """c0 in N, c1 in N per unit of the reading, c2 in N per its square."""
+    unit: str = "N"
+    """Unit of the reading: N, counts, mV/V, V."""
     device: str = ""
     serial_number: str = ""
     temperature: Temperature | None = None
@@ -56,7 +76,11 @@ class CellCalibration(Table):
     nonlinearity: Count = 0.0
     """Nonlinearity: largest deviation of the mean curve from its line, as a share of the span."""
     hysteresis: Count = 0.0
-    """Hysteresis: largest difference between unloading and loading, as a share of the span."""
+    """Hysteresis: largest difference between unloading and loading beyond the zero return, as a
+    share of the span."""
+    zero_return: Number = 0.0
+    """Zero return: reading at the smallest load after the largest one less before it, as a share of
+    the span."""
     repeatability: Count = 0.0
     """Repeatability: standard deviation between series at a load, as a share of the span."""
     point: tuple[CalibrationPoint, ...] = ()

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Annotated
 
-from winchkit.errors import suggest
-from winchkit.schema.quantity import Frequency, Number
+from winchkit.errors import UsageError, suggest
+from winchkit.schema.quantity import Frequency, Marker, Number
 from winchkit.schema.table import Rule, Table
 from winchkit.units import UNITS, dimension_of
 
@@ -15,8 +16,12 @@ __all__ = [
     "CHANNELS",
     "DATE",
     "EXCEL",
+    "MAGNITUDE",
     "MATRIX",
+    "MODULO",
     "STAMP",
+    "TWOS",
+    "VECTOR",
     "ImportMapping",
     "MappedColumn",
     "MappedLog",
@@ -28,6 +33,10 @@ DATE = "date"
 """Channel of a column with the date, beside one with the time of day."""
 MATRIX = tuple(f"platform_r{row}{column}" for row in "123" for column in "123")
 """Elements of a platform's rotation matrix, which become its quaternion."""
+MODULO, TWOS, MAGNITUDE = "modulo", "two's complement", "sign and magnitude"
+"""How numbers are stored that wrap or have lost their sign."""
+VECTOR = "rotation vector"
+"""How roll, pitch and yaw are stored as the components of a rotation vector."""
 
 _OF_A_WINCH = {
     **{"motor_angle": "angle", "motor_velocity": "angular speed"},
@@ -49,10 +58,26 @@ CHANNELS: dict[str, str] = {
 
 
 @dataclass(frozen=True)
+class NameOrNumber(Marker):
+    """Marks a text that may be written as a number without quotes."""
+
+    @property
+    def wanted(self) -> str:
+        """Description of the expected value."""
+        return 'the name of a column in quotes, such as "Torque", or its number'
+
+    def read(self, raw: object) -> str:
+        """Convert a value of a file; raises UsageError with the reason."""
+        if isinstance(raw, str) or (isinstance(raw, int) and not isinstance(raw, bool)):
+            return str(raw)
+        raise UsageError(f"expected {self.wanted}, not {raw!r}")
+
+
+@dataclass(frozen=True)
 class MappedColumn(Table):
     """One column: SI value = factor × number + offset."""
 
-    source: str
+    source: Annotated[str, NameOrNumber()]
     """Name of the column in the file, or its number from 1."""
     channel: str
     """Channel of a run, with a winch's name before it where there are several: ``A.tension``."""
@@ -62,6 +87,10 @@ class MappedColumn(Table):
     """SI value of 1; by default that of ``unit``."""
     offset: Number = 0.0
     """SI value of 0."""
+    stored: str = ""
+    """``modulo 360`` for numbers that wrap there, ``two's complement 65536`` or ``sign and
+    magnitude 65536`` for ones without their sign, with the number of values of the field;
+    ``rotation vector`` for the three components of one in place of roll, pitch and yaw."""
 
     def rules(self) -> Iterator[Rule]:
         """The channel exists, and the factor is known."""
@@ -82,6 +111,11 @@ class MappedColumn(Table):
             yield "unit", f"'{self.unit}' has no known SI value; give `factor`, the SI value of 1"
         if self.factor is not None and (self.factor == 0 or not math.isfinite(self.factor)):
             yield "factor", f"{self.factor:g} is not a scale"
+        kind, _, size = self.stored.rpartition(" ")
+        is_known = kind in {MODULO, TWOS, MAGNITUDE} and _is_positive(size)
+        if self.stored not in {"", VECTOR} and not is_known:
+            kinds = f"'{MODULO} N', '{TWOS} N', '{MAGNITUDE} N', '{VECTOR}'"
+            yield "stored", f"'{self.stored}' is none of {kinds}"
 
     @property
     def si(self) -> float | None:
@@ -92,6 +126,13 @@ class MappedColumn(Table):
             return 1.0 if self.unit == STAMP else 86_400.0
         dimension = dimension_of(self.unit)
         return None if dimension is None else UNITS[dimension][self.unit]
+
+
+def _is_positive(text: str) -> bool:
+    try:
+        return 0 < float(text) < math.inf
+    except ValueError:
+        return False
 
 
 @dataclass(frozen=True)

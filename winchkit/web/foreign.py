@@ -10,11 +10,18 @@ from typing import Any
 from winchkit.errors import FileError, UsageError
 from winchkit.plain_json import significant
 from winchkit.report.figures.reduction import decimated
-from winchkit.runs.importing.answers import CONSTANTS, Answers, read_column, read_constant
+from winchkit.runs.importing.answers import (
+    CONSTANTS,
+    STORAGE,
+    Answers,
+    read_column,
+    read_constant,
+    with_options,
+)
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.mapping import mapping_id, mapping_of
-from winchkit.runs.importing.runs import metadata_of, run_of
+from winchkit.runs.importing.runs import metadata_of, whole_run
 from winchkit.runs.importing.streams import streams_of
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
@@ -44,7 +51,8 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
     path : Path
         The file.
     answers : mapping, optional
-        ``columns`` as the command line takes them (``tension=F [N]``), and constants by name.
+        ``columns`` as the command line takes them (``tension=F [N]``), constants by name, and
+        ``options`` of the command line that answer a question (``--signed "torque"``).
 
     Raises
     ------
@@ -78,7 +86,14 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
         "rows": max((len(column) for column in guess.table.columns), default=0),
         "columns": rows,
         "channels": list(CHANNELS),
-        "questions": [{"text": question.text, "key": question.key} for question in guess.questions],
+        "questions": [
+            {
+                "text": question.text,
+                "key": question.key,
+                "options": question.options if question.key in STORAGE else (),
+            }
+            for question in guess.questions
+        ],
         "notes": [*guess.table.notes, *guess.notes],
         "certain": guess.is_certain and not guess.questions,
     }
@@ -108,7 +123,7 @@ def imported(path: Path, answers: Mapping[str, Any]) -> Run:
     metadata = metadata_of(guess, {"imported_mapping": mapping_id(mapping)})
     if mass := str(answers.get("load_mass", "")).strip():
         metadata["load_mass"] = f"{parse(mass, 'mass'):.12g} kg"
-    return replace(run_of(streams_of(guess), metadata), name=path.stem)
+    return replace(whole_run(streams_of(guess), metadata), name=path.stem)
 
 
 def _answers(given: Mapping[str, Any]) -> Answers:
@@ -121,7 +136,8 @@ def _answers(given: Mapping[str, Any]) -> Answers:
         for key in CONSTANTS
         if str(given.get(key, "")).strip()
     }
-    return _with(answers, **values)
+    stored = with_options(answers, map(str, given.get("options", ())))
+    return _with(stored, **values)
 
 
 def _with(answers: Answers, **constants: Any) -> Answers:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, date, datetime
 from pathlib import Path
 
@@ -83,7 +84,7 @@ def test_a_calibration_that_cannot_be_right(tmp_path: Path, wrong: str, words: s
 def test_points_in_kilograms_go_up_and_down_by_themselves(tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     path.write_text("# hung by hand\nload [kg],indicated [N]\n0,0.1\n5,49.0\n10,98.0\n5,49.2\n")
-    points = read_points(path)
+    points = read_points(path).points
     assert [point.load for point in points] == pytest.approx([0, 49.03325, 98.0665, 49.03325])
     assert [point.going for point in points] == ["up", "up", "up", "down"]
     assert [point.series for point in points] == [1, 1, 1, 1]
@@ -93,13 +94,19 @@ def test_a_series_begins_upwards(tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     rows = [f"{load},{load},{series}" for series in (1, 2) for load in (0, 5, 10, 5, 0)]
     path.write_text("load [N],indicated [N],series\n" + "\n".join(rows) + "\n")
-    assert [point.going for point in read_points(path)] == ["up", "up", "up", "down", "down"] * 2
+    assert [point.going for point in read_points(path).points] == [
+        "up",
+        "up",
+        "up",
+        "down",
+        "down",
+    ] * 2
 
 
 def test_points_say_their_own_direction_series_and_unit(tmp_path: Path) -> None:
     path = tmp_path / "points.csv"
     path.write_text("load [kN],indicated [N],going,series,std [mN]\n0.1,99,down,3,20\n")
-    assert read_points(path) == (CalibrationPoint(100.0, 99.0, 0.02, "down", 3),)
+    assert read_points(path).points == (CalibrationPoint(100.0, 99.0, 0.02, "down", 3),)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +115,7 @@ def test_points_say_their_own_direction_series_and_unit(tmp_path: Path) -> None:
         ("", "is empty"),
         ("load [kg]\n1\n", "lacks the column indicated"),
         ("load [kg],weight\n1,2\n", "unknown column 'weight'"),
-        ("load [m],indicated [N]\n1,2\n", "unknown force unit 'm'.*or kg"),
+        ("load [m],indicated [N]\n1,2\n", "column 'load .m.' has the unknown unit 'm'; write load"),
         (
             "# x\nload [kg],indicated [N]\n1,2\n2,two\n",
             r"points.csv:4: .*indicated 'two' is no number",
@@ -129,3 +136,43 @@ def test_a_file_that_cannot_be_written_leaves_the_old_one(tmp_path: Path) -> Non
     with pytest.raises(FileError, match="cannot be written"):
         write_text(tmp_path / "nowhere" / "c.toml", "x")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("unit", "newton"),
+    [("kg", 9.80665), ("g", 9.80665e-3), ("lb", 4.4482216), ("lbf", 4.4482216), ("kip", 4448.2216)],
+)
+def test_loads_in_any_unit_and_readings_in_counts(unit: str, newton: float, tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    heads = {"reading [counts]": "counts", "Reading": "counts", "reading [mV/V]": "mV/V"}
+    for reading, wanted in heads.items():
+        path.write_text(f"load [{unit}],{reading}\n0,8212\n5,19158\n")
+        found = read_points(path)
+        assert found.unit == wanted
+        assert [p.load for p in found.points] == pytest.approx([0, 5 * newton])
+        assert [p.indicated for p in found.points] == [8212, 19158]
+
+
+@pytest.mark.parametrize("head", ["load,reading", "load [furlong],reading"])
+def test_a_load_without_a_known_unit_is_refused_with_its_column(head: str, tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text(f"# bench 3\n{head}\n0,1\n")
+    words = r"points.csv:2: column 'load.*' has .*; write load \[N\], \[kg\], \[lb\]"
+    with pytest.raises(FileError, match=words):
+        read_points(path)
+
+
+def test_samples_at_one_load_are_one_point_with_their_noise(tmp_path: Path) -> None:
+    path = tmp_path / "points.csv"
+    path.write_text("load [N],reading [N]\n" + "0,1\n0,3\n0,2\n5,6\n5,8\n0,2\n")
+    first, second, last = read_points(path).points
+    assert (first.indicated, second.indicated, last.indicated) == (2, 7, 2)
+    assert first.std == pytest.approx(1 / 3**0.5)
+    assert last.going == "down"
+
+
+def test_a_calibration_in_counts_is_read_back(tmp_path: Path) -> None:
+    points = (CalibrationPoint(0.0, 8212.5, 1.5), CalibrationPoint(98.0665, 30109.0, 1.0))
+    own = replace(CALIBRATION, unit="counts", zero_return=-0.001, point=points)
+    path = write_text(tmp_path / "c.toml", calibration_toml(own))
+    assert read_calibration(path) == own

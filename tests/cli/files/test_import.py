@@ -112,7 +112,7 @@ def test_a_certain_guess_needs_no_consent_and_the_mapping_makes_the_next_import_
 def test_a_lost_sign_is_not_accepted_by_yes(tmp_path: Path) -> None:
     """A servo's load of ±300 in 11 bits, of which the highest is the sign."""
     loads = [round(300 * np.sin(k / 9)) for k in range(300)]
-    rows = (f"{k / 100},{k % 90}.5,{v if v >= 0 else 1024 - v}" for k, v in enumerate(loads))
+    rows = (f"{k / 100},{k}.5,{v if v >= 0 else 1024 - v}" for k, v in enumerate(loads))
     path = tmp_path / "servo.csv"
     path.write_text("time [s],position [deg],torque [mN m]\n" + "\n".join(rows) + "\n")
     refused = command(path, "-o", tmp_path / "runs", "--yes")
@@ -312,7 +312,7 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--rated-torque", "2 kg"), "is not a torque with its unit"),
+        (("--rated-torque", "2 kg"), "unknown torque unit"),
         (("--counts-per-turn", "-3"), "must be above 0"),
         (("--column", "tenson=x"), "did you mean 'tension'?"),
         (("--load-mass", "1 kg", "--load-mass", "2 kg"), "2 --load-mass for 1 files"),

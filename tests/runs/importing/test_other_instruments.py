@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,8 @@ from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.can_trace import is_can_trace
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
-from winchkit.runs.importing.sign_bits import lost_sign
+from winchkit.runs.importing.runs import run_of
+from winchkit.runs.importing.stored.sign_bits import lost_sign
 from winchkit.runs.importing.streams import streams_of
 
 COUNT, STEP = 300, 0.01
@@ -223,14 +225,17 @@ def test_a_lost_sign_is_asked(bits: int, how: str, tmp_path: Path) -> None:
     """A servo's load of ±300 in a field without a sign."""
     head = "time,position,torque\n"
     loads = [round(300 * np.sin(k / 9)) for k in range(COUNT)]
-    lines = [f"{k * STEP:g},{k % 90}.5,{_stored(v, bits, how)}" for k, v in enumerate(loads)]
+    lines = [f"{k * STEP:g},{k}.5,{_stored(v, bits, how)}" for k, v in enumerate(loads)]
     columns = ("motor_angle=position [deg]", "motor_torque=torque*0.01 [N m]")
     path = tmp_path / "servo.csv"
     (question,) = guessed(path, head + "\n".join(lines) + "\n", *columns).questions
     assert f"{bits} bits stored without a sign ({how}" in question.text
-    assert question.options == ('--unsigned "torque"', '--column "motor_torque="')
+    assert question.options == ('--signed "torque"', '--unsigned "torque"')
     answers = Answers(tuple(read_column(text) for text in columns), unsigned=("torque",))
     assert not guess_columns(read_table(path), answers).questions
+    signed = guess_columns(read_table(path), replace(answers, unsigned=(), signed=("torque",)))
+    torque = run_of(streams_of(signed), {})["motor_torque"]
+    assert torque == pytest.approx(0.01 * np.array(loads))
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(8, 20))
@@ -241,7 +246,7 @@ def test_counts_and_levels_have_their_sign(seed: int, bits: int) -> None:
     levels = np.where(rng.random(500) < 0.5, 0, 1200) + rng.integers(0, 20, 500)
     signed = rng.integers(-(2**bits), 2**bits, 500).astype(float)
     for values in (counts, levels.astype(float), signed, np.full(500, 7.0)):
-        assert not lost_sign("x", values)
+        assert not lost_sign(values)
 
 
 def test_components_of_a_six_axis_cell_are_asked(tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ __all__ = [
     "device_of",
     "eds_of",
     "instruments",
+    "is_raw",
     "refs_of",
     "tares_of",
 ]
@@ -74,8 +75,21 @@ def calibration_of(spec: BenchSpec, ref: DeviceRef) -> CellCalibration | None:
         return None
     from winchkit.schema.read import read_calibration
 
-    beside = Path(spec.path).parent if spec.path else Path()
-    return read_calibration(beside / ref.calibration)
+    path = (Path(spec.path).parent if spec.path else Path()) / ref.calibration
+    found = read_calibration(path)
+    device = device_of(spec, ref)
+    if (found.unit == "N") == is_raw(device):
+        message = (
+            f"is for readings in {found.unit}, and device '{ref.device}' reads in "
+            f"{device.unit or '1'}; calibrate it with its own readings"
+        )
+        raise FileError(Fault(message, str(path)))
+    return found
+
+
+def is_raw(device: DeviceSpec) -> bool:
+    """Whether an instrument reads counts or another number in place of a quantity."""
+    return device.unit == "1"
 
 
 def tares_of(spec: BenchSpec) -> TareBook:

@@ -6,23 +6,29 @@ import csv
 import dataclasses
 import json
 import math
-from collections.abc import Iterator
+import statistics
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from datetime import datetime
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 from winchkit.arguments import path_of
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import Fault, FileError
 from winchkit.regular_file import regular
 from winchkit.runs.files import write_whole
+from winchkit.runs.importing.unit_spelling import BRIDGE, COUNTS, read_unit
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
-from winchkit.units import GRAVITY, convert, format_quantity, suggest
+from winchkit.units import GRAVITY, format_quantity, suggest
 
-__all__ = ["calibration_toml", "read_points", "tares_toml", "write_text"]
+__all__ = ["PointFile", "calibration_toml", "read_points", "tares_toml", "write_text"]
 
 _DIGITS = 9
 """Significant digits: 1 mN in 1 MN is below the resolution of every indicator, so that reading back
 changes nothing."""
+_RAW = (COUNTS, BRIDGE, "voltage")
+"""Dimensions of readings in a unit of their own."""
 _COLUMNS = ("load", "indicated", "std", "going", "series")
 
 
@@ -53,16 +59,17 @@ def calibration_toml(calibration: CellCalibration) -> str:
         f'direction = "{calibration.direction}"',
         f"low = {_quantity(calibration.low, 'N')}",
         f"high = {_quantity(calibration.high, 'N')}",
-        "# true force = c0 + c1 x + c2 x^2, x the indicated gross value, both in N",
+        f'unit = "{calibration.unit}"',
+        "# true force in N = c0 + c1 x + c2 x^2, x the indicated gross value in this unit",
         f"coefficients = [{', '.join(f'{c:.{_DIGITS}g}' for c in calibration.coefficients)}]",
         f"residual_std = {_quantity(calibration.residual_std, 'N')}",
     ]
-    for key in ("nonlinearity", "hysteresis", "repeatability"):
+    for key in ("nonlinearity", "hysteresis", "zero_return", "repeatability"):
         value = getattr(calibration, key)
         if math.isfinite(value):
             lines.append(f"{key} = {value:.3g}             # of the span")
     for point in calibration.point:
-        lines += ["", *_point(point)]
+        lines += ["", *_point(point, calibration.unit)]
     return "\n".join(lines) + "\n"
 
 
@@ -106,20 +113,30 @@ def write_text(path: str | Path, text: str) -> Path:
     return target
 
 
-def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
+@dataclass(frozen=True)
+class PointFile:
+    """Points of a calibration, and the unit of their readings."""
+
+    points: tuple[CalibrationPoint, ...]
+    unit: str = "N"
+
+
+def read_points(path: str | Path) -> PointFile:
     """Read points of a calibration from a CSV file.
 
     Parameters
     ----------
     path
-        File with the columns ``load [kg]`` or ``load [N]`` and ``indicated [N]`` (or ``reading``);
-        optional ``std [N]``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the
-        direction follows from the order of the loads.
+        File with the columns ``load`` in any unit of force or mass and ``indicated`` (or
+        ``reading``) in such a unit or in counts, mV/V or V (counts without a unit); optional
+        ``std``, ``going`` (up, down) and ``series`` (1, 2, …). Without ``going`` the direction
+        follows from the order of the loads.
 
     Returns
     -------
-    tuple of CalibrationPoint
-        In the order of the file.
+    PointFile
+        In the order of the file. Readings that follow each other at one load are one point: their
+        mean with its standard deviation.
 
     Raises
     ------
@@ -138,7 +155,7 @@ def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
         raise FileError(Fault(f"is no CSV text: {error}", str(path))) from None
     if not rows:
         raise FileError(Fault("is empty; it needs the columns load [kg], indicated [N]", str(path)))
-    columns = _columns(rows[0][1], str(path))
+    columns, unit = _columns(rows[0][1], str(path), rows[0][0])
     faults: list[Fault] = []
     points: list[CalibrationPoint] = []
     for number, row in rows[1:]:
@@ -148,46 +165,68 @@ def read_points(path: str | Path) -> tuple[CalibrationPoint, ...]:
             faults.append(Fault(f"cannot be read: {error}", str(path), number))
     if faults:
         raise FileError(faults)
-    return tuple(points)
+    return PointFile(tuple(points) if "std" in columns else _averaged(points), unit)
 
 
-def _columns(header: list[str], path: str) -> dict[str, tuple[int, str]]:
-    """Index and unit of each column."""
-    found: dict[str, tuple[int, str]] = {}
+def _averaged(points: Sequence[CalibrationPoint]) -> tuple[CalibrationPoint, ...]:
+    """One point in place of several that follow each other at one load."""
+    found = []
+    for _, items in groupby(points, lambda point: (point.load, point.series, point.going)):
+        own = list(items)
+        values = [point.indicated for point in own]
+        std = statistics.stdev(values) / math.sqrt(len(own)) if len(own) > 1 else 0.0
+        found.append(dataclasses.replace(own[0], indicated=statistics.fmean(values), std=std))
+    return tuple(found)
+
+
+def _columns(header: list[str], path: str, line: int) -> tuple[dict[str, tuple[int, float]], str]:
+    """Index and SI value of the unit of each column; the unit of the readings."""
+    found: dict[str, tuple[int, float]] = {}
+    unit = "N"
     for place, title in enumerate(header):
-        name, _, unit = title.strip().partition("[")
-        key = "indicated" if name.strip() == "reading" else name.strip()
+        name, _, written = title.strip().partition("[")
+        name, written = name.strip().lower(), written.strip(" ]")
+        key = "indicated" if name == "reading" else name
         if key not in _COLUMNS:
             raise FileError(
                 Fault(
                     f"unknown column '{key}'; known are {', '.join(_COLUMNS)}"
                     f"{suggest(key, list(_COLUMNS))}",
                     path,
-                    1,
+                    line,
                 )
             )
-        found[key] = (place, unit.strip(" ]"))
+        factor = 1.0
+        if key in ("load", "indicated", "std"):
+            known = read_unit(written)
+            if known is not None and known.dimension in ("force", "mass"):
+                factor = known.factor * (GRAVITY if known.dimension == "mass" else 1.0)
+            elif key != "load" and (not written or (known and known.dimension in _RAW)):
+                unit = (written or "counts") if key == "indicated" else unit
+            else:
+                given = f"the unknown unit '{written}'" if written else "no unit"
+                message = f"column '{title.strip()}' has {given}; write {name} [N], [kg], [lb]"
+                message += "" if key == "load" else ", [counts], [mV/V]"
+                raise FileError(Fault(f"{message} or another unit of force or mass", path, line))
+        found[key] = (place, factor)
     missing = [key for key in ("load", "indicated") if key not in found]
     if missing:
-        raise FileError(Fault(f"lacks the column {' and '.join(missing)}", path, 1))
-    for key in ("load", "indicated", "std"):
-        if key in found:
-            _force(1.0, found[key][1], path)
-    return found
+        raise FileError(Fault(f"lacks the column {' and '.join(missing)}", path, line))
+    return found, unit
 
 
 def _read_point(
-    row: list[str], columns: dict[str, tuple[int, str]], before: list[CalibrationPoint]
+    row: list[str], columns: dict[str, tuple[int, float]], before: list[CalibrationPoint]
 ) -> CalibrationPoint:
     def number(key: str) -> float:
-        place, unit = columns[key]
+        place, factor = columns[key]
         try:
             value = float(row[place])
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
             raise ValueError(f"{key} '{row[place]}' is no number")
-        return _force(value, unit, "")
+        return value * factor
 
     load = number("load")
     series = int(row[columns["series"][0]]) if "series" in columns else 1
@@ -203,22 +242,13 @@ def _read_point(
     return CalibrationPoint(load, number("indicated"), std, going, series)
 
 
-def _force(value: float, unit: str, path: str) -> float:
-    if unit in ("kg", "g", "t"):
-        return convert(value, unit, "mass") * GRAVITY
-    try:
-        return convert(value, unit, "force")
-    except UsageError as error:
-        raise FileError(Fault(f"{error} or kg", path, 1)) from None
-
-
-def _point(point: CalibrationPoint) -> Iterator[str]:
+def _point(point: CalibrationPoint, unit: str) -> Iterator[str]:
     yield "[[point]]"
     for field in dataclasses.fields(point):
         value = getattr(point, field.name)
-        yield f"{field.name} = " + (
-            _quantity(value, "N") if isinstance(value, float) else json.dumps(value)
-        )
+        is_force = field.name == "load" or (unit == "N" and isinstance(value, float))
+        text = f"{value:.{_DIGITS}g}" if isinstance(value, float) else json.dumps(value)
+        yield f"{field.name} = " + (_quantity(value, "N") if is_force else text)
 
 
 def _tare(tare: HostTare, unit: str) -> Iterator[str]:

@@ -1,10 +1,14 @@
 """Calibration of a load cell from known loads, with its figures of merit.
 
-The true force is a line or a parabola of the indicated one, fitted to all points, increasing and
-decreasing, by least squares. Figures of merit follow ISO 376 and OIML R 60, as shares of the span:
+The true force is a line or a parabola of the reading. The loads are exact and the readings have the
+noise, so that the squares of the readings' errors are minimised: of the line this is the inverse of
+the regression of the reading on the load, whose slope noise does not bias (Draper and Smith 1998,
+section 3.2). Figures of merit follow ISO 376 and OIML R 60, as shares of the span:
 
 - non-linearity: largest deviation of a load's mean from the straight line through all points;
-- hysteresis: largest difference between decreasing and increasing at the same load;
+- zero return: reading at the smallest load after the largest one less that before it;
+- hysteresis (reversibility): largest difference between decreasing and increasing at the same load,
+  beyond the zero return;
 - repeatability: standard deviation at the same load and direction between series.
 """
 
@@ -31,6 +35,9 @@ _FOLLOWS = 5.0
 """Least slope in its standard deviations."""
 _FAR = 3.0
 """Residual of an outlying point in standard deviations."""
+_ITERATIONS = 50
+_CONVERGED = 1e-12
+"""Relative change of the coefficients at which the iteration ends: rounding."""
 _SAME_LOAD = 1e-3
 """Loads that differ by less than this share of the span are the same load."""
 
@@ -48,7 +55,7 @@ class CellFit:
     """A fitted calibration."""
 
     coefficients: tuple[float, ...]
-    """c0 in N, c1, and for a parabola c2 in 1/N, of the true force over the indicated one."""
+    """c0 in N, c1 in N per unit of the reading, and for a parabola c2, of force over reading."""
     covariance: tuple[tuple[float, ...], ...]
     residuals: tuple[float, ...]
     """True less fitted, N, in the order of the points."""
@@ -57,6 +64,7 @@ class CellFit:
     span: float
     """N."""
     nonlinearity: Figure
+    zero_return: Figure
     hysteresis: Figure
     repeatability: Figure
     warnings: tuple[str, ...]
@@ -107,9 +115,9 @@ def fit_cell(
         std,
         span,
         _nonlinearity(from_line, groups, span),
-        _hysteresis(points, from_line, groups, span),
+        *_returns(points, from_line, groups, span),
         _repeatability(points, from_line, groups, span),
-        tuple(_warnings(points, groups, residuals, std)),
+        tuple(_warnings(points, groups, residuals, std, float(line[1]))),
     )
 
 
@@ -141,21 +149,38 @@ def _refuse_slope(slope: float, std: float) -> None:
 
 
 def _least_squares(x: Array, y: Array, degree: int) -> tuple[Array, Array, Array, float]:
-    """Coefficients with covariance, residuals and their standard deviation.
+    """Coefficients with covariance, residuals (true less fitted) and their standard deviation.
+
+    Raises RunError for a parabola that turns round within the loads.
 
     Notes
     -----
-    Ordinary least squares on columns scaled by the largest indicated force; covariance s² (XᵀX)⁻¹.
+    Gauss-Newton on the readings: minimises Σ (x − g(y))², with g the inverse of the polynomial,
+    from the regression of y on x; covariance s² (JᵀJ)⁻¹, ∂g/∂cₖ = −gᵏ/p'(g).
     """
     scale = float(np.max(np.abs(x)))
-    matrix = np.vander(x / scale, degree + 1, increasing=True)
-    inverse = np.linalg.pinv(matrix.T @ matrix)
-    scaled = inverse @ matrix.T @ y
-    residuals = y - matrix @ scaled
+    powers = np.arange(degree + 1.0)
+    found = np.linalg.lstsq(np.vander(x / scale, degree + 1, increasing=True), y, rcond=None)[0]
+    for _ in range(_ITERATIONS):
+        bow = found[2] if degree > 1 else 0.0
+        square = found[1] ** 2 + 4 * bow * (y - found[0])
+        if np.any(square <= 0):
+            raise RunError("the parabola turns round within the loads; take --order linear")
+        inverse = 2 * (y - found[0]) / (found[1] + np.copysign(np.sqrt(square), found[1]))
+        slope = found[1] + 2 * bow * inverse
+        jacobian = -np.vander(inverse, degree + 1, increasing=True) / slope[:, None]
+        step = np.linalg.lstsq(jacobian, x / scale - inverse, rcond=None)[0]
+        found = found + step
+        if np.max(np.abs(step)) <= _CONVERGED * np.max(np.abs(found)):
+            break
+    residuals = y - np.vander(x / scale, degree + 1, increasing=True) @ found
     free = len(x) - degree - 1
-    variance = float(residuals @ residuals) / free if free > 0 else math.nan
-    units = scale ** -np.arange(degree + 1.0)
-    return scaled * units, variance * inverse * np.outer(units, units), residuals, variance**0.5
+    error = x / scale - inverse
+    variance = float(error @ error) / free if free > 0 else math.nan
+    units = scale**-powers
+    covariance = variance * np.linalg.pinv(jacobian.T @ jacobian) * np.outer(units, units)
+    std = math.sqrt(float(residuals @ residuals) / free) if free > 0 else math.nan
+    return found * units, covariance, residuals, std
 
 
 def _groups(load: Array, span: float) -> list[Array]:
@@ -172,21 +197,30 @@ def _nonlinearity(from_line: Array, groups: list[Array], span: float) -> Figure:
     return Figure(float(abs(means[worst])) / span, spread / span)
 
 
-def _hysteresis(
+def _returns(
     points: Sequence[CalibrationPoint], from_line: Array, groups: list[Array], span: float
-) -> Figure:
-    """Decreasing less increasing at the same load, largest over all loads."""
+) -> tuple[Figure, Figure]:
+    """Zero return, and hysteresis: decreasing less increasing, largest over the other loads."""
     differences = []
     for group in groups:
         up = [from_line[k] for k in group if points[k].going == "up"]
         down = [from_line[k] for k in group if points[k].going == "down"]
         if up and down:
-            differences.append((abs(np.mean(down) - np.mean(up)), 1 / len(up) + 1 / len(down)))
-    if not differences:
-        return Figure(math.nan, math.nan)
-    largest, weight = max(differences)
+            weight = 1 / len(up) + 1 / len(down)
+            differences.append((float(np.mean(up) - np.mean(down)), weight, group is groups[0]))
     spread = _pooled(from_line, _split(points, groups))
-    return Figure(float(largest) / span, spread * math.sqrt(weight) / span)
+    unknown = Figure(math.nan, math.nan)
+    zero = next(((size, weight) for size, weight, is_zero in differences if is_zero), None)
+    loops = [
+        (abs(size - (zero[0] if zero else 0.0)), weight + (zero[1] if zero else 0.0))
+        for size, weight, is_zero in differences
+        if not is_zero
+    ]
+    largest, weight = max(loops, default=(math.nan, math.nan))
+    return (
+        unknown if zero is None else Figure(zero[0] / span, spread * math.sqrt(zero[1]) / span),
+        Figure(largest / span, spread * math.sqrt(weight) / span) if loops else unknown,
+    )
 
 
 def _repeatability(
@@ -222,6 +256,7 @@ def _warnings(
     groups: list[Array],
     residuals: Array,
     std: float,
+    slope: float,
 ) -> list[str]:
     """Warnings on missing loads, directions, series, and on outlying points."""
     found = []
@@ -229,6 +264,10 @@ def _warnings(
         found.append(f"only {len(groups)} loads; at least {_FEWEST_LOADS} are usual")
     if {point.going for point in points} != {"up", "down"}:
         found.append("loads go one way only, so hysteresis is unknown")
+    elif not any(points[k].going == "down" for k in groups[0]):
+        found.append(
+            "no reading at the smallest load after the largest: a moved zero is told as hysteresis"
+        )
     if max(point.series for point in points) == 1:
         found.append("one series only, so repeatability is unknown")
     found += [
@@ -236,6 +275,6 @@ def _warnings(
         for point, residual in zip(points, residuals, strict=True)
         if abs(residual) > _FAR * std > 0
     ]
-    if max(point.std for point in points) > std > 0:
+    if slope * max(point.std for point in points) > std > 0:
         found.append("the readings have more noise than the points: wait longer after each load")
     return found

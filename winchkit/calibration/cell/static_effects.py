@@ -1,10 +1,13 @@
 """Effects of a load cell that points at rest determine: zero, span, curvature, hysteresis.
 
-The difference of reading and load is a linear model of up to four columns; all subsets are fitted
-by least squares, and that of least BIC is kept. Its terms are those of the effects ``cell-offset``,
-``cell-gain``, ``cell-nonlinearity`` and ``cell-hysteresis``, so that the values go into a profile.
-Series that repeat each other give the pure error, with which the lack of fit of the kept model is
-tested.
+The difference of reading and load is a linear model of up to six columns; all subsets whose terms
+are significant (t test, 5 %) are fitted by least squares, and that of least BIC is kept. Its terms
+are those of the effects ``cell-offset``, ``cell-gain``, ``cell-nonlinearity`` and
+``cell-hysteresis``, so that the values go into a profile, and two that depend on the order of the
+loads: a zero return (all readings of a series after its largest load) and a zero shift (all
+readings after the first largest load). Readings in a unit of their own (counts, mV/V) have their
+zero and span by definition; the other terms are then in newtons of their own span. Series that
+repeat each other give the pure error, with which the lack of fit of the kept model is tested.
 
 References
 ----------
@@ -14,7 +17,7 @@ ISO 376:2011, Calibration of force-proving instruments.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -23,6 +26,7 @@ from scipy.special import fdtrc, stdtr
 
 from winchkit.arguments import require_types
 from winchkit.arrays import Array
+from winchkit.calibration.cell.fit import fit_cell
 from winchkit.errors import RunError
 from winchkit.schema.calibration import CalibrationPoint
 
@@ -33,9 +37,19 @@ _TERMS = (
     ("cell-gain", "gain_error", "1"),
     ("cell-nonlinearity", "quadratic", "N"),
     ("cell-hysteresis", "fraction", "1"),
+    ("zero-return", "shift", "N"),
+    ("zero-shift", "shift", "N"),
 )
-_HYSTERESIS = 3
-"""Term that needs loads in both directions."""
+_RETURNING = (3, 4)
+"""Terms that need loads in both directions."""
+_SHIFT = 5
+"""Term that needs several series: of one it is the zero return."""
+_LINE = (0, 1)
+"""Terms of a straight line, which readings in a unit of their own have by definition."""
+_SIGNIFICANT = 0.05
+"""Level of the t test of a term: of few points the BIC alone keeps terms of p = 0.26."""
+_ALIKE = 2.0
+"""Difference of BIC below which two models are told as a set (Raftery 1995: no evidence)."""
 _UNIT_TENSION = 500.0
 """As in the effect ``cell-nonlinearity``: q (T/500 N)²."""
 _ROUNDING = 1e-9
@@ -70,15 +84,19 @@ class StaticDiagnosis:
     """Pure error: standard deviation at the same load and direction, N; NaN without series."""
     p_value: float
     """Of the F test of the lack of fit; NaN without series."""
+    alternatives: tuple[tuple[str, ...], ...] = ()
+    """Effects of other models that explain the points as well."""
 
 
-def static_effects(points: Sequence[CalibrationPoint]) -> StaticDiagnosis:
+def static_effects(points: Sequence[CalibrationPoint], unit: str = "N") -> StaticDiagnosis:
     """Effects of a cell that explain the differences of its readings and the loads.
 
     Parameters
     ----------
     points : sequence of CalibrationPoint
-        Known loads with indicated forces.
+        Known loads with readings.
+    unit : str, optional
+        Unit of the readings; in another one than N their line gives the force.
 
     Returns
     -------
@@ -90,29 +108,50 @@ def static_effects(points: Sequence[CalibrationPoint]) -> StaticDiagnosis:
     if not points:
         raise RunError("no point given")
     load = np.array([point.load for point in points])
-    error = np.array([point.indicated for point in points]) - load
+    reading = np.array([point.indicated for point in points])
+    if unit != "N":
+        coefficients = fit_cell(points).coefficients
+        reading = coefficients[0] + coefficients[1] * reading
+    error = reading - load
     up = np.array([1.0 if point.going == "up" else -1.0 for point in points])
-    columns = np.column_stack([np.ones_like(load), load, (load / _UNIT_TENSION) ** 2, -up * load])
-    offered = [k for k in range(len(_TERMS)) if k != _HYSTERESIS or len(set(up)) > 1]
+    after = np.array([point.going == "down" for point in points], dtype=np.float64)
+    moved = np.maximum.accumulate(after)
+    bow, loop = (load / _UNIT_TENSION) ** 2, -up * load
+    columns = np.column_stack([np.ones_like(load), load, bow, loop, after, moved])
+    offered = [k for k in range(len(_TERMS)) if k not in (*_RETURNING, _SHIFT) or len(set(up)) > 1]
+    if len({point.series for point in points}) == 1 and _SHIFT in offered:
+        offered.remove(_SHIFT)
     able = [k for k in offered if _determines(columns, k, offered)]
-    subsets = [s for n in range(len(able) + 1) for s in combinations(able, n)]
+    forced = () if unit == "N" else _LINE
+    free_terms = [k for k in able if k not in forced]
+    subsets = [
+        tuple(sorted((*forced, *s)))
+        for n in range(len(free_terms) + 1)
+        for s in combinations(free_terms, n)
+    ]
     floor = (_ROUNDING * float(np.max(np.abs(load), initial=1.0))) ** 2 * len(load)
-    fits = [_fit(columns[:, s], error) for s in subsets if len(s) < len(load)]
+    subsets = [s for s in subsets if len(s) < len(load)]
+    fits = [_fit(columns[:, s], error) for s in subsets]
+    found = [
+        _effects_of(s, values, inverse, square / (len(load) - len(s)), len(load))
+        for s, (values, inverse, square) in zip(subsets, fits, strict=True)
+    ]
     bic = [
         len(load) * np.log(max(square, floor) / len(load)) + len(values) * np.log(len(load))
-        for values, _, square in fits
+        if all(e.p_value < _SIGNIFICANT for e in effects if e.effect not in _names_of(forced))
+        else np.inf
+        for effects, (values, _, square) in zip(found, fits, strict=True)
     ]
     best = int(np.argmin(bic))
-    kept, (values, inverse, square) = subsets[best], fits[best]
+    kept, square = subsets[best], fits[best][2]
     free = len(load) - len(kept)
     variance = square / free
-    stds = np.sqrt(variance * np.diag(inverse))
-    effects = [
-        StaticEffect(
-            *_TERMS[k][:2], float(value), float(std), _TERMS[k][2], _two_sided(value, std, free)
-        )
-        for k, value, std in zip(kept, values, stds, strict=True)
-    ]
+    effects = [e for e in found[best] if e.effect not in _names_of(forced)]
+    others = tuple(
+        _names_of(k for k in subsets[index] if k not in forced)
+        for index in np.argsort(bic)
+        if index != best and bic[index] < bic[best] + _ALIKE and len(subsets[index]) == len(kept)
+    )
     pure, degrees = _pure_error(points, error)
     lack = free - degrees
     p_value = float("nan")
@@ -124,7 +163,29 @@ def static_effects(points: Sequence[CalibrationPoint]) -> StaticDiagnosis:
         float(np.sqrt(variance)),
         float(np.sqrt(pure / degrees)) if degrees > 0 else float("nan"),
         p_value,
+        others if square > floor else (),
     )
+
+
+def _names_of(terms: Iterable[int]) -> tuple[str, ...]:
+    """Names of effects by the indices of their terms."""
+    return tuple(_TERMS[k][0] for k in terms)
+
+
+def _effects_of(
+    terms: Sequence[int], values: Array, inverse: Array, variance: float, count: int
+) -> list[StaticEffect]:
+    stds = np.sqrt(variance * np.diag(inverse))
+    return [
+        StaticEffect(
+            *_TERMS[k][:2],
+            float(value),
+            float(std),
+            _TERMS[k][2],
+            _two_sided(value, std, count - len(terms)),
+        )
+        for k, value, std in zip(terms, values, stds, strict=True)
+    ]
 
 
 def _determines(columns: Array, index: int, offered: Sequence[int]) -> bool:

@@ -136,11 +136,11 @@ def command(
     if output is not None:
         check_output(output, (".toml",))
     found = _found(cell, bench, points, serial, guided)
-    fit, needed = fit_cell(found.points, order), static_effects(found.points)
+    fit, needed = fit_cell(found.points, order), static_effects(found.points, found.unit)
     beside = Path(bench or points or "").parent
     target = Path(output or beside / f"{found.name.replace('.', '-')}.toml")
     calibration = _calibration(target.stem, fit, found, degrees, direction)
-    for line in [*report_lines(fit, found.points), *effect_lines(needed)]:
+    for line in [*report_lines(fit, found.points, found.unit), *effect_lines(needed)]:
         click.echo(line, err=as_json)
     if html is not None:
         _write_page(html, calibration, fit, needed)
@@ -168,6 +168,8 @@ class _Measured:
     device: str
     serial: str
     points: tuple[CalibrationPoint, ...]
+    unit: str = "N"
+    """Of the readings."""
 
 
 def _found(
@@ -218,6 +220,8 @@ def _calibration(
         high=max(loads),
         residual_std=fit.residual_std,
         nonlinearity=fit.nonlinearity.value,
+        unit=found.unit,
+        zero_return=fit.zero_return.value,
         hysteresis=fit.hysteresis.value,
         repeatability=fit.repeatability.value,
         point=found.points,
@@ -245,30 +249,36 @@ def _from_file(name: str, bench: str, points: str) -> _Measured:
     spec = read_bench(bench)
     winch, _, role = name.rpartition(".")
     device = device_of(spec, refs_of(spec)[winch, role]).name
-    return _Measured(name, device, "", read_points(points))
+    found = read_points(points)
+    return _Measured(name, device, "", found.points, found.unit)
 
 
 def _from_file_alone(points: str) -> _Measured:
     """Points of a CSV file for a cell of no bench, named as the file."""
     from winchkit.calibration.cell.files import read_points
 
-    return _Measured(f"{Path(points).stem}-calibration", "", "", read_points(points))
+    found = read_points(points)
+    return _Measured(f"{Path(points).stem}-calibration", "", "", found.points, found.unit)
 
 
 def _measure(
     cell: str, bench: str, *, weights: str | None, series: int, duration: str, settle: str
 ) -> _Measured:
     """Lead through the weights."""
+    from winchkit.bench.cells.instruments import device_of, is_raw, refs_of
     from winchkit.calibration.cell.weighing_order import plan
     from winchkit.cli.cell.options import cells
     from winchkit.cli.core.quantities import quantity
+    from winchkit.schema.read import read_bench
 
+    spec = read_bench(bench)
     try:
         steps = plan(weights or click.prompt("Weights, rising (0 2 5 10 kg)", err=True), series)
     except UsageError as error:
         raise UsageError(f"--weights: {error}") from None
     average, wait = quantity(duration, "time"), quantity(settle, "time")
     with cells(bench, cell) as (found, name):
+        winch, _, role = name.rpartition(".")
         known = found.do("identify", name)
         identity = known["identity"]
         serial = f"{identity['serial number']:.0f}" if "serial number" in identity else ""
@@ -276,7 +286,8 @@ def _measure(
             _hang(found, name, f"{number}/{len(steps)}", step, average, wait)
             for number, step in enumerate(steps, start=1)
         )
-        return _Measured(name, known["device"], serial, points)
+        device = device_of(spec, refs_of(spec)[winch, role])
+        return _Measured(name, known["device"], serial, points, "counts" if is_raw(device) else "N")
 
 
 def _hang(

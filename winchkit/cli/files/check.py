@@ -126,7 +126,10 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
         if suffix == ".toml" or not Path(file).is_file():
             return _declaration(file, effects)
         known = ", ".join((".toml", *EDS, *RUNS))
-        return Verdict(file, "", faults=(Fault(f"'{suffix}' is none of {known}", file),))
+        from winchkit.runs.importing.formats.can_trace import trace_advice
+
+        message = trace_advice(Path(file)) or f"'{suffix}' is none of {known}"
+        return Verdict(file, "", faults=(Fault(message, file),))
     except FileError as error:
         return Verdict(file, "", faults=error.faults)
 

@@ -37,7 +37,7 @@ def asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
     from winchkit.runs.importing.guess import guess_columns
 
     if guess.questions:
-        click.echo(tables_text(replace(guess, questions=())), err=True)
+        click.echo(tables_text([replace(guess, questions=())]), err=True)
     while guess.questions:
         answers = _answered(guess, answers)
         guess = guess_columns(guess.file, answers)
@@ -48,7 +48,7 @@ def _answered(guess: Guess, answers: Answers) -> Answers:
     question = guess.questions[0]
     click.echo(f"? {question.text}", err=True)
     if question.key:
-        return replace(answers, **{question.key: _value(question, answers)})
+        return _with_value(question, answers)
     if question.options[0].startswith("--body"):
         return replace(answers, body=_picked([o[8:-1] for o in question.options]))
     own = [option[len('--column "') : -1] for option in question.options]
@@ -64,15 +64,18 @@ def _answered(guess: Guess, answers: Answers) -> Answers:
     return replace(answers, columns=(*answers.columns, _column(_picked(own))))
 
 
-def _value(question: Question, answers: Answers) -> Any:
-    """Answer to a question on a field of the answers: a constant, or the column of the axis."""
+def _with_value(question: Question, answers: Answers) -> Answers:
+    """Answer to a question on a field of the answers: a constant, columns, or the axis."""
+    from winchkit.runs.importing.answers import STORAGE, with_options
+
+    if question.key in STORAGE:
+        return with_options(answers, [_picked(question.options)])
     example = re.sub(r'^--\S+ |"', "", question.options[0])
-    if question.key == "unsigned":
-        click.confirm("  has it no sign?", default=False, abort=True, err=True)
-        return (*answers.unsigned, example)
     if question.key == "axis":
-        return example if click.confirm("  separate the axes?", default=True, err=True) else ""
-    return _until(f"  {question.key.replace('_', ' ')} (e.g. {example})", question.key)
+        is_long = click.confirm("  separate the axes?", default=True, err=True)
+        return replace(answers, axis=example if is_long else "")
+    value = _until(f"  {question.key.replace('_', ' ')} (e.g. {example})", question.key)
+    return replace(answers, **{question.key: value})
 
 
 def _column(text: str) -> Any:

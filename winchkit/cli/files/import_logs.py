@@ -17,6 +17,7 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
+from winchkit.cli.files.import_table import shortened
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:
@@ -61,19 +62,17 @@ _NO_ANGLE = (
     multiple=True,
     metavar="CHANNEL=COLUMN",
     help="Column of a channel, by name or number, e.g. 'motor_angle=Pos [deg]', "
-    "'motor_torque=u*35.1', '-Iq [A]' with the other sign; nothing after = for none. May be given "
-    "several times.",
+    "'motor_torque=u*35.1', '-Iq [A]' with the other sign, 'tau_a-tau_b' of several columns, "
+    "'FILE:tension=2 [N]' of one file; nothing after = for none. May be given several times.",
 )
 @click.option(
     "--rated-torque",
     metavar="TORQUE",
-    type=Quantity("torque", example="2.4 N m"),
     help="Torque of 100 %, e.g. '2.4 N m'.",
 )
 @click.option(
     "--torque-constant",
     metavar="CONSTANT",
-    type=Quantity("torque constant", example="0.12 N m/A"),
     help="Torque constant of the motor, e.g. '0.12 N m/A'.",
 )
 @click.option("--counts-per-turn", type=float, metavar="N", help="Counts in a turn of the motor.")
@@ -83,13 +82,11 @@ _NO_ANGLE = (
 @click.option(
     "--capacity",
     metavar="FORCE",
-    type=Quantity("force", example="500 N"),
     help="Rated load of the load cell, e.g. '500 N'.",
 )
 @click.option(
     "--sample-rate",
     metavar="RATE",
-    type=Quantity("frequency", example="1 kHz"),
     help="Rate of the rows, in place of times, e.g. '1 kHz'; of several files, of those that have "
     "none.",
 )
@@ -103,6 +100,23 @@ _NO_ANGLE = (
     multiple=True,
     metavar="COLUMN",
     help="Column that has no sign, where one seems to be lost; may be given several times.",
+)
+@click.option(
+    "--signed",
+    multiple=True,
+    metavar="COLUMN",
+    help="Column whose sign is lost: it is restored; may be given several times.",
+)
+@click.option(
+    "--modulo",
+    multiple=True,
+    metavar="COLUMN=NUMBER",
+    help="Number at which a column wraps, e.g. 'Position=65536'; 0 where it does not.",
+)
+@click.option(
+    "--orientation",
+    type=click.Choice(("vector", "angles", "wxyz", "xyzw")),
+    help="What rx, ry, rz are (rotation vector or fixed angles), or the order of q0 to q3.",
 )
 @click.option("--body", metavar="NAME", help="Body or marker of a tracker's export.")
 @click.option(
@@ -144,7 +158,7 @@ def command(
     that it saves makes the next import silent. A FILE without a motor angle is joined to the one
     that has it, by its time stamps or by cross-correlation (docs/howto/logger.md).
     """
-    from winchkit.cli.files.import_table import entry_of, tables_text
+    from winchkit.cli.files.import_table import alike, entry_of, tables_text
     from winchkit.runs.importing.streams import streams_of
 
     masses = _masses(load_masses, len(files))
@@ -159,7 +173,7 @@ def command(
         "runs": [],
         "sanity": [],
     }
-    shown = "\n\n".join(tables_text(guess) for guess in guesses)
+    shown = "\n\n".join(tables_text(group) for group in alike(guesses))
     if is_new and not as_json and (output is None or not is_quiet()):
         click.echo(shown, err=output is not None)
     elif is_new and not as_json:
@@ -185,11 +199,15 @@ def command(
             lag=_lag(lag),
         )
         report["joints"], report["mapping_id"] = joints, _identity(mapping_file)
+        targets = _targets_of(results, targets, overwrite=overwrite)
         report["sanity"] = _inspected([run for _, run in results])
     for joint in joints:
         note(f"{joint.path}: {joint.text}")
+    told: dict[str, list[str]] = {}
     for finding in report["sanity"]:
-        click.echo(f"{finding['run']}: {finding['channel']}: {finding['text']}", err=True)
+        told.setdefault(f"{finding['channel']}: {finding['text']}", []).append(finding["run"])
+    for text, names in told.items():
+        click.echo(f"{shortened(names)}: {text}", err=True)
     report["runs"] = _written(results, targets, Path(output), as_json=as_json)
     if is_new or save_mapping:
         report["mapping"] = _saved(mapping_file, save_mapping or str(Path(output) / _MAPPING))
@@ -199,10 +217,13 @@ def command(
 
 
 def _warn(guesses: Sequence[Guess]) -> None:
-    """Notes on what was read, without the table."""
+    """Notes on what was read, without the table; what several files have, once."""
+    found: dict[str, list[str]] = {}
     for guess in guesses:
         for text in (*guess.table.notes, *guess.notes):
-            click.echo(f"{one_line(guess.table.path)}: {text} (warning)", err=True)
+            found.setdefault(text, []).append(one_line(guess.table.path))
+    for text, paths in found.items():
+        click.echo(f"{shortened(paths)}: {text} (warning)", err=True)
 
 
 def _may_ask(yes: bool, as_json: bool) -> bool:
@@ -212,7 +233,13 @@ def _may_ask(yes: bool, as_json: bool) -> bool:
 
 def _answers(options: Mapping[str, Any]) -> Answers:
     """Answers of the command line in SI; raises UsageError."""
-    from winchkit.runs.importing.answers import CONSTANTS, Answers, read_column, read_constant
+    from winchkit.runs.importing.answers import (
+        CONSTANTS,
+        Answers,
+        read_column,
+        read_constant,
+        read_modulo,
+    )
 
     constants: dict[str, Any] = {
         key: read_constant(key, str(options[key])) for key in CONSTANTS if options[key] is not None
@@ -221,11 +248,19 @@ def _answers(options: Mapping[str, Any]) -> Answers:
         columns = tuple(read_column(text) for text in options["columns"])
     except UsageError as error:
         raise UsageError(f"--column: {error}") from None
+    pairs = [(item.channel, item.source, item.file) for item in columns if item.source]
+    for pair in dict.fromkeys(pairs):
+        channel, source, _ = pair
+        if pairs.count(pair) > 1:
+            raise UsageError(f"--column: {channel}={source} is given twice; give it once")
     own = Answers(
         columns=columns,
         body=options["body"],
+        orientation=options["orientation"] or "",
         axis=options["axis"],
         unsigned=tuple(options["unsigned"]),
+        signed=tuple(options["signed"]),
+        modulo=tuple(map(read_modulo, options["modulo"])),
     )
     return replace(own, **constants)
 
@@ -288,10 +323,15 @@ def _guesses(
         guesses.append(guess)
     if faults:
         raise RunError(faults)
-    for name in answers.unsigned:
+    named = {
+        "--unsigned": answers.unsigned,
+        "--signed": answers.signed,
+        "--modulo": [name for name, _ in answers.modulo],
+    }
+    for option, name in [(option, name) for option, names in named.items() for name in names]:
         if not any(guess.file.column(name) for guess in guesses):
             has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
-            raise UsageError(f"--unsigned: there is no column '{name}'; there are {has}")
+            raise UsageError(f"{option}: there is no column '{name}'; there are {has}")
     if declared is None and _lack_angle(guesses):
         guesses = [replace(guess, notes=(*guess.notes, _NO_ANGLE)) for guess in guesses]
     return guesses, declared
@@ -351,7 +391,7 @@ def _unanswered(guesses: Sequence[Guess]) -> str:
         ]
         for text in texts:
             asking.setdefault(text, []).append(one_line(guess.table.path))
-    lines = [f"  {_shortened(paths)}: {text}" for text, paths in asking.items()]
+    lines = [f"  {shortened(paths)}: {text}" for text, paths in asking.items()]
     if any(_NO_ANGLE in guess.notes for guess in guesses):
         lines.append(f"  {_NO_ANGLE}")
     if any(guess.questions for guess in guesses):
@@ -360,13 +400,6 @@ def _unanswered(guesses: Sequence[Guess]) -> str:
         lines.append("  no column has the motor angle: it is the integral of motor_velocity from 0")
     accept = 'accept the guess by --yes, or correct it by --column "CHANNEL=COLUMN [UNIT]":'
     return "\n".join([accept, *lines])
-
-
-def _shortened(paths: Sequence[str]) -> str:
-    """``a.csv``, ``a.csv and b.csv`` or ``5 files, a.csv to e.csv``."""
-    if len(paths) < 3:
-        return " and ".join(paths)
-    return f"{len(paths)} files, {paths[0]} to {paths[-1]}"
 
 
 def _mapping_of(files: Sequence[str], guesses: Sequence[Guess]) -> ImportMapping:
@@ -411,6 +444,22 @@ def _targets(files: Sequence[str], folder: Path, *, overwrite: bool, is_joined: 
     return targets
 
 
+def _targets_of(
+    results: Sequence[tuple[int, Run]], targets: Sequence[Path], *, overwrite: bool
+) -> list[Path]:
+    """File of each run; pieces of one recording have ``-piece1`` and so on behind its name."""
+    from winchkit.runs.overwriting import refuse_existing
+
+    found = []
+    for index, run in results:
+        target = targets[index] if len(targets) > index else targets[0]
+        if piece := run.metadata.get("piece", "").partition(" ")[0]:
+            target = target.with_stem(f"{target.stem}-piece{piece}")
+            refuse_existing(target, overwrite)
+        found.append(target)
+    return found
+
+
 @dataclass(frozen=True)
 class _Metadata:
     guesses: Sequence[Guess]
@@ -444,7 +493,7 @@ def _runs(
 ) -> tuple[list[tuple[int, Run]], tuple[Joint, ...]]:
     """Runs with the index of their file; files without a motor angle are joined to the one with."""
     from winchkit.runs.importing.clocks.joint import joined
-    from winchkit.runs.importing.runs import has_angle, run_of, with_angle
+    from winchkit.runs.importing.runs import has_angle, with_angle
 
     if not any(has_angle(part) for part in parts):
         parts = [with_angle(part) for part in parts]
@@ -462,7 +511,7 @@ def _runs(
         results = []
         for index, part in enumerate(parts):
             try:
-                results.append((index, run_of(part, metadata.of([index]))))
+                results += [(index, run) for run in _pieces(part, metadata.of([index]))]
             except RunError as error:
                 faults += error.faults
         if faults:
@@ -472,7 +521,25 @@ def _runs(
     whole, joints = joined([parts[index] for index in order], lag)
     texts = metadata.of(order)
     texts["joined"] = "; ".join(joint.text.replace(":", " ") for joint in joints)
-    return [(order[0], run_of(whole, texts))], joints
+    return [(order[0], run) for run in _pieces(whole, texts)], joints
+
+
+def _pieces(streams: Streams, metadata: Mapping[str, str]) -> list[Run]:
+    """The run of a file, or those before and after every jump of its motor angle."""
+    from winchkit.runs.importing.pieces import jumps_of, pieces_of
+    from winchkit.runs.importing.runs import run_of
+
+    jumps = jumps_of(streams)
+    for jump in jumps:
+        text = f"{jump.text}; the pieces before and after it are runs of their own"
+        click.echo(f"{one_line(streams.path)}: {text} (warning)", err=True)
+    pieces = pieces_of(streams, jumps)
+    if len(pieces) == 1:
+        return [run_of(pieces[0], metadata)]
+    return [
+        run_of(piece, {**metadata, "piece": f"{number} of {len(pieces)}"})
+        for number, piece in enumerate(pieces, start=1)
+    ]
 
 
 def _inspected(runs: Sequence[Run]) -> list[dict[str, Any]]:
@@ -495,8 +562,7 @@ def _written(
     except OSError as error:
         raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
     entries = []
-    for index, run in results:
-        target = targets[index] if len(targets) > index else targets[0]
+    for (_, run), target in zip(results, targets, strict=True):
         write_run(run, target)
         summary = summary_of(run)
         for remark in run.notes:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 from winchkit.errors import one_line
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from winchkit.runs.importing.assignment import Assignment, Guess
     from winchkit.runs.importing.table import Column
 
-__all__ = ["entry_of", "tables_text"]
+__all__ = ["alike", "entry_of", "shortened", "tables_text"]
 
 _WIDEST = 24
 """Characters of a name or of values, so that a row fits on a usual terminal."""
@@ -21,13 +23,37 @@ _FIRST = 3
 _HEAD = ("column", "channel", "unit", "SI of 1", "confidence", "first values", "plot", "reason")
 
 
-def tables_text(guess: Guess) -> str:
-    """The guess of one file as text: a line per column, notes, and what is not known.
+def shortened(paths: Sequence[str]) -> str:
+    """``a.csv``, ``a.csv and b.csv`` or ``5 files, a.csv to e.csv``."""
+    if len(paths) < 3:
+        return " and ".join(paths)
+    return f"{len(paths)} files, {paths[0]} to {paths[-1]}"
+
+
+def alike(guesses: Sequence[Guess]) -> list[list[Guess]]:
+    """Guesses in groups of equal columns, units, notes and questions, in the order of the files.
 
     Parameters
     ----------
-    guess : Guess
-        Assignments.
+    guesses : sequence of Guess
+        Of all files.
+    """
+    found: dict[Any, list[Guess]] = {}
+    for guess in guesses:
+        notes = (*guess.table.notes, *guess.notes)
+        constants = tuple(guess.table.constants.items())
+        key = guess.table.layout, guess.assignments, guess.questions, notes, constants
+        found.setdefault(key, []).append(guess)
+    return list(found.values())
+
+
+def tables_text(group: Sequence[Guess]) -> str:
+    """The guess of files of one kind as text: a line per column, notes, and what is not known.
+
+    Parameters
+    ----------
+    group : sequence of Guess
+        Equal assignments; the values are those of the first file.
 
     Returns
     -------
@@ -36,9 +62,12 @@ def tables_text(guess: Guess) -> str:
     """
     from winchkit.report.words.columns import aligned
 
+    guess = group[0]
     table = guess.table
-    rows = max((len(column) for column in table.columns), default=0)
-    title = f"{one_line(table.path)}: {table.layout}; {len(table.columns)} columns, {rows} rows"
+    counts = [max((len(c) for c in one.table.columns), default=0) for one in group]
+    rows = str(counts[0]) if len(set(counts)) == 1 else f"{min(counts)} to {max(counts)}"
+    names = shortened([one_line(one.table.path) for one in group])
+    title = f"{names}: {table.layout}; {len(table.columns)} columns, {rows} rows"
     columns = {column.source: column for column in table.columns}
     ordered = sorted(guess.assignments, key=lambda item: not item.channel)
     lines = [_HEAD, *(_row(item, columns[item.source]) for item in ordered)]
@@ -111,6 +140,7 @@ def entry_of(guess: Guess) -> dict[str, Any]:
                 "offset": item.offset if item.channel else None,
                 "confidence": item.confidence,
                 "reason": item.reason,
+                "stored": item.stored,
                 "first": list(columns[item.source].values[:_FIRST]),
             }
             for item in guess.assignments

@@ -20,16 +20,21 @@ if TYPE_CHECKING:
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration
 
 __all__ = [
-    "NAMES",
     "cell_figures",
     "effect_lines",
     "figures",
+    "names",
     "report_lines",
     "report_page",
 ]
 
-NAMES = ("c0 [N]", "c1 [1]", "c2 [1/N]")
-"""Names of the coefficients."""
+
+def names(unit: str) -> tuple[str, str, str]:
+    """Names of the coefficients for readings in a unit."""
+    per = "" if unit == "N" else f" per {unit}"
+    return ("c0 [N]", f"c1 [N{per}]", f"c2 [N{per}²]") if per else ("c0 [N]", "c1 [1]", "c2 [1/N]")
+
+
 _WIDTH = 56
 """Characters of the plot of residuals; with its scale within 80."""
 _ROWS = 11
@@ -37,7 +42,7 @@ _ROWS = 11
 _MARKS = {"up": "^", "down": "v"}
 
 
-def report_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
+def report_lines(fit: CellFit, points: Sequence[CalibrationPoint], unit: str = "N") -> list[str]:
     """Coefficients, figures of merit, residuals drawn with characters, warnings.
 
     Parameters
@@ -46,6 +51,8 @@ def report_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
         The fitted calibration.
     points : sequence of CalibrationPoint
         Loads and readings.
+    unit : str, optional
+        Of the readings.
 
     Returns
     -------
@@ -54,10 +61,10 @@ def report_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
     """
     lines = [f"calibration over {fit.span:.5g} N from {len(points)} points:"]
     lines += [
-        f"  {name:9}{value:+.6g} ± {std:.2g}"
-        for name, value, std in zip(NAMES, fit.coefficients, fit.std, strict=False)
+        f"  {name:20}{value:+.6g} ± {std:.2g}"
+        for name, value, std in zip(names(unit), fit.coefficients, fit.std, strict=False)
     ]
-    lines += [f"  {name:16}{value}" for name, value in figures(fit)]
+    lines += [f"  {name:28}{value}" for name, value in figures(fit)]
     lines += ["  residuals (true less fitted), ^ going up, v going down:"]
     lines += [f"  {line}" for line in _residual_lines(fit, points)]
     return lines + [f"  ! {warning}" for warning in fit.warnings]
@@ -66,10 +73,15 @@ def report_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[str]:
 def effect_lines(needed: StaticDiagnosis) -> list[str]:
     """Effects of the cell that the points need, and what they leave, as lines of text."""
     error = f"reading less load: {needed.before:.3g} N rms"
+    alike = [
+        f"  cannot be distinguished from: {', '.join(names) or 'none'}"
+        for names in needed.alternatives
+    ]
     if not needed.effects:
-        return [f"effects of the cell: none is needed ({error})"]
+        return [f"effects of the cell: none is needed ({error})", *alike]
     lines = [f"effects of the cell (least BIC; {error}, {needed.after:.3g} N beside them):"]
     lines += [f"  {' '.join(row)}" for row in _effect_rows(needed)]
+    lines += alike
     if not math.isnan(needed.p_value):
         lines.append(
             f"  lack of fit: p = {needed.p_value:.2g}; repeatability {needed.repeatability:.3g} N"
@@ -89,8 +101,10 @@ def figures(fit: CellFit) -> list[tuple[str, str]]:
     return [
         ("residual std", f"{fit.residual_std:.3g} N ({fit.residual_std / fit.span:.3%} of span)"),
         ("non-linearity", _share(fit.nonlinearity)),
-        ("hysteresis", _share(fit.hysteresis)),
+        ("zero return", _share(fit.zero_return)),
+        ("hysteresis (reversibility)", _share(fit.hysteresis)),
         ("repeatability", _share(fit.repeatability)),
+        ("creep", "unknown: the points have no times"),
     ]
 
 
@@ -119,7 +133,7 @@ def _residual_lines(fit: CellFit, points: Sequence[CalibrationPoint]) -> list[st
     return [*drawn, f"{'':10}{f'{low:.4g}':<{_WIDTH - len(high)}}{high}"]
 
 
-_FORMULA = "True force = c0 + c1 x + c2 x², x the indicated force in N; a line has no c2."
+_FORMULA = "True force in N = c0 + c1 x + c2 x², x the reading; a line has no c2."
 _TONES = {"up": "today", "down": "with"}
 
 
@@ -144,7 +158,9 @@ def report_page(
     """
     coefficients = [
         (name, f"{value:.6g}", f"{std:.2g}")
-        for name, value, std in zip(NAMES, fit.coefficients, fit.std, strict=False)
+        for name, value, std in zip(
+            names(calibration.unit), fit.coefficients, fit.std, strict=False
+        )
     ]
     drawn = cell_figures(fit, calibration)
     return page(
@@ -164,7 +180,7 @@ def report_page(
             join(element("p", warning) for warning in fit.warnings),
         ),
         section("effects", "Effects of the cell", _effects(needed)),
-        folded("points", "Points", _points(calibration.point, fit)),
+        folded("points", "Points", _points(calibration.point, fit, calibration.unit)),
     )
 
 
@@ -190,7 +206,7 @@ def _about(calibration: CellCalibration) -> Markup:
     return element("dl", *pairs, class_="facts")
 
 
-def _points(points: Sequence[CalibrationPoint], fit: CellFit) -> Markup:
+def _points(points: Sequence[CalibrationPoint], fit: CellFit, unit: str) -> Markup:
     rows = [
         (
             str(point.series),
@@ -202,7 +218,7 @@ def _points(points: Sequence[CalibrationPoint], fit: CellFit) -> Markup:
         )
         for point, residual in zip(points, fit.residuals, strict=True)
     ]
-    head = ("series", "going", "load [N]", "indicated [N]", "std [N]", "residual [N]")
+    head = ("series", "going", "load [N]", f"indicated [{unit}]", f"std [{unit}]", "residual [N]")
     caption = "Loads in the order of application; std is that of the reading."
     return table(caption, head, rows, 2)
 
@@ -224,8 +240,9 @@ def cell_figures(fit: CellFit, calibration: CellCalibration) -> list[Figure]:
     """
     points = calibration.point
     load = np.array([point.load for point in points], dtype=float)
-    shown = np.array([point.indicated for point in points], dtype=float)
     residual = np.asarray(fit.residuals, dtype=float)
+    shown = np.array([point.indicated for point in points], dtype=float)
+    shown = shown if calibration.unit == "N" else load - residual
     going = np.array([point.going for point in points])
     order = np.argsort(load)
     size = scale_for(float(np.max(np.abs(residual), initial=0.0)), "N")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Sequence
+import shlex
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from winchkit.errors import UsageError
 from winchkit.runs.columns import column_dimension
+from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE, read_unit
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
@@ -16,17 +20,20 @@ from winchkit.units import UNITS, suggest
 
 __all__ = [
     "CONSTANTS",
+    "STORAGE",
     "Answers",
     "ColumnAnswer",
     "answers_of",
     "permitted",
     "read_column",
     "read_constant",
+    "read_modulo",
+    "with_options",
 ]
 
 _COLUMN = re.compile(
-    r"\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"
-    r"(?:\*\s*(?:(?P<factor>[-+]?[\d.]+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
+    r"\s*(?:(?P<file>[^=]+):)?\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"
+    r"(?:\*\s*(?:(?P<factor>[-+]?\d*[.,]?\d+(?:[eE][-+]?\d+)?)|(?P<constant>[A-Za-z][\w.]*)))?\s*"
     r"(?:(?!(?<=\S)\[\d+\]\s*$)\[\s*(?P<unit>[^\[\]]*)\s*\])?\s*"
 )
 """A number in brackets at the end of a name is an index of it: ``tau[0]``."""
@@ -97,15 +104,30 @@ def read_constant(key: str, text: str) -> float:
         For a wrong unit, or a number that is not above zero.
     """
     dimension = CONSTANTS[key]
-    plain = _COUNTED.sub("", text) if dimension == "ratio" else text
     option = f"--{key.replace('_', '-')}"
+    plain = _with_point(option, _COUNTED.sub("", text) if dimension == "ratio" else text)
     try:
-        value = typed_quantity(plain, dimension)
+        value = typed_quantity(_our_spelling(plain, dimension), dimension)
     except UsageError as error:
         raise UsageError(f"{option}: {error}") from None
     if value <= 0:
         raise UsageError(f"{option} '{text}' must be above 0")
     return value
+
+
+def _with_point(option: str, text: str) -> str:
+    """A decimal point in place of a comma; raises UsageError where it may separate thousands."""
+    if re.match(r"\s*[1-9]\d{0,2},\d{3}(?!\d)", text):
+        raise UsageError(f"{option}: the comma of '{text}' may separate thousands; write a point")
+    return re.sub(r"^(\s*\d+),(?=\d)", r"\1.", text)
+
+
+def _our_spelling(text: str, dimension: str) -> str:
+    """A quantity with the unit as winchkit spells it: ``2.4 Nm`` is ``2.4 N m``."""
+    number = re.match(r"\s*[\d.]+\s*", text)
+    unit = read_unit(text[number.end() :]) if number else None
+    is_ours = unit is not None and unit.text in UNITS[dimension]
+    return f"{number[0]} {unit.text}" if number and unit and is_ours else text
 
 
 @dataclass(frozen=True)
@@ -122,6 +144,8 @@ class ColumnAnswer:
     """Name of a variable of the file that is the multiplier."""
     sign: float = 1.0
     """-1 for a column of the other sign."""
+    file: str = ""
+    """Name of the only file that it is of, with or without folder and suffix; empty for all."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +171,13 @@ class Answers:
     """Column that names the axis of each row; empty for a table whose rows are of all axes."""
     unsigned: tuple[str, ...] = ()
     """Columns whose numbers have no sign, although they look like signed ones that lost it."""
+    signed: tuple[str, ...] = ()
+    """Columns whose sign is lost and restored."""
+    orientation: str = ""
+    """``vector`` or ``angles`` for ``rx``, ``ry``, ``rz``; ``wxyz`` or ``xyzw`` for ``q0`` to
+    ``q3``; empty where the values say it."""
+    modulo: tuple[tuple[str, float], ...] = ()
+    """Columns with the number at which they wrap; 0 for one that does not."""
 
 
 def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answers:
@@ -165,15 +196,80 @@ def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answe
     -------
     Answers
         A column is that of the files that have its name; where none has, of those that have its
-        number; where none has that either, of all, so that each says so.
+        number; where none has that either, of all, so that each says so. An answer with the name
+        of a file is of that file only.
+
+    Raises
+    ------
+    UsageError
+        For the name of a file that is none of them.
     """
+    for item in answers.columns:
+        if item.file and not any(_is_named(t, item.file) for t in tables):
+            has = ", ".join(t.path for t in tables)
+            raise UsageError(f"--column: there is no file '{item.file}'; there are {has}")
 
     def is_own(item: ColumnAnswer) -> bool:
+        if item.file:
+            return _is_named(table, item.file)
         having = [t for t in tables if any(c.source == item.source for c in t.columns)]
+        having = having or [t for t in tables if with_derived(t, [item.source]) is not t]
         having = having or [t for t in tables if t.column(item.source) is not None]
         return not item.source or not having or any(t is table for t in having)
 
     return replace(answers, columns=tuple(item for item in answers.columns if is_own(item)))
+
+
+def _is_named(table: Table, name: str) -> bool:
+    return name in {table.path, Path(table.path).name, Path(table.path).stem}
+
+
+def read_modulo(text: str) -> tuple[str, float]:
+    """Read ``Position=65536``: a column and the number at which it wraps; raises UsageError."""
+    name, _, size = text.rpartition("=")
+    try:
+        value = float(size)
+    except ValueError:
+        value = math.nan
+    if not name or not 0 <= value < math.inf:
+        raise UsageError(f"--modulo: '{text}' is not COLUMN=NUMBER, e.g. 'Position=65536'")
+    return name.strip(), value
+
+
+STORAGE = ("signed", "modulo", "orientation")
+"""Keys of the questions that an option as it stands answers."""
+
+
+def with_options(answers: Answers, options: Iterable[str]) -> Answers:
+    """Answers with options of the command line that answer a question of :data:`STORAGE`.
+
+    Raises UsageError for another option.
+
+    Parameters
+    ----------
+    answers : Answers
+        Other answers.
+    options : iterable of str
+        ``--signed "speed 3" --signed "speed 5"``, ``--modulo "Position=65536"``,
+        ``--orientation vector``.
+    """
+    for text in options:
+        try:
+            words = shlex.split(text)
+        except ValueError:
+            words = []
+        for option, value in zip(words[::2], words[1::2], strict=False):
+            if option == "--signed":
+                answers = replace(answers, signed=(*answers.signed, value))
+            elif option == "--unsigned":
+                answers = replace(answers, unsigned=(*answers.unsigned, value))
+            elif option == "--modulo":
+                answers = replace(answers, modulo=(*answers.modulo, read_modulo(value)))
+            elif option == "--orientation":
+                answers = replace(answers, orientation=value)
+            else:
+                raise UsageError(f"'{text}' is no option that answers a question of a file")
+    return answers
 
 
 def read_column(text: str) -> ColumnAnswer:
@@ -186,7 +282,7 @@ def read_column(text: str) -> ColumnAnswer:
     text : str
         ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; the factor is a number or a
         variable of the file; a minus before the column changes its sign; nothing after ``=`` for a
-        channel that the file does not have.
+        channel that the file does not have; ``FILE:`` before it for one of several files.
 
     Returns
     -------
@@ -213,6 +309,7 @@ def read_column(text: str) -> ColumnAnswer:
             f"'{unit}' in '{text}' is a unit of {spelled.dimension}, not of {dimension}; use "
             + ", ".join(UNITS[dimension or "ratio"])
         )
-    factor = float(found["factor"]) if found["factor"] else None
+    factor = float(_with_point("factor", found["factor"])) if found["factor"] else None
     constant, sign = found["constant"] or "", -1.0 if found["minus"] else 1.0
-    return ColumnAnswer(channel, found["source"], unit, factor, constant, sign)
+    file = (found["file"] or "").strip()
+    return ColumnAnswer(channel, found["source"], unit, factor, constant, sign, file)

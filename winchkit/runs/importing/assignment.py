@@ -28,7 +28,7 @@ unit alone or from other columns, ``assumed`` by convention, ``unused``."""
 
 @dataclass(frozen=True)
 class Assignment:
-    """One column: SI value = factor × number + offset."""
+    """One column: SI value = factor × number + offset, of numbers as they were before storing."""
 
     source: str
     """Unique name of the column."""
@@ -40,6 +40,8 @@ class Assignment:
     offset: float = 0.0
     confidence: Confidence = "unused"
     reason: str = ""
+    stored: str = ""
+    """How numbers that wrap or have lost their sign are stored: ``modulo 360``."""
 
 
 @dataclass(frozen=True)

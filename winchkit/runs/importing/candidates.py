@@ -13,6 +13,7 @@ from winchkit.runs.importing.answers import permitted
 from winchkit.runs.importing.assignment import Candidate, Choice, Question
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of
+from winchkit.runs.importing.orientation import quaternion_order
 from winchkit.runs.importing.pose_columns import (
     body_of,
     chosen_body,
@@ -20,6 +21,7 @@ from winchkit.runs.importing.pose_columns import (
     quaternion_names,
     vector_names,
 )
+from winchkit.runs.importing.source_stamps import SOURCE_STAMP
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
@@ -58,7 +60,11 @@ _UNEVEN = 0.5
 
 
 def choose(
-    table: Table, given: Mapping[str, str], body: str | None, without: Collection[str] = ()
+    table: Table,
+    given: Mapping[str, str],
+    body: str | None,
+    without: Collection[str] = (),
+    orientation: str = "",
 ) -> Choice:
     """Choose the columns of all channels.
 
@@ -72,6 +78,8 @@ def choose(
         Body of a tracker's export.
     without : collection of str
         Channels that the file does not have, as the user says.
+    orientation : str, optional
+        Convention of the orientation, as the user says.
 
     Returns
     -------
@@ -79,7 +87,7 @@ def choose(
         Every column is in ``chosen`` or in ``unused``.
     """
     choice = Choice()
-    numbered = quaternion_names([item.name for item in table.columns])
+    numbered = _numbered(table, given, orientation, choice)
     vectors = vector_names([item.name for item in table.columns])
     free: list[Candidate] = []
     longest = max((len(item) for item in table.columns), default=0)
@@ -116,6 +124,26 @@ def choose(
     others = _left_after({item.channel for item in choice.chosen}, others, choice)
     choose_channels(others, choice, without)
     return choice
+
+
+def _numbered(
+    table: Table, given: Mapping[str, str], orientation: str, choice: Choice
+) -> dict[str, str]:
+    """Channels of a numbered quaternion, whose order its values say or which is asked."""
+    names = [item.name for item in table.columns]
+    found = list(quaternion_names(names))
+    columns = [item for name in found for item in table.columns if item.name == name]
+    if not found or any(item.source in given for item in columns):
+        return quaternion_names(names)
+    order = orientation if orientation in {"wxyz", "xyzw"} else ""
+    order = order or quaternion_order(columns[0].values, columns[-1].values)
+    if not order:
+        text = f"'{found[0]}' to '{found[-1]}' are a quaternion: is its first or last part real?"
+        options = ("--orientation wxyz", "--orientation xyzw")
+        choice.questions.append(Question(text, options, "orientation"))
+    elif not orientation:
+        choice.notes.append(f"'{found[0]}' to '{found[-1]}' are {', '.join(order)} by their values")
+    return quaternion_names(names, order or "wxyz")
 
 
 def _left_after(
@@ -274,16 +302,26 @@ def _blocks(table: Table, clocks: Sequence[Candidate]) -> list[list[Candidate]]:
     return blocks
 
 
-def _quality(item: Candidate) -> tuple[bool, bool, int]:
-    """An absolute clock with distinct stamps first, then one with a unit, then the finest."""
+def _quality(item: Candidate) -> tuple[bool, bool, bool, int]:
+    """That of the source first, an absolute one, one with a unit, then the finest.
+
+    All but the finest have distinct stamps that increase.
+    """
+    values = item.column.values
     if item.column.texts is not None:
         stamps = read_stamps(item.column.texts)
-        distinct, absolute = len(np.unique(stamps.values)), stamps.has_date
+        values, absolute = stamps.values, stamps.has_date
     else:
-        distinct = len(np.unique(item.column.values))
-        absolute = epoch_unit(item.column.values) is not None
-    complete = distinct >= 0.99 * len(item.column)
-    return complete and absolute, complete and item.unit is not None, distinct
+        absolute = epoch_unit(values) is not None
+    distinct, steps = len(np.unique(values)), np.diff(values[np.isfinite(values)])
+    complete = distinct >= 0.99 * len(values) and not (np.any(steps < 0) and np.any(steps > 0))
+    is_source = item.column.name == SOURCE_STAMP
+    return (
+        complete and is_source,
+        complete and absolute,
+        complete and item.unit is not None,
+        distinct,
+    )
 
 
 def _needs_date(item: Candidate) -> bool:

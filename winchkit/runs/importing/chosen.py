@@ -21,12 +21,16 @@ class ChosenColumn:
     """A chosen column while its unit is determined."""
 
     candidate: Candidate
+    scale: float | None = None
+    """Sign and factor that the user gives, by which the numbers are multiplied before the unit."""
     factor: float | None = None
-    """None while unknown."""
+    """SI value of 1 with its scale; None while unknown."""
     offset: float = 0.0
     unit: str = ""
     confidence: Confidence = "named"
     reason: str = ""
+    stored: str = ""
+    """How its numbers are stored, where they wrap or have lost their sign."""
 
     @property
     def column(self) -> Column:
@@ -38,10 +42,15 @@ class ChosenColumn:
         """Channel without a winch's name."""
         return self.candidate.channel.rpartition(".")[2]
 
-    def settle(self, factor: float, unit: str, confidence: Confidence, reason: str) -> None:
-        """Set the factor with its origin."""
-        self.factor, self.unit, self.reason = factor, unit, reason
-        self.confidence = confidence
+    @property
+    def size(self) -> float:
+        """Magnitude of the scale."""
+        return 1.0 if self.scale is None else abs(self.scale)
+
+    def settle(self, si: float, unit: str, confidence: Confidence, reason: str) -> None:
+        """Set the SI value of the unit, which the scale multiplies, with its origin."""
+        self.factor = si if self.scale is None else si * self.scale
+        self.unit, self.confidence, self.reason = unit, confidence, reason
 
 
 @dataclass

@@ -15,12 +15,22 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of, clock_values, is_counted
 
-__all__ = ["CLOCKS", "Ratio", "from_velocity", "likely_counts", "ratio_of"]
+__all__ = [
+    "CLOCKS",
+    "USUAL_COUNTS",
+    "Ratio",
+    "beyond_rating",
+    "from_velocity",
+    "likely_counts",
+    "ratio_of",
+]
 
 _CLEAR = 0.98
 """Least correlation of angle and integral at which their ratio is used."""
 _TOLERANCE = 0.02
 """Relative: factors of units differ by more, and calibrations of one machine by less."""
+_OVERLOAD = 10.0
+"""Torque over the rated one that no servo reaches: peaks are 3 to 5 times as large."""
 _TURN = 2 * math.pi
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "turn": _TURN}
 _SPEEDS = {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": _TURN / 60, "turn/s": _TURN}
@@ -92,12 +102,20 @@ def likely_counts(estimate: float) -> int | None:
         A power of two, or four times a usual number of lines, within 0.5 %; None where there is
         none or more than one.
     """
+    near = [n for n in USUAL_COUNTS if abs(estimate / n - 1) < 0.005]
+    return near[0] if len(near) == 1 else None
+
+
+def _usual_counts() -> frozenset[int]:
     lines = (100, 200, 250, 256, 360, 400, 500, 512, 600, 720, 900, 1000, 1024, 1250, 1500, 1800)
     more = (2000, 2048, 2500, 3600, 4000, 4096, 5000, 6400, 8192, 9000, 10_000)
     usual = {2**n for n in range(8, 25)} | {4 * n for n in (*lines, *more)}
     usual |= {360, 3600, 36_000, 360_000, 1000, 10_000, 100_000, 1_000_000}
-    near = [n for n in usual if abs(estimate / n - 1) < 0.005]
-    return near[0] if len(near) == 1 else None
+    return frozenset(usual)
+
+
+USUAL_COUNTS = _usual_counts()
+"""Usual resolutions of encoders, counts per turn."""
 
 
 def from_velocity(work: Work) -> None:
@@ -115,6 +133,19 @@ def from_velocity(work: Work) -> None:
         ratio = ratio_of(times, angle.column.values, velocity.column.values)
         if ratio is not None:
             _apply_ratio(work, ratio, angle, velocity, clock)
+
+
+def beyond_rating(work: Work) -> None:
+    """Notes on torques that no motor of the rated torque has."""
+    rated = work.answers.rated_torque
+    for item in [item for item in work.columns if item.base == "motor_torque" and item.factor]:
+        values = item.column.values[np.isfinite(item.column.values)]
+        times = float(np.max(np.abs(values), initial=0.0)) * abs(item.factor or 0) / (rated or 1)
+        if rated and times > _OVERLOAD:
+            work.notes.append(
+                f"'{item.column.source}' reaches {times:.3g} times the rated torque of {rated:g} "
+                "N m: is its unit, its sign or the rated torque wrong?"
+            )
 
 
 def _apply_ratio(
@@ -136,12 +167,12 @@ def _apply_ratio(
             if item.factor is None and len(options) == 1:
                 unit, factor = options.pop()
                 text = f"ratio of angle and velocity (correlation {abs(ratio.correlation):.4f})"
-                item.settle(factor, unit, "derived", text)
+                item.settle(factor / item.size, unit, "derived", text)
         if velocity.factor is None and angle.factor is not None and clock.factor is not None:
             measured = ratio.value * angle.factor / clock.factor
             work.measured[velocity.column.source] = measured
-    if None not in (angle.factor, velocity.factor) and ratio.value * (velocity.factor or 1) < 0:
-        velocity.factor = -(velocity.factor or 1)
+    if angle.factor and velocity.factor and ratio.value * angle.factor * velocity.factor < 0:
+        velocity.factor = -velocity.factor
         velocity.reason += "; sense reversed: it is opposite to the angle"
         work.notes.append(
             f"'{velocity.column.source}' has the opposite sense of '{angle.column.source}'; its "
@@ -159,14 +190,17 @@ def _matches(
     for speed in speeds:
         for stamp in clocks:
             if angle.factor is None and counted:
-                counts = likely_counts(_TURN * abs(ratio.value) / (speed[1] * stamp[1]))
+                turn = _TURN * angle.size
+                counts = likely_counts(turn * abs(ratio.value / (speed[1] * stamp[1])))
                 if counts:
-                    yield (f"1/{counts} turn", _TURN / counts), speed, stamp
+                    yield (f"1/{counts} turn", turn / counts), speed, stamp
                 continue
-            for turn in _options(angle, _ANGLES):
-                if ratio.agrees(abs(speed[1] * stamp[1] / turn[1])):
-                    yield turn, speed, stamp
+            for unit in _options(angle, _ANGLES):
+                if ratio.agrees(abs(speed[1] * stamp[1] / unit[1])):
+                    yield unit, speed, stamp
 
 
 def _options(item: ChosenColumn, units: dict[str, float]) -> list[tuple[str, float]]:
-    return [(item.unit, item.factor)] if item.factor is not None else list(units.items())
+    if item.factor is not None:
+        return [(item.unit, item.factor)]
+    return [(unit, value * item.size) for unit, value in units.items()]

@@ -7,16 +7,21 @@ ratio of angle and velocity; conventions. A unit that none of these gives is ask
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from winchkit.runs.importing.answers import Answers, ColumnAnswer
 from winchkit.runs.importing.assignment import Assignment, Guess, Question
 from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of
-from winchkit.runs.importing.consistency import from_velocity
+from winchkit.runs.importing.consistency import beyond_rating, from_velocity
+from winchkit.runs.importing.formats.arithmetic import is_expression, with_derived
 from winchkit.runs.importing.long_table import axes_of, likely_axis
-from winchkit.runs.importing.questions import ask_columns, ask_signs, ask_units, axis_question
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.orientation import settle_orientation
+from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
+from winchkit.runs.importing.source_stamps import delays, has_two_clocks, without_stamps
+from winchkit.runs.importing.stored.settling import settle_stored
+from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
 from winchkit.schema.mapping import DATE
 
@@ -44,13 +49,16 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     if answers.axis is None and (axis := likely_axis(table)) is not None:
         open_yet = [Assignment(item.source, "", item.unit) for item in table.columns]
         return Guess(table, tuple(open_yet), (axis_question(table, axis.source),))
+    answers = replace(answers, columns=tuple(_whole(item, table) for item in answers.columns))
+    table = with_derived(table, [item.source for item in answers.columns])
     given, unknown = _given(table, answers)
     channels = {source: item.channel for source, item in given.items()}
     without = {item.channel for item in answers.columns if not item.source}
-    choice = choose(table, channels, answers.body, without)
+    choice = choose(table, channels, answers.body, without, answers.orientation)
     work = Work(table, answers, questions=[*unknown, *choice.questions], notes=[*choice.notes])
     for candidate in choice.chosen:
         work.columns.append(started(work, candidate, given.get(candidate.column.source)))
+    settle_stored(work)
     as_others(work)
     from_velocity(work)
     by_convention(work)
@@ -58,8 +66,14 @@ def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     from_velocity(work)
     as_others(work)
     _drop_clocks(work)
+    if has_two_clocks(work):
+        logged, note = without_stamps(table)
+        again = guess_columns(logged, answers)
+        return replace(again, notes=(note, *again.notes))
+    work.notes += delays(work)
+    beyond_rating(work)
+    settle_orientation(work)
     ask_units(work)
-    ask_signs(work)
     rate = _rate(work)
     ask_columns(work, choice)
     assigned = {item.column.source: _assignment(item) for item in work.columns}
@@ -87,9 +101,10 @@ def _of_axes(table: Table, answers: Answers, by: str) -> Guess:
 def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], list[Question]]:
     """Answers by the unique name of their column; a question for a column that is not there."""
     found: dict[str, ColumnAnswer] = {}
-    missing = []
+    missing: list[Question] = []
     for item in answers.columns:
         column = table.column(item.source) if item.source else None
+        missing += _contradictions(found, column, item)
         if column is not None and item.constant and item.constant not in table.constants:
             known = ", ".join(f"{k} = {v:g}" for k, v in table.constants.items()) or "none"
             text = f"there is no constant '{item.constant}'; the file has {known}"
@@ -101,6 +116,32 @@ def _given(table: Table, answers: Answers) -> tuple[dict[str, ColumnAnswer], lis
             text = f"there is no column '{item.source}'; the file has {names}"
             missing.append(Question(text, (f"--column {item.channel}=COLUMN",)))
     return found, missing
+
+
+def _whole(item: ColumnAnswer, table: Table) -> ColumnAnswer:
+    """An answer with its sign and factor as parts of its expression, which they are of a sum."""
+    if table.column(item.source) is not None or not is_expression(item.source):
+        return item
+    factor = item.constant or ("" if item.factor is None else f"{item.factor!r}")
+    source = "-" * (item.sign < 0) + item.source + (f"*{factor}" if factor else "")
+    return replace(item, source=source, factor=None, constant="", sign=1.0)
+
+
+def _contradictions(
+    found: Mapping[str, ColumnAnswer], column: Column | None, item: ColumnAnswer
+) -> Iterator[Question]:
+    """Questions for a column that is given twice, and for a channel of two columns."""
+    if column is None:
+        return
+    before = found.get(column.source)
+    own = f'--column "{item.channel}={item.source}"'
+    if before is not None and before.channel != item.channel:
+        text = f"column '{column.source}' is given as {before.channel} and as {item.channel}"
+        yield Question(text, (f'--column "{before.channel}={before.source}"', own))
+    others = [s for s, o in found.items() if o.channel == item.channel and s != column.source]
+    if others and item.channel not in {"time", DATE}:
+        text = f"{item.channel} is given as column '{others[0]}' and as '{column.source}'"
+        yield Question(text, (f'--column "{item.channel}={others[0]}"', own))
 
 
 def _rate(work: Work) -> float | None:
@@ -141,4 +182,5 @@ def _assignment(item: ChosenColumn) -> Assignment:
         item.offset,
         confidence,
         reason,
+        item.stored,
     )

@@ -11,9 +11,10 @@ from pathlib import Path
 from winchkit.errors import Fault, RunError
 from winchkit.runs.files import write_whole
 from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.table import Table
-from winchkit.schema.mapping import ImportMapping, MappedColumn, MappedLog
+from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedLog
 
 __all__ = ["guess_by", "mapping_id", "mapping_of", "write_mapping"]
 
@@ -31,12 +32,25 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
     Returns
     -------
     ImportMapping
-        Files with the same columns are one log.
+        Files with the same columns are one log; a counter that wraps in one of them does in all.
     """
     logs: list[MappedLog] = []
+    wraps = {
+        (item.source, item.channel): item.stored
+        for _, guess in guesses
+        for item in guess.used
+        if item.stored.startswith(MODULO)
+    }
     for title, guess in guesses:
         columns = tuple(
-            MappedColumn(item.source, item.channel, item.unit, item.factor, item.offset)
+            MappedColumn(
+                item.source,
+                item.channel,
+                item.unit,
+                item.factor,
+                item.offset,
+                item.stored or wraps.get((item.source, item.channel), ""),
+            )
             for item in guess.used
         )
         own = (columns, guess.sample_rate, guess.axis)
@@ -96,6 +110,8 @@ def write_mapping(mapping: ImportMapping, path: Path) -> None:
                 column["factor"] = float(item.factor)
             if item.offset:
                 column["offset"] = float(item.offset)
+            if item.stored:
+                column["stored"] = item.stored
             columns.append(column)
         table["column"] = columns
         logs.append(table)
@@ -111,7 +127,8 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     whole : Table
         The file.
     mapping : ImportMapping
-        Its first log whose columns the file has is used.
+        Its first log whose columns the file has is used; of logs with the same columns the one
+        with the name of the file.
 
     Returns
     -------
@@ -121,15 +138,13 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     Raises
     ------
     RunError
-        With the columns that the file lacks, where no log fits.
+        With the columns that the file lacks, where no log fits, and where several logs with the
+        same columns do.
     """
-    for log in mapping.log:
-        if log.axis and whole.column(log.axis) is None:
-            continue
+    whole = with_derived(whole, [item.source for log in mapping.log for item in log.column])
+    for log in _fitting(whole, mapping)[:1]:
         table = next(iter(axes_of(whole, log.axis).values())) if log.axis else whole
         found = [(item, table.column(item.source)) for item in log.column]
-        if any(column is None for _, column in found):
-            continue
         by_source = {
             column.source: Assignment(
                 column.source,
@@ -139,6 +154,7 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
                 item.offset,
                 "given",
                 f"mapping '{mapping.name}'",
+                item.stored,
             )
             for item, column in found
             if column is not None
@@ -160,8 +176,31 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     )
 
 
+def _fitting(whole: Table, mapping: ImportMapping) -> list[MappedLog]:
+    """Logs whose columns a file has, the one that is used first."""
+    logs = [
+        log
+        for log in mapping.log
+        if all(whole.column(n) is not None for n in _names(log)) and log.column
+    ]
+    alike = [log for log in logs if set(_names(log)) == set(_names(logs[0]))]
+    named = [log for log in alike if log.name == Path(whole.path).stem]
+    if len(alike) > 1 and len(named) != 1:
+        names = " and ".join(f"'{log.name}'" for log in alike)
+        message = (
+            f"fits the logs {names} of the mapping '{mapping.path or mapping.name}', which have "
+            "the same columns; leave one of them, or give it the name of this file"
+        )
+        raise RunError(Fault(message, whole.path))
+    return named if len(alike) > 1 else logs
+
+
+def _names(log: MappedLog) -> list[str]:
+    return [item.source for item in log.column] + [log.axis] * bool(log.axis)
+
+
 def _lacking(table: Table, log: MappedLog, mapping: ImportMapping) -> str:
-    names = [item.source for item in log.column] + [log.axis] * bool(log.axis)
+    names = _names(log)
     lacking = [repr(name) for name in names if table.column(name) is None]
     has = ", ".join(repr(column.source) for column in table.columns[:20])
     return (

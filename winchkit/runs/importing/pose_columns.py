@@ -116,22 +116,25 @@ def vector_names(names: Sequence[str]) -> frozenset[str]:
     return frozenset(n for own in stems.values() if len(own) == 3 for n in own.values())
 
 
-def quaternion_names(names: Sequence[str]) -> dict[str, str]:
-    """Channels of numbered quaternions: ``q0`` to ``q3`` (w first) beside positions.
+def quaternion_names(names: Sequence[str], order: str = "wxyz") -> dict[str, str]:
+    """Channels of numbered quaternions: ``q0`` to ``q3`` beside positions.
 
     Parameters
     ----------
     names : sequence of str
         Names of all columns.
+    order : str, optional
+        Of the elements.
 
     Returns
     -------
     dict
-        Channel by name; empty where the four names are not there, or no positions.
+        Channel by name, from ``q0`` to ``q3``; empty where the four names are not there,
+        or no positions.
     """
     words = {words_of(name).replace(" ", ""): name for name in names}
     axes = all(any(key in words for key in (axis, f"pos{axis}", f"p{axis}")) for axis in "xyz")
     joint = any(key.startswith(("q4", "q5", "dq")) for key in words)
     if not axes or joint or not all(f"q{n}" in words for n in range(4)):
         return {}
-    return {words[f"q{n}"]: channel for n, channel in enumerate(_QUATERNION)}
+    return {words[f"q{n}"]: f"platform_q{axis}" for n, axis in enumerate(order)}

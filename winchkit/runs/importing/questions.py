@@ -8,14 +8,13 @@ from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.assignment import Choice, Question
 from winchkit.runs.importing.chosen import ChosenColumn, Work, is_counted, is_whole
 from winchkit.runs.importing.long_table import axes_of
-from winchkit.runs.importing.sign_bits import lost_sign
 from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_settling import is_alike
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE
 from winchkit.schema.mapping import DATE
 from winchkit.units import UNITS
 
-__all__ = ["ask_columns", "ask_signs", "ask_units", "axis_question"]
+__all__ = ["ask_columns", "ask_units", "axis_question"]
 
 _SHOWN = 8
 """Names listed in a question; about one line."""
@@ -54,17 +53,6 @@ def axis_question(table: Table, by: str) -> Question:
     names = ", ".join(list(axes_of(table, by))[:_SHOWN])
     text = f"each row seems to be of one axis, which column '{by}' names ({names})"
     return Question(text, (f'--axis "{by}"', '--axis ""'), "axis")
-
-
-def ask_signs(work: Work) -> None:
-    """Ask for the sign of every column whose sign seems to be lost."""
-    for item in work.columns:
-        name = item.column.source
-        if item.base in {"time", DATE} or name in work.answers.unsigned:
-            continue
-        if text := lost_sign(name, item.column.values):
-            options = (f'--unsigned "{name}"', f'--column "{item.candidate.channel}="')
-            work.questions.append(Question(text, options, "unsigned"))
 
 
 def ask_units(work: Work) -> None:

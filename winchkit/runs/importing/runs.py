@@ -17,13 +17,14 @@ from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.mapping import guess_by, mapping_id
+from winchkit.runs.importing.pieces import jumps_of
 from winchkit.runs.importing.streams import Stream, Streams, merged, streams_of
 from winchkit.runs.run import ANGLE_INTEGRATED, Run
 from winchkit.schema.mapping import ImportMapping
 from winchkit.schema.read import read_mapping
 from winchkit.units import UNITS
 
-__all__ = ["has_angle", "metadata_of", "read_mapped", "run_of", "with_angle"]
+__all__ = ["has_angle", "metadata_of", "read_mapped", "run_of", "whole_run", "with_angle"]
 
 _INTEGRAL = (
     "no column has the motor angle: it is the integral of motor_velocity from 0, so that its "
@@ -64,7 +65,15 @@ def read_mapped(path: str | Path, mapping: str | Path | ImportMapping) -> Run:
     guess = guess_by(read_table(path), read)
     streams = streams_of(guess)
     streams = streams if has_angle(streams) else with_angle(streams)
-    return run_of(streams, metadata_of(guess, {"imported_mapping": mapping_id(read)}))
+    return whole_run(streams, metadata_of(guess, {"imported_mapping": mapping_id(read)}))
+
+
+def whole_run(streams: Streams, metadata: Mapping[str, str]) -> Run:
+    """Run of one file as :func:`run_of`; raises RunError where its angle jumps."""
+    if jumps := jumps_of(streams):
+        advice = "; winchkit import writes the pieces before and after it as runs of their own"
+        raise RunError([Fault(f"{jump.text}{advice}", streams.path) for jump in jumps])
+    return run_of(streams, metadata)
 
 
 def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
@@ -191,6 +200,8 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     if streams.is_absolute:
         moment = datetime.fromtimestamp(streams.origin + first, UTC)
         texts["start_time"] = moment.isoformat(timespec="microseconds")
+    elif streams.has_time and streams.origin + first:
+        texts["source time of 0"] = f"{streams.origin + first:.9g} s"
     header = [(name, next(iter(UNITS[column_dimension(name) or "ratio"]))) for name in channels]
     columns = list(channels.values())
     if streams.has_time:

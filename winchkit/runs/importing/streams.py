@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,18 +12,23 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault
-from winchkit.model.robot.rotation import quaternion_of
+from winchkit.model.robot.rotation import quaternion_of, rotation_by
 from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
+from winchkit.runs.importing.stored.numbers import range_of, restored
 from winchkit.runs.importing.table import Column, Table
-from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
+from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP, VECTOR
 
 __all__ = ["Stream", "Streams", "merged", "streams_of"]
 
 _STILL = 0.01
 """Share of repeated stamps that are left out; with more of them the clock is too coarse."""
+_FEWEST = 20
+"""Rows below which a time that goes back is no exception."""
+_ALONE = 0.5
+"""Intervals by which the rows beside a single one may differ from two intervals."""
 _PADDED = 0.67
 """Share of rows with a value below which a column has a rate of its own: half the rate or less."""
 _BRIDGED = 2.5
@@ -34,6 +39,7 @@ _EXCEL_EPOCH = 25_569.0
 """1970-01-01 in days since 1899-12-30."""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(\.\d{3}){2,}|(,\d{3}){2,})")
 """Whole numbers with separators of thousands: one separator alone may be a decimal sign."""
+_ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
 _QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
 
 
@@ -69,6 +75,8 @@ class Streams:
     line_of: Callable[[int], int | None]
     faults: tuple[Fault, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    wraps: Mapping[str, float] = field(default_factory=dict)
+    """Range in SI of every channel whose numbers wrap."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -111,8 +119,9 @@ def streams_of(guess: Guess) -> Streams:
         clock = _clock_of(clocks, column)
         key = clock.source if clock is not None else f"\0{len(column)}"
         with np.errstate(over="ignore"):
-            values = column.values * item.factor + item.offset
+            values = restored(column.values, item.stored) * item.factor + item.offset
         blocks.setdefault(key, {})[item.channel] = values
+    is_vector = any(item.stored == VECTOR for item in guess.used)
     streams = []
     for key, channels in blocks.items():
         first, time, _ = read.get(key, (0.0, None, False))
@@ -126,9 +135,10 @@ def streams_of(guess: Guess) -> Streams:
             continue
         else:
             time = time + (first - origin)
-        stream = Stream(time, _with_quaternion(channels), np.arange(count))
-        stream, note = _without_copies(_forward(stream))
-        notes += note
+        stream = Stream(time, _with_quaternion(channels, is_vector=is_vector), np.arange(count))
+        stream, early = _in_order(_forward(stream), table.line_of)
+        stream, note = _without_copies(stream)
+        notes += [*early, *note]
         streams += _by_rate(stream)
     is_absolute = bool(absolute) and len(absolute) == len(read)
     return Streams(
@@ -140,6 +150,7 @@ def streams_of(guess: Guess) -> Streams:
         table.line_of,
         tuple(faults),
         tuple(notes),
+        {item.channel: range_of(item.stored) * abs(item.factor) for item in guess.used},
     )
 
 
@@ -167,6 +178,7 @@ def _of_axes(guess: Guess) -> Streams:
         line_of=guess.file.line_of,
         faults=tuple(dict.fromkeys(fault for part in parts.values() for fault in part.faults)),
         notes=tuple(dict.fromkeys(note for part in parts.values() for note in part.notes)),
+        wraps={f"{n}.{c}": size for n, part in parts.items() for c, size in part.wraps.items()},
     )
 
 
@@ -231,16 +243,25 @@ def _clock_of(clocks: Sequence[Column], column: Column) -> Column | None:
     return before[-1] if before else own[0] if own else None
 
 
-def _with_quaternion(channels: dict[str, Array]) -> dict[str, Array]:
-    """A quaternion in place of the elements of a rotation matrix."""
+def _with_quaternion(channels: dict[str, Array], *, is_vector: bool) -> dict[str, Array]:
+    """A quaternion in place of a rotation vector or of the elements of a rotation matrix."""
+    if is_vector and all(name in channels for name in _ANGLES):
+        vector = np.stack([channels[name] for name in _ANGLES], axis=-1)
+        others = {name: values for name, values in channels.items() if name not in _ANGLES}
+        return {**others, **_quaternion(rotation_by(vector))}
     if not all(name in channels for name in MATRIX):
         return {name: values for name, values in channels.items() if name not in MATRIX}
     matrix = np.stack([channels[name] for name in MATRIX], axis=-1).reshape(-1, 3, 3)
     others = {name: values for name, values in channels.items() if name not in MATRIX}
+    return {**others, **_quaternion(matrix)}
+
+
+def _quaternion(matrix: Array) -> dict[str, Array]:
+    """Quaternion of rotation matrices (n, 3, 3), NaN where one has a NaN."""
     known = np.isfinite(matrix).all(axis=(1, 2))
     quaternion = np.full((len(matrix), 4), np.nan)
     quaternion[known] = quaternion_of(matrix[known])
-    return {**others, **dict(zip(_QUATERNION, quaternion.T, strict=True))}
+    return dict(zip(_QUATERNION, quaternion.T, strict=True))
 
 
 def _forward(stream: Stream) -> Stream:
@@ -250,6 +271,36 @@ def _forward(stream: Stream) -> Stream:
         return stream
     channels = {name: values[::-1] for name, values in stream.channels.items()}
     return Stream(stream.time[::-1], channels, stream.rows[::-1])
+
+
+def _in_order(stream: Stream, line_of: Callable[[int], int | None]) -> tuple[Stream, list[str]]:
+    """Without a few single rows whose stamps are out of order, with a note.
+
+    A row is out of order where the times before and after it are two intervals apart and it is not
+    between them; a clock that is set back shifts all later rows as well.
+    """
+    time = stream.time
+    steps = np.diff(time)
+    if len(steps) < _FEWEST or not np.any(steps < 0) or not np.all(np.isfinite(steps)):
+        return stream, []
+    usual = float(np.median(steps))
+    wrong = []
+    for step in np.flatnonzero(steps < 0):
+        for row in (int(step) + 1, int(step)):
+            if 0 < row < len(time) - 1:
+                around = time[row + 1] - time[row - 1]
+                if abs(around / usual - 2) < _ALONE and row not in wrong:
+                    wrong.append(row)
+                    break
+    kept = np.ones(len(time), dtype=bool)
+    kept[wrong] = False
+    if len(wrong) > _STILL * len(time) or np.any(np.diff(time[kept]) < 0):
+        return stream, []
+    lines = [line for row in sorted(wrong) if (line := line_of(int(stream.rows[row])))]
+    where = f" (line {', '.join(map(str, lines))})" if lines else ""
+    count = f"{len(wrong)} of {len(time)} rows"
+    note = f"{count}{where} have a time that is out of order and are left out"
+    return _rows_of(stream, kept), [note]
 
 
 def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:

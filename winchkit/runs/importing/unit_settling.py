@@ -55,34 +55,45 @@ def started(work: Work, candidate: Candidate, answer: ColumnAnswer | None) -> Ch
     item = ChosenColumn(candidate, reason=candidate.reason)
     confidence: Confidence = "named" if candidate.rank <= 2 else "derived"
     unit, text = candidate.unit, candidate.column.unit
-    scale = 1.0
+    is_scaled = answer is not None and (answer.factor is not None or bool(answer.constant))
     if answer is not None:
         confidence = "given"
-        scale = answer.factor if answer.factor is not None else 1.0
+        factor = answer.factor if answer.factor is not None else 1.0
         if answer.constant:
-            scale = work.table.constants.get(answer.constant, math.nan)
-        scale *= answer.sign
+            factor = work.table.constants.get(answer.constant, math.nan)
+        if is_scaled or answer.sign != 1.0:
+            item.scale = factor * answer.sign
         if answer.unit:
             text = answer.unit
-        elif answer.factor is not None or answer.constant:
+        elif is_scaled:
             si = column_dimension(item.base) or "ratio"
-            item.settle(scale, next(iter(UNITS[si])), "given", "--column")
+            item.settle(1.0, next(iter(UNITS[si])), "given", "--column")
             return item
     if candidate.channel in {"time", DATE}:
-        _settle_clock(work, item, unit, scale, confidence)
+        _settle_clock(work, item, unit, confidence)
     elif column_dimension(item.base) == "ratio" or item.base in MATRIX:
-        item.settle(scale, "1", confidence, candidate.reason)
+        item.settle(1.0, "1", confidence, candidate.reason)
+    elif unit is not None and _is_raw(item, unit):
+        item.unit = unit.text
+        if is_scaled:
+            item.settle(1.0, unit.text, "given", "--column")
     elif unit is not None:
-        _settle_unit(work, item, unit, scale, confidence)
+        _settle_unit(work, item, unit, confidence)
         item.unit = item.unit or text
     elif item.base == "motor_angle" and work.answers.counts_per_turn and is_whole(item):
         counts = work.answers.counts_per_turn or math.nan
-        item.settle(_TURN / counts * scale, "counts", "given", f"{counts:g} counts per turn")
+        item.settle(_TURN / counts, "counts", "given", f"{counts:g} counts per turn")
     return item
 
 
+def _is_raw(item: ChosenColumn, unit: SpelledUnit) -> bool:
+    """Whether a unit is that of an amplifier or converter, of which only a user knows the scale."""
+    is_counted = unit.dimension == COUNTS and item.base != "motor_angle"
+    return unit.dimension == "voltage" or is_counted
+
+
 def _settle_clock(
-    work: Work, item: ChosenColumn, unit: SpelledUnit | None, scale: float, confidence: Confidence
+    work: Work, item: ChosenColumn, unit: SpelledUnit | None, confidence: Confidence
 ) -> None:
     if item.column.texts is not None:
         item.settle(1.0, STAMP, confidence, "dates and times of day as text")
@@ -93,7 +104,7 @@ def _settle_clock(
     if epoch == EXCEL and unit is None:
         item.settle(86_400.0, EXCEL, "derived", "days of a spreadsheet")
     elif unit is not None:
-        item.settle(scale * unit.factor, unit.text, confidence, item.reason)
+        item.settle(unit.factor, unit.text, confidence, item.reason)
     elif epoch is not None:
         item.settle(CLOCKS[epoch], epoch, "named", f"{epoch} since 1970")
     else:
@@ -110,47 +121,40 @@ def _settle_clock(
             item.settle(CLOCKS[matching[0]], matching[0], "named", reason)
 
 
-def _settle_unit(
-    work: Work, item: ChosenColumn, unit: SpelledUnit, scale: float, confidence: Confidence
-) -> None:
+def _settle_unit(work: Work, item: ChosenColumn, unit: SpelledUnit, confidence: Confidence) -> None:
     """Factor of a known unit; units without an SI value need a constant."""
     answers, dimension = work.answers, unit.dimension
     item.unit = unit.text
-    if dimension == "voltage" or (dimension == COUNTS and item.base != "motor_angle"):
-        if item.candidate.rank == 0 and scale != 1.0:
-            item.settle(scale, unit.text, "given", "--column")
-    elif dimension in {COUNTS, COUNT_RATE}:
+    if dimension in {COUNTS, COUNT_RATE}:
         if answers.counts_per_turn:
             text = f"{answers.counts_per_turn:g} counts per turn"
-            item.settle(_TURN / answers.counts_per_turn * scale, unit.text, "given", text)
+            item.settle(_TURN / answers.counts_per_turn, unit.text, "given", text)
     elif dimension == SHARE:
         if answers.rated_torque:
-            factor = answers.rated_torque * unit.factor * scale
+            factor = answers.rated_torque * unit.factor
             item.settle(factor, unit.text, "given", f"of {answers.rated_torque:g} N m")
     elif dimension == "current":
-        _settle_current(work, item, unit, scale, confidence)
+        _settle_current(work, item, unit, confidence)
     elif dimension == BRIDGE:
         if answers.sensitivity and answers.capacity:
-            factor = answers.capacity / answers.sensitivity * unit.factor * scale
+            factor = answers.capacity / answers.sensitivity * unit.factor
             text = f"{answers.capacity:g} N at {answers.sensitivity:g} mV/V"
             item.settle(factor, unit.text, "given", text)
     elif dimension == "mass":
-        item.settle(
-            unit.factor * GRAVITY * scale, unit.text, confidence, f"weight at {GRAVITY} m/s^2"
-        )
+        item.settle(unit.factor * GRAVITY, unit.text, confidence, f"weight at {GRAVITY} m/s^2")
     else:
-        item.settle(unit.factor * scale, unit.text, confidence, item.reason)
+        item.settle(unit.factor, unit.text, confidence, item.reason)
         item.offset = unit.offset
 
 
 def _settle_current(
-    work: Work, item: ChosenColumn, unit: SpelledUnit, scale: float, confidence: Confidence
+    work: Work, item: ChosenColumn, unit: SpelledUnit, confidence: Confidence
 ) -> None:
     """Factor of a current, or of the torque that it gives."""
     if math.isnan(unit.factor):
         return
     if item.base != "motor_torque":
-        item.settle(unit.factor * scale, unit.text, confidence, item.reason)
+        item.settle(unit.factor, unit.text, confidence, item.reason)
         return
     constant = work.answers.torque_constant or _gain(work.table)
     if constant:
@@ -158,7 +162,7 @@ def _settle_current(
         text = f"{constant:g} N m/A"
         if not item.column.unit and item.candidate.rank:
             origin, text = "assumed", f"{text}; a current without a unit: A"
-        item.settle(constant * unit.factor * scale, unit.text, origin, text)
+        item.settle(constant * unit.factor, unit.text, origin, text)
 
 
 def _gain(table: Table) -> float | None:
@@ -182,7 +186,9 @@ def as_others(work: Work) -> None:
             is_known = other.factor is not None and not other.column.unit
             if is_known and is_alike(item, other):
                 text = f"as '{other.column.source}'"
-                item.settle(abs(other.factor or math.nan), other.unit, "derived", text)
+                known = abs(other.factor or math.nan)
+                si = known if item.scale is None else known / other.size
+                item.settle(si, other.unit, "derived", text)
                 break
 
 

@@ -80,7 +80,9 @@ _FOREIGN: dict[str, dict[float, str]] = {
         1e6: "MN",
         GRAVITY: "kgf kp",
         GRAVITY * 1e-3: "gf p",
-        _LB: "lbf lb lbs",
+        _LB: "lbf lb lbs pound pounds",
+        1e3 * _LB: "kip kips klbf klb",
+        _LB / 16: "ozf oz",
     },
     "mass": {1.0: "Kilogramm kilogram kilograms kilos", 1e-3: "Gramm gram grams gr"},
     "length": {
@@ -117,7 +119,7 @@ _FOREIGN: dict[str, dict[float, str]] = {
     BRIDGE: {1.0: "mV/V", 1e-3: "uV/V"},
 }
 _OTHER_OFFSET = {
-    "F": SpelledUnit("F", "temperature", 5 / 9, -160 / 9),
+    "F": SpelledUnit("°F", "temperature", 5 / 9, -160 / 9),
     "K": SpelledUnit("K", "temperature", 1.0, -273.15),
 }
 _DROPPED = re.compile(r"[\s·⋅*×•^_.]")

@@ -34,13 +34,13 @@ function show(file, found, given) {
     const times = el("input", { value: factor, size: 6, placeholder: "× 1", "aria-label": `Factor of ${row.source}`, onchange: () => column(row, row.channel, times.value ? "" : row.unit, times.value.trim()) });
     return [el("td", {}, el("b", {}, row.source)), el("td", {}, name), el("td", {}, row.channel ? times : ""), el("td", {}, row.channel ? unit : el("span", { class: "note" }, row.unit)), el("td", {}, row.first.slice(0, 3).join(" ")), el("td", {}, spark(row.plot)), el("td", { class: "note" }, [row.confidence, row.reason].filter(Boolean).join(": "))];
   };
-  const questions = found.questions.map((q) => el("p", { class: "question" }, icon("partly"), q.text, q.key ? el("input", { "aria-label": q.text, placeholder: q.key.replaceAll("_", " "), onchange: (event) => again({ ...given, [q.key]: event.target.value }) }) : null));
+  const questions = found.questions.map((q) => el("p", { class: "question" }, icon("partly"), q.text, q.options.length ? el("select", { "aria-label": q.text, onchange: (event) => again({ ...given, options: [...(given.options || []), event.target.value] }) }, ["", ...q.options].map((own) => el("option", { value: own }, own))) : q.key ? el("input", { "aria-label": q.text, placeholder: q.key.replaceAll("_", " "), onchange: (event) => again({ ...given, [q.key]: event.target.value }) }) : null));
   const mass = el("input", { size: 8, placeholder: "10 kg", value: given.load_mass || "", "aria-label": "Mass on the cable", onchange: () => { given.load_mass = mass.value; } });
   dialog(`Import ${file}`, el("p", { class: "note" }, `${found.layout}; ${found.columns.length} columns, ${found.rows} rows. A factor is a number, or the name of a value in the file.`),
     el("div", { class: "scroll" }, el("table", { class: "rows" }, el("thead", {}, el("tr", {}, ["Column", "Channel", "Factor", "Unit", "First values", "Plot", "Why"].map((text) => el("th", {}, text)))), el("tbody", {}, found.columns.map((row) => el("tr", {}, cells(row)))))),
     ...questions, found.notes.map((text) => el("p", { class: "note" }, text)),
     el("div", { class: "row", style: { marginTop: "12px" } }, el("label", { class: "row" }, "Mass on the cable", mass),
-      el("button", { class: "primary", disabled: found.questions.length > 0, onclick: () => attempt(async () => { last = given; await order("import", { file, answers: given }); document.getElementById("dialog").close(); }) }, "Import")));
+      el("button", { class: "primary", disabled: found.questions.length > 0, onclick: () => attempt(async () => { last = { ...given, load_mass: "" }; await order("import", { file, answers: given }); document.getElementById("dialog").close(); }) }, "Import")));
 }
 
 const escaped = (text) => text.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");

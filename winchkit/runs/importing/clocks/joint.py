@@ -90,7 +90,9 @@ def _aligned(first: Streams, other: Streams, lag: float | None) -> tuple[Streams
     if lag is not None:
         moved = shifted(other, stamped + lag)
         _require_overlap(first, moved)
-        return moved, Joint(other.path, "given lag", lag, 0.0, f"joined with a lag of {lag:g} s")
+        found = agreement_of(first, other)
+        text = f"joined with a lag of {lag:g} s{_doubts(first, moved, found, stamped + lag)}"
+        return moved, Joint(other.path, "given lag", lag, 0.0, text, found)
     found = agreement_of(first, other)
     known = found is not None and found.is_known
     overlapping = _overlap(first, shifted(other, stamped)) > 0
@@ -139,6 +141,27 @@ def _require_overlap(first: Streams, other: Streams) -> None:
             f"{end:.6g} s on its clock; is the lag right?"
         )
         raise RunError(Fault(message, other.path))
+
+
+def _doubts(first: Streams, moved: Streams, found: Agreement | None, lag: float) -> str:
+    """Text on a given lag that leaves rows over or that the signals contradict.
+
+    Raises RunError where both are, of more than half of the shorter file.
+    """
+    shorter = min((first, moved), key=lambda part: span_of(part)[1] - span_of(part)[0])
+    (start, _), (begin, _) = span_of(first), span_of(moved)
+    low, high = max(start, begin), max(start, begin) + _overlap(first, moved)
+    stamps = max(shorter.streams, key=lambda stream: len(stream.time)).time
+    both = int(np.count_nonzero((stamps >= low) & (stamps <= high)))
+    text = "" if both == len(stamps) else f"; {both} of {len(stamps)} rows are in both files"
+    if found is not None and found.is_known:
+        apart = found.lag - lag
+        if abs(apart) > _resolution(first, moved) + _SIGNIFICANT * found.lag_std:
+            text += f"; the signals follow each other {apart:.4g} s beside it ({found.text})"
+            if 2 * both < len(stamps):
+                advice = ": was the clock of a file shifted? Leave out --lag, or correct it"
+                raise RunError(Fault(f"the lag cannot be right{text}{advice}", moved.path))
+    return text
 
 
 def _resolution(first: Streams, other: Streams) -> float:

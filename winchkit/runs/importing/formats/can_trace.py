@@ -9,8 +9,19 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from itertools import islice
+from pathlib import Path
 
-__all__ = ["is_can_trace"]
+from winchkit.regular_file import regular
+
+__all__ = ["TRACE", "TRACED", "is_can_trace", "trace_advice"]
+
+TRACED = 20_000
+"""Bytes in which a trace is recognised."""
+TRACE = (
+    "is a trace of CAN frames, whose numbers are in the bytes of the frames: decode it first, by "
+    "the DBC or EDS file of the device, to a table with a column for each signal (CSV, MDF, MAT) "
+    "and import that"
+)
 
 _SAMPLED = 200
 """Lines by which a trace is recognised; its header has fewer."""
@@ -46,6 +57,16 @@ def is_can_trace(lines: Sequence[str]) -> bool:
     found = [frame for frame in frames[first:] if frame is not None]
     is_marked = any(_MARKED.fullmatch(byte) for frame in found for byte in frame)
     return len(found) >= max(_FEWEST, _SHARE * len(frames[first:])) and is_marked
+
+
+def trace_advice(path: Path) -> str:
+    """What to do with a file that is a trace of CAN frames; empty for another one."""
+    try:
+        with open(path, "rb", opener=regular) as file:
+            start = file.read(TRACED)
+    except (OSError, ValueError):
+        return ""
+    return TRACE if is_can_trace(start.decode("latin-1").splitlines()) else ""
 
 
 def _frame_of(line: str) -> list[str] | None:

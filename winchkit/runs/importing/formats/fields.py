@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-__all__ = ["fields_of", "numbers_of"]
+__all__ = ["fields_of", "numbers_of", "stamp_of"]
 
 _LONGEST = 64
 """Most elements of an array in a message; longer ones are images and point clouds."""
@@ -34,6 +34,43 @@ def numbers_of(value: Any) -> Iterator[tuple[str, float]]:
     for name, item in fields_of(value):
         if not isinstance(item, str) and not _HEADER.match(name):
             yield name, item
+
+
+def stamp_of(value: Any) -> int | None:
+    """Stamp of the header of a message, or of the header of a part of it; None without one.
+
+    Parameters
+    ----------
+    value : object
+        As for :func:`numbers_of`.
+
+    Returns
+    -------
+    int, optional
+        ns.
+    """
+    header = _field(value, "header")
+    for part in () if header is not None else map(str, _keys(value)):
+        header = header or _field(_field(value, part), "header")
+    stamp = _field(header, "stamp") or _field(value, "timestamp") or _field(value, "stamp")
+    seconds = _field(stamp, "sec")
+    parts = [_field(stamp, name) for name in ("nanosec", "nsec")]
+    fraction = next((part for part in parts if part is not None), None)
+    if not isinstance(seconds, int) or not isinstance(fraction, int):
+        return None
+    return seconds * 1_000_000_000 + fraction
+
+
+def _keys(value: Any) -> Sequence[Any]:
+    if isinstance(value, Mapping):
+        return list(value)
+    return [key.lstrip("_") for key in getattr(value, "__slots__", ())]
+
+
+def _field(value: Any, name: str) -> Any:
+    if isinstance(value, Mapping):
+        return value.get(name)
+    return getattr(value, name, None) if hasattr(value, "__slots__") else None
 
 
 def fields_of(value: Any) -> Iterator[tuple[str, float | str]]:

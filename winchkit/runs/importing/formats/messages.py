@@ -1,23 +1,34 @@
 """Reader of MCAP files of other programs: messages in JSON, and of ROS 2 (extra ``ros2``).
 
-Every topic is a group of columns with its own time stamps; fields are named by their path, elements
-of arrays by their index, joints of a JointState by their name.
+Every topic is a group of columns with its own times, of its recorder and of its source; fields are
+named by their path, elements of arrays by their index, joints of a JointState by their name.
 """
 
 from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from winchkit.errors import Fault, RunError, UsageError, WinchkitError, one_line
-from winchkit.runs.importing.formats.fields import numbers_of
+from winchkit.runs.importing.formats.fields import numbers_of, stamp_of
+from winchkit.runs.importing.source_stamps import LOG_TIME, SOURCE_STAMP
 from winchkit.runs.importing.table import Column, Table, named_apart
 
 __all__ = ["read_messages"]
+
+
+@dataclass(frozen=True)
+class _Message:
+    log_time: int
+    """ns."""
+    stamp: int | None
+    """Of its header, ns; None without one."""
+    numbers: dict[str, float]
 
 
 def read_messages(path: str, data: bytes) -> Table:
@@ -33,7 +44,8 @@ def read_messages(path: str, data: bytes) -> Table:
     Returns
     -------
     Table
-        Columns by topic; the time is the log time, in ns since 1970 or on the recorder's clock.
+        Columns by topic, in the order of the file, with the log time and the stamp of the header,
+        in ns since 1970 or on a clock of their own.
 
     Raises
     ------
@@ -44,7 +56,7 @@ def read_messages(path: str, data: bytes) -> Table:
     """
     from mcap.reader import NonSeekingReader
 
-    rows: dict[str, list[tuple[int, dict[str, float]]]] = {}
+    rows: dict[str, list[_Message]] = {}
     notes: list[str] = []
     decoders: dict[int, Any] = {}
     try:
@@ -52,8 +64,8 @@ def read_messages(path: str, data: bytes) -> Table:
         for schema, channel, message in messages:
             found = _decoded(path, schema, channel, message.data, decoders)
             if found is not None:
-                numbers = dict(numbers_of(found))
-                rows.setdefault(channel.topic, []).append((message.log_time, numbers))
+                read = _Message(message.log_time, stamp_of(found), dict(numbers_of(found)))
+                rows.setdefault(channel.topic, []).append(read)
             else:
                 encoding = one_line(channel.message_encoding)
                 notes.append(f"topic {channel.topic} is in '{encoding}' and left out")
@@ -66,7 +78,7 @@ def read_messages(path: str, data: bytes) -> Table:
         notes.append(
             f"the file is damaged or cut off ({error}); its first {count} messages are read"
         )
-    columns = [c for topic, found in rows.items() for c in _columns(topic, found)]
+    columns = [c for topic, found in rows.items() for c in _columns(topic, found, notes)]
     notes = list(dict.fromkeys(notes))
     if not columns:
         text = "has no messages with numbers in JSON or ROS 2"
@@ -96,13 +108,18 @@ def _ros2(path: str, schema: Any) -> Any:
     return DecoderFactory().decoder_for("cdr", schema)
 
 
-def _columns(topic: str, found: Sequence[tuple[int, Mapping[str, float]]]) -> Iterator[Column]:
-    found = sorted(found, key=lambda item: item[0])
-    times = np.array([stamp for stamp, _ in found], dtype=np.int64)
-    names = dict.fromkeys(name for _, values in found for name in values)
+def _columns(topic: str, found: Sequence[_Message], notes: list[str]) -> Iterator[Column]:
+    names = dict.fromkeys(name for item in found for name in item.numbers)
     if not names:
         return
-    yield Column("log_time", times.astype(np.float64), "ns", (topic,), group=topic)
+    stamps = [item.stamp for item in found if item.stamp is not None]
+    zeros = stamps.count(0)
+    if zeros > 1:
+        notes.append(f"topic {topic}: {zeros} of {len(found)} stamps are 0; none is used")
+    elif len(stamps) == len(found):
+        yield Column(SOURCE_STAMP, np.array(stamps, float), "ns", (topic,), group=topic)
+    times = np.array([item.log_time for item in found], dtype=np.float64)
+    yield Column(LOG_TIME, times, "ns", (topic,), group=topic)
     for name in names:
-        values = np.array([row.get(name, np.nan) for _, row in found], dtype=np.float64)
+        values = np.array([item.numbers.get(name, np.nan) for item in found], dtype=np.float64)
         yield Column(name, values, "", (topic,), group=topic)

@@ -16,13 +16,6 @@ from winchkit.runs.importing.table import LARGEST, Table
 
 __all__ = ["read_table"]
 
-_TRACED = 20_000
-"""Bytes in which a trace of CAN frames is recognised; the last line may be cut off."""
-_TRACE = (
-    "is a trace of CAN frames, whose numbers are in the bytes of the frames: decode it first, by "
-    "the DBC or EDS file of the device, to a table with a column for each signal (CSV, MDF, MAT) "
-    "and import that"
-)
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
@@ -75,14 +68,14 @@ def _read(path: str | Path) -> Table:
 
 def _of_text(name: str, data: bytes) -> Table:
     """JSON, or rows of text."""
-    from winchkit.runs.importing.formats.can_trace import is_can_trace
+    from winchkit.runs.importing.formats.can_trace import TRACE, TRACED, is_can_trace
     from winchkit.runs.importing.formats.json_file import is_json, read_json
     from winchkit.runs.importing.formats.motion_capture import read_capture
     from winchkit.runs.importing.formats.text import read_text_table
 
     _refuse_known(name, data)
-    if is_can_trace(data[:_TRACED].decode("latin-1").splitlines()[:-1]):
-        raise RunError(Fault(_TRACE, name))
+    if is_can_trace(data[:TRACED].decode("latin-1").splitlines()):
+        raise RunError(Fault(TRACE, name))
     table = read_json(name, data) if is_json(data) else read_capture(name, data)
     return table or read_text_table(name, data)
 

@@ -1,0 +1,129 @@
+"""Answers for one of several files, columns of columns, single rows out of order, one table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from winchkit.arrays import Array
+from winchkit.cli import main
+from winchkit.errors import RunError
+from winchkit.runs import read_run
+from winchkit.runs.importing.answers import Answers, read_column
+from winchkit.runs.importing.formats.source import read_table
+from winchkit.runs.importing.guess import guess_columns
+from winchkit.runs.importing.runs import run_of
+from winchkit.runs.importing.streams import streams_of
+from winchkit.runs.run import Run
+
+TIME = np.arange(200) / 50 + 0.01
+ANGLE = 30 * np.sin(TIME)
+
+
+def write(path: Path, head: str, *columns: Array) -> Path:
+    np.savetxt(path, np.column_stack(columns), "%.6f", ",", header=head, comments="")
+    return path
+
+
+def command(*arguments: str | Path) -> tuple[int, str]:
+    result = CliRunner().invoke(main, ["import", *map(str, arguments)])
+    return result.exit_code, result.output
+
+
+def test_a_column_of_one_of_several_files_without_names(tmp_path: Path) -> None:
+    paths = []
+    for name, values in (("pos1", ANGLE), ("tau1", 2 + np.cos(TIME))):
+        paths.append(tmp_path / f"{name}.t")
+        np.savetxt(paths[-1], np.column_stack([TIME, values]), "%.6f")
+    given = ("-c", "pos1.t:motor_angle=2 [deg]", "-c", "tau1:motor_torque=2 [N m]")
+    code, output = command(*paths, *given, "--lag", "0 s", "-o", tmp_path / "runs", "-y")
+    assert code == 0, output
+    run = read_run(tmp_path / "runs" / "pos1.csv")
+    assert run["motor_angle"] == pytest.approx(np.radians(ANGLE), abs=1e-6)
+    assert run["motor_torque"] == pytest.approx(2 + np.cos(TIME), abs=1e-6)
+    mapping = tmp_path / "runs" / "mapping.toml"
+    again = command(*paths, "--mapping", mapping, "--lag", "0 s", "-o", tmp_path / "again")
+    assert again[0] == 0, again[1]
+    same = read_run(tmp_path / "again" / "pos1.csv")
+    assert np.array_equal(same["motor_torque"], run["motor_torque"])
+    code, output = command(*paths, "-c", "pos2.t:motor_angle=2 [deg]")
+    assert code == 2
+    assert "there is no file 'pos2.t'" in output
+
+
+def imported(path: Path, *given: str) -> Run:
+    guess = guess_columns(read_table(path), Answers(tuple(map(read_column, given))))
+    assert not guess.questions, guess.questions
+    return run_of(streams_of(guess), {})
+
+
+@pytest.mark.parametrize(
+    ("expression", "weights", "constant"),
+    [
+        ("tau_meas-tau_model", (1, -1), 0),
+        ("tau_meas - tau_model*2", (1, -2), 0),
+        ("-tau_meas+tau_model", (-1, 1), 0),
+        ("tau_meas + 0.5*tau_model - 3", (1, 0.5), -3),
+        ("2-tau_meas", (-1, 0), 2),
+    ],
+)
+def test_sums_of_columns(
+    expression: str, weights: tuple[float, float], constant: float, tmp_path: Path
+) -> None:
+    meas, model = np.sin(TIME), np.cos(3 * TIME)
+    path = write(
+        tmp_path / "a.csv", "time [s],q [deg],tau_meas,tau_model", TIME, ANGLE, meas, model
+    )
+    run = imported(path, f"motor_torque={expression} [mN m]")
+    wanted = weights[0] * meas + weights[1] * model + constant
+    assert run["motor_torque"] == pytest.approx(1e-3 * wanted, abs=1e-8)
+
+
+def test_units_of_a_sum_are_converted_and_must_be_of_one_kind(tmp_path: Path) -> None:
+    head = "time [s],q [deg],a [N m],b [mN m],c [N]"
+    path = write(tmp_path / "a.csv", head, TIME, ANGLE, np.sin(TIME), 100 * np.cos(TIME), TIME)
+    run = imported(path, "motor_torque=a-b")
+    assert run["motor_torque"] == pytest.approx(np.sin(TIME) - 0.1 * np.cos(TIME), abs=1e-6)
+    guess = guess_columns(read_table(path), Answers((read_column("motor_torque=a-c"),)))
+    assert "there is no column 'a-c'" in guess.questions[0].text
+
+
+def test_a_name_with_a_minus_is_that_column(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.csv", "time [s],q [deg],a-b,a,b", TIME, ANGLE, 7 * TIME, TIME, TIME)
+    run = imported(path, "motor_torque=a-b [N m]")
+    assert run["motor_torque"] == pytest.approx(7 * TIME, abs=1e-5)
+
+
+@pytest.mark.parametrize("shift", [-3.5, 2.5])
+def test_a_single_row_out_of_order_is_left_out(shift: float, tmp_path: Path) -> None:
+    time = TIME.copy()
+    time[77] += shift / 50
+    path = write(tmp_path / "a.csv", "time [s],q [deg]", time, ANGLE)
+    run = imported(path)
+    assert len(run) == len(TIME) - 1
+    assert run["motor_angle"] == pytest.approx(np.radians(np.delete(ANGLE, 77)), abs=1e-6)
+    assert any("1 of 200 rows (line 79)" in note for note in run.notes)
+
+
+@pytest.mark.parametrize("back", [1.5, 3.0, 60.0])
+def test_a_clock_that_is_set_back_is_refused(back: float, tmp_path: Path) -> None:
+    time = np.where(np.arange(200) < 100, TIME, TIME - back / 50)
+    path = write(tmp_path / "a.csv", "time [s],q [deg]", time, ANGLE)
+    with pytest.raises(RunError, match="goes back|increase"):
+        imported(path)
+
+
+def test_sixteen_files_of_one_kind_are_one_table(tmp_path: Path) -> None:
+    paths = [
+        write(tmp_path / f"run{n:02}.csv", "time [s],q [deg],tau [N m]", TIME, ANGLE + n, ANGLE)
+        for n in range(16)
+    ]
+    code, output = command(*paths, "-o", tmp_path / "runs", "-y")
+    assert code == 0
+    assert output.count("motor_angle  ") == 1
+    assert len(output.splitlines()) <= 42
+    _, shown = command(*[write(p, "time [s],q,tau [N m]", TIME, 5 * ANGLE, TIME) for p in paths])
+    assert shown.count("? 'q'") == 1

@@ -1,0 +1,100 @@
+"""Stamps of the source of a message and log times of its recorder, with faults of either clock."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.writer import Writer
+
+from winchkit.errors import RunError
+from winchkit.runs.importing.answers import Answers, read_column
+from winchkit.runs.importing.assignment import Guess
+from winchkit.runs.importing.formats.source import read_table
+from winchkit.runs.importing.guess import guess_columns
+from winchkit.runs.importing.runs import run_of
+from winchkit.runs.importing.streams import streams_of
+
+TIME = np.arange(1000) / 100
+ANGLE = 16 * np.sin(2 * np.pi * 0.15 * TIME)
+START = 1_700_000_000
+Clock = Callable[[float], float]
+
+
+def real(time: float) -> float:
+    """A clock that counts from 1970."""
+    return START + time
+
+
+def back(time: float) -> float:
+    """A clock that is set back at 7 s."""
+    return START + time - (3.0037 if time > 7 else 0)
+
+
+def zero_first(time: float) -> float:
+    """A stamp before the first message of the simulated clock."""
+    return START + time if time >= 0.5 else 0.0
+
+
+def _stamp(time: float) -> dict[str, int]:
+    whole = int(np.floor(time))
+    return {"sec": whole, "nanosec": round((time - whole) * 1e9)}
+
+
+def bag(path: Path, log: Clock, stamp: Clock | None, cell: Clock | None) -> Guess:
+    """Two topics, each with the stamp of a clock or without a header."""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("any", "jsonschema", b"{}")
+        topics = {
+            name: writer.register_channel(name, "json", schema) for name in ("/joint", "/cell")
+        }
+        for time, angle in zip(TIME, ANGLE, strict=True):
+            logged = round(log(float(time)) * 1e9)
+            for name, clock, fields in (
+                ("/joint", stamp, {"position": angle}),
+                ("/cell", cell, {"force": 200 + angle}),
+            ):
+                header = {} if clock is None else {"header": {"stamp": _stamp(clock(float(time)))}}
+                content = json.dumps({**header, **fields}).encode()
+                writer.add_message(topics[name], logged, content, logged)
+        writer.finish()
+    given = ("motor_angle=position [rad]", "tension=force [N]")
+    return guess_columns(read_table(path), Answers(columns=tuple(map(read_column, given))))
+
+
+@pytest.mark.parametrize(
+    ("log", "stamp", "cell", "told"),
+    [
+        (real, real, real, "header.stamp; the log time is later by 0"),
+        (lambda t: real(t) + 0.02, real, real, "later by 20 ms"),
+        (back, real, real, "goes back by up to 2.9937 s"),
+        (real, lambda t: t + 0.5, lambda t: t + 0.5, "time is header.stamp"),
+        (real, zero_first, zero_first, "50 of 1000 stamps are 0; none is used"),
+        (real, lambda _t: 0.0, lambda _t: 0.0, "1000 of 1000 stamps are 0; none is used"),
+        (real, real, None, "log time is the time of all topics: no usable header.stamp in /cell"),
+        (real, real, zero_first, "log time is the time of all topics"),
+    ],
+)
+def test_the_angle_has_its_true_times(
+    log: Clock, stamp: Clock, cell: Clock | None, told: str, tmp_path: Path
+) -> None:
+    guess = bag(tmp_path / "a.mcap", log, stamp, cell)
+    assert told in " ".join((*guess.table.notes, *guess.notes))
+    run = run_of(streams_of(guess), {})
+    assert len(run) == len(TIME)
+    assert run.time == pytest.approx(TIME, abs=1e-6)
+    assert run["motor_angle"] == pytest.approx(ANGLE)
+    assert run["tension"] == pytest.approx(200 + ANGLE, abs=1e-6)
+
+
+@pytest.mark.parametrize("stamp", [back, None, lambda _t: 0.0])
+def test_times_that_go_back_are_refused(stamp: Clock | None, tmp_path: Path) -> None:
+    """Rows are in the order of the file, as those of text are."""
+    guess = bag(tmp_path / "a.mcap", back, stamp, stamp)
+    with pytest.raises(RunError, match="time goes back from"):
+        run_of(streams_of(guess), {})

@@ -1,0 +1,157 @@
+"""Pieces of a recording between jumps of the motor angle that are no motion.
+
+Rows that were lost, a homing during the recording, and turns that an encoder lost change the angle
+by a step of another size than all others. Both sides of it are right, and their difference is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.errors import Fault, RunError
+from winchkit.runs.importing.streams import Stream, Streams
+
+__all__ = ["Jump", "jumps_of", "pieces_of"]
+
+_MOST = 5
+"""Jumps of a recording; more large steps are motions between slow samples."""
+_TIMES = 10.0
+"""Size of a jump over that of the largest other step."""
+_FEWEST = 20
+"""Samples of a piece; the steps of fewer do not say which is a jump."""
+_SHORT = 3
+"""Samples after which a spike has returned."""
+_GAP = 2.5
+"""Median intervals of a gap, as two lost samples are."""
+_AMBIGUOUS = 0.5
+"""Share of the modulus that a counter passes in a gap over which its turns are not known."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A step of an angle that is no motion."""
+
+    channel: str
+    time: float
+    """Of the last sample before it, s on the clock of the file."""
+    until: float
+    """Of the first sample after it, s."""
+    text: str
+
+
+def jumps_of(streams: Streams) -> tuple[Jump, ...]:
+    """Jumps of every motor angle, in the order of time.
+
+    Parameters
+    ----------
+    streams : Streams
+        Channels in SI.
+
+    Returns
+    -------
+    tuple of Jump
+        Steps ten times as large as any other, beside a motion as large, which do not return
+        within three samples and which the velocity does not have; and gaps of a counter that wraps
+        in which it may have wrapped.
+    """
+    if not streams.has_time:
+        return ()
+    found = [
+        jump
+        for stream in streams.streams
+        for name, values in stream.channels.items()
+        if name.rpartition(".")[2] == "motor_angle"
+        for jump in _jumps(streams, stream, name, values)
+    ]
+    return tuple(sorted(found, key=lambda jump: jump.time))
+
+
+def _jumps(streams: Streams, stream: Stream, name: str, values: Array) -> Iterator[Jump]:
+    known = np.flatnonzero(np.isfinite(values) & np.isfinite(stream.time))
+    time, angle = stream.time[known], values[known]
+    if len(known) < _FEWEST or np.any(np.diff(time) <= 0):
+        return
+    intervals, steps = np.diff(time), np.diff(angle)
+    usual = float(np.median(intervals))
+    rates = steps / np.maximum(intervals, usual)
+    winch, dot, _ = name.rpartition(".")
+    velocity = stream.channels.get(f"{winch}{dot}motor_velocity")
+    beyond = _outstanding(rates, steps)
+    modulus = streams.wraps.get(name, np.inf)
+    fastest = float(np.max(np.abs(np.delete(rates, beyond)), initial=0.0))
+    largest = float(np.max(np.abs(np.delete(steps, beyond)), initial=0.0))
+    gaps = (intervals > _GAP * usual) & (fastest * intervals > _AMBIGUOUS * modulus)
+    for index in sorted({*beyond, *map(int, np.flatnonzero(gaps))}):
+        is_lost = bool(gaps[index])
+        if not is_lost and velocity is not None:
+            passed = float(np.mean(velocity[known[index : index + 2]])) * intervals[index]
+            if abs(steps[index] - passed) < 0.5 * abs(steps[index]):
+                continue
+        line = streams.line_of(int(stream.rows[known[index + 1]]))
+        where = f" (line {line})" if line is not None else ""
+        at = f"{time[index] - time[0]:.6g} s{where}"
+        what = (
+            f"{name} has a gap of {intervals[index]:.3g} s after {at}, in which its counter may "
+            "have wrapped"
+            if is_lost
+            else f"{name} jumps by {steps[index]:.4g} rad after {at}, beside steps of at most "
+            f"{largest:.3g} rad: rows were lost, the axis was "
+            "homed or the encoder lost turns"
+        )
+        yield Jump(name, float(time[index]), float(time[index + 1]), what)
+
+
+def _outstanding(rates: Array, steps: Array) -> list[int]:
+    """Indices of the few steps that are far larger than all others and do not return."""
+    order = np.argsort(-np.abs(rates))
+    sizes = np.abs(rates[order])
+    count = next(
+        (n for n in range(min(_MOST, len(sizes) - 1), 0, -1) if sizes[n - 1] > _TIMES * sizes[n]), 0
+    )
+    found = sorted(int(index) for index in order[:count])
+    others = float(np.sum(np.abs(np.delete(steps, found))))
+    kept = []
+    for index in found:
+        near = [other for other in found if abs(other - index) <= _SHORT]
+        returns = abs(sum(float(steps[other]) for other in near)) < abs(float(steps[index])) / 2
+        if not returns and others > abs(float(steps[index])):
+            kept.append(index)
+    return kept
+
+
+def pieces_of(streams: Streams, jumps: tuple[Jump, ...]) -> tuple[Streams, ...]:
+    """A file in pieces between its jumps; pieces with too few samples are left out.
+
+    Parameters
+    ----------
+    streams : Streams
+        Channels in SI.
+    jumps : tuple of Jump
+        Of :func:`jumps_of`.
+
+    Raises
+    ------
+    RunError
+        Where all pieces have too few samples.
+    """
+    if not jumps:
+        return (streams,)
+    edges = [-np.inf, *((jump.time + jump.until) / 2 for jump in jumps), np.inf]
+    pieces = []
+    for start, end in pairwise(edges):
+        parts = []
+        for stream in streams.streams:
+            kept = (stream.time > start) & (stream.time < end)
+            channels = {name: values[kept] for name, values in stream.channels.items()}
+            parts.append(Stream(stream.time[kept], channels, stream.rows[kept]))
+        if min(len(part.time) for part in parts) >= _FEWEST:
+            pieces.append(replace(streams, streams=tuple(parts)))
+    if not pieces:
+        short = f"; no piece between the jumps has {_FEWEST} samples"
+        raise RunError([Fault(jump.text + short, streams.path) for jump in jumps])
+    return tuple(pieces)

@@ -1,0 +1,57 @@
+"""Stamps of the source of a message beside the log time of its recorder."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from winchkit.runs.importing.chosen import Work
+from winchkit.runs.importing.table import Table
+
+__all__ = ["LOG_TIME", "SOURCE_STAMP", "delays", "has_two_clocks", "without_stamps"]
+
+SOURCE_STAMP, LOG_TIME = "header.stamp", "log_time"
+"""Names of the columns of a topic."""
+
+
+def has_two_clocks(work: Work) -> bool:
+    """Whether some topics have a stamp of their source, and others the log time only."""
+    names = {item.column.name for item in work.columns if item.base == "time"}
+    return names == {SOURCE_STAMP, LOG_TIME}
+
+
+def without_stamps(table: Table) -> tuple[Table, str]:
+    """The table with log times only, and a note."""
+    groups = {item.group for item in table.columns if item.name == SOURCE_STAMP}
+    bare = {item.group for item in table.columns} - groups
+    columns = tuple(item for item in table.columns if item.name != SOURCE_STAMP)
+    note = (
+        f"log time is the time of all topics: no usable {SOURCE_STAMP} in {', '.join(sorted(bare))}"
+    )
+    return replace(table, columns=columns), note
+
+
+def delays(work: Work) -> Iterator[str]:
+    """Notes on the delay of the log time after the stamp that is used, by topic."""
+    for clock in work.columns:
+        group, name = clock.column.group, clock.column.name
+        others = (c for c in work.table.columns if c.group == group and c.name == LOG_TIME)
+        log = next(others, None) if clock.base == "time" and name == SOURCE_STAMP else None
+        if log is None:
+            continue
+        delay = (log.values - clock.column.values) * 1e-9
+        low, middle, high = np.percentile(delay, [5, 50, 95])
+        text = (
+            f"{group}: time is {SOURCE_STAMP}; the log time is later by {_seconds(middle)} "
+            f"(90 % of the messages: {_seconds(low)} to {_seconds(high)})"
+        )
+        steps = np.diff(log.values) * 1e-9
+        if np.any(steps < 0):
+            text += f"; the log time goes back by up to {_seconds(-float(steps.min()))}"
+        yield text
+
+
+def _seconds(value: float) -> str:
+    return f"{value * 1e3:.3g} ms" if abs(value) < 1 else f"{value:.6g} s"

@@ -1,0 +1,1 @@
+"""Numbers as a file stores them: modulo a range, or without their sign."""

@@ -1,0 +1,111 @@
+"""Columns whose numbers wrap or have lost their sign: restored, told, or asked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from dataclasses import replace
+
+from winchkit.runs.importing.assignment import Question
+from winchkit.runs.importing.chosen import ChosenColumn, Work, is_whole
+from winchkit.runs.importing.consistency import USUAL_COUNTS
+from winchkit.runs.importing.names import words_of
+from winchkit.runs.importing.stored.numbers import restored, wrap_of
+from winchkit.runs.importing.stored.sign_bits import LostSign, lost_sign
+from winchkit.runs.importing.unit_spelling import COUNTS, SHARE
+from winchkit.schema.mapping import DATE, MODULO
+
+__all__ = ["settle_stored"]
+
+_TURN = 2 * math.pi
+_RANGES = tuple(2.0**bits for bits in range(8, 33))
+"""Ranges of counters: a byte to a double word."""
+
+
+def settle_stored(work: Work) -> None:
+    """Restore the numbers of every column, before units are compared; ask where it is not sure."""
+    given = dict(work.answers.modulo)
+    lost: dict[tuple[str, str], list[tuple[ChosenColumn, LostSign]]] = {}
+    for item in work.columns:
+        name = item.column.source
+        if item.base in {"time", DATE} or item.column.texts is not None:
+            continue
+        if given.get(name):
+            _restore(item, f"{MODULO} {given[name]:.12g}")
+        elif name not in given and _settle_wrap(work, item):
+            continue
+        elif name not in work.answers.unsigned:
+            unit = item.candidate.unit
+            is_small = unit is not None and unit.dimension == SHARE
+            if sign := lost_sign(item.column.values, is_small=is_small):
+                lost.setdefault((_stem(name), sign.stored), []).append((item, sign))
+    for items in lost.values():
+        _settle_signs(work, items)
+
+
+def _restore(item: ChosenColumn, stored: str) -> None:
+    values = restored(item.column.values, stored)
+    item.candidate = replace(item.candidate, column=replace(item.column, values=values))
+    item.stored = stored
+
+
+def _settle_wrap(work: Work, item: ChosenColumn) -> bool:
+    """Unwrap an angle or a counter by its steps; whether it wraps, for certain or perhaps."""
+    usual, rare = _moduli(work, item)
+    wrap = wrap_of(item.column.values, usual, rare) if usual else None
+    if wrap is None:
+        return False
+    name = item.column.source
+    if wrap.is_sure:
+        _restore(item, f"{MODULO} {wrap.modulus:.12g}")
+        times = "once" if wrap.count == 1 else f"{wrap.count} times"
+        work.notes.append(
+            f"'{name}' wraps at {wrap.modulus:.10g} ({times}) and is unwrapped; "
+            f'--modulo "{name}=0" where it does not'
+        )
+        return True
+    text = (
+        f"'{name}' jumps {wrap.count} times by about {wrap.modulus:.4g}, as numbers do that "
+        "wrap there; its other steps do not say so for certain"
+    )
+    options = (f'--modulo "{name}={wrap.modulus:.6g}"', f'--modulo "{name}=0"')
+    work.questions.append(Question(text, options, "modulo"))
+    return True
+
+
+def _moduli(work: Work, item: ChosenColumn) -> tuple[Collection[float], Collection[float]]:
+    """Usual and rare moduli of an angle or a counter; none of another column."""
+    unit = item.candidate.unit
+    if item.base not in {"motor_angle", "cable_length", "swivel"}:
+        return (), ()
+    if unit is not None and unit.dimension == "angle":
+        return tuple(share * _TURN / unit.factor for share in (0.5, 1, 2)), ()
+    if is_whole(item) or (unit is not None and unit.dimension == COUNTS):
+        own = work.answers.counts_per_turn
+        turns = tuple(own * share for share in (1, 0.5, 2)) if own else ()
+        return (*_RANGES, 360.0, *turns), [*map(float, USUAL_COUNTS)]
+    return ((360.0, _TURN, 1.0) if unit is None and item.base != "cable_length" else ()), ()
+
+
+def _stem(name: str) -> str:
+    """Words of a name that those of its siblings have, ``speed`` of ``speed (3)``."""
+    return " ".join(word for word in words_of(name).split() if not word.isdecimal())
+
+
+def _settle_signs(work: Work, items: list[tuple[ChosenColumn, LostSign]]) -> None:
+    """Restore the signs of columns that are named alike, or ask for them at once."""
+    names = [item.column.source for item, _ in items]
+    if all(name in work.answers.signed for name in names):
+        for item, sign in items:
+            _restore(item, sign.stored)
+        return
+    sign = items[0][1]
+    values = "; ".join(f"'{item.column.source}' of {one.text}" for item, one in items)
+    text = (
+        f"values of {values}: as signed numbers of {sign.bits} bits stored without a sign "
+        f"({sign.kind}); are they signed?"
+    )
+    options = tuple(
+        " ".join(f'--{word} "{name}"' for name in names) for word in ("signed", "unsigned")
+    )
+    work.questions.append(Question(text, options, "signed"))
