@@ -1,8 +1,8 @@
 """Physical effects: the catalogue, and the binding of effects to profiles.
 
-``on_length``, ``on_tension``, ``on_torque`` and ``on_robot`` have one effect per file, ordered by
-the first output that it changes. ``bind`` and ``bind_robot`` make terms of the tables of a profile,
-``parametrization`` gives the coordinates in which a fit changes their values.
+``on_length``, ``on_tension``, ``on_torque``, ``on_axis`` and ``on_robot`` have one effect per file,
+ordered by the first output that it changes. ``bind`` and ``bind_robot`` make terms of the tables of
+a profile, ``parametrization`` gives the coordinates in which a fit changes their values.
 """
 
 from winchkit.effects.bind import check_profile, line_of, terms_of

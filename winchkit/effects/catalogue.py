@@ -19,7 +19,7 @@ from winchkit.units import UNITS, dimension_of, suggest
 
 __all__ = ["Catalogue", "load_catalogue"]
 
-_ROOMS = ("on_length", "on_tension", "on_torque", "on_robot")
+_ROOMS = ("on_length", "on_tension", "on_torque", "on_axis", "on_robot")
 
 
 class Catalogue:

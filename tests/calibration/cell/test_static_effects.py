@@ -131,7 +131,7 @@ def moved(seed: int, kind: str, series: int = 3) -> list[CalibrationPoint]:
 
 
 @pytest.mark.parametrize("kind", ["zero-return", "zero-shift"])
-def test_a_moved_zero_is_told_by_its_order(kind: str) -> None:
+def test_a_moved_zero_is_named_by_its_order(kind: str) -> None:
     found = static_effects(moved(1, kind))
     values = {e.effect: e for e in found.effects}
     assert kind in values

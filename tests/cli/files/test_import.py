@@ -312,7 +312,7 @@ def test_control_characters_of_a_file_do_not_reach_the_terminal(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--rated-torque", "2 kg"), "unknown torque unit"),
+        (("--rated-torque", "2 kg"), "is not a torque with its unit"),
         (("--counts-per-turn", "-3"), "must be above 0"),
         (("--column", "tenson=x"), "did you mean 'tension'?"),
         (("--load-mass", "1 kg", "--load-mass", "2 kg"), "2 --load-mass for 1 files"),

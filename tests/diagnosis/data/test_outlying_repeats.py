@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from winchkit.diagnosis.data.outlying_repeats import outlying_repeat
+from winchkit.diagnosis.data.repeats import outlying_repeat
 
 TURN = np.linspace(0, 2 * np.pi, 512)
 COGGING = np.sin(7 * TURN) + 0.5 * np.sin(14 * TURN)

@@ -108,7 +108,7 @@ def test_of_logs_with_equal_columns_the_one_of_the_file_is_used(tmp_path: Path) 
         read_run(path, mapping=mapping)
 
 
-def test_a_lag_that_the_signals_contradict_is_told_or_refused() -> None:
+def test_a_lag_that_the_signals_contradict_is_reported_or_refused() -> None:
     """The clock of the second file is 20 s ahead; the motion does not repeat."""
     time = np.arange(3000) / 100
     angle = np.cumsum(np.random.default_rng(3).normal(size=3000)) / 10
@@ -130,7 +130,7 @@ def test_a_lag_that_the_signals_contradict_is_told_or_refused() -> None:
     assert joined((first, moved), 0.0)[1][0].text == "joined with a lag of 0 s"
 
 
-def test_a_trace_of_frames_is_told_by_every_command(tmp_path: Path) -> None:
+def test_a_trace_of_frames_is_reported_by_every_command(tmp_path: Path) -> None:
     path = tmp_path / "bus.log"
     path.write_text("".join(f"(1.{k:06d}) can0 181#{k:04X}00FF\n" for k in range(20)))
     for words in (("check",), ("log", "info"), ("import",)):

@@ -112,7 +112,7 @@ def test_a_single_row_out_of_order_is_left_out(shift: float, tmp_path: Path) -> 
 def test_a_clock_that_is_set_back_is_refused(back: float, tmp_path: Path) -> None:
     time = np.where(np.arange(200) < 100, TIME, TIME - back / 50)
     path = write(tmp_path / "a.csv", "time [s],q [deg]", time, ANGLE)
-    with pytest.raises(RunError, match="goes back|increase"):
+    with pytest.raises(RunError, match=r"goes back|increase"):
         imported(path)
 
 

@@ -266,7 +266,7 @@ def _warnings(
         found.append("loads go one way only, so hysteresis is unknown")
     elif not any(points[k].going == "down" for k in groups[0]):
         found.append(
-            "no reading at the smallest load after the largest: a moved zero is told as hysteresis"
+            "no reading at the smallest load after the largest: a moved zero counts as hysteresis"
         )
     if max(point.series for point in points) == 1:
         found.append("one series only, so repeatability is unknown")

@@ -49,7 +49,7 @@ _LINE = (0, 1)
 _SIGNIFICANT = 0.05
 """Level of the t test of a term: of few points the BIC alone keeps terms of p = 0.26."""
 _ALIKE = 2.0
-"""Difference of BIC below which two models are told as a set (Raftery 1995: no evidence)."""
+"""Difference of BIC below which two models are reported as a set (Raftery 1995: no evidence)."""
 _UNIT_TENSION = 500.0
 """As in the effect ``cell-nonlinearity``: q (T/500 N)²."""
 _ROUNDING = 1e-9

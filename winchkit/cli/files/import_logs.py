@@ -14,7 +14,7 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import is_quiet, note, suggest_next
 from winchkit.cli.core.options import TABLE, output_option
 from winchkit.cli.core.output import echo_json
-from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.quantity_type import Quantity, naming
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
 from winchkit.cli.files.import_table import shortened
@@ -36,6 +36,22 @@ _NO_ANGLE = (
     "no column is the motor angle or velocity, without which there is no run: name it by --column "
     '"motor_angle=COLUMN [deg]", or import the file together with the one that has it'
 )
+
+
+class _Written(Quantity):
+    """A quantity as people write it, ``2,4 Nm``, in winchkit's spelling."""
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str:
+        """The text with a decimal point and the unit as winchkit spells it."""
+        from winchkit.runs.importing.answers import as_ours
+
+        try:
+            text = as_ours(str(value), self.dimensions[0])
+        except UsageError as error:
+            raise UsageError(f"{naming(param)}: {error}") from None
+        return super().convert(text, param, ctx)
 
 
 @click.command(
@@ -68,11 +84,13 @@ _NO_ANGLE = (
 @click.option(
     "--rated-torque",
     metavar="TORQUE",
+    type=_Written("torque", example="2.4 N m"),
     help="Torque of 100 %, e.g. '2.4 N m'.",
 )
 @click.option(
     "--torque-constant",
     metavar="CONSTANT",
+    type=_Written("torque constant", example="0.12 N m/A"),
     help="Torque constant of the motor, e.g. '0.12 N m/A'.",
 )
 @click.option("--counts-per-turn", type=float, metavar="N", help="Counts in a turn of the motor.")
@@ -82,11 +100,13 @@ _NO_ANGLE = (
 @click.option(
     "--capacity",
     metavar="FORCE",
+    type=_Written("force", example="500 N"),
     help="Rated load of the load cell, e.g. '500 N'.",
 )
 @click.option(
     "--sample-rate",
     metavar="RATE",
+    type=_Written("frequency", example="1 kHz"),
     help="Rate of the rows, in place of times, e.g. '1 kHz'; of several files, of those that have "
     "none.",
 )

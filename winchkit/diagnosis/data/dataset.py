@@ -24,8 +24,7 @@ from winchkit.diagnosis.data.low_pass import (
     removed_by_low_pass,
 )
 from winchkit.diagnosis.data.motor_current import with_torques
-from winchkit.diagnosis.data.outlying_repeats import outlying_repeat
-from winchkit.diagnosis.data.repeats import Repeats, find_repeats
+from winchkit.diagnosis.data.repeats import Repeats, find_repeats, outlying_repeat
 from winchkit.diagnosis.data.sampling import away_from, bridged, bridged_channel, evenly_stamped
 from winchkit.diagnosis.data.sanity import caveats, findings, resolutions, usable
 from winchkit.diagnosis.data.spectrum import Band, fast_count

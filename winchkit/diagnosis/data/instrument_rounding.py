@@ -15,9 +15,9 @@ from scipy.ndimage import uniform_filter1d
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset, Recording
-from winchkit.diagnosis.data.rounding import mean_error, noise_before_rounding
 from winchkit.model.line import Line, Motion
 from winchkit.runs.sanity.local_noise import local_noise
+from winchkit.runs.sanity.rounding import mean_error, noise_before_rounding
 
 __all__ = ["RoundingError", "instrument_noise", "rounding_errors"]
 
@@ -35,7 +35,7 @@ class RoundingError:
         Channel that is rounded; the zero of its steps is the same in all runs.
     components : ndarray of shape (2 × harmonics, n)
         Cosine, then sine components of the harmonics of the mean error, see
-        :func:`~winchkit.diagnosis.data.rounding.mean_error`, at the samples of the run.
+        :func:`~winchkit.runs.sanity.rounding.mean_error`, at the samples of the run.
     white : float
         Variance of the rest of the output's own error. Of an input it is zero: that of repeats is
         in their differences.

@@ -24,6 +24,7 @@ __all__ = [
     "Answers",
     "ColumnAnswer",
     "answers_of",
+    "as_ours",
     "permitted",
     "read_column",
     "read_constant",
@@ -105,9 +106,9 @@ def read_constant(key: str, text: str) -> float:
     """
     dimension = CONSTANTS[key]
     option = f"--{key.replace('_', '-')}"
-    plain = _with_point(option, _COUNTED.sub("", text) if dimension == "ratio" else text)
+    plain = _COUNTED.sub("", text) if dimension == "ratio" else text
     try:
-        value = typed_quantity(_our_spelling(plain, dimension), dimension)
+        value = typed_quantity(as_ours(plain, dimension), dimension)
     except UsageError as error:
         raise UsageError(f"{option}: {error}") from None
     if value <= 0:
@@ -115,19 +116,29 @@ def read_constant(key: str, text: str) -> float:
     return value
 
 
-def _with_point(option: str, text: str) -> str:
-    """A decimal point in place of a comma; raises UsageError where it may separate thousands."""
-    if re.match(r"\s*[1-9]\d{0,2},\d{3}(?!\d)", text):
-        raise UsageError(f"{option}: the comma of '{text}' may separate thousands; write a point")
-    return re.sub(r"^(\s*\d+),(?=\d)", r"\1.", text)
+def as_ours(text: str, dimension: str) -> str:
+    """A quantity as winchkit writes it: ``2,4 Nm`` is ``2.4 N m``.
 
+    Raises UsageError where a comma may separate thousands.
 
-def _our_spelling(text: str, dimension: str) -> str:
-    """A quantity with the unit as winchkit spells it: ``2.4 Nm`` is ``2.4 N m``."""
-    number = re.match(r"\s*[\d.]+\s*", text)
-    unit = read_unit(text[number.end() :]) if number else None
+    Parameters
+    ----------
+    text : str
+        Number with unit.
+    dimension : str
+        Name of the dimension.
+    """
+    plain = _with_point(text)
+    number = re.match(r"\s*[\d.]+\s*", plain)
+    unit = read_unit(plain[number.end() :]) if number else None
     is_ours = unit is not None and unit.text in UNITS[dimension]
-    return f"{number[0]} {unit.text}" if number and unit and is_ours else text
+    return f"{number[0]} {unit.text}" if number and unit and is_ours else plain
+
+
+def _with_point(text: str) -> str:
+    if re.match(r"\s*[1-9]\d{0,2},\d{3}(?!\d)", text):
+        raise UsageError(f"the comma of '{text}' may separate thousands; write a point")
+    return re.sub(r"^(\s*\d+),(?=\d)", r"\1.", text)
 
 
 @dataclass(frozen=True)
@@ -309,7 +320,7 @@ def read_column(text: str) -> ColumnAnswer:
             f"'{unit}' in '{text}' is a unit of {spelled.dimension}, not of {dimension}; use "
             + ", ".join(UNITS[dimension or "ratio"])
         )
-    factor = float(_with_point("factor", found["factor"])) if found["factor"] else None
+    factor = float(_with_point(found["factor"])) if found["factor"] else None
     constant, sign = found["constant"] or "", -1.0 if found["minus"] else 1.0
     file = (found["file"] or "").strip()
     return ColumnAnswer(channel, found["source"], unit, factor, constant, sign, file)

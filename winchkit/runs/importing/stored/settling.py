@@ -1,4 +1,4 @@
-"""Columns whose numbers wrap or have lost their sign: restored, told, or asked."""
+"""Columns whose numbers wrap or have lost their sign: restored, reported, or asked."""
 
 from __future__ import annotations
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.fft import dct
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.data.rounding import mean_error, noise_before_rounding
 from winchkit.runs.sanity.local_noise import local_noise
+from winchkit.runs.sanity.rounding import mean_error, noise_before_rounding
 
 STEP = 0.5
 

@@ -59,7 +59,7 @@ def command(*arguments: str | Path) -> tuple[int, str]:
         ("encoder [counts]", TURN / 65536, 2.0**17, 1.0),
     ],
 )
-def test_a_wrapped_angle_is_unwrapped_and_told(
+def test_a_wrapped_angle_is_unwrapped_and_reported(
     head: str, si: float, modulus: float, resolution: float, shift: float, tmp_path: Path
 ) -> None:
     """Over its whole range from 0, and over half of it to either side."""
@@ -210,7 +210,7 @@ def test_per_cent_that_are_all_negative_have_lost_their_sign() -> None:
     assert lost_sign(values.astype(np.float64)) is None
 
 
-def test_a_torque_far_beyond_the_rated_one_is_told(tmp_path: Path) -> None:
+def test_a_torque_far_beyond_the_rated_one_is_reported(tmp_path: Path) -> None:
     path = log(tmp_path / "a.csv", "motor_angle [rad]", ANGLE)
     found = guess_columns(read_table(path), Answers(rated_torque=0.2))
     assert any("80 times the rated torque" in note for note in found.notes)
