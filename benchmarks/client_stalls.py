@@ -30,8 +30,6 @@ from pathlib import Path
 
 from winchkit.sim.live.client import send
 
-__all__ = ["Stalled", "served", "stall"]
-
 WINCHKIT = [sys.executable, "-c", "from winchkit.cli import main; main()"]
 KINDS = ("jog", "keys", "hold-tension", "move")
 _UP = b"\x1b[A"

@@ -27,8 +27,6 @@ from winchkit.drivers.can.cia402.position_agreement import PositionAgreement
 from winchkit.drivers.can.cia402.units import Scale, Units, scale_of
 from winchkit.schema.read import read_device
 
-__all__ = ["FILTERS", "drives", "false_ones", "slowest", "smallest_jump"]
-
 Array = npt.NDArray[np.float64]
 
 CYCLE, RESPONSE, ACCELERATION, SPEED, RADIUS = 0.004, 0.06, 1.0, 0.3, 0.03

@@ -18,8 +18,6 @@ from pathlib import Path
 from winchkit.bench.ownership import owner_process
 from winchkit.schema.read import read_bench
 
-__all__ = ["COMMAND_FAULTS", "Commands", "NotMoving", "log_problems"]
-
 COMMAND_FAULTS = {
     "SIGTERM": 143,
     "SIGHUP": 129,

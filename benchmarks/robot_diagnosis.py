@@ -30,8 +30,6 @@ from robot_poses.hidden import Case, profile_text, record
 from summaries import print_cases
 from winchkit.cli import main
 
-__all__ = ["answer", "calibrated", "covered", "named", "summary", "wrong"]
-
 CALIBRATED = ("elastic ropes", "none")
 
 

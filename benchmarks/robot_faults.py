@@ -38,8 +38,6 @@ from winchkit.errors import MotionError, NotPermitted, WinchkitError
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 
-__all__ = ["FAULTS", "Outcome", "RobotCase", "drawn", "played", "summary"]
-
 BROKEN = "broken cable"
 FAULTS = {
     "drive silent": KINDS["drive silent"],

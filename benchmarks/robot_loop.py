@@ -40,8 +40,6 @@ from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.robot.build import build_robot
 
-__all__ = ["KINDS", "Case", "case_of", "looped", "outcome", "profile_text", "robot_of_case"]
-
 ROBOT = "cabtive-robot"
 KINDS = ("drum radius", "cell gain", "soft cable", "exit point", "none")
 OUTCOMES = ("right", "in a set", "wrong", "silent")

@@ -33,8 +33,6 @@ from robot_poses.truth import Noise, Vector, csv, poses
 from summaries import print_cases
 from winchkit.cli import main
 
-__all__ = ["Hidden", "diagnosed", "drawn", "judged"]
-
 _REAL = ("none", "home length", "exit point", "drum radius")
 _BY_NAME = {case.name: case for case in CASES}
 _EFFECT = {"frame": "tracker-frame", "reflector": "reflector-offset", "scale": "tracker-scale"}

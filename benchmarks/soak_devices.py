@@ -22,8 +22,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "support"))
 from slave import Declared, Slave
 from slave.frames import Frame
 
-__all__ = ["Wire", "serve"]
-
 _EDS = Path(__file__).parents[1] / "devices" / "generic-cia402" / "generic-cia402.eds"
 _STEP = 2e-3
 _PRIORITY = 60

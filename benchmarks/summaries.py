@@ -7,8 +7,6 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-__all__ = ["print_cases", "print_summary"]
-
 
 def print_summary(summary: Mapping[str, Any], *, as_json: bool) -> None:
     """Lines to stderr, and JSON to stdout where it is asked for."""

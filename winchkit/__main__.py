@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import sys
 
-__all__ = ["program"]
-
 
 def program() -> None:
     """Import the command line and run it."""

@@ -14,8 +14,6 @@ from pathlib import Path
 
 from winchkit.errors import UsageError, one_line
 
-__all__ = ["number", "path_of", "positive", "require_each", "require_type", "require_types"]
-
 _CALLS = {
     "Addition": "add(effect, runs, profile)",
     "BenchSpec": "read_bench(path)",

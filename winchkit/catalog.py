@@ -10,8 +10,6 @@ from winchkit.arguments import path_of
 from winchkit.errors import FileError, UsageError, suggest
 from winchkit.regular_file import file_kind
 
-__all__ = ["Kind", "find", "folder", "names"]
-
 Kind = Literal["devices", "profiles", "sim"]
 
 _SINGULAR: dict[Kind, str] = {

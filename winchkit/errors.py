@@ -22,27 +22,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-__all__ = [
-    "CONTROL_CHARACTERS",
-    "ConnectionLost",
-    "DeviceRefused",
-    "DriveFault",
-    "Fault",
-    "FileError",
-    "LimitTripped",
-    "MotionError",
-    "NoReply",
-    "NotPermitted",
-    "RunError",
-    "UsageError",
-    "WinchkitError",
-    "class_name",
-    "error_of",
-    "one_line",
-    "printable",
-    "suggest",
-]
-
 CONTROL_CHARACTERS = re.compile(
     "[\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u0600-\u0605\u061c\u06dd\u070f\u180e\u200b-\u200f"
     "\u2028-\u202e\u2060-\u206f\ud800-\udfff\ufeff\ufff9-\ufffb\U000e0000-\U000e007f]"

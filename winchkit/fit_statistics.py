@@ -20,8 +20,6 @@ from typing import Any
 from winchkit.rendering import Shown
 from winchkit.tabular import Columns, Tabular
 
-__all__ = ["Correlation", "FitStatistics", "FittedParameter", "correlations_of"]
-
 _SHOWN = 0.5
 """Least size of a correlation that is listed."""
 

@@ -17,8 +17,6 @@ from contextlib import ExitStack
 from ipaddress import ip_address
 from typing import Any
 
-__all__ = ["MulticastPort"]
-
 _QUEUE = 1 << 20
 """Bytes of the socket's queue."""
 _LONGEST = 4096

@@ -6,8 +6,6 @@ from collections.abc import Iterable, Mapping
 from math import isfinite
 from typing import Any
 
-__all__ = ["finite_or_none", "significant", "without_nan"]
-
 
 def finite_or_none(value: float) -> float | None:
     """Return the number, or None where it is not finite."""

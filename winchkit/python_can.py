@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import sys
 
-__all__ = ["import_python_can"]
-
 
 def import_python_can() -> None:
     """Import ``can``, if it is not imported yet, as without asammdf.

@@ -6,8 +6,6 @@ import errno
 import os
 import stat
 
-__all__ = ["file_kind", "read_text", "regular"]
-
 _KINDS = {
     stat.S_IFDIR: "a directory",
     stat.S_IFIFO: "a FIFO",

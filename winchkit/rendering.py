@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Plotted", "Renderer", "Renderers", "Shown", "renderers"]
-
 
 class Renderer(NamedTuple):
     """How results of one type are shown; no dataclass, whose import takes as long as winchkit's."""

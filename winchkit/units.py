@@ -11,19 +11,6 @@ import re
 
 from winchkit.errors import UsageError, suggest
 
-__all__ = [
-    "GRAVITY",
-    "UNITS",
-    "article",
-    "convert",
-    "dimension_of",
-    "factor",
-    "format_quantity",
-    "number_and_unit",
-    "parse",
-    "suggest",
-]
-
 GRAVITY = 9.80665
 """Standard acceleration of gravity, m/s² (3rd CGPM, 1901; exact)."""
 _TURN = 2 * math.pi

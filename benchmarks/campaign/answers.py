@@ -8,8 +8,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
 
-__all__ = ["keep", "kept"]
-
 S = TypeVar("S")
 
 

@@ -12,8 +12,6 @@ from campaign.truth import Situation
 from campaign.winch import Winch, draw_winch, turns_for
 from winchkit.arrays import Array
 
-__all__ = ["Bench", "draw_bench", "draw_beside"]
-
 Random = np.random.Generator
 _FINE = 200.0
 """Steps of a fine physics, Hz."""

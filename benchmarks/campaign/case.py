@@ -14,8 +14,6 @@ from campaign.truth import OUTPUTS, Hidden, Shown, show
 from campaign.winch import write_profile
 from winchkit.arrays import Array
 
-__all__ = ["ATTEMPTS", "Case", "Plan", "draw_effects", "make_case", "size_effects"]
-
 Random = np.random.Generator
 KINDS = {"none": 0, "single": 1, "pair": 2, "triple": 3, "norepeat": 1, "outside": 1}
 TOO_ALIKE = 0.9

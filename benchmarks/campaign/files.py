@@ -10,8 +10,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["write_run"]
-
 UNITS = {
     "time": "s",
     "motor_angle": "rad",

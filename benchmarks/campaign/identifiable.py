@@ -27,8 +27,6 @@ from campaign.sizes import CATALOGUE, PHASED, RECENT, Sized, allowed, shapes
 from campaign.truth import OUTPUTS, Hidden, Shown, show
 from winchkit.arrays import Array
 
-__all__ = ["RATIO", "Identity", "identity"]
-
 RATIO = 20.0
 _KNOTS = (0.4, 1.0, 1.6)
 _NEAR = 0.3

@@ -21,8 +21,6 @@ from scipy.linalg import solveh_banded
 from campaign.record import AR
 from winchkit.arrays import Array
 
-__all__ = ["gram", "least_along", "without"]
-
 
 def gram(columns: Array, rows: NDArray[np.intp], white: float, coloured: float) -> Array:
     """Products CᵀΣ⁻¹C of columns (n, k) at increasing sample numbers ``rows`` (n,); (k, k).

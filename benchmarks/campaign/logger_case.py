@@ -24,8 +24,6 @@ from campaign.sizes import CATALOGUE, RECENT, allowed
 from campaign.truth import Hidden
 from campaign.winch import write_profile
 
-__all__ = ["LoggerCase", "LoggerPlan", "answer", "make_logger_case", "run_logger_cases"]
-
 Random = np.random.Generator
 
 

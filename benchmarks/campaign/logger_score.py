@@ -16,8 +16,6 @@ from scipy.stats import beta
 
 from campaign.loggers import FAULTS, MISREAD
 
-__all__ = ["LoggerScore", "clopper_pearson", "logger_summary", "logger_table"]
-
 AIMS = {
     "truth_in_first": ">= 0.97",
     "wrong_single_name": "<= 0.005",

@@ -17,8 +17,6 @@ from campaign.record import Recording
 from campaign.truth import OUTPUTS
 from winchkit.arrays import Array
 
-__all__ = ["FAULTS", "MISREAD", "Fault", "Logged", "fault_of"]
-
 Random = np.random.Generator
 KEPT = (0.6, 0.95)
 """Share of a run that an excerpt has."""

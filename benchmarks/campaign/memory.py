@@ -8,8 +8,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["dahl", "lag", "play", "stack"]
-
 
 def play(x: Array, gap: float) -> Array:
     """Follow ``x`` through a play of ``gap`` that begins in the middle; shape (n,)."""

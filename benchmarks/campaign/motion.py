@@ -6,8 +6,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["programme"]
-
 
 def programme(
     random: np.random.Generator, rate: float, seconds: float, stroke: float

@@ -13,17 +13,6 @@ from campaign.files import write_run
 from campaign.truth import OUTPUTS, Hidden, show
 from winchkit.arrays import Array
 
-__all__ = [
-    "AR",
-    "EDGE",
-    "Recording",
-    "instrument_noise",
-    "record",
-    "record_several",
-    "recordings",
-    "write",
-]
-
 Random = np.random.Generator
 AR = 0.9
 """Coefficient of the coloured part of the noise."""

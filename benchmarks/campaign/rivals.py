@@ -23,8 +23,6 @@ from winchkit.diagnosis.selection.signatures import Signatures, signatures
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.effects.effect import MOTOR_ORDERS
 
-__all__ = ["RIVALS", "SELECTIONS", "Regression", "in_time", "regression_of"]
-
 _LEVEL = 0.05
 _MOST = 15
 _FOLDS = 5

@@ -13,8 +13,6 @@ from campaign.answers import keep, kept
 from campaign.case import Case, Plan, make_case
 from campaign.score import Score, refused, score
 
-__all__ = ["run_case", "run_cases"]
-
 
 def run_case(seed: int, plan: Plan, folder: Path) -> Score | None:
     """Make one case, diagnose its files and score the answer; None where no case can be made."""

@@ -12,8 +12,6 @@ from campaign.case import Case
 from campaign.sizes import CATALOGUED
 from campaign.truth import Hidden
 
-__all__ = ["Score", "refused", "score", "summary", "table"]
-
 AIMS = {
     "none": {"alarm": "<= 0.05", "named": "<= 0.01"},
     "single": {"truth_in_first": ">= 0.98", "wrong_single_name": "<= 0.005"},

@@ -15,8 +15,6 @@ from campaign.record import record_several
 from campaign.truth import Hidden
 from campaign.winch import write_profile
 
-__all__ = ["EXTENTS", "Several", "make_several"]
-
 EXTENTS = ("none", "one", "all")
 
 

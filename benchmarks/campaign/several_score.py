@@ -16,8 +16,6 @@ from campaign.answers import keep, kept
 from campaign.case import Plan
 from campaign.several import EXTENTS, Several, make_several
 
-__all__ = ["SeveralScore", "answer_several", "run_several", "several_summary"]
-
 
 @dataclass(frozen=True)
 class SeveralScore:

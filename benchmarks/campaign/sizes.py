@@ -12,8 +12,6 @@ import numpy as np
 
 from campaign.winch import Winch
 
-__all__ = ["CATALOGUE", "CATALOGUED", "OUTSIDE", "RECENT", "Scene", "allowed", "draw", "shapes"]
-
 Random = np.random.Generator
 T = TypeVar("T")
 Values = dict[str, float]

@@ -16,17 +16,6 @@ from campaign.memory import dahl, lag, play, stack
 from campaign.winch import Winch
 from winchkit.arrays import Array
 
-__all__ = [
-    "OUTPUTS",
-    "G",
-    "Hidden",
-    "Shown",
-    "Situation",
-    "bearing_friction",
-    "show",
-    "wound_cable",
-]
-
 Values = Mapping[str, float]
 Hidden = Mapping[str, Values]
 OUTPUTS = ("cable_length", "tension", "motor_torque")

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["Winch", "draw_winch", "turns_for", "write_profile"]
-
 Random = np.random.Generator
 
 

@@ -10,8 +10,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-__all__ = ["FarDrives"]
-
 _PRIORITY = 60
 """Above the bench's: a drive answers at its own time, whatever this computer does."""
 

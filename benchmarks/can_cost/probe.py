@@ -13,8 +13,6 @@ import sys
 import time
 from contextlib import suppress
 
-__all__ = ["Probes"]
-
 _PRIORITY, _PERIOD, _NOTED = 80, 1e-3, 1e-4
 
 

@@ -14,8 +14,6 @@ from typing import Any, Protocol
 
 import can
 
-__all__ = ["PairLibrary", "SocketWire", "VirtualWire", "Wire"]
-
 _FRAME = struct.Struct("=IB3x8s")
 
 

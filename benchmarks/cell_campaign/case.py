@@ -15,9 +15,10 @@ from cell_campaign.device import Device
 from cell_campaign.line import FarEnd, run
 from cell_campaign.warp import WarpClock, WarpLoop
 from winchkit import catalog
+from winchkit.drivers.counters import Counters
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.line import ModbusLine
-from winchkit.drivers.reading import Counters, Reading
+from winchkit.drivers.reading import Reading
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device

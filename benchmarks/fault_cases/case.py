@@ -7,8 +7,6 @@ from random import Random
 
 from fault_cases.kinds import KINDS
 
-__all__ = ["NOISE_KNOWN", "Case", "Planned", "cases"]
-
 _MOTIONS = ("jog", "move", "programme")
 _SPANS = (0.02, 0.05, 0.12, 0.3, 0.8)
 _INDEPENDENT = 0.4

@@ -19,8 +19,6 @@ from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.plant.plant import WinchPlant
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = ["IndependentDrive", "carry_remote_frames", "replace_drives"]
-
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "support"))
 
 from slave import Declared, Slave

@@ -27,8 +27,6 @@ from fault_cases.kinds import KINDS, READING_DELAY, STIFFNESS, Kind
 from fault_cases.play import Record
 from fault_cases.world import LIMITS, Sample
 
-__all__ = ["Verdict", "judge"]
-
 _STALLS = {"computer stalls 0.1 s": 0.1, "computer stalls 0.5 s": 0.5}
 """s."""
 _MOVES = 0.004

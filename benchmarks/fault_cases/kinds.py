@@ -10,8 +10,6 @@ from typing import Any, Literal
 
 from fault_cases.world import World
 
-__all__ = ["KINDS", "READING_DELAY", "STIFFNESS", "Kind"]
-
 STIFFNESS = 3000.0
 """Of what a load snags on, N/m."""
 

@@ -10,8 +10,6 @@ from fault_cases.world import World
 from winchkit.bench.winch import Winch
 from winchkit.drivers.scheduling import thread_of
 
-__all__ = ["Operator"]
-
 _REPEAT = 0.05
 """Of a held key, s."""
 _WAYS = {"move": (-1.2, 0.65), "programme": (-0.15, 0.15)}

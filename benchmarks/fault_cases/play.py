@@ -21,8 +21,6 @@ from winchkit.bench.winch import Winch
 from winchkit.runs import read_run
 from winchkit.runs.recording.rows import RowLog
 
-__all__ = ["Forbidden", "Record", "play"]
-
 _AFTER = 1.1
 """From the last fault until all is mended, s."""
 _HELD_ON = 0.5

@@ -33,8 +33,6 @@ from winchkit.sim.live.buses import Carried
 from winchkit.sim.live.paced_clock import PacedClock
 from winchkit.testing.declared import declared
 
-__all__ = ["HEARTBEAT", "LIMITS", "Sample", "Strange", "World", "opened_world"]
-
 HEARTBEAT = 0.05
 LIMITS = {"speed": 0.6, "acceleration": 1.5, "tension_high": 400.0, "tension_slack": 15.0}
 """Of ``spiral-bench``."""

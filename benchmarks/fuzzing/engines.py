@@ -17,8 +17,6 @@ from typing import NoReturn
 from fuzzing.targets import Failure, Target
 from winchkit.errors import WinchkitError
 
-__all__ = ["with_atheris", "with_mutation", "within_atheris"]
-
 HANG = 1.0
 """An input that takes more processor time hangs, s."""
 STALLED = 20

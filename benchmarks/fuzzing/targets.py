@@ -30,8 +30,6 @@ from winchkit.schema.read import read_any, read_device
 from winchkit.schema.template import parts_of
 from winchkit.units import UNITS, parse
 
-__all__ = ["Failure", "Target", "every"]
-
 
 class Failure(Exception):
     """A parser did what it must not."""

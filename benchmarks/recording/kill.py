@@ -24,8 +24,6 @@ from winchkit.runs.read import read_log, read_run
 from winchkit.runs.recording.rotation import parts_beside
 from winchkit.runs.recover import recover
 
-__all__ = ["Killed", "kill_once"]
-
 _START_TIME = 60.0
 _LEAST_ROWS = 2
 """A run has at least so many."""

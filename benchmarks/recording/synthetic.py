@@ -26,8 +26,6 @@ from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import ConnectionLost
 from winchkit.runs.recording.rotation import Rotation
 
-__all__ = ["GIVEN", "REMEMBERED", "TOLD", "Cell", "SyntheticBench", "record"]
-
 TOLD = struct.Struct("<qd")
 GIVEN = struct.Struct("<d")
 REMEMBERED = 8192

@@ -8,8 +8,6 @@ from dataclasses import replace
 from robot_poses.hidden import BASE, MASS, Case
 from robot_poses.truth import HOME, UPPER, Row, Vector, turn
 
-__all__ = ["CASES"]
-
 STILL = (0.0,) * 8
 ELASTIC = "cable-elongation-linear"
 STIFFNESS = f"{ELASTIC}.axial_stiffness"

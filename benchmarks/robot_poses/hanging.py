@@ -18,8 +18,6 @@ from scipy.optimize import brentq, minimize
 from robot_poses.truth import GRAVITY, HOME, Truth, Vector, turn
 from winchkit.arrays import Array
 
-__all__ = ["Hanging", "hanging_truth"]
-
 LINES = 4
 _STEP = 1e-6
 

@@ -17,8 +17,6 @@ import numpy as np
 from robot_poses.truth import GRAVITY, HOME, Noise, Row, Truth, Vector, csv, poses, turn
 from winchkit.arrays import Array
 
-__all__ = ["BASE", "MASS", "Beyond", "Case", "Seen", "balanced", "profile_text", "record"]
-
 Beyond = Callable[[int, Row], float]
 Seen = Callable[[Row], Row]
 BASE = Truth()

@@ -15,8 +15,6 @@ from robot_poses.hidden import BASE, MASS, _arm, _slope
 from robot_poses.truth import GRAVITY, HOME, Row, Truth, Vector, turn
 from winchkit.arrays import Array
 
-__all__ = ["log", "place"]
-
 _STEP = 1e-3
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
 

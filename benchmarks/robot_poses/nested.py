@@ -15,8 +15,6 @@ from scipy.optimize import least_squares
 from robot_poses.truth import ANCHOR, EXIT, HOME, TURNS, UPPER
 from winchkit.arrays import Array
 
-__all__ = ["ITERATIONS", "NestedProblem", "nominal"]
-
 ITERATIONS = 25
 LINES = 8
 _TURN = 2 * np.pi

@@ -16,8 +16,6 @@ from robot_poses.hidden import Case, balanced
 from robot_poses.truth import HOME, Noise, Row, Vector, csv, poses, turn
 from winchkit.arrays import Array
 
-__all__ = ["Station", "about", "observed"]
-
 _ZERO: Vector = (0.0, 0.0, 0.0)
 
 

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from winchkit.cli import main
 from winchkit.errors import FileError, UsageError
 from winchkit.model.sizing.parts import belt_length, centre_distance
-from winchkit.model.sizing.row import down, up
-from winchkit.model.sizing.sizing import Row, sized
+from winchkit.model.sizing.row import Row, down, up
+from winchkit.model.sizing.sizing import sized
 from winchkit.schema.profiles.sizing import SizeSpec, WormSpec
 from winchkit.schema.read import read_size
 

@@ -11,15 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-__all__ = [
-    "STARTS",
-    "Served",
-    "number",
-    "opened",
-    "texts",
-    "until",
-]
-
 STARTS = 60.0
 """For a page or a server to start, s."""
 

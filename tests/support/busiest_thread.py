@@ -6,8 +6,6 @@ import os
 import time
 from pathlib import Path
 
-__all__ = ["busiest_thread"]
-
 _WATCHED = 0.3
 
 

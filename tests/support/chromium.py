@@ -9,8 +9,6 @@ from typing import Any
 
 import pytest
 
-__all__ = ["NEEDS_CHROMIUM", "chromium"]
-
 _PROGRAM = shutil.which("chromium")
 
 NEEDS_CHROMIUM = pytest.mark.skipif(

@@ -9,8 +9,6 @@ import click
 from winchkit.cli import COMMANDS, main
 from winchkit.cli.core.command import Example
 
-__all__ = ["commands", "examples"]
-
 
 def commands() -> Iterator[tuple[str, click.Command]]:
     """Each command and group with its words; the root has none."""

@@ -17,8 +17,6 @@ from scipy.io import savemat
 
 from winchkit.runs import read_run
 
-__all__ = ["GAIN", "emps_variables", "folder", "lay_out"]
-
 GAIN = 35.15065
 """Force over the drive's signal of EMPS, N/V, published with the data."""
 _EMPS = {"train.csv": "DATA_EMPS.mat", "test.csv": "DATA_EMPS_PULSES.mat"}

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-__all__ = ["run_on_small_disk"]
-
 
 def run_on_small_disk(
     folder: Path, script: str, size: str, environment: dict[str, str] | None = None

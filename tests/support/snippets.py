@@ -32,8 +32,6 @@ from pathlib import Path
 
 import pytest
 
-__all__ = ["FIRST_TERMINAL", "LANGUAGES", "ROOT", "Session", "Snippet", "said", "snippets_of"]
-
 ROOT = Path(__file__).parents[2]
 _FENCE = re.compile(
     r"^(?:<!-- not run: (?P<reason>[^\n]+) -->\n)?```(?P<info>\w[^\n]*)\n(?P<text>.*?)^```$",

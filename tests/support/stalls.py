@@ -23,8 +23,6 @@ from typing import Self
 
 import pytest
 
-__all__ = ["LATE_CYCLES", "StallWatch", "stolen", "waited"]
-
 LATE_CYCLES = pytest.StashKey[Callable[[], int]]()
 """Of a test of a page: late cycles of its bench's control, where it tripped. The threads of a
 browser wait for a processor at any time; their lateness excuses no failure."""

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Text", "texts_of", "without_quotes"]
-
 _QUOTED = re.compile(r"``[^`]*``|:\w+:`[^`]*`")
 _PARAMETER = re.compile(r"^\s*\w+(, \w+)*( : .*)?$", re.MULTILINE)
 

@@ -42,8 +42,6 @@ from winchkit.schema.bench import BenchSpec
 if TYPE_CHECKING:
     from winchkit.bench.robot.platform import Platform
 
-__all__ = ["Bench", "Stations"]
-
 
 class Stations(Protocol):
     """The server through which other processes take part in a bench."""

@@ -11,8 +11,6 @@ from winchkit.bench.winch import Winch
 from winchkit.drivers.clock import Clock
 from winchkit.errors import MotionError, UsageError
 
-__all__ = ["begin_together", "wait_together"]
-
 _POLL = 0.01
 """s: delay with which the others are stopped after one has ended early."""
 

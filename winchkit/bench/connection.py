@@ -34,8 +34,6 @@ from winchkit.schema.bench import BenchSpec
 if TYPE_CHECKING:
     from winchkit.bench.robot.tracker import Tracker
 
-__all__ = ["BenchConnection"]
-
 _WATCHED = 2.0
 """Frames are collected for so long after somebody asked for them, s."""
 _LISTEN = 1.1

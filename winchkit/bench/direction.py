@@ -8,8 +8,6 @@ from typing import TypedDict
 from winchkit.arguments import number
 from winchkit.errors import UsageError
 
-__all__ = ["DirectionKeyword", "directed", "no_positional", "paid_out"]
-
 
 class DirectionKeyword(TypedDict, total=False):
     """The one of the two keywords that a call is given, with its positive number."""

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from winchkit.drivers.can.canopen.node import SdoNode
     from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["Stopped", "stop_on_bus"]
-
 _STOP_TIME = 5.0
 """s: five times the quick stop from 1 m/s with 1 m/s²; then the operator has to use the emergency
 stop."""

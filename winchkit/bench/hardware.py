@@ -45,8 +45,6 @@ from winchkit.version import __version__
 if TYPE_CHECKING:
     from winchkit.model.robot import Robot
 
-__all__ = ["Wired", "wire"]
-
 _STALE_BEATS = 2
 """Feedback may be this many heartbeats old: the bench file says how soon silence must count."""
 _LEAST_GAP = 6

@@ -14,8 +14,6 @@ from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.profile_parameters import HERE, HomingSpec, check_homing
 from winchkit.errors import DeviceRefused, DriveFault, NotPermitted, UsageError
 
-__all__ = ["homing"]
-
 _SHARE = 0.1
 """Of the winch's speed limit, at which it searches by default."""
 _SLOWER = 0.2

@@ -13,8 +13,6 @@ from winchkit.bench.remote.commander import Commanders
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.clock import Clock
 
-__all__ = ["WinchHost"]
-
 
 class WinchHost(Protocol):
     """The bench of a winch: clock, state, permissions, and what concerns all winches."""

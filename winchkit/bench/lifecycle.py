@@ -18,16 +18,6 @@ from winchkit.drivers.reading import Sensor
 from winchkit.errors import LimitTripped, MotionError, NoReply, NotPermitted, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = [
-    "await_cycles",
-    "await_feedback",
-    "await_rest",
-    "await_sensors",
-    "clear_faults",
-    "reset",
-    "stopped_after",
-]
-
 _POLL = 0.01
 """s: two or more cycles at the usual 4 ms."""
 _FIRST_FEEDBACK = 2.0

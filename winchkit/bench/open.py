@@ -13,8 +13,6 @@ from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_bench
 
-__all__ = ["open_bench"]
-
 
 def open_bench(
     bench: str | Path | BenchSpec,

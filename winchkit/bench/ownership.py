@@ -21,17 +21,6 @@ from winchkit import catalog
 from winchkit.errors import ConnectionLost, MotionError, NotPermitted, WinchkitError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = [
-    "Ownership",
-    "connect_to_owner",
-    "digest_of",
-    "listen",
-    "log_path",
-    "mark_stop",
-    "owner_process",
-    "unless_stopped",
-]
-
 _CONNECT_TIME = 2.0
 """s: an owner accepts at once; one under load within some tenths."""
 

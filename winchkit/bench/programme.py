@@ -13,8 +13,6 @@ from winchkit.bench.winch import Winch
 from winchkit.errors import RunError, UsageError
 from winchkit.schema.programme import Programme, Step
 
-__all__ = ["Ask", "Progress", "earlier_runs", "run_programme"]
-
 Ask = Callable[[Step], None]
 """Asks the operator to do something; returns when it is done, raises when it is refused."""
 Progress = Callable[[int, int, Step], None]

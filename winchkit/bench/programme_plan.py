@@ -15,8 +15,6 @@ from winchkit.model.trajectory import plan
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.programme import ALL, Programme, Step
 
-__all__ = ["ProgrammePlan", "plan_programme"]
-
 _SAMPLES = 24
 """Of a move."""
 

@@ -22,8 +22,6 @@ from winchkit.bench.winch_status import WinchStatus
 from winchkit.errors import MotionError, NotPermitted, UsageError
 from winchkit.units import parse
 
-__all__ = ["Winch"]
-
 _LONGEST_HOLD = 1.0
 """s: a motion without its commander lasts no longer."""
 _POLL = 0.01

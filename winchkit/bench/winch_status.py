@@ -14,8 +14,6 @@ from winchkit.drivers.reading import Sensor
 from winchkit.errors import DriveFault, MotionError, NotPermitted
 from winchkit.schema.bench import WinchWiring
 
-__all__ = ["WinchStatus"]
-
 
 class WinchStatus:
     """Status of a winch of an open bench, and the conditions of its motions."""

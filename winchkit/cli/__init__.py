@@ -17,8 +17,6 @@ from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.outcome import finish
 from winchkit.version import __version__
 
-__all__ = ["main"]
-
 # The matrices here are small: threads of a linear algebra library spin longer than they work, and
 # take the processor from a bench in real time. They read this once, when numpy is imported.
 for _library in ("OPENBLAS", "OMP", "MKL"):

@@ -33,17 +33,6 @@ from winchkit.rendering import Shown
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = [
-    "Addition",
-    "FittedAddition",
-    "Removal",
-    "add",
-    "fitted_addition",
-    "fitted_addition_to",
-    "fitted_json",
-    "remove",
-]
-
 _STARTS = 4
 """Grid points of the effect from which `add` begins a fit; computing cost, rule of thumb."""
 _Fits = tuple[TimeSeriesSelection, tuple[Fit, Noise], tuple[Fit, Noise]]

@@ -27,8 +27,6 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.text import size
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Compared", "compare", "compared", "initial_hypothesis", "initial_residual"]
-
 
 @dataclass(frozen=True)
 class Compared:

@@ -16,8 +16,6 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.runs.sanity.text import size
 
-__all__ = ["oversized", "short_travel"]
-
 _LARGEST_RATIO = 2.0
 """Range of an effect's change over that of the output itself, from which other effects must cancel
 it; rule of thumb: a balancer cancels most of a weight."""

@@ -71,17 +71,6 @@ from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.tabular import Columns, Tabular
 
-__all__ = [
-    "Answer",
-    "ProgressCallback",
-    "WinchAnswer",
-    "diagnose",
-    "diagnose_prepared",
-    "no_progress",
-    "selection_engine",
-    "with_offsets_where_better",
-]
-
 _PREDICTED = 0.1
 """Share of a residual that a curve or an order must predict for it to be a missing effect."""
 _REPEAT = "record the same motion again: without repeats the noise is not known"

@@ -12,12 +12,9 @@ from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect_template import check_own, write_own, write_wave_on_drum
 from winchkit.effects.empirical import EMPIRICAL
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, suggest
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.units import suggest
-
-__all__ = ["new_effect"]
 
 
 def new_effect(

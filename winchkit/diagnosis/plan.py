@@ -16,8 +16,6 @@ from winchkit.rendering import Shown
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.programme import Programme
 
-__all__ = ["Plan", "plan"]
-
 
 @dataclass(frozen=True, repr=False)
 class Plan(Shown):

@@ -18,26 +18,6 @@ from winchkit.rendering import Plotted
 from winchkit.runs.sanity.finding import Finding
 from winchkit.tabular import Columns, Tabular
 
-__all__ = [
-    "CandidateScore",
-    "Combination",
-    "Comparison",
-    "Detectable",
-    "Diagnosis",
-    "Doubt",
-    "Estimate",
-    "NextRun",
-    "OutputError",
-    "OutputFit",
-    "Place",
-    "RobotDiagnosis",
-    "RunOffset",
-    "Step",
-    "effect_and_line",
-    "plain_step",
-    "series_orders",
-]
-
 _ORDER, _AMPLITUDE = "order", "amplitude"
 Verdict = Literal["adequate", "explained", "partly", "unknown", "undecided"]
 

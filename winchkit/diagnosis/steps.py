@@ -29,8 +29,6 @@ from winchkit.diagnosis.verdict.decision import excess
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.plausibility import implausible
 
-__all__ = ["Standing", "candidates_of", "is_small", "standing_of", "steps_of", "with_standing"]
-
 _CERTAIN = 0.1
 """Share of what a step explains that may be left unexplained in its outputs where it is certain:
 the tenth of the verdict ``explained``."""

@@ -14,8 +14,6 @@ from winchkit.effects.term import Term
 from winchkit.profile_edit.fitted import Fitted, write_fitted, write_without
 from winchkit.profile_edit.ledger import Judged
 
-__all__ = ["write_addition", "write_removal"]
-
 
 def write_addition(
     source: str | Path, addition: Addition, runs: Sequence[str], out: str | Path

@@ -6,8 +6,6 @@ from collections import deque
 from dataclasses import dataclass, field
 from math import ceil, log10, nan
 
-__all__ = ["Counters", "Latency", "Tally"]
-
 _FIRST = 1e-5
 """s: upper end of the first bin, below every bus's latency."""
 _PER_DECADE = 10

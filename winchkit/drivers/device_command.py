@@ -11,8 +11,6 @@ from winchkit.drivers.reading import Sensor
 from winchkit.errors import DeviceRefused, NotPermitted
 from winchkit.schema.devices.modbus import StatusMeaning
 
-__all__ = ["confirm", "declared_command", "permitted_command"]
-
 _Any = TypeVar("_Any")
 
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-__all__ = ["FrozenDetector"]
-
 _BLOCK = 40
 """Trials in a block. With a noise of one step a block alike throughout has a chance of 4e-16."""
 _BLOCKS = 10

@@ -7,12 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.counters import Tally
+from winchkit.drivers.counters import Counters, Tally
 from winchkit.drivers.frozen_counts import FrozenDetector
 from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.reading import Counters, Quality, Reading
-
-__all__ = ["InstrumentReadings", "Publisher", "Sampled"]
+from winchkit.drivers.reading import Quality, Reading
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,6 @@ from typing import Protocol
 from winchkit.drivers.counters import Counters
 from winchkit.errors import ConnectionLost
 
-__all__ = ["REPLY_HORIZON", "Counters", "Quality", "Reading", "Sensor"]
-
 REPLY_HORIZON = 10.0
 """A reply comes within so many of the device's longest reply times after its time-out, or never.
 The device file's number is from a manual; a converter on the way adds a delay of its own."""

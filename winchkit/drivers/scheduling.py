@@ -14,8 +14,6 @@ from typing import Any, Protocol, runtime_checkable
 
 from winchkit.drivers.clock import Clock
 
-__all__ = ["Event", "Scheduler", "Thread", "event_loop_of", "event_of", "lock_of", "thread_of"]
-
 
 class Event(Protocol):
     """Used part of ``threading.Event``."""

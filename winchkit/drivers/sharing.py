@@ -8,18 +8,6 @@ from math import inf
 from statistics import median
 from typing import Protocol, TypeVar
 
-__all__ = [
-    "LATE",
-    "QUICK_RETRIES",
-    "RECONNECT",
-    "RETRY",
-    "STALE_TIMEOUTS",
-    "LineShare",
-    "Polled",
-    "fair_rates",
-    "next_of",
-]
-
 QUICK_RETRIES = 2
 """Failures in a row after which an instrument is polled at once again; a further one makes it rare,
 so that others on the line keep their rates."""

@@ -11,8 +11,6 @@ from winchkit.drivers.reading import Sensor
 from winchkit.drivers.scheduling import event_loop_of, event_of, thread_of
 from winchkit.errors import NoReply
 
-__all__ = ["Identifying", "SlowDevices", "SlowLine"]
-
 T = TypeVar("T")
 _COMMAND_TIME = 5.0
 """s: a tare or a write into an EEPROM takes up to some seconds, and waits for the reads before it.

@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from winchkit.drivers.reading import Quality
 from winchkit.schema.devices.modbus import StatusMeaning
 
-__all__ = ["StatusWord"]
-
 _FLAGS: Mapping[StatusMeaning, Quality] = {
     "overload": Quality.OVERLOAD,
     "underload": Quality.UNDERLOAD,

@@ -7,13 +7,10 @@ from collections.abc import Mapping
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.effects.term import Term, modifiers_of
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.line import Line
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
-from winchkit.units import dimension_of, parse, suggest
-
-__all__ = ["check_profile", "line_of", "not_in", "terms_of", "values_of"]
-
+from winchkit.units import dimension_of, parse
 
 _BESIDE_PARAMETERS = {"id", "fitted"}
 

@@ -14,19 +14,10 @@ from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import at_line
 from winchkit.effects.term import Term, robot_with_terms
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, suggest
 from winchkit.model.robot import Robot
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
-from winchkit.units import suggest
-
-__all__ = [
-    "check_robot",
-    "declared_terms",
-    "lines_with_home_length",
-    "robot_terms",
-    "robot_with_effects",
-]
 
 _HOME_LENGTH = "home-length"
 

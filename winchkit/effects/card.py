@@ -17,18 +17,6 @@ from winchkit.effects.reference_robot import robot_changes
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
 
-__all__ = [
-    "UNITS",
-    "Signature",
-    "card",
-    "card_data",
-    "in_control",
-    "parameter_kind",
-    "signature",
-    "sparkline",
-    "usual_values",
-]
-
 _PLACES = {"all": "all lines equally", "one": "one line", "platform": "the platform"}
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 _BARS = "▁▂▃▄▅▆▇█"

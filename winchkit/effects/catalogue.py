@@ -13,11 +13,9 @@ from pkgutil import iter_modules
 from winchkit.arguments import require_types
 from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
 from winchkit.effects.empirical import EMPIRICAL
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.stages import OUTPUTS
-from winchkit.units import UNITS, dimension_of, suggest
-
-__all__ = ["Catalogue", "load_catalogue"]
+from winchkit.units import UNITS, dimension_of
 
 _ROOMS = ("on_length", "on_tension", "on_torque", "on_axis", "on_robot")
 

@@ -13,22 +13,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, suggest
 from winchkit.model.stages import PARTS, ROBOT_STAGES, At, Stage
-from winchkit.units import suggest
-
-__all__ = [
-    "MOTOR_ORDERS",
-    "NEED_WORDS",
-    "Effect",
-    "Need",
-    "Parameter",
-    "Placement",
-    "Plausible",
-    "Values",
-    "order_per_turn",
-    "told_apart",
-]
 
 Values = Mapping[str, float]
 Need = Literal[

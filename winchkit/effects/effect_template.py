@@ -12,17 +12,6 @@ from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 
-__all__ = [
-    "CURVE",
-    "DRUM",
-    "FOOT",
-    "HEAD",
-    "WAVE",
-    "check_own",
-    "write_own",
-    "write_wave_on_drum",
-]
-
 HEAD = '''"""{id}: residual of the {output} over the {variable}; its physics is to be filled in.
 
 Use it with --effects {file}. Written by winchkit effects new; replace the formula in apply, the

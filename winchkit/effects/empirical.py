@@ -16,8 +16,6 @@ from winchkit.effects.effect import Effect, Need, Output, Parameter, Values, ord
 from winchkit.model.stages import At, Stage
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLE_UNITS, VARIABLES
 
-__all__ = ["EMPIRICAL", "KNOTS", "empirical_id", "heights", "knots", "placed", "variable_of"]
-
 KNOTS = 9
 """Knots of a curve over one variable; twice as many over two variables."""
 _VALUE = "value_"

@@ -11,8 +11,6 @@ from winchkit.effects.effect import Effect, Parameter
 from winchkit.model.stages import At
 from winchkit.model.variables import VARIABLES
 
-__all__ = ["located"]
-
 _BELOW = 0.1
 """Smallest extent over that of the grid."""
 

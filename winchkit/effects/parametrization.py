@@ -17,8 +17,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter
 
-__all__ = ["Coordinates"]
-
 _FORM = frozenset({"shape", "nuisance"})
 """Roles of parameters that, where they are positive, are fitted by their logarithm."""
 

@@ -10,16 +10,6 @@ from dataclasses import dataclass, fields, replace
 
 from winchkit.effects.effect import Effect, Parameter
 
-__all__ = [
-    "HOME",
-    "LineEffect",
-    "at_line",
-    "base_of",
-    "line_of_effect",
-    "placements",
-    "with_home_lengths",
-]
-
 HOME = "home_length_"
 """Prefix of the home lengths that a cable's law has on a robot, one per line."""
 _HOME_TYPICAL = 1e-3

@@ -10,8 +10,6 @@ from winchkit.effects.effect import Parameter, Values
 from winchkit.model.friction import dahl
 from winchkit.model.stages import At
 
-__all__ = ["START", "Presliding"]
-
 START = Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed")
 """F/F_c at the first sample."""
 

@@ -28,9 +28,6 @@ from winchkit.schema.profiles.winch import (
 )
 from winchkit.units import GRAVITY
 
-__all__ = ["STANDARD_PROFILE", "standard_motion"]
-
-
 STANDARD_PROFILE = WinchProfile(
     name="standard",
     drum=DrumSpec(kind="spiral", winding_radius=0.06),

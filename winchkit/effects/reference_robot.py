@@ -22,8 +22,6 @@ from winchkit.schema.profiles.winch import (
     WinchProfile,
 )
 
-__all__ = ["STANDARD_ROBOT", "robot_changes", "standard_poses"]
-
 _POSES = 120
 """On the closed path: 40 on each period of its fastest coordinate."""
 _MIDDLE = 40.0

@@ -15,8 +15,6 @@ from winchkit.effects.effect import Parameter, Values
 from winchkit.effects.term import Term
 from winchkit.model.stages import At
 
-__all__ = ["fundamentals", "harmonic_series", "orders_of", "single_orders"]
-
 _ORDER = "order"
 
 

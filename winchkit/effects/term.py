@@ -17,8 +17,6 @@ from winchkit.model.robot import Robot, robot_of
 from winchkit.model.stages import At, Modifier, Stage
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["Term", "act", "modifiers_of", "robot_with_terms"]
-
 _ORDERS_IN_LABEL = 6
 """Numbers that a label lists; with the rest counted it fits a line of a report."""
 

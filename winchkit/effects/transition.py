@@ -16,16 +16,6 @@ from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.model.stages import At
 
-__all__ = [
-    "CABLE_TRANSITION",
-    "MOTOR_TRANSITION",
-    "TRANSITION",
-    "cable_direction",
-    "motor_direction",
-    "with_free_transition",
-    "with_transitions",
-]
-
 TRANSITION = "transition"
 """Name of the parameter."""
 MOTOR_TRANSITION = Parameter(

@@ -7,8 +7,6 @@ import numpy as np
 from winchkit.effects.card import UNITS, signature, usual_values
 from winchkit.effects.effect import Effect, Values
 
-__all__ = ["broken_promises"]
-
 _ROUNDING = 1e-9
 """SI, of metres and newtons."""
 

@@ -19,8 +19,6 @@ from winchkit.model.line import Line
 from winchkit.model.stages import At, Modifier, Stage
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["CableEstimator", "CableState", "Sample"]
-
 _LOW_PASS = 0.2
 """Time constant of the low-pass of the tension, s: well below the period of a swinging load."""
 _DEAD_BAND = 3e-3

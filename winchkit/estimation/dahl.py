@@ -15,8 +15,6 @@ from winchkit.errors import UsageError
 from winchkit.estimation.groups import PULLEY_SLOTS, PulleyGroup, flat_covariances, flat_pulleys
 from winchkit.estimation.kernels import PLAIN, STATE_SLOTS, Kernels
 
-__all__ = ["DahlEstimator", "PlatformTension"]
-
 _UNIFORM = 3.0**-0.5
 """Standard deviation of a uniform distribution from −1 to 1: friction that is unknown within its
 limit."""

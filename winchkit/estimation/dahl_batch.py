@@ -10,8 +10,6 @@ from winchkit.errors import UsageError
 from winchkit.estimation.kernels import PLAIN, Kernels
 from winchkit.model.friction import dahl, dahl_constant
 
-__all__ = ["dahl_batch"]
-
 _FEW = 0.02
 """Reversals per sample up to which whole strokes are quicker than single samples."""
 

@@ -23,15 +23,6 @@ from winchkit.model.stages import Signals
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = [
-    "Identified",
-    "Record",
-    "correlation_time",
-    "covariance_of",
-    "identify_dahl",
-    "record_of",
-]
-
 _SINGULAR = 1e-10
 """Share of the largest singular value of scaled columns below which a combination is not
 identified: a condition of 1e10 leaves six of the sixteen digits (rule of thumb)."""

@@ -34,8 +34,6 @@ from winchkit.model.robot import (
     flat_pose,
 )
 
-__all__ = ["ElongationCorrection", "Stretch"]
-
 
 @dataclass(frozen=True, slots=True)
 class Stretch:

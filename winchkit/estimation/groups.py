@@ -8,14 +8,6 @@ from math import cos, isfinite
 
 from winchkit.errors import UsageError
 
-__all__ = [
-    "COVARIANCE_SLOTS",
-    "PULLEY_SLOTS",
-    "PulleyGroup",
-    "flat_covariances",
-    "flat_pulleys",
-]
-
 PULLEY_SLOTS = 5
 """Per pulley: cosine of the wrap, μ, σ, β, index of its group."""
 COVARIANCE_SLOTS = 6

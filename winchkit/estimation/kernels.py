@@ -19,8 +19,6 @@ from winchkit.estimation.groups import COVARIANCE_SLOTS, PULLEY_SLOTS
 from winchkit.model.friction import dahl_step
 from winchkit.model.pulleys import presliding_step
 
-__all__ = ["PLAIN", "STATE_SLOTS", "Kernels", "compiled", "fastest"]
-
 STATE_SLOTS = 5
 """Numbers per pulley: its friction force, and the derivatives of it by μ, σ, β and by the start."""
 _NEAR_ONE = 1e-4

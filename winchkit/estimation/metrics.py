@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike
 
 from winchkit.errors import UsageError
 
-__all__ = ["mean_relative_error", "overshoot"]
-
 
 def overshoot(force: ArrayLike, target: float) -> float:
     """Overshoot over a constant target, (max F − F_o)/F_o (Eq. 28).

@@ -18,8 +18,6 @@ from winchkit.errors import ConnectionLost, UsageError
 from winchkit.library.tasks import Outcome, Task, failed, outcome_of
 from winchkit.version import __version__
 
-__all__ = ["cluster_outcomes"]
-
 _WORKER_BYTES = 2 << 30
 """Memory that a diagnosis of long runs needs, with reserve."""
 _AHEAD = 4

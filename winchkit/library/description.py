@@ -21,8 +21,6 @@ from winchkit.runs.recording.log_file import is_written
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.inspection import inspect_run
 
-__all__ = ["ProfileOfRuns", "described", "library_winch", "session_of"]
-
 _DATE = re.compile(r"\d{4}\D?\d{2}(\D?\d{2})?\b.*")
 """Name of a folder that begins with a date: a session, and no winch."""
 _STARTS = ("start_time", "started", "begun", "date")

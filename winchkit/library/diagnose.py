@@ -16,8 +16,6 @@ from winchkit.library.partitions import Partitions, Row
 from winchkit.library.sessions import winch_sessions
 from winchkit.library.tasks import Outcome, Task, outcome_of, task_of
 
-__all__ = ["FleetReport", "diagnose_library"]
-
 _COMMIT = 5.0
 """Longest time between two writings of the tables, s."""
 

@@ -11,8 +11,6 @@ from pathlib import Path
 from winchkit.regular_file import read_text
 from winchkit.runs.read import SUFFIXES
 
-__all__ = ["RunFile", "run_files"]
-
 _FOREIGN = (".txt", ".tsv", ".dat", ".xlsx", ".mat", ".h5", ".hdf5", ".npz", ".npy", ".parquet")
 """Suffixes of files of other programs, which are runs where a mapping is above them."""
 _PART = re.compile(r"(.+)\.\d{3,}")

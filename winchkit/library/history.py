@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from winchkit.effects.term import Term
     from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["LibraryHistory", "common_effects", "library_history"]
-
 
 @dataclass(frozen=True)
 class LibraryHistory:

@@ -14,15 +14,6 @@ from winchkit.library.description import ProfileOfRuns, described
 from winchkit.library.files import RunFile, run_files
 from winchkit.library.partitions import Partitions, Row
 
-__all__ = [
-    "IndexReport",
-    "index_library",
-    "indexed",
-    "no_progress",
-    "profile_of_runs",
-    "profile_path",
-]
-
 _COMMIT = 5.0
 """Longest time between two writings of the table, s: a kill costs at most these runs."""
 _STATE = ("path", "winch", "size", "mtime", "fault", "profile", "imported_from")

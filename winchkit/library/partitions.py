@@ -26,8 +26,6 @@ from winchkit.runs.recording.log_file import Lock, lock_file
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["FOLDER", "Partitions", "Row"]
-
 FOLDER = ".winchkit-library"
 """Folder of the tables, below that of the runs."""
 _EMPTY = "%"

@@ -14,8 +14,6 @@ from winchkit.library.tables import TABLES, arrow_schema
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["library_estimates", "library_runs", "query_library"]
-
 _LOAD_TOLERANCE = 1e-3
 """Relative difference of loads that count as equal."""
 

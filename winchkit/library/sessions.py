@@ -12,8 +12,6 @@ from winchkit.library.partitions import Partitions, Row
 if TYPE_CHECKING:
     from winchkit.runs.run import Run
 
-__all__ = ["SessionRun", "WinchSession", "winch_sessions"]
-
 
 @dataclass(frozen=True)
 class SessionRun:

@@ -11,8 +11,6 @@ from winchkit.errors import UsageError
 if TYPE_CHECKING:
     import pyarrow as pa
 
-__all__ = ["DIAGNOSES", "ESTIMATES", "RUNS", "TABLES", "Column", "arrow_schema", "columns_of"]
-
 Kind = Literal["text", "texts", "number", "numbers", "integer", "flag", "time"]
 
 

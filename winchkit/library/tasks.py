@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.diagnose import WinchAnswer
     from winchkit.diagnosis.results import Estimate
 
-__all__ = ["Outcome", "Task", "failed", "outcome_of", "stored_result", "task_of"]
-
 _CANDIDATES = 10
 """Candidates that a stored result keeps."""
 _STORED = (

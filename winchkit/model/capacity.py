@@ -16,17 +16,6 @@ import numpy as np
 from winchkit.model.drum import drum_of
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = [
-    "DEAD_WRAPS",
-    "Capacity",
-    "capacity",
-    "drum_warnings",
-    "length_at",
-    "safe_lengths",
-    "turns_at",
-    "wrap_ratio",
-]
-
 DEAD_WRAPS = 2.0
 """Least number of turns on a drum under load (29 CFR 1910.179(h)(2)(iii)(a), wire ropes).
 

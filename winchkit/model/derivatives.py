@@ -11,14 +11,6 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.model.smoothing_spline import SmoothingSpline
 
-__all__ = [
-    "Clock",
-    "direction",
-    "is_smoother",
-    "shifted",
-    "with_turning_points",
-]
-
 _SIGNIFICANT = 3.0
 """Standard deviations of its noise that a rate at standstill does not exceed: one in 370 does."""
 _ROUNDED, _MOST_ROUNDED = 0.01, 0.01

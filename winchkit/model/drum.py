@@ -14,8 +14,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Archimedean", "Drum", "Grooved", "Spiral", "Squared", "drum_of"]
-
 _TURN = 2 * np.pi
 
 

@@ -17,17 +17,6 @@ from numpy.typing import ArrayLike
 from winchkit.arrays import Array
 from winchkit.model.recurrence import linear
 
-__all__ = [
-    "capstan_ratio",
-    "coulomb_ratio",
-    "dahl",
-    "dahl_constant",
-    "dahl_step",
-    "normal_force",
-    "stribeck",
-    "tension_after",
-]
-
 
 def normal_force(before: Array, after: Array, wrap: float) -> Array:
     """N = √(T0² − 2 T0 T1 cos α + T1²), the force on the pulley (Eq. 22), N."""

@@ -10,8 +10,6 @@ from math import atan, cos, nan, pi, prod, tan
 
 from winchkit.errors import UsageError
 
-__all__ = ["GearStage", "Gearbox", "worm_stage"]
-
 
 @dataclass(frozen=True)
 class GearStage:

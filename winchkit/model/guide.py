@@ -17,8 +17,6 @@ from winchkit.errors import UsageError
 from winchkit.model.capacity import capacity, turns_at
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["FLEET_LIMIT", "Guide", "guide_of", "guide_warnings"]
-
 _TURN = 2 * pi
 FLEET_LIMIT = {"grooved": np.deg2rad(2.0), "smooth": np.deg2rad(1.5)}
 """Largest recommended fleet angle of a wire rope, rad: 2° on grooves, 1.5° on a smooth drum.

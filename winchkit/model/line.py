@@ -22,8 +22,6 @@ from winchkit.model.stages import At, Modifier, Path, Signals, Stage, WinchKinem
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.units import GRAVITY
 
-__all__ = ["Line", "Motion"]
-
 CREEP_SPEED = 1e-3
 """m/s, and with `_CREEP_RATE`, rad/s at the motor, the rates that always have a direction, whatever
 their noise. Rule of thumb: below the slowest programmed speed."""

@@ -25,8 +25,6 @@ from winchkit.model.friction import (
     tension_after,
 )
 
-__all__ = ["Bearings", "Eyelets", "Presliding", "eq27_tension", "over_pulleys", "presliding_step"]
-
 Step = Callable[[float, float, float, float, float], float]
 PulleyStep = Callable[..., Any]
 _NEWTON_STEPS = 8

@@ -10,8 +10,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["first_order_lag", "linear", "play"]
-
 _FORGOTTEN = 1e-18
 """Product of decays below which earlier samples are left out: their share is below the rounding
 (2e-16) of a state that they could exceed a hundredfold."""

@@ -31,8 +31,6 @@ from winchkit.arrays import Array
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-__all__ = ["Design", "SmoothingSpline"]
-
 _DEGREE = 5
 """The function of least squared third derivative through given values is a spline of degree five.
 """

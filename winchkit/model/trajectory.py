@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 
-__all__ = ["Trajectory", "plan"]
-
 
 @dataclass(frozen=True)
 class Trajectory:

@@ -10,8 +10,6 @@ from winchkit.arrays import Array
 from winchkit.model.recurrence import play
 from winchkit.model.stages import At
 
-__all__ = ["ANGLES", "COMPOUND", "VARIABLES", "VARIABLE_UNITS"]
-
 _CREEP_SPEED = 1e-4
 """m/s: a slower cable has no direction; above the noise of a differentiated encoder, far below the
 slowest motion (1 mm/s)."""

@@ -14,8 +14,6 @@ from winchkit.regular_file import read_text
 from winchkit.schema.profiles.winch import SHORTHANDS
 from winchkit.units import format_quantity
 
-__all__ = ["effect_tables", "read_document", "shorthands", "tables", "write_document", "written"]
-
 
 def read_document(path: Path) -> Any:
     """Parse a profile with its comments and layout. Raises FileError.

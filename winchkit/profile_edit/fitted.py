@@ -28,8 +28,6 @@ from winchkit.profile_edit.document import (
 from winchkit.profile_edit.ledger import Judged, note
 from winchkit.schema.profiles.winch import SHORTHANDS
 
-__all__ = ["Fitted", "write_fitted", "write_without"]
-
 _HOME_LENGTH = "home-length"
 
 

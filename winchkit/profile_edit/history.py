@@ -14,8 +14,6 @@ from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import LedgerEntry, WinchProfile
 from winchkit.units import dimension_of, parse
 
-__all__ = ["LADDER_UNITS", "Rung", "ladder"]
-
 LADDER_UNITS: Mapping[str, str] = {**OUTPUT_UNITS, "platform_position": "m"}
 """Outputs of winches and robots, in the order of reports, with their SI units."""
 

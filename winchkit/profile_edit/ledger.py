@@ -21,8 +21,6 @@ from winchkit.profile_edit.document import (
     written,
 )
 
-__all__ = ["Judged", "note", "undo"]
-
 
 @dataclass(frozen=True)
 class Judged:

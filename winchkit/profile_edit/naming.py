@@ -6,8 +6,6 @@ from pathlib import Path
 
 from winchkit.arguments import path_of
 
-__all__ = ["extended_name"]
-
 
 def extended_name(profile: str | Path, *effects: str) -> str:
     """Proposed file name of a profile with added effects, such as ``bench-drum-radius.toml``.

@@ -16,8 +16,6 @@ from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.figures.waterfall import Waterfall, waterfall_of
 from winchkit.report.words.sentence import changes_text, sentence
 
-__all__ = ["report_json"]
-
 
 def report_json(answer: Answer) -> dict[str, Any]:
     """A diagnosis as ``winchkit diagnose --json`` prints it.

@@ -8,8 +8,6 @@ from winchkit.report.words.numbers import percent, quantity, scale_for
 from winchkit.report.words.sentence import CLEAR_ORDER, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
 
-__all__ = ["HEAD", "followed", "map_lines", "offset_text", "size_rows"]
-
 HEAD = ("error", "rms", "bias", "largest", "noise", "measured, rms")
 _FOLLOWED = 3
 """Variables of an attribution that a row has room for; ``--json`` has all."""

@@ -13,9 +13,6 @@ from winchkit.effects.effect import Effect, Parameter
 from winchkit.report.words.numbers import quantity
 from winchkit.report.words.vocabulary import parameter_name, parameter_unit
 
-__all__ = ["Visible", "effects_of", "smallest_shown", "untestable",
-           "useful_candidates", "visible"]  # fmt: skip
-
 _FEW = 4
 """Effects that a sentence lists; the table has all."""
 _LOWERED = 0.99

@@ -12,16 +12,6 @@ from winchkit.diagnosis.fleet.swapped_profiles import Swap
 from winchkit.report.words.numbers import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
 
-__all__ = [
-    "ChangeText",
-    "beyond_text",
-    "change_text",
-    "day_text",
-    "history_text",
-    "odd_texts",
-    "swap_text",
-]
-
 _DO = {
     "cell": "calibrate the load cell with known weights, look for damage and moisture of its cable",
     "cable": "measure the cable with a known length and load, look for broken wires; shorten or "

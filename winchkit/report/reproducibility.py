@@ -15,8 +15,6 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.report.html.markup import Markup, compact, details, element, folded, table
 
-__all__ = ["Command", "repeat"]
-
 _FEW = 3
 """Runs that a command names; more are written with a wildcard."""
 

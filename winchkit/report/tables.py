@@ -34,19 +34,6 @@ from winchkit.report.words.vocabulary import (
     values_text,
 )
 
-__all__ = [
-    "bar",
-    "candidates",
-    "detectable",
-    "equivalence",
-    "figures",
-    "fit_of",
-    "named",
-    "output_scale",
-    "steps",
-    "waterfall",
-]
-
 _TOP = 10
 """Rows of a table that are open; the others are folded."""
 

@@ -53,15 +53,6 @@ from winchkit.report.words.vocabulary import (
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal
 
-__all__ = [
-    "addition_text",
-    "compare_text",
-    "error_lines",
-    "head_lines",
-    "report_text",
-    "step_lines",
-]
-
 _MOST_LINES = 29
 """Lines of the short text; with the next command a screen."""
 _FEW = 3

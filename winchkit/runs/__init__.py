@@ -7,7 +7,8 @@ functions are in ``read`` (runs and logs), ``writer``, ``export``, ``recover`` a
 
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Channel, Run
-from winchkit.runs.writer import RunWriter, open_writer, write_csv, write_mcap, write_run
+from winchkit.runs.run_writer import RunWriter
+from winchkit.runs.writer import open_writer, write_csv, write_mcap, write_run
 
 __all__ = [
     "Channel",

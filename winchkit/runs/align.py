@@ -14,9 +14,6 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.runs.layout import Layout, Source
 
-__all__ = ["MAY_LACK", "PATIENCE", "Aligner", "Moments", "Series", "patience_of", "values_at"]
-
-
 PATIENCE = 0.5
 """Longest wait of a row for a source that sends no samples, s."""
 MAY_LACK = "motor_torque"

@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.errors import Fault, RunError, UsageError
+from winchkit.errors import Fault, RunError, UsageError, suggest
 from winchkit.runs.columns import POSE_DIMENSIONS, column_dimension, near_miss, unit_fault
 from winchkit.runs.run import Channel, Run
-from winchkit.units import UNITS, convert, factor, parse, suggest
-
-__all__ = ["Recording", "assemble", "refuse"]
+from winchkit.units import UNITS, convert, factor, parse
 
 _SHOWN = 20
 """Faults of a file that are listed; the others are counted. About one screen."""

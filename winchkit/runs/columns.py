@@ -5,10 +5,9 @@ from __future__ import annotations
 import re
 from difflib import get_close_matches
 
+from winchkit.errors import suggest
 from winchkit.runs.run import CHANNEL_DIMENSIONS
-from winchkit.units import GRAVITY, UNITS, dimension_of, suggest
-
-__all__ = ["POSE_DIMENSIONS", "column_dimension", "header_of", "near_miss", "unit_fault"]
+from winchkit.units import GRAVITY, UNITS, dimension_of
 
 POSE_DIMENSIONS: dict[str, str] = {
     **dict.fromkeys(("platform_x", "platform_y", "platform_z"), "length"),

@@ -13,8 +13,6 @@ from winchkit.runs.read import read_log, read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
 
-__all__ = ["FORMATS", "export"]
-
 FORMATS = (".csv", ".mcap", ".parquet", ".mf4")
 
 

@@ -10,8 +10,6 @@ from typing import BinaryIO
 from winchkit.errors import Fault, FileError
 from winchkit.runs.recording.log_file import refuse_written
 
-__all__ = ["abandoned", "write_whole"]
-
 
 def write_whole(path: Path, data: bytes) -> None:
     """Write a file completely or not at all; raises FileError, UsageError for an open log.

@@ -27,8 +27,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["averaged", "holds_of", "is_log"]
-
 _LEVEL = 0.01
 """Probability that noise alone ends a hold anywhere in the log."""
 _LEAST_ROWS = 5

@@ -16,14 +16,6 @@ from winchkit.runs.layout import Samples, Source
 from winchkit.runs.log import Log, Note
 from winchkit.runs.run import Run, lost_samples
 
-__all__ = [
-    "LogInfo",
-    "RunSummary",
-    "SourceInfo",
-    "info_of",
-    "summary_of",
-]
-
 _GAP = 1.5
 """Steps beyond this many usual ones are gaps: midway between one and two, which is one sample
 lost."""

@@ -12,8 +12,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 
-__all__ = ["Layout", "RowRule", "Samples", "Signal", "Source", "read_layout", "write_layout"]
-
 _LARGEST = 1 << 62
 """ns: offsets beyond are damaged, and would overflow 64 bits in a sum."""
 

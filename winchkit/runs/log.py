@@ -14,8 +14,6 @@ from winchkit.runs.assemble import Recording, assemble
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
 from winchkit.runs.run import Run
 
-__all__ = ["Log", "Note", "aligned", "joined", "known_event", "log_of_run", "tables_in"]
-
 _BRIDGED = 1.5
 """In sampling intervals: midway between the usual step and one lost sample."""
 

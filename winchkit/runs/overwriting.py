@@ -6,8 +6,6 @@ from pathlib import Path
 
 from winchkit.errors import UsageError
 
-__all__ = ["refuse_existing"]
-
 
 def refuse_existing(target: Path, replace: bool) -> None:
     """Raise UsageError where ``target`` exists and is not to be replaced."""

@@ -19,15 +19,12 @@ from numpy.typing import NDArray
 
 from winchkit.arguments import require_type, require_types
 from winchkit.arrays import Array
-from winchkit.errors import Fault, RunError
+from winchkit.errors import Fault, RunError, suggest
 from winchkit.model.robot.rotation import angles_of, rotation_from_quaternion
 from winchkit.runs.holds import averaged, holds_of, is_log
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
-from winchkit.units import suggest
-
-__all__ = ["Measured", "Samples", "joined", "read_poses", "read_trajectory"]
 
 _POSITION = ("platform_x", "platform_y", "platform_z")
 _QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")

@@ -15,8 +15,6 @@ from winchkit.runs.recording.rotation import parts_beside
 from winchkit.runs.run import Run
 from winchkit.schema.mapping import ImportMapping
 
-__all__ = ["SUFFIXES", "read_log", "read_run"]
-
 SUFFIXES = (".csv", ".mcap")
 _LOGGER = logging.getLogger(__name__)
 
@@ -94,8 +92,9 @@ def _has_begun(path: Path) -> bool:
     data = read_bytes(path, may_be_empty=True)
     if _format_of(path) == ".csv":
         return any(line.strip() and line[:1] != b"#" for line in data.split(b"\n")[:-1])
-    from winchkit.runs.formats.mcap_file import COLUMNS, LOG, MARK
+    from winchkit.runs.formats.mcap_file import COLUMNS, LOG
     from winchkit.runs.formats.mcap_read import read_content
+    from winchkit.runs.formats.mcap_records import MARK
 
     if MARK.startswith(data):
         return False

@@ -31,8 +31,6 @@ from winchkit.runs.formats.mcap_records import (
 )
 from winchkit.runs.overwriting import refuse_existing
 
-__all__ = ["Recovered", "recover", "recovered_path"]
-
 _COPIED = (Op.SCHEMA, Op.CHANNEL, Op.METADATA)
 _NO_SAMPLES = (EVENTS, COUNTERS)
 _CSV_BEGIN = f"{CSV_MARK}\n".encode()

@@ -9,13 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.errors import Fault, RunError
+from winchkit.errors import Fault, RunError, suggest
 from winchkit.rendering import Plotted
 from winchkit.tabular import Columns, Tabular
-from winchkit.units import parse, suggest
-
-__all__ = ["ANGLE_INTEGRATED", "CHANNEL_DIMENSIONS", "Channel", "Run", "lost_samples"]
-
+from winchkit.units import parse
 
 ANGLE_INTEGRATED = "integral of motor_velocity"
 """Metadata ``motor_angle`` of a run whose recording has no angle."""

@@ -9,12 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, suggest
 from winchkit.runs.files import abandoned
 from winchkit.runs.recording.log_file import require_in_place
-from winchkit.units import suggest
-
-__all__ = ["Clock", "Columns", "RunWriter"]
 
 Columns = Sequence[tuple[str, str]]
 """Names and units of the columns, in order."""

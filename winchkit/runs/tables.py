@@ -15,8 +15,6 @@ from winchkit.runs.columns import header_of
 from winchkit.runs.run import Run
 from winchkit.tabular import arrow_of
 
-__all__ = ["run_of"]
-
 _NAME = "name"
 
 

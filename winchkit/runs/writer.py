@@ -22,8 +22,6 @@ from winchkit.runs.recording.log_file import create
 from winchkit.runs.run import Run
 from winchkit.runs.run_writer import Clock, Columns, RunWriter
 
-__all__ = ["RunWriter", "kind_for", "open_writer", "write_csv", "write_mcap", "write_run"]
-
 
 def open_writer(
     path: str | Path,

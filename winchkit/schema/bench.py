@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, suggest
 from winchkit.schema.devices.servo import Encoder, OptionSpec
 from winchkit.schema.quantity import (
     Flag,
@@ -28,9 +28,6 @@ from winchkit.schema.quantity import (
 )
 from winchkit.schema.robot_bench import RobotWiring
 from winchkit.schema.table import Rule, Table
-from winchkit.units import suggest
-
-__all__ = ["BenchSpec", "BusSpec", "Deviation", "DeviceRef", "LimitSpec", "WinchWiring"]
 
 _LATCH = ".trip.json"
 _UNHOMED_SHARE, _UNHOMED = 0.1, 0.02

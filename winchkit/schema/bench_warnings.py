@@ -6,8 +6,6 @@ from collections.abc import Iterator
 
 from winchkit.schema.bench import BenchSpec, LimitSpec
 
-__all__ = ["bench_warnings"]
-
 _SLOW_HEARTBEAT = 0.25
 """After 2.5 of them a drive stops by itself: 0.6 s, 0.3 m of cable at 0.5 m/s."""
 _LONG_RAMP = 2.0

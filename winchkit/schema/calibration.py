@@ -20,8 +20,6 @@ from winchkit.schema.quantity import (
 from winchkit.schema.table import Rule, Table
 from winchkit.units import parse
 
-__all__ = ["CalibrationPoint", "CellCalibration", "HostTare", "TareBook", "tare_book_path"]
-
 LoadDirection = Literal["tension", "compression"]
 
 

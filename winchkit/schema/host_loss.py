@@ -9,15 +9,6 @@ from typing import Annotated, Literal
 from winchkit.schema.quantity import PositiveDuration, Whole
 from winchkit.schema.table import Rule, Table
 
-__all__ = [
-    "HARDWARE",
-    "MECHANISMS",
-    "VENDOR",
-    "VendorObject",
-    "VendorWatchdog",
-    "unknown_mechanism",
-]
-
 MECHANISMS = ("heartbeat", "guarding", "rpdo-timeout", "sync-loss")
 """Mechanisms of CiA 301, best first."""
 VENDOR = "vendor:"

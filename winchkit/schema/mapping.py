@@ -12,21 +12,6 @@ from winchkit.schema.quantity import Frequency, Marker, Number
 from winchkit.schema.table import Rule, Table
 from winchkit.units import UNITS, dimension_of
 
-__all__ = [
-    "CHANNELS",
-    "DATE",
-    "EXCEL",
-    "MAGNITUDE",
-    "MATRIX",
-    "MODULO",
-    "STAMP",
-    "TWOS",
-    "VECTOR",
-    "ImportMapping",
-    "MappedColumn",
-    "MappedLog",
-]
-
 STAMP, EXCEL = "stamp", "excel"
 """Units of a time: text with a date or a time of day; days since 1899-12-30."""
 DATE = "date"

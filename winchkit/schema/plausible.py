@@ -13,8 +13,6 @@ from typing import NamedTuple
 from winchkit.errors import UsageError
 from winchkit.units import parse
 
-__all__ = ["LARGEST", "Bound", "check_size", "typed_quantity"]
-
 
 class Bound(NamedTuple):
     """The largest magnitude of a dimension, and why."""

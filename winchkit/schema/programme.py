@@ -22,13 +22,6 @@ from winchkit.schema.quantity import (
 from winchkit.schema.table import Rule, Table
 from winchkit.units import format_quantity
 
-__all__ = [
-    "ALL",
-    "Programme",
-    "Step",
-    "write_programme",
-]
-
 ALL = "all"
 """Name that stands for all winches of a bench, in programmes and commands."""
 _RUN_UP = 0.1

@@ -19,35 +19,6 @@ from winchkit.units import UNITS, article, parse
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
 
-__all__ = [
-    "Angle",
-    "Count",
-    "Duration",
-    "Flag",
-    "Force",
-    "Frequency",
-    "Inertia",
-    "Length",
-    "LinearDensity",
-    "Marker",
-    "Mass",
-    "Number",
-    "PositiveAcceleration",
-    "PositiveDuration",
-    "PositiveForce",
-    "PositiveLength",
-    "PositiveMass",
-    "PositiveNumber",
-    "PositiveSpeed",
-    "Quantity",
-    "QuantityOrNone",
-    "Temperature",
-    "Torque",
-    "Truth",
-    "Whole",
-    "WholeNumber",
-]
-
 
 class Marker(ABC):
     """Reader of a field within ``Annotated``, with a description of the expected value."""

@@ -33,25 +33,6 @@ from winchkit.schema.reading.source import open_source
 from winchkit.schema.robot_programme import RobotProgramme
 from winchkit.schema.simbench import SimBench
 
-__all__ = [
-    "Declaration",
-    "Declared",
-    "load",
-    "read_any",
-    "read_bench",
-    "read_calibration",
-    "read_device",
-    "read_mapping",
-    "read_profile",
-    "read_programme",
-    "read_robot",
-    "read_robot_programme",
-    "read_simbench",
-    "read_size",
-    "read_tares",
-    "read_winch",
-]
-
 Declared = (
     WinchProfile
     | RobotProfile

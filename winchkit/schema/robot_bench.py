@@ -16,8 +16,6 @@ from winchkit.schema.quantity import (
 )
 from winchkit.schema.table import Rule, Table
 
-__all__ = ["LostWinch", "RobotWiring", "TrackerWiring"]
-
 LostWinch = Literal["stop-together"]
 """Declared reaction of the other winches where one is lost: all make a quick stop."""
 _DEG = pi / 180

@@ -17,8 +17,6 @@ from winchkit.schema.quantity import (
 )
 from winchkit.schema.table import Rule, Table
 
-__all__ = ["PlaceSpec", "PoseSpec", "PoseStep", "RobotProgramme"]
-
 _ACTIONS = ("to", "by", "hold")
 
 

@@ -18,8 +18,6 @@ from winchkit.schema.quantity import (
 )
 from winchkit.schema.table import Rule, Table
 
-__all__ = ["PlatformTruth", "TrackerTruth"]
-
 Point = tuple[Length, Length, Length]
 Noise = Annotated[float, Quantity("length", 0.0)]
 AngleNoise = Annotated[float, Quantity("angle", 0.0)]

@@ -11,8 +11,6 @@ from winchkit.schema.quantity import Duration, PositiveDuration, PositiveMass, Q
 from winchkit.schema.sim_platform import PlatformTruth
 from winchkit.schema.table import Table
 
-__all__ = ["FaultSpec", "HiddenSpec", "NoiseSpec", "SimBench", "WinchTruth", "dotted_keys"]
-
 
 @dataclass(frozen=True)
 class HiddenSpec(Table):

@@ -11,8 +11,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from pydantic_core import CoreSchema
 
-__all__ = ["BrokenRules", "Rule", "Table"]
-
 Rule = tuple[str, str]
 """A key of the table (dotted, positions in arrays from 0; empty for the table itself) and its
 fault."""

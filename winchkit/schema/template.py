@@ -12,8 +12,6 @@ from string import Formatter
 
 from winchkit.errors import UsageError
 
-__all__ = ["Part", "fields_of", "length_of", "parts_of"]
-
 
 @dataclass(frozen=True, slots=True)
 class Part:

@@ -8,22 +8,11 @@ from pathlib import Path
 from random import Random
 
 from winchkit.catalog import find, folder, names
-from winchkit.errors import FileError
+from winchkit.errors import FileError, suggest
 from winchkit.regular_file import file_kind
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import HiddenSpec, SimBench
 from winchkit.sim.physics.table import build, scaled
-from winchkit.units import suggest
-
-__all__ = [
-    "choose_bench",
-    "choose_hidden",
-    "demo_names",
-    "hiding",
-    "listed_benches",
-    "profiles_of",
-    "programme_path",
-]
 
 _DEMO = "demo-"
 _PROGRAMME = "programme-"

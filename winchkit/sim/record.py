@@ -15,14 +15,13 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme
 from winchkit.schema.simbench import SimBench, WinchTruth
 from winchkit.sim.plant.kinematics import Kinematics
-from winchkit.sim.plant.plant import MAX_STEP, Measurement, WinchPlant
+from winchkit.sim.plant.plant import MAX_STEP, WinchPlant
+from winchkit.sim.plant.sensors import Measurement
 from winchkit.sim.plant.servo import DriveCommand
 from winchkit.sim.schedule import RunPlan, schedule
 
 if TYPE_CHECKING:
     from winchkit.runs.run import Run
-
-__all__ = ["simulate"]
 
 Row = tuple[float, dict[str, Measurement]]
 

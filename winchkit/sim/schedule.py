@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, suggest
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.programme import ALL, Programme, Step
 from winchkit.sim.plant.trajectory import SCurve, plan
-from winchkit.units import suggest
-
-__all__ = ["Leg", "RunPlan", "schedule"]
 
 _JERK_TIME = 0.4
 """Rise time of an acceleration without another limit of jerk, s."""

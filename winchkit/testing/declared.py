@@ -14,8 +14,6 @@ from winchkit.errors import UsageError
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import SimBench
 
-__all__ = ["declared"]
-
 _DEFAULT = "spiral-bench"
 _FILE = "sim-bench.toml"
 

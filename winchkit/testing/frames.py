@@ -11,8 +11,6 @@ from winchkit.drivers.can.tools.decode import KnownNode, decode, known_node
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.sim.live.buses import Carried
 
-__all__ = ["Frame", "FrameNames"]
-
 _NMT, _SYNC = 0x000, 0x080
 _EMCY, _SDO_REPLY, _SDO_REQUEST, _HEARTBEAT = 0x080, 0x580, 0x600, 0x700
 

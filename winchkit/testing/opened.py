@@ -18,8 +18,6 @@ from winchkit.sim.live.paced_clock import PacedClock
 from winchkit.testing.frames import Frame
 from winchkit.testing.recording import Recording
 
-__all__ = ["OpenedBench"]
-
 _POLL = 2e-3
 """s: half a cycle of the usual 4 ms."""
 _WALL = 10.0

@@ -12,8 +12,6 @@ from winchkit.schema.read import read_device
 from winchkit.sim.live.buses import Carried, Wire
 from winchkit.testing.frames import Frame, FrameNames
 
-__all__ = ["Recording"]
-
 _KEPT = 200_000
 """Frames: half a minute of a full bus at 1 Mbit/s (7700 frames of eight bytes a second)."""
 

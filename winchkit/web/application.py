@@ -31,8 +31,6 @@ from winchkit.web.workspace import Workspace
 if TYPE_CHECKING:
     from winchkit.web.bench.view import BenchView
 
-__all__ = ["application", "open_robot"]
-
 _STATIC = Path(__file__).parent / "static"
 _LARGEST_FILE = 400_000_000
 """Bytes of a dropped file: 20 channels of 10⁶ samples as text."""

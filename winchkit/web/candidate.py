@@ -15,8 +15,6 @@ from winchkit.errors import UsageError
 from winchkit.web.ladder import card
 from winchkit.web.state import State
 
-__all__ = ["candidate_card"]
-
 
 def candidate_card(state: State, effect_id: str) -> dict[str, Any]:
     """Card of a candidate of a diagnosis, with its signature.

@@ -34,8 +34,6 @@ from winchkit.report.words.sentence import CLEAR_ORDER, capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 from winchkit.runs.run import Run
 
-__all__ = ["OutputCurves", "curves_of", "recorded_curves"]
-
 _PANELS = 6
 """Small multiples; the design of the page has six."""
 _SAMPLES = 1500

@@ -13,8 +13,6 @@ from winchkit.schema.simbench import SimBench
 from winchkit.sim import choose_bench
 from winchkit.sim.record import simulate
 
-__all__ = ["Simulated", "example_runs", "mystery_runs"]
-
 _PROGRAMMES = ("programme-demo-fast", "programme-demo-slow")
 
 

@@ -28,8 +28,6 @@ from winchkit.runs.run import Run
 from winchkit.schema.mapping import CHANNELS
 from winchkit.units import parse
 
-__all__ = ["imported", "is_run", "preview"]
-
 _FIRST = 5
 _POINTS = 120
 

@@ -23,8 +23,6 @@ from winchkit.report.words.sentence import (
 from winchkit.report.words.steps import alike, doubt_texts, step_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
 
-__all__ = ["VERDICT_WORDS", "Rung", "card", "ladder", "refitted", "verdict"]
-
 _SHOWN = 8
 """Candidates in the ladder; the others have less evidence."""
 _CHANGE = 0.01

@@ -19,8 +19,6 @@ from winchkit.web.curves import curves_of
 from winchkit.web.ladder import Rung
 from winchkit.web.state import State, Version
 
-__all__ = ["refit"]
-
 
 def refit(state: State, effect: str, dataset: Dataset, catalogue: Catalogue, folder: Path) -> State:
     """State with an effect in the profile, its refitted errors and curves, not yet diagnosed.

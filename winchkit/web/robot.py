@@ -39,8 +39,6 @@ from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.read import read_any, read_robot
 from winchkit.units import GRAVITY
 
-__all__ = ["RobotWork", "is_robot", "pose_picture"]
-
 _GRID = 22
 """Cells of the slice along its longer side: 484 linear programmes of 3 ms."""
 _ARROWS = 120

@@ -17,8 +17,6 @@ from winchkit.errors import UsageError
 if TYPE_CHECKING:
     import uvicorn
 
-__all__ = ["serve"]
-
 _HOST = "127.0.0.1"
 _SHUTDOWN = 1
 """For open sockets to close at the end, s; a browser that does not answer is left."""

@@ -11,8 +11,6 @@ from pathlib import Path
 from winchkit.catalog import find
 from winchkit.errors import ConnectionLost
 
-__all__ = ["simulated_bench"]
-
 _PATIENCE = 30.0
 """For a simulated bench to start, s."""
 _ENDING = 0.5

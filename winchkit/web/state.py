@@ -17,8 +17,6 @@ from winchkit.runs.run import Run
 from winchkit.web.curves import OutputCurves
 from winchkit.web.ladder import VERDICT_WORDS, Rung, ladder, refitted, verdict
 
-__all__ = ["Judgement", "LoadedRun", "State", "Version"]
-
 
 @dataclass(frozen=True)
 class Judgement:

@@ -35,8 +35,6 @@ from winchkit.web.library.runs import LibraryRun
 from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, State, Version
 
-__all__ = ["Cancelled", "Workspace"]
-
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
 _READERS = 2

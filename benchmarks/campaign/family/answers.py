@@ -10,8 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-__all__ = ["TimeLimit", "answer"]
-
 
 class TimeLimit(BaseException):
     """The limit of processor time; no ``except Exception`` of a search may keep it."""

@@ -16,8 +16,6 @@ from campaign.record import Recording
 from campaign.sizes import Scene, allowed
 from campaign.truth import Hidden, Shown, Situation, show
 
-__all__ = ["BASES", "Base", "draw_base"]
-
 Random = np.random.Generator
 BASES: tuple[tuple[str, ...], ...] = (
     ("friction",),

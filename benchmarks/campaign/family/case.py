@@ -15,8 +15,6 @@ from campaign.family.machine import PARTS, Friction, Machine, draw_friction, dra
 from campaign.record import Recording, write
 from campaign.winch import Winch, write_profile
 
-__all__ = ["Case", "Truth", "draw_friction_case", "shown_by", "write_case"]
-
 Random = np.random.Generator
 ATTEMPTS = 100
 

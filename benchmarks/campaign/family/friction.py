@@ -20,8 +20,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["ELEMENTS", "LAWS", "Law", "Shape", "draw_shape", "sense"]
-
 Random = np.random.Generator
 ELEMENTS = ((0.3, 0.3), (1.0, 0.4), (3.0, 0.3))
 """Of Maxwell-slip: distance over the mean one, share of the friction."""

@@ -14,8 +14,6 @@ from campaign.record import Recording
 from campaign.truth import OUTPUTS, TURN, Shown
 from winchkit.arrays import Array
 
-__all__ = ["GARBAGE", "draw_garbage"]
-
 Random = np.random.Generator
 SLACK = 0.02
 """Force of a cable whose load stands on the ground, over the load's weight."""

@@ -13,8 +13,6 @@ from campaign.record import Recording, instrument_noise
 from campaign.truth import OUTPUTS, TURN, Shown
 from winchkit.arrays import Array
 
-__all__ = ["Chain", "draw_chain", "runs_of"]
-
 Random = np.random.Generator
 LATEST = 0.4
 """Start of a late recording, s: every motion begins at rest for longer than that."""

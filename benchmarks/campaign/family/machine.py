@@ -17,8 +17,6 @@ from campaign.truth import TURN, G, Shown, bearing_friction, wound_cable
 from campaign.winch import Winch, draw_winch, turns_for
 from winchkit.arrays import Array
 
-__all__ = ["PARTS", "STEP", "Friction", "Machine", "draw_friction", "draw_machine", "show_fine"]
-
 Random = np.random.Generator
 PARTS = ("motor", "pulley", "gear")
 STEP = 1e-3

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["VARIABLES", "is_certain", "places"]
-
 Place = tuple[str, str, str]
 """Part, output, variable; the last is empty where it is unknown or there is none."""
 

@@ -14,8 +14,6 @@ from campaign.sizes import allowed
 from campaign.truth import Hidden
 from campaign.winch import Winch
 
-__all__ = ["WRONG", "draw_wrong_profile"]
-
 Random = np.random.Generator
 UNITS = {
     "cable-elongation-linear": ("axial_stiffness", "N", "cable", "cable_length"),

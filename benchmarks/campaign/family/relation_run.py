@@ -13,8 +13,6 @@ from campaign.family.base import draw_base
 from campaign.family.relations import RELATIONS, write_files
 from campaign.family.run import Job
 
-__all__ = ["run_relations"]
-
 
 def run_relations(job: Job) -> dict[str, Any]:
     """The line of a base case: the answer to it, and to each of its forms."""

@@ -9,8 +9,6 @@ from typing import Any
 from campaign.family.places import is_certain
 from campaign.family.relations import RELATIONS
 
-__all__ = ["relation_table", "violations"]
-
 Answer = Mapping[str, Any]
 FAILED = ("crash", "timeout", "refused")
 TOLD = ("adequate", "explained", "partly")

@@ -18,8 +18,6 @@ from campaign.record import Recording
 from campaign.winch import Winch, write_profile
 from winchkit.arrays import Array
 
-__all__ = ["RELATIONS", "Files", "write_files"]
-
 Random = np.random.Generator
 DAY = 86_400.0
 UNITS = {

@@ -18,8 +18,6 @@ from campaign.family.case import Case, draw_friction_case, write_case
 from campaign.family.garbage import draw_garbage
 from campaign.family.profiles import draw_wrong_profile
 
-__all__ = ["CASES", "Job", "read_lines", "run_jobs"]
-
 CASES: Mapping[str, Callable[[np.random.Generator, int], Case]] = {
     "friction": draw_friction_case,
     "garbage": draw_garbage,

@@ -8,8 +8,6 @@ from typing import Any
 from campaign.family.places import VARIABLES, is_certain, places
 from campaign.logger_score import clopper_pearson
 
-__all__ = ["changes", "failures", "judge", "table"]
-
 Line = Mapping[str, Any]
 FAILED = ("crash", "timeout")
 

@@ -9,19 +9,10 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from calibration_cases import (
-    EXACT,
-    Noise,
-    Truth,
-    csv,
-    held,
-    measured,
-    robot,
-    rows,
-    true_values,
-    with_turns,
-)
-from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate, split
+from calibration_cases import EXACT, held, measured, robot, rows, true_values, with_turns
+from robot_poses.truth import Noise, Truth, csv
+from winchkit.calibration.robot.calibrate import Calibrated, calibrate, split
+from winchkit.calibration.robot.options import Options
 from winchkit.calibration.robot.pose_design import next_poses
 from winchkit.calibration.robot.prediction import rms
 from winchkit.errors import UsageError

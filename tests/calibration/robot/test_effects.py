@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from calibration_cases import EXACT, Noise, Truth, csv, elastic_rows, held, measured, robot, rows
-from robot_poses.truth import GRAVITY, HOME, Row, turn
+from calibration_cases import EXACT, elastic_rows, held, measured, robot, rows
+from robot_poses.truth import GRAVITY, HOME, Noise, Row, Truth, csv, turn
 from winchkit.arrays import Array
-from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate
+from winchkit.calibration.robot.calibrate import Calibrated, calibrate
+from winchkit.calibration.robot.options import Options
 from winchkit.calibration.robot.prediction import rms
 from winchkit.errors import UsageError
 from winchkit.runs.poses import Measured

@@ -9,12 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from calibration_cases import csv, elastic_rows, held, measured, robot, rows
+from calibration_cases import elastic_rows, held, measured, robot, rows
+from robot_poses.truth import csv
 from winchkit.arrays import Array
-from winchkit.calibration.robot.calibrate import Options, calibrate, equations_of
+from winchkit.calibration.robot.calibrate import calibrate, equations_of
 from winchkit.calibration.robot.elongation import LAWS
 from winchkit.calibration.robot.equations import Equations
 from winchkit.calibration.robot.instruments import declared_instruments
+from winchkit.calibration.robot.options import Options
 from winchkit.calibration.robot.selection import with_instruments
 from winchkit.effects import load_catalogue
 from winchkit.model.drum import drum_of

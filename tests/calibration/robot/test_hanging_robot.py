@@ -11,8 +11,8 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import brentq, minimize
 
-from calibration_cases import Truth, robot
-from robot_poses.truth import GRAVITY, HOME, turn
+from calibration_cases import robot
+from robot_poses.truth import GRAVITY, HOME, Truth, turn
 from winchkit.arrays import Array
 from winchkit.calibration.robot import pose_design as robot_next
 from winchkit.calibration.robot.calibrate import calibrate, split

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from calibration_cases import csv, held, measured, robot, rows
+from calibration_cases import held, measured, robot, rows
+from robot_poses.truth import csv
 from winchkit.arrays import Array
 from winchkit.calibration.robot.calibrate import Calibrated, calibrate
 from winchkit.fit_statistics import FitStatistics

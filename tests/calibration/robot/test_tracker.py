@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from calibration_cases import EXACT, csv, measured, robot, rows
+from calibration_cases import EXACT, measured, robot, rows
 from robot_poses.station import Station, about
+from robot_poses.truth import csv
 from winchkit.calibration.robot.calibrate import calibrate, split
 from winchkit.calibration.robot.prediction import rms
 from winchkit.catalog import find

@@ -13,9 +13,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from calibration_cases import EXACT, csv, rows
+from calibration_cases import EXACT, rows
 from can_commands import served, without_trip
 from command_tree import examples
+from robot_poses.truth import csv
 from served import Served as ServedCell
 from winchkit.cli import main
 from winchkit.cli.core.command import Example

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from calibration_cases import EXACT, Row, csv, elastic_rows, rows
+from calibration_cases import EXACT, elastic_rows, rows
 from report_parsed import Page
+from robot_poses.truth import Row, csv
 from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.runs.read import read_run

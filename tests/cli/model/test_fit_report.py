@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from calibration_cases import csv, rows
+from calibration_cases import rows
 from report_answers import recorded
+from robot_poses.truth import csv
 from winchkit.cli import main
 from winchkit.runs.writer import write_run
 

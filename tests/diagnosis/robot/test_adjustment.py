@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration_cases import csv, measured, robot, rows
-from winchkit.calibration.robot.calibrate import Options, calibrate
+from calibration_cases import measured, robot, rows
+from robot_poses.truth import csv
+from winchkit.calibration.robot.calibrate import calibrate
+from winchkit.calibration.robot.options import Options
 from winchkit.diagnosis.robot.adjustment import adjusted
 from winchkit.diagnosis.robot.candidates import priors_of_geometry
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses

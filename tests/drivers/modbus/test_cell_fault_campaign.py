@@ -9,11 +9,11 @@ import pytest
 
 from cell_campaign.case import FAULTS, Plan, modbus_devices, play, spec_of
 from cell_faults import plans
+from winchkit.drivers.counters import Counters
 from winchkit.drivers.modbus.consistency import Consistency
 from winchkit.drivers.modbus.decoder import Decoder
 from winchkit.drivers.modbus.frames import AnswerGate
 from winchkit.drivers.modbus.late_replies import LateReplies
-from winchkit.drivers.reading import Counters
 
 DEVICES = modbus_devices()
 LINES = [pytest.param(True, id="rtu"), pytest.param(False, id="tcp")]

@@ -10,8 +10,9 @@ import pytest
 
 from robot_poses.truth import Truth, csv, poses
 from winchkit.arrays import Array
-from winchkit.calibration.robot.calibrate import Options, equations_of
+from winchkit.calibration.robot.calibrate import equations_of
 from winchkit.calibration.robot.equations import State
+from winchkit.calibration.robot.options import Options
 from winchkit.catalog import find
 from winchkit.diagnosis.robot.dataset import RobotDataset, prepare_poses
 from winchkit.diagnosis.robot.equations import Equations, start_pose

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from calibration_cases import csv, held, measured, robot, rows
+from calibration_cases import held, measured, robot, rows
 from report_answers import answer_of, recorded
+from robot_poses.truth import csv
 from winchkit.calibration.robot.calibrate import Calibrated, calibrate
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import compare

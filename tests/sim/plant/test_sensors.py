@@ -7,8 +7,8 @@ import pytest
 
 from plant_benches import GROOVED, hide
 from winchkit.schema.simbench import NoiseSpec, WinchTruth
-from winchkit.sim.plant.plant import Measurement, WinchPlant
-from winchkit.sim.plant.sensors import Noise
+from winchkit.sim.plant.plant import WinchPlant
+from winchkit.sim.plant.sensors import Measurement, Noise
 from winchkit.sim.plant.servo import DriveCommand
 
 COUNT = 40_000

@@ -7,8 +7,6 @@ from dataclasses import replace
 from winchkit import find, read_simbench
 from winchkit.schema.simbench import SimBench
 
-__all__ = ["bare_winches"]
-
 
 def bare_winches(names: str, *, cycle: float = 0.004, heartbeat: float | None = None) -> SimBench:
     """One drive for each name; ``cycle`` and ``heartbeat`` in s."""

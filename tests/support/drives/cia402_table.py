@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from winchkit.drivers.can.cia402.state_machine import RequestedState, State
 
-__all__ = ["STOPS", "transition"]
-
 STOPS = (
     RequestedState.RUN_DOWN,
     RequestedState.HALT,

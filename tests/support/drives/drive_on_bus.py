@@ -10,15 +10,13 @@ from pathlib import Path
 
 import can
 
-from flywheel import INERTIA, Flywheel
+from flywheel import Flywheel
 from winchkit import catalog
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.read import read_device
 from winchkit.sim.drive.drive import SimDrive
 from winchkit.sim.drive.object_dictionary import ObjectDictionary, read_eds
-
-__all__ = ["INERTIA", "DriveOnBus", "bus_spec", "device"]
 
 _channels = itertools.count()
 

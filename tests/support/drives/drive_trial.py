@@ -10,8 +10,6 @@ from slave import State
 from slave.held_key import HeldKey
 from slave.rig import Rig
 
-__all__ = ["moves", "stopped"]
-
 
 def moves(rig: Rig, text: str, dead: Callable[[Rig], None] | None = None) -> None:
     """Jog for a while and release; then move, and let the host die."""

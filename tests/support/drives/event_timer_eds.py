@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["with_event_timer"]
-
 _EVENT_TIMER = """\
 [1400sub5]
 ParameterName=Event timer

@@ -12,7 +12,7 @@ from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
-from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import RequestedState, State, control_word
 from winchkit.drivers.reading import Quality, Reading

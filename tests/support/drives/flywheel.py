@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = ["INERTIA", "Flywheel"]
-
 INERTIA = 0.01
 """kg m²."""
 _LAG = 0.004

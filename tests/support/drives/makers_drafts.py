@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-__all__ = ["DRAFTS", "FOLDER", "completed_animatics", "draft"]
-
 FOLDER = Path(os.environ.get("WINCHKIT_MAKERS_EDS", Path(__file__).parents[4] / "shared/data/eds"))
 
 _HEAD = """\

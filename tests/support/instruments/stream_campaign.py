@@ -8,8 +8,6 @@ from random import Random
 from stream_rig import Rig, device
 from winchkit.drivers.reading import Reading
 
-__all__ = ["KINDS", "Outcome", "campaign"]
-
 RAMP = 0.5
 """Of the truth, N/s: a value identifies its time."""
 KINDS = (

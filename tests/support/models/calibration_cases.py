@@ -20,22 +20,6 @@ from winchkit.runs.poses import Measured, read_poses
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_robot
 
-__all__ = [
-    "ELASTIC",
-    "EXACT",
-    "Noise",
-    "Row",
-    "Truth",
-    "csv",
-    "elastic_rows",
-    "held",
-    "measured",
-    "robot",
-    "rows",
-    "true_values",
-    "with_turns",
-]
-
 EXACT = Noise(tracker=0.0, encoder=0.0, angle=0.0)
 ELASTIC = Truth(stiffness=2e4, home_tension=30.0)
 

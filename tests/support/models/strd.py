@@ -24,8 +24,6 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 
-__all__ = ["LINEAR", "NONLINEAR", "Curve", "Dataset", "digits", "regression_of", "start_of"]
-
 
 @dataclass(frozen=True)
 class Dataset:

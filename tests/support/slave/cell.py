@@ -10,8 +10,6 @@ from winchkit.bench.bench import Bench
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import ConnectionLost
 
-__all__ = ["Cell"]
-
 
 @dataclass
 class Cell:

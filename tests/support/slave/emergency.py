@@ -7,8 +7,6 @@ from collections.abc import Callable
 from slave.dictionary import Dictionary
 from slave.frames import Frame
 
-__all__ = ["Emergencies"]
-
 _GENERIC = 0x01
 _BITS = {0x2: 0x02, 0x3: 0x04, 0x4: 0x08, 0x8: 0x10}
 """Bits of 1001h by the first digit of a code."""

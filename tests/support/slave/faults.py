@@ -13,8 +13,6 @@ from slave.power import State
 if TYPE_CHECKING:
     from slave.slave import Slave
 
-__all__ = ["FAULTS", "Fault"]
-
 _EVERYTHING = frozenset({"nmt", "sync", "rpdo", "sdo", "heartbeat", "guarding", "other"})
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["Frame", "kind_from_host", "kind_from_slave"]
-
 
 class Frame(NamedTuple):
     """A frame of 11 bits."""

@@ -12,8 +12,6 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.remote.identity import Client
 from winchkit.errors import WinchkitError
 
-__all__ = ["HeldKey", "Outcome", "Record", "jogging", "observe", "since"]
-
 _REPEAT = 0.05
 _MOVES = 0.5
 """rad/s of the motor; 1.5 mm/s of cable."""

@@ -11,8 +11,6 @@ from slave.dictionary import Dictionary
 from slave.motor import Declared, Motor
 from slave.power import Power, State
 
-__all__ = ["CYCLIC", "Motion"]
-
 PP, PV, HM, IP, CSP, CSV = 1, 3, 6, 7, 8, 9
 CYCLIC = (IP, CSP, CSV)
 """Modes that take a target at every SYNC."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-__all__ = ["Declared", "Motor"]
-
 _REST = 0.02
 """rad/s."""
 

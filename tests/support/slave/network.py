@@ -8,8 +8,6 @@ from enum import IntEnum
 from slave.dictionary import Abort, Dictionary
 from slave.frames import Frame
 
-__all__ = ["Network", "Nmt"]
-
 _MS = 1e-3
 HEARTBEAT_LOST = 0x8130
 

@@ -13,8 +13,6 @@ import can
 from slave.frames import Frame
 from slave.slave import Slave
 
-__all__ = ["SlavesOnBus"]
-
 _WAIT = 5e-4
 
 

@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 from slave.power import State
 from slave.slave import Slave
 
-__all__ = ["Oracle"]
-
 FIRST_STOP = 0.15
 """From the first sign to quick stop, s."""
 ESCALATED = 0.5

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from slave.dictionary import Abort, Dictionary
 from slave.frames import Frame
 
-__all__ = ["Pdos"]
-
 _VALID = 1 << 31
 _MS, _INHIBIT = 1e-3, 1e-4
 _SHORT, _LATE = 0x8210, 0x8250

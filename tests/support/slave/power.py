@@ -7,8 +7,6 @@ from typing import Protocol
 
 from slave.dictionary import Dictionary
 
-__all__ = ["Power", "State"]
-
 
 class State(Enum):
     """States with the bits of the status word that show them."""

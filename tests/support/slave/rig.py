@@ -23,8 +23,6 @@ from winchkit import open_bench
 from winchkit.bench.bench import Bench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 
-__all__ = ["CYCLE", "Rig", "Sample", "bench_text"]
-
 STEP = 1e-3
 CYCLE = 0.004
 _LONGEST = 600_000

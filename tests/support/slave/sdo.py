@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from slave.dictionary import Abort
 
-__all__ = ["SdoServer"]
-
 _TOGGLE = 0x05030000
 _COMMAND = 0x05040001
 _LENGTH = 0x06070010

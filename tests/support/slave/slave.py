@@ -18,8 +18,6 @@ from slave.pdo import Pdos
 from slave.power import Power, State
 from slave.sdo import SdoServer
 
-__all__ = ["Reactions", "Slave"]
-
 _STEP = 1e-3
 _SYNC_LOST = 0x8700
 _MISSED = 1.5

@@ -10,8 +10,6 @@ import pytest
 from slave.frames import Frame
 from slave.slave import Slave
 
-__all__ = ["GENERIC", "Wire", "emergencies", "moving"]
-
 GENERIC = Path(__file__).parents[3] / "devices" / "generic-cia402" / "generic-cia402.eds"
 
 

@@ -19,8 +19,6 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["CHANNELS", "Finished", "Unavailable", "fetch", "run"]
-
 CHANNELS = ("vcan0", "vcan1")
 PACKAGES = ("user-mode-linux", "can-utils")
 INIT = Path(__file__).with_name("init.py")

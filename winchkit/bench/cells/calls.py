@@ -15,16 +15,6 @@ from winchkit.bench.remote.cell_session import at_cells
 from winchkit.calibration.cell.health import Health, Samples, examine, samples_of
 from winchkit.drivers.reading import Quality, Reading
 
-__all__ = [
-    "cell_health",
-    "cell_info",
-    "cell_rate",
-    "cell_store",
-    "cell_tare",
-    "cell_zero",
-    "samples_of_readings",
-]
-
 
 def cell_info(bench: str | Path, cell: str | None = None) -> dict[str, Any]:
     """Return device file, serial number, calibration, tare, and a reading of a load cell.

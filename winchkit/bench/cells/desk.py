@@ -13,19 +13,9 @@ from winchkit.drivers.host_scale import HostScale
 from winchkit.drivers.publisher import InstrumentReadings, Publisher
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
-from winchkit.errors import NoReply, NotPermitted, UsageError
+from winchkit.errors import NoReply, NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, DeviceRef
 from winchkit.schema.devices.device import DeviceSpec
-from winchkit.units import suggest
-
-__all__ = [
-    "CellDesk",
-    "Steady",
-    "check_permanent",
-    "full_name",
-    "indicated",
-    "steady",
-]
 
 _FIRST_READING = 2.0
 """s: several time-outs and the connection of a slow line (rule of thumb)."""

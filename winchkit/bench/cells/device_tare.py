@@ -6,8 +6,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
 from winchkit.errors import NoReply
 
-__all__ = ["await_device_tare"]
-
 _POLL = 0.01
 """s: a reading of the fastest usual cell."""
 _WITHIN = 2.0

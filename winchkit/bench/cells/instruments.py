@@ -24,18 +24,6 @@ if TYPE_CHECKING:
     from winchkit.drivers.can.process_value import ProcessInstrument
     from winchkit.drivers.instrument_process.process import InstrumentProcess
 
-__all__ = [
-    "ROLES",
-    "calibration_of",
-    "can_buses",
-    "device_of",
-    "eds_of",
-    "instruments",
-    "is_raw",
-    "refs_of",
-    "tares_of",
-]
-
 ROLES = ("cell", "load", "length", "temperature")
 
 

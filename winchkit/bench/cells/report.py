@@ -9,12 +9,10 @@ from typing import Any
 
 from winchkit.bench.cells.desk import CellDesk
 from winchkit.bench.cells.instruments import calibration_of
+from winchkit.drivers.counters import Counters
 from winchkit.drivers.modbus.timing import exchange
-from winchkit.drivers.reading import Counters
 from winchkit.schema.calibration import CellCalibration
 from winchkit.schema.devices.device import DeviceSpec
-
-__all__ = ["about", "rate_report"]
 
 _SERIAL = "serial number"
 _WORTH_TELLING = 1.5

@@ -13,16 +13,6 @@ from winchkit.calibration.cell.files import tares_toml, write_text
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.schema.calibration import HostTare, TareBook, tare_book_path
 
-__all__ = [
-    "clear_device_tare",
-    "clear_tare",
-    "device_tare",
-    "device_zero",
-    "host_tare",
-    "restore_tares",
-    "tares_now",
-]
-
 _CHECK = 0.3
 """s: an indicator's filter of some readings has settled, and a fast cell gives ten readings."""
 

@@ -21,8 +21,6 @@ from winchkit.drivers.reading import Quality, Reading
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["TASKS", "Cells", "LocalCells", "do", "readings_of"]
-
 
 class Cells(Protocol):
     """The instruments of a bench, here or at its owner."""

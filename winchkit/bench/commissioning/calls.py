@@ -12,8 +12,6 @@ from winchkit.bench.commissioning.record import Record
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.schema.read import read_bench
 
-__all__ = ["commission"]
-
 
 def commission(bench: str | Path, answers: str | Path | None = None) -> Record:
     """Commission a bench: try directions, units, brake, limits and the loss of the host.

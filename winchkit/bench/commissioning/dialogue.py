@@ -11,8 +11,6 @@ from winchkit.bench.commissioning.record import hash_of
 from winchkit.errors import Fault, FileError, NotPermitted, UsageError
 from winchkit.regular_file import read_text
 
-__all__ = ["YES_OR_NO", "AnswerFile", "Dialogue", "TypedAnswers", "agreed", "confirm"]
-
 _YES = ("yes", "y")
 YES_OR_NO = (*_YES, "no", "n")
 

@@ -6,8 +6,6 @@ import sys
 
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["tell_hardware"]
-
 
 def tell_hardware(spec: BenchSpec) -> None:
     """Say on stderr which winches those are, and what stops them."""

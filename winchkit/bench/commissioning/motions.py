@@ -12,8 +12,6 @@ from winchkit.bench.control.snapshot import Direction
 from winchkit.bench.direction import directed
 from winchkit.errors import NotPermitted
 
-__all__ = ["Motions", "Moved"]
-
 _STEP = 0.02
 """m, at most a motor turn: visible to the operator, ten times the resolution of a length sensor."""
 _TURN = 2 * math.pi

@@ -38,8 +38,6 @@ from winchkit.errors import NotPermitted
 from winchkit.schema.bench import BenchSpec, WinchWiring
 from winchkit.version import __version__
 
-__all__ = ["commission_bench"]
-
 _COMMAND = "commission"
 _SLIP = 5e-3
 """Of the cable within two seconds after the drive was disabled, m."""

@@ -18,18 +18,6 @@ from typing import Any
 from winchkit.errors import FileError, NotPermitted
 from winchkit.regular_file import read_text, regular
 
-__all__ = [
-    "Confirmation",
-    "DriveRecord",
-    "FileHash",
-    "HostLossRecord",
-    "Record",
-    "WinchRecord",
-    "hash_of",
-    "read_record",
-    "write_record",
-]
-
 SCHEMA = 1
 """Of the record, which counts on with each change of its keys."""
 

@@ -33,8 +33,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import ConnectionLost, MotionError, NoReply, NotPermitted
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["Trial", "Trials"]
-
 _ENABLE_TIME = 2.0
 """s: drives take some tenths, and with a brake to open about one."""
 _SETTLE_TIME = 0.3

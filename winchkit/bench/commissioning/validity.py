@@ -21,16 +21,6 @@ from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import FileError, NotPermitted
 from winchkit.schema.bench import BenchSpec, BusSpec, WinchWiring
 
-__all__ = [
-    "drive_record",
-    "is_simulated",
-    "items_of",
-    "require_commissioned",
-    "stale_items",
-    "trust_record",
-    "unproved",
-]
-
 _SIMULATED = ("virtual", "udp_multicast")
 _VIRTUAL_CAN = "vcan"
 _NAMES = {

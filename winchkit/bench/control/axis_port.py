@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Protocol
 
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
-from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 from winchkit.drivers.can.cia402.state_machine import RequestedState, State
-
-__all__ = ["AxisPort"]
 
 
 class AxisPort(Protocol):

@@ -8,8 +8,6 @@ from typing import NamedTuple, Protocol
 from winchkit.errors import FileError
 from winchkit.estimation.cable_state import CableEstimator, Sample
 
-__all__ = ["CableMap", "LineModel"]
-
 _FAR = 5e-3
 """Change of the cable length after which length and arm are computed again, m."""
 _SOON = 0.02

@@ -13,17 +13,6 @@ import threading
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = [
-    "PRIORITY",
-    "Item",
-    "instrument_reading",
-    "locks_without_limit",
-    "memory_remedy",
-    "scheduling_remedy",
-    "survey",
-    "threads",
-]
-
 PRIORITY = 50
 """SCHED_FIFO priority of the control thread and of the receive threads of CAN buses."""
 _CAPABILITY_LOCK = 14

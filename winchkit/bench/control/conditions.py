@@ -23,8 +23,6 @@ from winchkit.bench.control.observation import (
 )
 from winchkit.bench.control.snapshot import Direction
 
-__all__ = ["BENCH_CONDITIONS", "CONDITIONS", "BenchCondition", "Condition", "Exceeds", "Test"]
-
 _SLACK_TIME = 0.2
 """A load that swings relieves its cable for less, s."""
 _LENGTH_TOLERANCE = 5e-3

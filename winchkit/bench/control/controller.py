@@ -21,11 +21,9 @@ from winchkit.bench.control.motion import (
 from winchkit.bench.control.snapshot import Phase
 from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
 from winchkit.drivers.can.canopen.nmt import NmtState
-from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, RequestedState, State
 from winchkit.schema.bench import LimitSpec
-
-__all__ = ["Controller"]
 
 _ENABLE_TIME = 2.0
 """s, as in the trials of a commissioning: drives take some tenths, and about one with a brake."""

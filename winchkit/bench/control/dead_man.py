@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from winchkit.errors import MotionError, NotPermitted
 
-__all__ = ["DEAD_MAN", "FIRST_PRESS", "LIFE_SIGN", "REFRESH", "DeadMan", "remaining"]
-
 DEAD_MAN = 0.2
 """A jog ends this long after its last refresh, s."""
 REFRESH = 0.05

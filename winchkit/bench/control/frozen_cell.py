@@ -32,8 +32,6 @@ from statistics import NormalDist, median
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.units import GRAVITY
 
-__all__ = ["Frozen", "FrozenCell", "HangingLoad"]
-
 _CONFIDENCE = 1e-9
 """Probability of a live cell that a run of repeats as long as the one that trips begins."""
 _HOURS = 1000 * 3600.0

@@ -11,8 +11,6 @@ from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.motion import Target
 from winchkit.drivers.can.cia402.modes import Homing
 
-__all__ = ["HomingMotion", "HomingRequest"]
-
 _SETTLE = 0.06
 """For which bits of an earlier homing may still stand, s."""
 _JUMP = 1.0

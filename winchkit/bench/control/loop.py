@@ -23,8 +23,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import Scheduler, Thread, event_of, thread_of
 from winchkit.errors import ConnectionLost, MotionError, UsageError, WinchkitError
 
-__all__ = ["BusPort", "Callback", "ControlLoop"]
-
 Callback = Callable[[BenchSnapshot], Mapping[str, float] | None]
 
 _LOGGER = logging.getLogger(__name__)

@@ -15,26 +15,6 @@ from winchkit.errors import NotPermitted
 from winchkit.model.trajectory import Trajectory, plan
 from winchkit.schema.bench import LimitSpec
 
-__all__ = [
-    "GAIN",
-    "JERK_TIME",
-    "SETTLED",
-    "SETTLE_TIME",
-    "Held",
-    "Jog",
-    "MotionSource",
-    "Move",
-    "PathStop",
-    "Ramp",
-    "RunDown",
-    "StartGate",
-    "Stop",
-    "Target",
-    "Trim",
-    "commanded_and_moved",
-    "within_limits",
-]
-
 _new = tuple.__new__
 _CALM = 0.5
 """Time at rest before the length is compared with its target, s: the tension settles."""

@@ -15,16 +15,6 @@ from typing import NamedTuple
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.schema.bench import LimitSpec
 
-__all__ = [
-    "FACTS",
-    "Instrumented",
-    "Memory",
-    "Quantities",
-    "Supervised",
-    "WinchInput",
-    "facts_of",
-]
-
 _RATE_TIME = 0.05
 """Shortest span over which a change of tension counts, s."""
 _LEAST_CYCLES = 6

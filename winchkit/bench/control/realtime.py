@@ -33,8 +33,6 @@ from winchkit.bench.control.computer import (
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.errors import NotPermitted
 
-__all__ = ["NOT_REQUESTED", "RealTime", "Request", "RestCollector", "acquire"]
-
 Request = Literal["try"] | bool
 """``"try"`` takes what is permitted, ``True`` demands priority and locked memory."""
 

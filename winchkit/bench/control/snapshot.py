@@ -8,16 +8,6 @@ from dataclasses import dataclass
 from enum import Enum, Flag
 from typing import Any, NamedTuple
 
-__all__ = [
-    "BenchSnapshot",
-    "Direction",
-    "Phase",
-    "Trip",
-    "WinchSnapshot",
-    "WinchSnapshots",
-    "to_dict",
-]
-
 
 class Direction(Flag):
     """Directions of cable motion."""

@@ -14,8 +14,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["StandstillCause"]
-
 _PERIOD = 0.1
 """Period of the readings that a standstill is compared with, s: one takes 15 us."""
 _UNKNOWN = (

@@ -10,8 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
-__all__ = ["STOP_TABLE", "Rung", "StopEscalation", "StopEvidence", "StopRung"]
-
 
 class Rung(IntEnum):
     """A stop method."""

@@ -17,8 +17,6 @@ from winchkit.bench.control.conditions import CONDITIONS, Condition, Exceeds, Te
 from winchkit.bench.control.observation import Memory, Quantities, Supervised, WinchInput, facts_of
 from winchkit.bench.control.snapshot import Direction, Trip
 
-__all__ = ["Supervisor", "direction_of"]
-
 _BY_CELL = ("cell", "tension_high", "tension_slack", "tension_rate")
 """Needs of conditions that are tested only where there is a load cell."""
 _Rows = tuple[tuple[Test, Condition], ...]

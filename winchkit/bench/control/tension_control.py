@@ -19,16 +19,6 @@ from winchkit.errors import UsageError
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.profiles.winch import CableSpec
 
-__all__ = [
-    "LOOP",
-    "TensionControl",
-    "TensionReading",
-    "TensionSetting",
-    "UsedUp",
-    "fastest_within",
-    "greatest_stiffness",
-]
-
 LOOP = 0.25
 """Gain times stiffness times delay: of 0.37, the limit of a response without overshoot, and 1.57,
 the limit of stability, of an integrator with a delay."""

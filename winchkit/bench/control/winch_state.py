@@ -13,14 +13,12 @@ from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
 from winchkit.bench.control.observation import Instrumented, WinchInput
 from winchkit.bench.control.snapshot import Phase, WinchSnapshot
-from winchkit.drivers.can.cia402.axis import AxisFeedback
+from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.state_machine import State
 from winchkit.drivers.reading import Reading
 from winchkit.errors import ConnectionLost
 from winchkit.estimation.cable_state import Sample
 from winchkit.schema.profiles.winch import CableSpec
-
-__all__ = ["Captured", "SensorPort", "WinchParts", "known", "pictures"]
 
 _IDLE = (Phase.DISABLED, Phase.RESETTING)
 _ANSWERED = 2

@@ -16,8 +16,6 @@ from winchkit.errors import Fault, FileError
 from winchkit.schema.bench import BenchSpec, WinchWiring
 from winchkit.schema.devices.servo import PdoSpec
 
-__all__ = ["loads"]
-
 _COMMANDS = {(0x6040, 0), (0x6060, 0), (0x60B1, 0), (0x60B2, 0)}
 """Control word, mode and offsets: an RPDO with one of them, or the mode's target, is sent."""
 

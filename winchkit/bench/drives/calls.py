@@ -30,21 +30,6 @@ from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.read import read_bench
 
-__all__ = [
-    "bus_load",
-    "can_bus",
-    "config_diff",
-    "config_load",
-    "config_restore",
-    "config_save",
-    "config_store",
-    "drive_info",
-    "lss_identify",
-    "lss_list",
-    "lss_set",
-    "scan",
-]
-
 Wiring = str | Path | BenchSpec
 
 

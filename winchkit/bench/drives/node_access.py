@@ -17,20 +17,9 @@ from winchkit.drivers.can.canopen.identity import fitting_device
 from winchkit.drivers.can.canopen.node import Objects, SdoNode, read_dictionary
 from winchkit.drivers.can.tools.scan import Found, RawNode, identity_of, named_after, scan
 from winchkit.drivers.clock import Clock, MonotonicClock
-from winchkit.errors import DeviceRefused, NotPermitted, UsageError
+from winchkit.errors import DeviceRefused, NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, BusSpec, WinchWiring
 from winchkit.schema.devices.device import DeviceSpec
-from winchkit.units import suggest
-
-__all__ = [
-    "DeclaredDrive",
-    "Node",
-    "bus_only",
-    "declared_drive",
-    "drive_at",
-    "free_bus",
-    "nodes_on",
-]
 
 _LISTEN = 1.1
 """For heartbeats, whose period is a second at most where they are of use, s."""

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.clock import Clock
 
-__all__ = ["SetUpProgress", "Tell", "to_stderr"]
-
 Tell = Callable[[str], None]
 _FIRST, _PERIOD = 2.0, 5.0
 """s: a drive with answers of some ms is set up within 1 s; who waits longer wants to know why."""

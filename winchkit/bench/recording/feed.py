@@ -19,8 +19,6 @@ from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
 if TYPE_CHECKING:
     from winchkit.bench.robot.tracker import TrackedPose, Tracker
 
-__all__ = ["CHANNELS", "TARED", "Feed"]
-
 CHANNELS: dict[str, tuple[str, str]] = {
     "cell": ("tension", "N"),
     "load": ("load", "N"),

@@ -10,8 +10,6 @@ from typing import Any, Protocol, TextIO
 
 from winchkit.errors import ConnectionLost, UsageError
 
-__all__ = ["JsonLines", "LiveSink", "UdpJson"]
-
 _LARGEST = 65_000
 """Bytes: a datagram of UDP over IPv4 has 65 507 at most."""
 

@@ -12,8 +12,6 @@ from pathlib import Path
 from winchkit.regular_file import read_text
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["git_state", "origin"]
-
 _LIBRARIES = ("numpy", "canopen", "python-can", "pymodbus", "pyserial", "mcap")
 _PATIENCE = 2.0
 """s: git answers within some ms; a repository on a dead network drive does not delay a log."""

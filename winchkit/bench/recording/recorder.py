@@ -35,8 +35,6 @@ from winchkit.runs.recording.sync import Syncer
 if TYPE_CHECKING:
     from winchkit.bench.robot.tracker import Tracker
 
-__all__ = ["CHANNELS", "Recorder", "counters_of", "tares_in_force"]
-
 _LOGGER = logging.getLogger(__name__)
 _PERIOD = {".csv": 0.05}
 _CHUNK_PERIOD = 0.075

@@ -17,8 +17,6 @@ from winchkit.runs.layout import Signal
 from winchkit.runs.log import Log
 from winchkit.runs.read import read_log
 
-__all__ = ["Replay", "open_replay"]
-
 _LEAST_WAIT = 2e-3
 """s: shorter waits are longer than ordered on most systems, and the next one makes up for them."""
 _MEASURED = ("motor_angle", "motor_velocity", "motor_torque", "tension", "load", "temperature")

@@ -11,8 +11,6 @@ import numpy as np
 from winchkit.runs.align import patience_of
 from winchkit.runs.layout import Layout, Samples
 
-__all__ = ["Silences"]
-
 
 @dataclass
 class _Silence:

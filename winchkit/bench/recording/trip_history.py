@@ -9,8 +9,6 @@ from typing import Any
 from winchkit.bench.control.snapshot import BenchSnapshot, Direction, Trip
 from winchkit.plain_json import significant
 
-__all__ = ["AFTER", "BEFORE", "TripHistory"]
-
 BEFORE, AFTER = 2.0, 0.5
 """Time kept before and after the cycle of the trip, s."""
 _CHANNELS = (

@@ -15,8 +15,6 @@ from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.records.record_file import RecordFile
 from winchkit.errors import NotPermitted
 
-__all__ = ["LatchFile"]
-
 _SIZE = 8192
 """Bytes of a record."""
 _MOST = 16

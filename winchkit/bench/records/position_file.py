@@ -16,8 +16,6 @@ from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.records.record_file import RecordFile
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 
-__all__ = ["PositionFile"]
-
 _MOVE_ON = "look at the winches, make the file and its folder writable, then reset"
 
 

@@ -12,8 +12,6 @@ import stat
 import threading
 from contextlib import suppress
 
-__all__ = ["RecordFile"]
-
 _PAGE = 4096
 """Bytes: a record grows by whole pages, padded with spaces."""
 _FLAGS = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NONBLOCK", 0)

@@ -16,8 +16,6 @@ from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.slow import SlowDevices
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["at_cells"]
-
 
 @contextmanager
 def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[Cells]:

@@ -17,8 +17,6 @@ from winchkit.schema.bench import BenchSpec
 if TYPE_CHECKING:
     from winchkit.drivers.can.tools.scan import Found
 
-__all__ = ["RemoteCells", "RemoteStation", "attach"]
-
 _ANSWER_TIME = 10.0
 """s: longer than the longest answer without a motion, a reset of several drives (some seconds)."""
 _CELL_TIME = 20.0

@@ -17,8 +17,6 @@ from winchkit.bench.remote.identity import Client
 from winchkit.drivers.clock import Clock
 from winchkit.errors import MotionError, NotPermitted
 
-__all__ = ["Commanded", "Commanders", "NotCommander", "NotReleased"]
-
 
 class NotCommander(NotPermitted):
     """Another client commands the winch, or did until a moment ago."""

@@ -10,8 +10,6 @@ from winchkit.bench.remote.client import RemoteStation
 from winchkit.errors import ConnectionLost, NotPermitted
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["own", "own_or_find"]
-
 _PATIENCE = 10.0
 """For a bench process to disable its drives and end, s."""
 _CLOSING = 2.0

@@ -8,8 +8,6 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["Client", "LifeSign", "client_name"]
-
 _STEP = 0.05
 """Of silence that one cycle adds at most, s: a standstill of this process is not the client's."""
 

@@ -13,8 +13,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-__all__ = ["Interruption", "Terminated", "interrupted_by_signals"]
-
 _NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
 _ENDING = 10.0
 """Time to come to rest, s: signals that repeat the first one within it change nothing."""

@@ -13,8 +13,6 @@ from winchkit.bench.control.dead_man import LIFE_SIGN
 from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.remote.identity import Client
 
-__all__ = ["LifeSigns"]
-
 
 class LifeSigns:
     """Called once a cycle; ends the motions of clients that have fallen silent."""

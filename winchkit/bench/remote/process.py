@@ -29,8 +29,6 @@ from winchkit.schema.bench import BenchSpec
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
 
-__all__ = ["Spawned", "can_spawn", "main", "spawn"]
-
 LINGER = 3.0
 """The process ends this long after its last client has left, s."""
 _FIRST = 10.0

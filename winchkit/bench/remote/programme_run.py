@@ -17,8 +17,6 @@ from winchkit.schema.programme import Programme, Step
 from winchkit.schema.read import load
 from winchkit.schema.robot_programme import RobotProgramme
 
-__all__ = ["ProgrammeRun"]
-
 _LOGGER = logging.getLogger(__name__)
 _POLL = 0.02
 """Period in which a hold asks whether the programme goes on, s (winchkit.bench.programme)."""

@@ -13,8 +13,6 @@ from winchkit.bench.remote.session import at_station
 if TYPE_CHECKING:
     from winchkit.bench.remote.station import Station
 
-__all__ = ["watch"]
-
 _GRACE = 0.5
 """For a program that takes the bench over, before a bench process is started, s."""
 _Result = TypeVar("_Result")

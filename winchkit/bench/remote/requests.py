@@ -13,8 +13,6 @@ from typing import Any
 
 from winchkit.errors import ConnectionLost, UsageError, error_of
 
-__all__ = ["OwnerGone", "Requests"]
-
 
 class OwnerGone(ConnectionLost):
     """The process that owned the bench has ended, or does not answer any more."""

@@ -27,8 +27,6 @@ from winchkit.errors import (
     class_name,
 )
 
-__all__ = ["OPERATIONS", "StationServer"]
-
 _LOGGER = logging.getLogger(__name__)
 
 OPERATIONS = (

@@ -21,8 +21,6 @@ from winchkit.schema.bench import BenchSpec
 if TYPE_CHECKING:
     from winchkit.bench.remote.station import Station
 
-__all__ = ["at_station", "attach"]
-
 _PATIENCE = 15.0
 """For an owner that opens, closes or hands over the bench, s."""
 _POLL = 0.05

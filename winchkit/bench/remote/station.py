@@ -23,8 +23,6 @@ from winchkit.drivers.reading import Sensor
 from winchkit.errors import MotionError, UsageError
 from winchkit.schema.programme import ALL
 
-__all__ = ["LocalStation", "Station"]
-
 
 class Station(Protocol):
     """An operator's place at a bench. Closing it ends what it has started."""

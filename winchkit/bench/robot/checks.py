@@ -20,8 +20,6 @@ from winchkit.model.robot import (
 )
 from winchkit.schema.bench import LimitSpec
 
-__all__ = ["require_within_limits"]
-
 _STATIONS = 200
 """Of a trajectory at which a stop is tested, at most."""
 

@@ -18,8 +18,6 @@ from typing import Any, Protocol, Self, TypeVar
 
 from winchkit.errors import WinchkitError
 
-__all__ = ["Computation", "ComputationProcess", "at_once"]
-
 T = TypeVar("T")
 _POLL = 0.02
 """Between two looks at the bench while a result is awaited, s."""

@@ -11,8 +11,6 @@ from winchkit.bench.control.motion import GAIN, SETTLE_TIME, SETTLED, Target
 from winchkit.bench.robot.tension_trim import CableTrim
 from winchkit.bench.robot.trajectory import PlatformTrajectory
 
-__all__ = ["CableMotion", "PathTime"]
-
 _SHORTEST_STOP = 0.1
 """Time in which the platform comes to rest at least, s."""
 

@@ -21,8 +21,6 @@ from winchkit.model.robot.rotation import rotation_by, rotation_rates, rotation_
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-__all__ = ["Path", "Waypoint", "paths_through"]
-
 _SPACING = 2e-3
 """Of samples along the path, m."""
 _FEWEST = 33

@@ -18,8 +18,6 @@ from winchkit.model.robot import ForceLimits, Pose, Robot, angles_of, rotation_o
 from winchkit.schema.bench import BenchSpec, LimitSpec
 from winchkit.schema.robot_bench import RobotWiring
 
-__all__ = ["Planner", "coordinates_of", "moved"]
-
 _COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 

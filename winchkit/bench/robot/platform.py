@@ -33,8 +33,6 @@ from winchkit.schema.robot_bench import RobotWiring
 if TYPE_CHECKING:
     from winchkit.bench.winch import Winch
 
-__all__ = ["Platform"]
-
 _AGREE = 0.02
 """Largest difference between a cable length by its drum and by the geometry at the pose that fits
 all cables best, m: a larger one is a wrong reference, a slipped or a slack cable."""

@@ -18,8 +18,6 @@ from winchkit.errors import NotPermitted, RunError, UsageError
 from winchkit.model.robot import Pose
 from winchkit.schema.robot_programme import PoseStep, RobotProgramme
 
-__all__ = ["planned_motions", "programme_files", "run_robot_programme"]
-
 _POLL = 0.02
 """s: a hold ends that soon after a stop."""
 Motions = list[PlatformTrajectory | float]

@@ -11,8 +11,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.bench.robot.trajectory import PlatformTrajectory
 
-__all__ = ["quick_stop_ramps"]
-
 _LEAST = 0.1
 """Ramp of a cable that hardly moves, as a share of that of the fastest."""
 

@@ -32,7 +32,8 @@ from winchkit.bench.robot.planner import Planner, moved
 from winchkit.bench.robot.tracker import Tracker, mean_pose
 from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.bench.robot.wiring import robot_of_bench
-from winchkit.calibration.robot.calibrate import Calibrated, Options, calibrate
+from winchkit.calibration.robot.calibrate import Calibrated, calibrate
+from winchkit.calibration.robot.options import Options
 from winchkit.calibration.robot.pose_design import next_poses
 from winchkit.calibration.robot.prediction import rms
 from winchkit.calibration.robot.profile import Provenance, write_calibrated
@@ -47,8 +48,6 @@ from winchkit.schema.read import read_robot
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
-
-__all__ = ["PoseVolume", "SelfCalibration", "recorded_poses", "self_calibrated"]
 
 _TRIES = 40
 """Draws of one pose, of which one is to be within the limits."""

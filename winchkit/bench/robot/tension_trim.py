@@ -22,8 +22,6 @@ from winchkit.bench.control.motion import GAIN, Target
 from winchkit.bench.control.tension_control import LOOP, UsedUp, fastest_within
 from winchkit.schema.bench import LimitSpec
 
-__all__ = ["CableTrim", "ForceTrim", "TrimSetting"]
-
 
 @dataclass(frozen=True)
 class TrimSetting:

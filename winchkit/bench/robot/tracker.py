@@ -24,8 +24,6 @@ from winchkit.arrays import Array
 from winchkit.errors import ConnectionLost, NoReply
 from winchkit.model.robot.rotation import rotation_from_quaternion
 
-__all__ = ["MeanPose", "TrackedPose", "Tracker", "mean_pose", "parse_pose"]
-
 _LONGEST = 2048
 """Bytes of a datagram; one has about 200."""
 _KEPT = 4096

@@ -20,8 +20,6 @@ from winchkit.model.robot import (
 )
 from winchkit.model.trajectory import Trajectory, plan
 
-__all__ = ["PlatformTrajectory", "motion_at", "plan_along"]
-
 _STEP = 0.02
 """Of the samples between which motor angles are interpolated, s."""
 _MOST = 20_000

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from winchkit.model.robot import Robot
     from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["line_profiles", "no_robot", "robot_of_bench"]
-
 
 def no_robot(spec: BenchSpec) -> UsageError:
     """The refusal of what needs a robot on a bench that declares none."""

@@ -15,14 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.arguments import path_of
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, suggest
 from winchkit.regular_file import regular
 from winchkit.runs.files import write_whole
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNTS, read_unit
 from winchkit.schema.calibration import CalibrationPoint, CellCalibration, HostTare, TareBook
-from winchkit.units import GRAVITY, format_quantity, suggest
-
-__all__ = ["PointFile", "calibration_toml", "read_points", "tares_toml", "write_text"]
+from winchkit.units import GRAVITY, format_quantity
 
 _DIGITS = 9
 """Significant digits: 1 mN in 1 MN is below the resolution of every indicator, so that reading back

@@ -26,8 +26,6 @@ from winchkit.arrays import Array
 from winchkit.errors import RunError
 from winchkit.schema.calibration import CalibrationPoint
 
-__all__ = ["CellFit", "Figure", "fit_cell"]
-
 _FEWEST_LOADS = 5
 """Three coefficients leave two degrees of freedom per direction; ISO 376 asks for at least eight.
 """

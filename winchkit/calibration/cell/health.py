@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import RunError
 
-__all__ = ["Creep", "Health", "Hum", "Samples", "examine", "samples_of"]
-
 _MAINS = (50.0, 60.0)
 """Hz: the two mains frequencies in use."""
 _FEWEST = 20

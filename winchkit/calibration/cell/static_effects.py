@@ -30,8 +30,6 @@ from winchkit.calibration.cell.fit import fit_cell
 from winchkit.errors import RunError
 from winchkit.schema.calibration import CalibrationPoint
 
-__all__ = ["StaticDiagnosis", "StaticEffect", "static_effects"]
-
 _TERMS = (
     ("cell-offset", "offset", "N"),
     ("cell-gain", "gain_error", "1"),

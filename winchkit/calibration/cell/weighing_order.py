@@ -9,8 +9,6 @@ from winchkit.errors import UsageError
 from winchkit.schema.calibration import CalibrationPoint
 from winchkit.units import GRAVITY, UNITS, convert
 
-__all__ = ["plan", "spoken"]
-
 _WEIGHTS = re.compile(r"([\d.,;\s]+?)\s*([a-zA-Z]+)")
 
 

@@ -17,8 +17,6 @@ from winchkit.model.robot import (
 from winchkit.model.robot.wrench import weight_by_payload
 from winchkit.schema.profiles.robot import PlatformSpec
 
-__all__ = ["CableForces"]
-
 
 @dataclass(frozen=True)
 class CableForces:

@@ -56,8 +56,6 @@ from winchkit.rendering import Plotted
 from winchkit.runs.poses import Measured
 from winchkit.tabular import Columns, Tabular
 
-__all__ = ["Calibrated", "Options", "calibrate", "equations_of", "split"]
-
 _HELD_OUT_EVERY = 10
 """Every tenth pose: the fit loses 5 % of its accuracy, and 100 poses leave ten for the held-out
 error."""

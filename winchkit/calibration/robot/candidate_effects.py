@@ -24,8 +24,6 @@ from winchkit.model.robot.identification.bundle_adjustment import (
     linearise,
 )
 
-__all__ = ["Candidate", "candidates"]
-
 Blocks = Mapping[str, NDArray[np.intp]]
 Values = NDArray[np.float64] | NDArray[np.bool_]
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["LAWS", "LawParameter"]
-
 
 @dataclass(frozen=True)
 class LawParameter:

@@ -42,8 +42,6 @@ from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.runs.poses import Measured
 from winchkit.schema.profiles.robot import PlatformSpec
 
-__all__ = ["Equations"]
-
 _RATIO_STEP = 1e-6
 """Relative step of a gear ratio for its derivative."""
 

@@ -26,13 +26,6 @@ from winchkit.model.robot.identification.bundle_adjustment import (
 )
 from winchkit.model.robot.rotation import mean_rotation, rotation_by, rotation_vector, skew
 
-__all__ = [
-    "Observability",
-    "observability",
-    "outside_bounds",
-    "refuse_unfit",
-]
-
 _LEAST_EIGENVALUE = 1e-11
 """Least eigenvalue of an identifiable direction, as a share of the largest: above rounding."""
 _SIGNIFICANT = 25.0

@@ -27,15 +27,6 @@ from winchkit.model.robot.identification.tracker import (
 )
 from winchkit.runs.poses import Measured
 
-__all__ = [
-    "LARGEST_SCALE",
-    "NUMBERS",
-    "OF_LINES",
-    "Instruments",
-    "declared_instruments",
-    "registered_instruments",
-]
-
 LARGEST_SCALE = 0.01
 """Largest relative error of a tracker's scale that is fitted: a hundred times that of a camera
 system in good order; beyond it units are wrong."""

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from winchkit.model.robot.identification.bundle_adjustment import Loss
 
-__all__ = ["Options", "ProgressCallback"]
-
 ProgressCallback = Callable[[str], None]
 
 

@@ -9,8 +9,6 @@ from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
 from winchkit.model.robot.identification.bundle_adjustment import Solution
 
-__all__ = ["gross_errors", "unexplained"]
-
 _WORDS = {
     "closure": "motor angles",
     "position": "positions",

@@ -20,16 +20,6 @@ from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotPr
 from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse
 
-__all__ = [
-    "EFFECTS",
-    "GEOMETRY",
-    "Estimated",
-    "Parameter",
-    "Parameters",
-    "own_effects",
-    "parameters_of",
-]
-
 _HOME = "home-length"
 
 

@@ -23,8 +23,6 @@ from winchkit.model.robot.identification.pose_design import (
 from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.runs.poses import Measured
 
-__all__ = ["NextPose", "next_poses"]
-
 _CANDIDATES = 400
 """Rule of thumb: of 400 random poses the best is within the best 1 % with a probability of 98 %."""
 _WIDER = 1.25

@@ -16,8 +16,6 @@ from winchkit.model.robot.identification.pose_estimation import start_pose
 from winchkit.model.robot.identification.tracker import pose_behind, reading_of, registered
 from winchkit.model.robot.rotation import rotation_vector
 
-__all__ = ["PoseErrors", "cable_errors", "errors_at", "predicted_poses", "rms", "start_of"]
-
 _ROUNDS = 4
 """Each multiplies the error of the lengths by the strain, at most some per cent: four reach 1e-6 of
 the elongation."""

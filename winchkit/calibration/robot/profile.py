@@ -26,8 +26,6 @@ from winchkit.profile_edit.document import effect_tables, read_document, write_d
 from winchkit.schema.profiles.winch import LAYERED
 from winchkit.units import format_quantity, parse
 
-__all__ = ["Provenance", "write_calibrated"]
-
 _SHOWN = {"m": "mm"}
 _DIGITS = 9
 """Significant digits: 1 nm in 1 m, below every uncertainty of a geometry."""

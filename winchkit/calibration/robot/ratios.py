@@ -32,8 +32,6 @@ from winchkit.arrays import Array
 from winchkit.calibration.robot.equations import Equations
 from winchkit.model.robot.identification.bundle_adjustment import Solution
 
-__all__ = ["Ratio", "Ratios", "ratios_of"]
-
 _PENALTY = 25.0
 """χ² that a line must explain to be named: five standard deviations."""
 _TOLERANCE = 1e-3

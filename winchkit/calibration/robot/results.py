@@ -15,14 +15,6 @@ from winchkit.calibration.robot.prediction import PoseErrors, rms
 from winchkit.calibration.robot.variance_components import NOISE
 from winchkit.model.robot import angles_of
 
-__all__ = [
-    "calibration_json",
-    "calibration_text",
-    "candidate_lines",
-    "in_words",
-    "noise_words",
-]
-
 _SHOWN = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0))}
 
 

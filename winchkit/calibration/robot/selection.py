@@ -56,8 +56,6 @@ from winchkit.model.robot.identification.bundle_adjustment import (
 )
 from winchkit.model.robot.identification.tracker import Tracker
 
-__all__ = ["Fitted", "fitted_with_instruments"]
-
 _NOISE_ROUNDS = 8
 """Rule of thumb: the components converge linearly; where two of them exchange variance they do not
 settle in any number of rounds."""

@@ -16,8 +16,6 @@ from winchkit.calibration.robot.parameters import Estimated
 from winchkit.fit_statistics import FitStatistics, FittedParameter, correlations_of
 from winchkit.model.robot.identification.bundle_adjustment import Solution, Weights
 
-__all__ = ["calibration_statistics"]
-
 _95 = 1.959964
 """Standard deviations: 97.5 % quantile of the normal distribution, for 95 % two-sided."""
 

@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from winchkit.model.robot.identification.bundle_adjustment import Solution, Weights, leverage
 from winchkit.model.robot.identification.variance_components import START, re_estimated
 
-__all__ = ["NOISE", "KindNoise", "re_estimated_weights"]
-
 
 @dataclass(frozen=True)
 class KindNoise:

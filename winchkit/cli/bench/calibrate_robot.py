@@ -18,12 +18,10 @@ if TYPE_CHECKING:
     from winchkit.bench.robot.computation import Computation
     from winchkit.bench.robot.self_calibration import PoseVolume, SelfCalibration
     from winchkit.bench.robot.tracker import Tracker
-    from winchkit.calibration.robot.calibrate import Options
+    from winchkit.calibration.robot.options import Options
     from winchkit.cli.core.terminal import ProgressCallback
     from winchkit.runs.run import Run
     from winchkit.schema.bench import BenchSpec
-
-__all__ = ["PoseSeries", "pose_names"]
 
 _FEWEST = 10
 """Poses from which a fit of those of a stopped calibration is suggested."""

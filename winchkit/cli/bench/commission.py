@@ -12,8 +12,6 @@ from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import bench_argument
 from winchkit.cli.core.output import echo_json
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

@@ -15,8 +15,6 @@ from winchkit.errors import UsageError
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
 
-__all__ = ["Directed", "direction_options", "magnitude", "read_direction"]
-
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 
 

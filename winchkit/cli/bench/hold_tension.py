@@ -19,8 +19,6 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 
-__all__ = ["command"]
-
 _NEEDS_CELL = "needs a bench with a load cell"
 
 

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from winchkit.bench.remote.station import Station
 
-__all__ = ["hold_on"]
-
 
 def hold_on(station: Station, winch: str | None, duration: float) -> None:
     """Refresh what was just started for ``duration`` s; raises MotionError where it has ended."""

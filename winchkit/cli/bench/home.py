@@ -19,8 +19,6 @@ from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
 
-__all__ = ["command"]
-
 _POLL = 0.02
 """s, below what a hand or a drive notices."""
 

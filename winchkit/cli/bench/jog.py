@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
     from winchkit.bench.remote.station import Station
 
-__all__ = ["command"]
-
 _SPEED = "0.05 m/s"
 _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
 

@@ -22,16 +22,6 @@ if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
     from winchkit.bench.remote.station import Station
 
-__all__ = [
-    "HELP",
-    "INCHES",
-    "HeldKey",
-    "KeyboardJog",
-    "Keys",
-    "Press",
-    "open_keys",
-]
-
 _ARROWS = {"\x1b[A": "up", "\x1b[B": "down", "\x1bOA": "up", "\x1bOB": "down"}
 _WINDOWS_ARROWS = {"H": "up", "P": "down"}
 _QUEUE = 4096

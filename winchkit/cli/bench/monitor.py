@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from winchkit.bench.remote.station import Station
 
-__all__ = ["command", "status_table"]
-
 
 @click.command(
     cls=Command,

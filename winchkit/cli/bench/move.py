@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
     from winchkit.bench.remote.station import Station
 
-__all__ = ["command"]
-
 _POLL = 0.05
 """s between two looks at a move; it delays the end of the command only."""
 

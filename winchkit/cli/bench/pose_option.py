@@ -5,10 +5,7 @@ from __future__ import annotations
 from math import degrees
 
 from winchkit.cli.core.quantities import check_typed, quantity
-from winchkit.errors import UsageError
-from winchkit.units import suggest
-
-__all__ = ["COORDINATES", "pose_line", "read_pose"]
+from winchkit.errors import UsageError, suggest
 
 COORDINATES = {
     "x": "length",

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
     from winchkit.schema.programme import Programme, Step
 
-__all__ = ["command"]
-
 _POLL = 0.05
 """s between two looks at a programme; it delays the end of the command only."""
 

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.robot_programme import RobotProgramme
 
-__all__ = ["run_robot"]
-
 
 def run_robot(
     programme: RobotProgramme,

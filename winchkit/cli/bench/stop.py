@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from winchkit.bench.emergency_stop import Stopped
     from winchkit.schema.bench import BenchSpec
 
-__all__ = ["command"]
-
 _PATIENCE = 3.0
 """With the owner, before the bus itself is used, s."""
 _BY_OWNER = "the bench's owner confirms it at rest"

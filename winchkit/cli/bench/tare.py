@@ -8,8 +8,6 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option, winch_argument
 from winchkit.cli.core.output import echo_json
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.completion import complete_bench, complete_winch
 from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.messages import note, suggest_next
-from winchkit.cli.core.options import TABLE, bench_by_default, complete_bench, complete_winch
+from winchkit.cli.core.options import TABLE, bench_by_default
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.standard_input import is_standard_input
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from winchkit.calibration.cell.fit import CellFit
     from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration, LoadDirection
-
-__all__ = ["command"]
 
 _AT_REST = 4.0
 """The spread of a mean over what white noise would make of it; more is a load that moves."""

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from winchkit.calibration.cell.health import Health
     from winchkit.drivers.reading import Reading
 
-__all__ = ["command"]
-
 _MEANINGS = {
     "mismatch": "status and value contradict each other; check order, type and scale of the "
     "value in the device file",

@@ -6,8 +6,6 @@ import click
 
 from winchkit.cli.core.lazy import At, LazyGroup
 
-__all__ = ["command"]
-
 COMMANDS = {
     "info": At("winchkit.cli.cell.info", "What an instrument is, and what it says now."),
     "rate": At("winchkit.cli.cell.rate", "How fast it can be read, and what limits that."),

@@ -10,8 +10,6 @@ from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.options import bench_option, complete_winch
+from winchkit.cli.core.completion import complete_winch
+from winchkit.cli.core.options import bench_option
 
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import Cells
-
-__all__ = ["cell_options", "cells", "host_tare_note", "shown", "unit_of"]
 
 _UNITS = {"cell": "N", "load": "N", "length": "m", "temperature": "degC"}
 

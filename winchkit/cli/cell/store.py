@@ -9,8 +9,6 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import yes_option
 from winchkit.cli.core.output import echo_json
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

@@ -9,8 +9,6 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

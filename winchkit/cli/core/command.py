@@ -18,8 +18,6 @@ from click.core import ParameterSource
 
 from winchkit.cli.core.messages import detail, is_verbose, verbosity_options
 
-__all__ = ["LETTERS", "Command", "Example", "Group"]
-
 LETTERS = {
     "b": "bench",
     "c": "column",

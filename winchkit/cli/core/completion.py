@@ -17,20 +17,6 @@ from click.shell_completion import CompletionItem
 
 from winchkit.regular_file import regular
 
-__all__ = [
-    "complete_bench",
-    "complete_device",
-    "complete_effect",
-    "complete_effect_of_profile",
-    "complete_file",
-    "complete_profile",
-    "complete_programme",
-    "complete_run",
-    "complete_sim_bench",
-    "complete_winch",
-    "files_of_kind",
-]
-
 _KIND = re.compile(r'^kind\s*=\s*"([\w-]+)"', re.MULTILINE)
 _HEAD = 2000
 """Characters of a file in which its kind stands."""

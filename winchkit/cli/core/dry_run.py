@@ -23,14 +23,6 @@ if TYPE_CHECKING:
     from winchkit.schema.simbench import SimBench
     from winchkit.sim.live.buses import Carried
 
-__all__ = [
-    "Frame",
-    "nodes_of",
-    "show_frames",
-    "station_for",
-    "writes",
-]
-
 _CYCLIC = ("SYNC", "RPDO", "heartbeat")
 _CONTROL_WORD = "6040h"
 

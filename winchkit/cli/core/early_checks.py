@@ -13,15 +13,6 @@ if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.programme import Programme
 
-__all__ = [
-    "check_exists",
-    "check_file",
-    "check_folder",
-    "check_new_file",
-    "check_output",
-    "check_winches",
-]
-
 
 def check_output(path: str | Path, suffixes: tuple[str, ...]) -> None:
     """Raise UsageError for an output of another format, in no folder, or that is a folder."""

@@ -12,10 +12,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from winchkit.cli.core.command import Group
-from winchkit.units import suggest
-
-__all__ = ["At", "LazyGroup"]
-
+from winchkit.errors import suggest
 
 _PROGRAM = "WINCHKIT"
 _SHARED = ("bench", "profile", "quiet", "verbose")

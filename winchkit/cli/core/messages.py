@@ -18,16 +18,6 @@ import click
 if TYPE_CHECKING:
     import logging
 
-__all__ = [
-    "COPY_OF_INPUT",
-    "detail",
-    "is_quiet",
-    "is_verbose",
-    "note",
-    "suggest_next",
-    "verbosity_options",
-]
-
 _QUIET = "winchkit.quiet"
 _VERBOSE = "winchkit.verbose"
 COPY_OF_INPUT = "winchkit.standard_input"

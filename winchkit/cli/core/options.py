@@ -12,7 +12,6 @@ import click
 
 from winchkit.cli.core.completion import (
     complete_bench,
-    complete_device,
     complete_file,
     complete_profile,
     complete_programme,
@@ -28,31 +27,6 @@ from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
-
-__all__ = [
-    "BENCH",
-    "BENCH_VARIABLE",
-    "PROFILE",
-    "PROGRAMME",
-    "RUN",
-    "SIM_BENCH",
-    "TABLE",
-    "BusChoice",
-    "bench_argument",
-    "bench_by_default",
-    "bench_option",
-    "bus_options",
-    "checked",
-    "complete_bench",
-    "complete_device",
-    "complete_winch",
-    "dry_run_option",
-    "effects_option",
-    "output_option",
-    "take_over_option",
-    "winch_argument",
-    "yes_option",
-]
 
 BENCH_VARIABLE = "WINCHKIT_BENCH"
 _ARGUMENT = "winchkit.bench_argument"

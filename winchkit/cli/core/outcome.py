@@ -15,8 +15,6 @@ from winchkit.bench.remote.interruption import Interruption, interrupted_by_sign
 from winchkit.cli.core.terminal import escaped_output
 from winchkit.errors import Fault, FileError, WinchkitError
 
-__all__ = ["INTERNAL", "INTERRUPTED", "finish", "threads_abandoned"]
-
 INTERRUPTED = 130
 """128 + SIGINT (2), the convention of shells."""
 INTERNAL = 70

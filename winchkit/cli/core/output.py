@@ -16,8 +16,6 @@ import click
 from winchkit.errors import CONTROL_CHARACTERS
 from winchkit.plain_json import finite_or_none
 
-__all__ = ["echo_each", "echo_json", "plain", "to_json"]
-
 
 def to_json(value: object) -> str:
     """One line of JSON; NaN and infinity become null, dataclasses objects, and arrays lists.

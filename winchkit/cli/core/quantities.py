@@ -6,8 +6,6 @@ from winchkit.errors import UsageError
 from winchkit.schema.plausible import typed_quantity
 from winchkit.units import UNITS, article, number_and_unit
 
-__all__ = ["check_typed", "dimension", "optional", "quantity", "seconds"]
-
 
 def quantity(text: str, dimension: str) -> float:
     """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError, also for a time below zero."""

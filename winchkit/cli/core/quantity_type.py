@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import click
 
-__all__ = ["Quantity", "naming"]
-
 
 class Quantity(click.ParamType):  # type: ignore[type-arg]
     """A number with a unit of one of some dimensions.

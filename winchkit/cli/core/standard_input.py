@@ -19,8 +19,6 @@ from click.shell_completion import CompletionItem
 from winchkit.cli.core.messages import COPY_OF_INPUT, note
 from winchkit.cli.core.terminal import EscapedStream
 
-__all__ = ["Completer", "Readable", "forget_typed", "is_standard_input"]
-
 Completer = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 _MAGIC = (

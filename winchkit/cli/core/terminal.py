@@ -28,24 +28,6 @@ if TYPE_CHECKING:
 
     from winchkit.bench.recording.live_sinks import LiveSink
 
-__all__ = [
-    "HEADS",
-    "EscapedStream",
-    "ProgressCallback",
-    "cell",
-    "counter_rows",
-    "counter_table",
-    "escaped_output",
-    "live_display",
-    "live_sinks",
-    "live_table",
-    "progress_bar",
-    "screen",
-    "status_line",
-    "terminal_console",
-]
-
-
 ProgressCallback = Callable[[str, float | None], None]
 """Called with the present task and the share that is done; None where that is not known."""
 

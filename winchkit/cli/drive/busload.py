@@ -13,8 +13,6 @@ from winchkit.cli.core.output import echo_json
 if TYPE_CHECKING:
     from winchkit.drivers.can.bus.load import Load
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Group
+from winchkit.cli.core.completion import complete_winch
 from winchkit.cli.core.early_checks import check_exists, check_output
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import (
     TABLE,
     BusChoice,
     bus_options,
-    complete_winch,
     dry_run_option,
     output_option,
     yes_option,
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from winchkit.cli.core.dry_run import Frame
     from winchkit.drivers.can.canopen.node import Objects
     from winchkit.drivers.can.tools.config import Difference
-
-__all__ = ["command"]
 
 _FORMATS = (".dcf", ".json")
 _FILE = click.Path(dir_okay=False, path_type=Path)

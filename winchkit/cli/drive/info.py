@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.command import Command, Example
-from winchkit.cli.core.options import BusChoice, bus_options, complete_device, complete_winch
+from winchkit.cli.core.completion import complete_device, complete_winch
+from winchkit.cli.core.options import BusChoice, bus_options
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
     from winchkit.bench.drives.node_access import Node
     from winchkit.drivers.can.tools.info import DriveInfo, Noted
-
-__all__ = ["command"]
 
 
 @click.command(

@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     from winchkit.drivers.can.canopen.identity import Identity
     from winchkit.drivers.can.canopen.lss import LssLine
 
-__all__ = [
-    "command",
-    "rehearsed",
-]
-
 _BUS = "can"
 _SELECTED = {0x43: 0x44}
 """Answers whose first byte is not that of the question."""

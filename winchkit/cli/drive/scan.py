@@ -15,8 +15,6 @@ from winchkit.errors import NoReply
 if TYPE_CHECKING:
     from winchkit.drivers.can.tools.scan import Found
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

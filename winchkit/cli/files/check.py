@@ -20,8 +20,6 @@ from winchkit.errors import Fault, FileError, one_line
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
 
-__all__ = ["Verdict", "check", "command"]
-
 RUNS = (".csv", ".mcap")
 EDS = (".eds", ".dcf")
 _XML = (".xdd", ".xdc", ".xml")

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
 
-__all__ = ["about_computer", "refusals"]
-
 _SIMULATED = ("virtual", "udp_multicast")
 
 

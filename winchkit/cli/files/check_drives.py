@@ -14,8 +14,6 @@ from winchkit.schema.simbench import SimBench
 if TYPE_CHECKING:
     from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["DriveReport", "report_of"]
-
 _EXAMPLE = 100.0
 """rpm: a speed of which the number is easily compared with the manual's."""
 

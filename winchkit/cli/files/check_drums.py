@@ -10,8 +10,6 @@ if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.read import Declared
 
-__all__ = ["stroke_of", "warnings_of_drums"]
-
 
 def warnings_of_drums(file: str, value: Declared) -> tuple[Fault, ...]:
     """Warnings of a profile at its reference, or of a bench at the ends of its length limits."""

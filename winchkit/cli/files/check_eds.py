@@ -11,8 +11,6 @@ from winchkit.errors import Fault
 if TYPE_CHECKING:
     from winchkit.drivers.can.canopen.description import DriveDescription, PdoEntry
 
-__all__ = ["describe_eds", "lines_of"]
-
 _SHOWN = 12
 """Values of an instrument in one line."""
 

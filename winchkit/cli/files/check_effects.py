@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from winchkit.schema.profiles.winch import WinchProfile
     from winchkit.schema.read import Declared
 
-__all__ = ["bench_of", "faults_and_warnings"]
-
 
 def faults_and_warnings(
     file: str, value: Declared, effects: Sequence[str]

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from winchkit.schema.read import Declared
     from winchkit.schema.reading.lines import Key
 
-__all__ = ["faults_and_warnings"]
-
 Said = list[tuple["Key", str]]
 _NEAR = 1e-3
 """m and rad: far above the tolerance of the solution, below what a profile can mean by another

@@ -6,8 +6,6 @@ import click
 
 from winchkit.cli.core.command import Command
 
-__all__ = ["command"]
-
 _SHELLS = ("bash", "zsh", "fish")
 
 

@@ -11,8 +11,6 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import runs_argument
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

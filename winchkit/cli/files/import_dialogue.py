@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from winchkit.runs.importing.answers import Answers
     from winchkit.runs.importing.assignment import Guess, Question
 
-__all__ = ["asked"]
-
 
 def asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
     """Ask the open questions on the terminal, and guess again with the answers.

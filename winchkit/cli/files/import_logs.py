@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from winchkit.runs.run import Run
     from winchkit.schema.mapping import ImportMapping
 
-__all__ = ["command"]
-
 _MAPPING = "mapping.toml"
 _NO_ANGLE = (
     "no column is the motor angle or velocity, without which there is no run: name it by --column "

@@ -12,8 +12,6 @@ if TYPE_CHECKING:
     from winchkit.runs.importing.assignment import Assignment, Guess
     from winchkit.runs.importing.table import Column
 
-__all__ = ["alike", "entry_of", "shortened", "tables_text"]
-
 _WIDEST = 24
 """Characters of a name or of values, so that a row fits on a usual terminal."""
 _PLOT = 16

@@ -13,8 +13,6 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import json_option
 
-__all__ = ["command"]
-
 
 @click.command(
     "diagnose",

@@ -7,8 +7,6 @@ import click
 from winchkit.cli.core.command import Example
 from winchkit.cli.core.lazy import At, LazyGroup
 
-__all__ = ["command"]
-
 COMMANDS = {
     "diagnose": At("winchkit.cli.library.diagnose", "Diagnose every winch and session."),
     "trend": At("winchkit.cli.library.trend", "What changed, since when, at what cost."),

@@ -6,8 +6,6 @@ import click
 
 from winchkit.cli.core.lazy import At, LazyGroup
 
-__all__ = ["command"]
-
 COMMANDS = {
     "index": At("winchkit.cli.library.index", "Bring the tables to the state of the files."),
     "list": At("winchkit.cli.library.list", "List runs by winch, programme, load, date, verdict."),

@@ -11,8 +11,6 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.model.options import json_option
 
-__all__ = ["command"]
-
 
 @click.command(
     "query",

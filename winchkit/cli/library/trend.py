@@ -15,8 +15,6 @@ from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import html_option, json_option, write_page
 from winchkit.errors import UsageError, suggest
 
-__all__ = ["command"]
-
 
 @click.command(
     "trend",

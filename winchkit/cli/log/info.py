@@ -16,8 +16,6 @@ from winchkit.errors import one_line
 if TYPE_CHECKING:
     from winchkit.runs.info import LogInfo, SourceInfo
 
-__all__ = ["command"]
-
 _SHOWN = 100
 """Characters of a metadata value that are shown; ``--json`` has all."""
 

@@ -12,15 +12,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.bench.remote.interruption import Terminated
+from winchkit.cli.core.completion import complete_bench
 from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.messages import suggest_next
-from winchkit.cli.core.options import (
-    bench_by_default,
-    complete_bench,
-    effects_option,
-    output_option,
-)
+from winchkit.cli.core.options import bench_by_default, effects_option, output_option
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.errors import UsageError, WinchkitError
@@ -28,8 +24,6 @@ from winchkit.errors import UsageError, WinchkitError
 if TYPE_CHECKING:
     from winchkit.bench.recording.live_sinks import LiveSink
     from winchkit.bench.remote.station import Station
-
-__all__ = ["command"]
 
 COMMANDS = {
     "info": At("winchkit.cli.log.info", "What a log holds: channels, rates, gaps, counters."),

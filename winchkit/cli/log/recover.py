@@ -11,8 +11,6 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.errors import UsageError
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

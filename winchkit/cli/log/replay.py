@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from winchkit.bench.control.snapshot import BenchSnapshot
     from winchkit.bench.recording.live_sinks import LiveSink
 
-__all__ = ["command"]
-
 _SHOW_PERIOD = 0.1
 """s between two pictures; ten a second look continuous."""
 

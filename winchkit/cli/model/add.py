@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
     from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=ManyValues,

@@ -28,12 +28,11 @@ from winchkit.cli.model.options import (
 from winchkit.errors import UsageError, suggest
 
 if TYPE_CHECKING:
-    from winchkit.calibration.robot.calibrate import Calibrated, Options
+    from winchkit.calibration.robot.calibrate import Calibrated
+    from winchkit.calibration.robot.options import Options
     from winchkit.calibration.robot.pose_design import NextPose
     from winchkit.cli.bench.calibrate_robot import PoseSeries
     from winchkit.cli.core.terminal import ProgressCallback
-
-__all__ = ["command"]
 
 Loss = Literal["least-squares", "huber", "cauchy"]
 
@@ -265,7 +264,7 @@ def _source(robot: str, runs: Sequence[str]) -> str:
 def _options(
     effects: Sequence[str], noise: Sequence[str], loss: str, middle_force: str | None
 ) -> Options:
-    from winchkit.calibration.robot.calibrate import Options
+    from winchkit.calibration.robot.options import Options
     from winchkit.cli.core.quantities import optional
 
     middle = optional(middle_force, "force")

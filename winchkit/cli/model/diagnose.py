@@ -39,8 +39,6 @@ if TYPE_CHECKING:
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

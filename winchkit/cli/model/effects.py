@@ -27,12 +27,6 @@ from winchkit.cli.model.options import (
 if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue
 
-__all__ = [
-    "command",
-    "new",
-    "show",
-]
-
 _OUTPUTS = ("cable_length", "tension", "motor_torque")
 
 

@@ -8,8 +8,6 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.model.options import html_option, profile_option, write_page
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

@@ -26,30 +26,6 @@ if TYPE_CHECKING:
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = [
-    "Asked",
-    "ManyValues",
-    "declared_profile",
-    "figures_option",
-    "html_option",
-    "json_option",
-    "model_options",
-    "page_title",
-    "pages_beside",
-    "profile_option",
-    "read_all",
-    "read_each",
-    "read_runs",
-    "refuse_curves",
-    "refuse_options",
-    "runs_argument",
-    "save_figures",
-    "save_page",
-    "suggest_with",
-    "write_figures",
-    "write_page",
-]
-
 profile_option = click.option(
     "-p",
     "--profile",

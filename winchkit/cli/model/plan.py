@@ -25,8 +25,7 @@ from winchkit.cli.model.options import (
     runs_argument,
     suggest_with,
 )
-from winchkit.errors import UsageError
-from winchkit.units import suggest
+from winchkit.errors import UsageError, suggest
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.design.plan import Offer
@@ -36,12 +35,6 @@ if TYPE_CHECKING:
     from winchkit.schema.bench import LimitSpec
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
-
-__all__ = [
-    "command",
-    "suggest_run",
-    "tell_poses",
-]
 
 
 def tell_poses(

@@ -25,8 +25,6 @@ from winchkit.cli.model.options import (
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Removal
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=ManyValues,

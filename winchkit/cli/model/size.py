@@ -12,9 +12,7 @@ from winchkit.cli.core.options import TABLE
 from winchkit.cli.core.output import echo_json
 
 if TYPE_CHECKING:
-    from winchkit.model.sizing.sizing import Row
-
-__all__ = ["command"]
+    from winchkit.model.sizing.row import Row
 
 _SHOWN = {"m": ("mm", 1e-3), "rad/s": ("rpm", 0.10471975511965977)}
 """SI units that a table for people writes in others."""

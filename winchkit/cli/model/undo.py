@@ -12,8 +12,6 @@ from winchkit.cli.core.options import output_option
 from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.cli.model.options import profile_option
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

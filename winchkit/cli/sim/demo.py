@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from winchkit.cli.sim.demo_loop import Findings
     from winchkit.diagnosis.results import Comparison
 
-__all__ = ["command"]
-
 _RECORDING_SECONDS = 62.0
 """s of simulated time of the programme; the progress bar needs its length only."""
 _BEFORE_THE_END = 0.98

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from winchkit.schema.programme import Programme, Step
     from winchkit.schema.simbench import SimBench
 
-__all__ = ["Findings", "ProgressCallback", "learn", "programmes", "record", "truth_of"]
-
 ProgressCallback = Callable[[str, float], None]
 """Called with the present step and the recorded time, s."""
 

@@ -6,8 +6,6 @@ import click
 
 from winchkit.cli.core.lazy import At, LazyGroup
 
-__all__ = ["command"]
-
 COMMANDS = {
     "record": At("winchkit.cli.sim.record", "Run programmes without buses and write the runs."),
     "serve": At("winchkit.cli.sim.serve", "Run a simulated bench live, with its buses."),

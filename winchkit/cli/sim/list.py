@@ -7,8 +7,6 @@ import click
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import echo_json
 
-__all__ = ["command"]
-
 
 @click.command(
     "list",

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from winchkit.runs.run import Run
     from winchkit.schema.programme import Programme
 
-__all__ = ["command"]
-
 
 @click.command(
     "record",

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from winchkit.sim.live.bench import LiveBench
     from winchkit.sim.live.buses import Interface
 
-__all__ = ["command"]
-
 _CHECK_EVERY = 0.1
 """s between two looks at the simulation; it delays the end of the command only."""
 _TURN = 1e-4

@@ -16,8 +16,6 @@ from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.model.options import declared_profile
 from winchkit.errors import UsageError
 
-__all__ = ["command"]
-
 
 @click.command(
     cls=Command,

@@ -24,8 +24,6 @@ from winchkit.runs.sanity.local_noise import local_noise
 from winchkit.runs.sanity.quantisation import resolution
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["COPIES", "without_copies"]
-
 COPIES = "repeats-are-copies"
 _DEPENDENT = 0.1
 """Median difference over the noise of one recording; of independent ones it is 0.95."""

@@ -46,8 +46,6 @@ from winchkit.runs.sanity.text import size
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Dataset", "Filtering", "Recording", "assemble", "prepare"]
-
 Mask = NDArray[np.bool_]
 
 

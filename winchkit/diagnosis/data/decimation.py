@@ -23,8 +23,6 @@ from winchkit.model.line import Motion
 from winchkit.model.stages import At
 from winchkit.runs.run import Run
 
-__all__ = ["LEAST_RATE", "Decimation", "decimation_for"]
-
 _LEAST_SAMPLES = 200_000
 """Samples of all runs from which decimation begins."""
 _TARGET_SAMPLES = 90_000

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 
-__all__ = ["half_of_samples_per_turn", "strongest_harmonic", "sums_by_order"]
-
 _TURN = 2 * np.pi
 """Rad of a turn; definition."""
 _MOST_ORDERS = 1000

@@ -27,14 +27,6 @@ from winchkit.diagnosis.data.spectrum import band_edges
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 
-__all__ = [
-    "contrasts",
-    "denoised_motions",
-    "shared_by_instruments",
-    "shared_by_repeats",
-    "wiener_filtered",
-]
-
 _FLOOR_SHARE = 1 / 3
 """Share of the highest frequencies whose mean power is taken for white noise; screened."""
 

@@ -19,8 +19,6 @@ from winchkit.model.line import Line, Motion
 from winchkit.runs.sanity.local_noise import local_noise
 from winchkit.runs.sanity.rounding import mean_error, noise_before_rounding
 
-__all__ = ["RoundingError", "instrument_noise", "rounding_errors"]
-
 _WINDOW = 25
 """Samples of a moving mean: it leaves a fifth of the noise and follows a motion."""
 

@@ -31,8 +31,6 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import size
 
-__all__ = ["Compared", "RemovedBand", "cut_off_of", "removed_by_low_pass", "torque_cut_off"]
-
 _TORQUE_BAND = 20.0
 """Usual cut-off of the torque, Hz; a tenth of a sampling rate below 200 Hz; convention of robot
 identification."""

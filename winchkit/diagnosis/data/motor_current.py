@@ -9,8 +9,6 @@ from winchkit.errors import Fault, RunError
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["with_torques"]
-
 
 def with_torques(runs: Sequence[Run], profile: WinchProfile) -> list[Run]:
     """Runs with a motor torque where only the motor current was recorded.

@@ -28,8 +28,6 @@ from winchkit.diagnosis.data.spectrum import fast_count
 from winchkit.model.stages import Signals
 from winchkit.units import GRAVITY
 
-__all__ = ["Outlying", "Repeats", "find_repeats", "mean_load", "outlying_repeat"]
-
 _ANGLE_TOLERANCE = 0.02
 """Rms difference of aligned motor angles of repeats, over their standard deviation; screened."""
 _LOAD_TOLERANCE = 0.02

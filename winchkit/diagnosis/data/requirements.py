@@ -11,8 +11,6 @@ from winchkit.effects.effect import NEED_WORDS, Effect
 from winchkit.model.stages import Stage
 from winchkit.schema.profiles.axis import AxisProfile
 
-__all__ = ["excites", "missing_needs"]
-
 _PERIODS = 2
 """Periods of an order that the motor must turn through; screened."""
 

@@ -13,15 +13,6 @@ from winchkit.model.derivatives import Clock
 from winchkit.model.smoothing_spline import SmoothingSpline
 from winchkit.runs.run import Run
 
-__all__ = [
-    "away_from",
-    "bridged",
-    "bridged_channel",
-    "even_instants",
-    "evenly_stamped",
-    "gaps",
-]
-
 Mask = NDArray[np.bool_]
 
 _GAP = 2.5

@@ -16,8 +16,6 @@ from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import Inspection
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["ALARMING", "caveats", "findings", "resolutions", "usable"]
-
 ALARMING = frozenset({"inverted-sign", "wrong-factor"})
 """Codes of findings with which effects of a winch are not looked for."""
 

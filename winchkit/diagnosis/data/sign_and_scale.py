@@ -38,8 +38,6 @@ from winchkit.runs.sanity.finding import Finding
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["MOST_SAMPLES", "length_words", "mending_column", "sign_and_scale"]
-
 _LARGEST = 1.8
 """Slope of measured over predicted, or its reciprocal, beyond which a unit is wrong; below the
 smallest constant of another unit but ft lb (1.36), above every effect: slopes of 120 simulated runs

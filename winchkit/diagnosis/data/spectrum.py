@@ -17,20 +17,6 @@ from scipy.special import chdtri, fdtri
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.sampling import bridged
 
-__all__ = [
-    "LOST_POWER",
-    "WHOLE_TRANSITION",
-    "Band",
-    "band_edges",
-    "fast_count",
-    "highest_frequency",
-    "low_pass",
-    "narrow_edges",
-    "smoothed",
-    "to_frequency",
-    "to_time",
-]
-
 _BUTTERWORTH_ORDER = 4
 """Order of the zero-phase low-pass of the torque; convention of robot identification (forward and
 backward Butterworth filter)."""

@@ -26,14 +26,6 @@ from winchkit.model.line import Motion
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import size
 
-__all__ = [
-    "STANDSTILL",
-    "spread_at_standstill",
-    "standstill_findings",
-    "standstill_mask",
-    "standstills",
-]
-
 STANDSTILL = "standstill"
 _LEAST_SAMPLES = 5
 """A shorter interval has hardly a variance, and a slow motion crosses its noise in it."""

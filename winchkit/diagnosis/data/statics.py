@@ -18,8 +18,6 @@ from winchkit.runs.sanity.local_noise import local_noise
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["is_at_rest", "prepared_statics"]
-
 _COMPARED = ("tension", "load", "temperature")
 _BEYOND_NOISE = 5.0
 """Standard deviation of a channel, in its local noise, that is a motion."""

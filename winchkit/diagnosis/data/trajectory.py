@@ -31,8 +31,6 @@ from winchkit.runs.holds import averaged
 from winchkit.runs.poses import Measured, Samples, joined
 from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
 
-__all__ = ["Trajectory", "trajectory_of"]
-
 _TRAVEL = 5e-3
 """Cable travel within a block, m: the second order of a length of 0.5 m is then 2 µm."""
 _MOST = 300

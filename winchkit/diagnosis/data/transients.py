@@ -16,8 +16,6 @@ from winchkit.model.derivatives import Clock
 from winchkit.model.drum import Spiral, drum_of
 from winchkit.model.line import Motion
 
-__all__ = ["transient_mask", "uncertain_force_mask", "white_noise", "with_neighbours"]
-
 Mask = NDArray[np.bool_]
 _NEIGHBOURS = 2
 """Samples to either side of a transient, besides the reach of the derivatives."""

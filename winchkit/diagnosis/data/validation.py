@@ -21,8 +21,6 @@ from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.repeated_values import constant
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["validate_runs", "without_constants"]
-
 _LEAST_SAMPLES = 50
 """Samples that a run must have; screened."""
 _SLOPE_RANGE = 0.75, 1.3333

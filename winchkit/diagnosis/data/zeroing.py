@@ -29,17 +29,6 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import size
 
-__all__ = [
-    "BLOCKS",
-    "LEVEL",
-    "angles_from_zero",
-    "as_noise",
-    "is_random_walk",
-    "is_setting",
-    "zeroed_anew",
-    "zeroed_finding",
-]
-
 BLOCKS = 8
 """Blocks of time over which the difference of two repeats, or the residual of a run, is averaged;
 screened: longer than the correlation time of an instrument, and seven degrees of freedom."""

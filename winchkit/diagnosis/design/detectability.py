@@ -11,8 +11,6 @@ from winchkit.diagnosis.results import Detectable
 from winchkit.diagnosis.selection.scores import Score
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["DetectionThreshold", "detectable"]
-
 _POWER_QUANTILE = 1.2816
 """Normal quantile of the power of detectable sizes; theory: Φ⁻¹(0.90)."""
 

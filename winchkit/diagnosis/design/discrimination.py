@@ -25,16 +25,6 @@ from winchkit.diagnosis.results import NextRun
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 
-__all__ = [
-    "LEAST_POWER",
-    "SEPARATED_AT",
-    "Information",
-    "information_of",
-    "next_runs",
-    "power_of",
-    "separation",
-]
-
 SEPARATED_AT = 3.841
 """95 % quantile of χ² with one degree of freedom."""
 _MOST_OFFERS = 2

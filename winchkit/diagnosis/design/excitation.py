@@ -12,8 +12,6 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import LEAST_TEMPERATURE_RANGE
 from winchkit.model.line import CREEP_SPEED
 
-__all__ = ["missing_excitation"]
-
 _LEAST_LOAD_RANGE = 0.05
 """Relative range of loads below which a note says "one load only"; rule of thumb."""
 _LEAST_SHARE_OF_DIRECTION = 0.02

@@ -28,8 +28,6 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.schema.programme import Programme, Step
 
-__all__ = ["Offer", "inseparable", "offers", "programme_of"]
-
 _HIGH_POWER = 0.9
 """Power below which a programme is not worth a run."""
 _LOADING_MINUTES, _WARMING_MINUTES = 1 / 3, 20.0

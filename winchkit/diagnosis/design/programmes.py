@@ -18,16 +18,6 @@ from winchkit.runs.run import Channel, Run
 from winchkit.schema.bench import LimitSpec
 from winchkit.units import GRAVITY
 
-__all__ = [
-    "CANDIDATE_PROGRAMMES",
-    "CandidateProgramme",
-    "OperatingRange",
-    "range_of_limits",
-    "range_of_runs",
-    "simulated",
-    "usual_temperature",
-]
-
 _MARGIN = 0.05
 """Share of a bench's stroke that is kept free at each end."""
 _RESERVE = 1.5

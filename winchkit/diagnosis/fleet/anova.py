@@ -29,8 +29,6 @@ from winchkit.diagnosis.residuals.attribution import (
     variables_of,
 )
 
-__all__ = ["SharedAttribution", "SharedError", "WinchErrors", "errors_of", "shared_errors"]
-
 _MOST_SAMPLES = 50_000
 """Samples per winch; shares do not become more exact with more."""
 _OUTLYING_SHARE = 0.5

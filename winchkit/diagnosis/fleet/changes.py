@@ -29,8 +29,6 @@ from scipy.special import stdtr
 from winchkit.arrays import Array
 from winchkit.diagnosis.fleet.robust_variance import Variance, robust_variance
 
-__all__ = ["Change", "Series", "StepDate", "change_of", "session_variance", "step_date"]
-
 LEAST_SESSIONS = 4
 """Sessions from which a change is tested."""
 _COMPARED = 0.05

@@ -13,8 +13,6 @@ from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["diagnose_each"]
-
 _CONCURRENT = 2
 """Winches that are diagnosed at the same time; computing cost: memory and cores."""
 

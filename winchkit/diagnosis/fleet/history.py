@@ -28,8 +28,6 @@ from winchkit.diagnosis.fleet.robust_variance import Variance
 from winchkit.diagnosis.fleet.sessions import SessionEstimate
 from winchkit.diagnosis.fleet.variance_function import moderated_stds, power_of_stated
 
-__all__ = ["FleetHistory", "FleetParameter", "WinchHistory", "fleet_history"]
-
 _FALSE_DISCOVERY_RATE = 0.01
 """False discovery rate of changes and of odd winches; convention."""
 _RIVAL_LEVEL = 0.05

@@ -15,8 +15,6 @@ from scipy.special import stdtrit
 from winchkit.diagnosis.fleet.changes import Series
 from winchkit.diagnosis.fleet.robust_variance import Variance
 
-__all__ = ["LimitDate", "limit_date"]
-
 
 @dataclass(frozen=True)
 class LimitDate:

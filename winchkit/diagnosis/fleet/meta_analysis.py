@@ -26,16 +26,6 @@ from winchkit.diagnosis.results import Diagnosis, Place, Step
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect, Parameter
 
-__all__ = [
-    "WINCHES_PER_OUTLYING",
-    "Pooled",
-    "SharedEffect",
-    "alarms",
-    "place_text",
-    "pooled",
-    "shared_effects",
-]
-
 _HOMOGENEITY_LEVEL = 0.01
 """Level of the homogeneity test."""
 _LEAST_WINCHES = 3

@@ -27,8 +27,6 @@ from scipy.special import stdtr
 from winchkit.arrays import Array
 from winchkit.diagnosis.fleet.meta_analysis import WINCHES_PER_OUTLYING
 
-__all__ = ["PartialPooling", "odd_p_values", "partial_pooling"]
-
 LEAST_WINCHES = 4
 """Winches from which one can differ from a majority of the others."""
 _GRID = 60

@@ -14,8 +14,6 @@ from scipy.optimize import brentq
 
 from winchkit.arrays import Array
 
-__all__ = ["Variance", "robust_variance"]
-
 _MEDIAN_OF_CHI_SQUARE = 0.454936
 """Median of χ²(1); theory."""
 _EFFICIENCY = 0.367

@@ -33,8 +33,6 @@ from winchkit.effects.term import Term
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["SessionEstimate", "common_terms", "fit_session", "null_term"]
-
 _STEP = 1e-3
 """Step of a difference of values by a fit's coordinate; numerical."""
 

@@ -25,8 +25,6 @@ from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Swap", "swapped_by_radius", "swapped_profiles"]
-
 _LEVEL = 0.01
 """Level of the test of exchanged profiles; convention."""
 _RADIUS, _RATIO = "drum-radius", "gear-ratio"

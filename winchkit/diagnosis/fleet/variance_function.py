@@ -25,8 +25,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["moderated_stds", "power_of_stated"]
-
 _VARIANCE_OF_LN_CHI_SQUARE = 4.934802
 """Of ln χ²(1): π²/2."""
 _PRIOR_STD = 0.5

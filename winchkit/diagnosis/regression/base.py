@@ -26,8 +26,6 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.model.stages import At, Stage
 
-__all__ = ["Coarse", "Folds", "Regression", "Segment"]
-
 
 @dataclass(frozen=True)
 class Segment:

@@ -26,8 +26,6 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Motion
 
-__all__ = ["CoarseTimeSeries", "coarse_regression"]
-
 _SAMPLES = 4000
 """Samples of all runs that are aimed at."""
 _LEAST_SAMPLES = 400

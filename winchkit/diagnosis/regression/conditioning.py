@@ -21,8 +21,6 @@ from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["ValueCovariance", "collinearity", "value_covariance"]
-
 _STEP = 1e-4
 """Step of a difference of values by a fit's coordinate; numerical."""
 

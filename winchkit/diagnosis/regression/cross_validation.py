@@ -23,15 +23,6 @@ from winchkit.diagnosis.regression.base import Folds, Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 
-__all__ = [
-    "extrapolation",
-    "held_out",
-    "held_out_rms",
-    "held_out_samples",
-    "left_out_steps",
-    "signed_rank_p_value",
-]
-
 _TOUCHED = 0.02
 """Blocks whose loss changes by less than this share of the largest change are not ranked;
 screened."""

@@ -24,8 +24,6 @@ from winchkit.effects.term import modifiers_of
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Signals
 
-__all__ = ["discretization_error", "without_discretization_error"]
-
 _FINER = 4
 """Intervals into which a sampling interval is divided; theory: differences have an error in the
 square of the interval, of which 1/16 is left."""

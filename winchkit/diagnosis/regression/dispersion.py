@@ -25,8 +25,6 @@ from winchkit.diagnosis.regression.intervals import whitened_jacobian
 from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof, sums_per_band
 from winchkit.diagnosis.regression.projection import orthonormal
 
-__all__ = ["fits_worse", "largest_loss", "overdispersed"]
-
 _EQUAL = 0.05
 """Level of the test that residual and noise of a band have one variance."""
 _WORSE = 1 / 740

@@ -18,8 +18,6 @@ from winchkit.diagnosis.data.transients import with_neighbours
 from winchkit.diagnosis.regression.hypothesis import Hypothesis, started
 from winchkit.effects.term import Term
 
-__all__ = ["without_impacts"]
-
 _FORCES = ("tension", "motor_torque")
 _MOST = 0.25
 """Share of samples beyond which impacts are not left out; screened."""

@@ -8,8 +8,6 @@ import numpy as np
 
 from winchkit.diagnosis.regression.base import Folds, Segment
 
-__all__ = ["five_blocks", "group_folds", "time_blocks"]
-
 _BLOCKS = 48
 """Blocks of time of all runs together; theory: a jackknife over n blocks has a relative standard
 error of 1/√(2(n − 1)), 10 %."""

@@ -28,16 +28,6 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Coarse, Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 
-__all__ = [
-    "CoarseProblem",
-    "Fit",
-    "Target",
-    "evaluated",
-    "fit",
-    "fit_from",
-    "starts_from_coarse_fits",
-]
-
 _ITERATIONS = 15
 """Steps of a fit; measured: 6 of 296 fits ended there."""
 _ITERATIONS_OF_PRODUCTS = 40

@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 from winchkit.effects.effect import Effect
 from winchkit.effects.term import Term
 
-__all__ = ["START", "Hypothesis", "started"]
-
 START = "start"
 """Parameter of an effect with memory: its state at the start of a run."""
 

@@ -39,18 +39,6 @@ from winchkit.effects.effect import Parameter
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = [
-    "HALF_WIDTH",
-    "BetweenParts",
-    "Spread",
-    "between_parts",
-    "effective_dof",
-    "estimates",
-    "profile_ends",
-    "spread_of",
-    "whitened_jacobian",
-]
-
 HALF_WIDTH = 1.959964
 """Standard deviations from a value to the end of its 95 % interval."""
 _MANY_PARTS = 3.0

@@ -21,8 +21,6 @@ from winchkit.diagnosis.regression.noise import (
 )
 from winchkit.diagnosis.regression.projection import orthonormal
 
-__all__ = ["BAND_LEVEL", "LackOfFitTest", "lack_of_fit_test"]
-
 BAND_LEVEL = 0.05
 """Level of the rejection of a band, Bonferroni over all bands."""
 

@@ -28,16 +28,6 @@ from winchkit.diagnosis.data.spectrum import smoothed
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.projection import LEAST_EIGENVALUE, orthonormal
 
-__all__ = [
-    "Noise",
-    "noise_from_repeats",
-    "noise_saturated",
-    "replicate_contrasts",
-    "replicate_rms",
-    "satterthwaite_dof",
-    "sums_per_band",
-]
-
 _KNOWN_DIFFERENCES = 6
 """Directions that known differences between repeats may take out of the pure error; screened."""
 _NOTICEABLE = 0.02

@@ -21,8 +21,6 @@ from winchkit.model.line import Line, Motion
 from winchkit.model.stages import Stage, WinchKinematics
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Predictor", "masked"]
-
 Part = TypeVar("Part")
 Correction = float | None
 """Discretisation correction of a known weight's force; None for no correction."""

@@ -6,16 +6,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = [
-    "LEAST_EIGENVALUE",
-    "explained_ss",
-    "explained_ss_of_sets",
-    "inverse_information",
-    "inverse_normal",
-    "orthonormal",
-    "partialled_out",
-]
-
 _UNIDENTIFIABLE = 1e-12
 """Eigenvalue of a scaled normal matrix, over the largest, below which a direction is not
 determined; numerical."""

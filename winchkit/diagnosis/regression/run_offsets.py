@@ -39,8 +39,6 @@ from winchkit.diagnosis.results import RunOffset
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.runs.sanity.finding import Finding
 
-__all__ = ["offset_between_runs", "run_offsets", "with_run_offsets"]
-
 _LEAST_SHARE = 1e-6
 """Share of a column's squared length that other columns must leave, for a direction to count."""
 

@@ -41,8 +41,6 @@ from winchkit.effects.effect import Effect
 from winchkit.model.line import Line
 from winchkit.model.stages import At, Stage
 
-__all__ = ["TimeSeriesRegression"]
-
 
 class TimeSeriesRegression(Regression):
     """Regression of a winch's runs on the effects of a hypothesis.

@@ -24,22 +24,6 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLES
 from winchkit.schema.profiles.axis import AxisProfile
 
-__all__ = [
-    "BINS",
-    "LEAST_SHARE",
-    "LEAST_TEMPERATURE_RANGE",
-    "MOST_PLACES",
-    "Attribution",
-    "attributions",
-    "binned_share",
-    "chance_share",
-    "harmonics",
-    "kept_rows",
-    "quantile_bins",
-    "ranked",
-    "variables_of",
-]
-
 BINS = 16
 """Bins per variable."""
 _LEVEL = 0.01

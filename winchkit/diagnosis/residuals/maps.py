@@ -25,8 +25,6 @@ from winchkit.diagnosis.residuals.attribution import (
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 from winchkit.plain_json import significant
 
-__all__ = ["PAIRS", "ResidualMap", "residual_maps", "same_cells"]
-
 PAIRS = (
     ("cable_length", "load"),
     ("cable_length", "drum_angle"),

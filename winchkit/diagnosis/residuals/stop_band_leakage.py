@@ -15,8 +15,6 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import replicate_rms
 
-__all__ = ["StopBandLeakage"]
-
 
 class StopBandLeakage:
     """Mean squares above the cut-off, per output, SI."""

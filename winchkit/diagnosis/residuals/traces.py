@@ -18,8 +18,6 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.tabular import Columns
 
-__all__ = ["PoseTrace", "Trace", "pose_traces", "trace_columns", "traces_of"]
-
 
 @dataclass(frozen=True)
 class Trace:

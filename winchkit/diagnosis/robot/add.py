@@ -21,13 +21,6 @@ from winchkit.errors import UsageError
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = [
-    "FittedRobotAddition",
-    "add_to_robot",
-    "fitted_robot_addition",
-    "remove_from_robot",
-]
-
 
 @dataclass(frozen=True)
 class FittedRobotAddition:

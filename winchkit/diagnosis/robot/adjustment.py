@@ -31,8 +31,6 @@ from winchkit.model.robot import Pose, Robot
 from winchkit.model.robot.constraints import ZERO_STD, Constraint, mean_offset
 from winchkit.model.robot.identification.bundle_adjustment import Rows, State, Weights, place, solve
 
-__all__ = ["STD_OF_ZERO", "Adjusted", "adjusted", "instrument_zeros", "placed"]
-
 _FLAT = 1e3
 """Standard deviation of the prior of an effect's coordinates, which are near one in size."""
 _STEP = 1e-3

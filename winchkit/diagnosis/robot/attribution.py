@@ -18,15 +18,6 @@ from winchkit.diagnosis.robot.errors import Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.robot import angles_of
 
-__all__ = [
-    "AXES",
-    "ON_PLATFORM",
-    "most_significant",
-    "on_cables",
-    "pose_attributions",
-    "variables_of_poses",
-]
-
 AXES = ("x", "y", "z")
 """Columns of a position's error."""
 ON_PLATFORM = tuple(f"platform_{name}" for name in (*AXES, "roll", "pitch", "yaw"))

@@ -24,16 +24,6 @@ from winchkit.model.stages import Stage
 from winchkit.schema.profiles.robot import PRIORS
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
-__all__ = [
-    "BALANCING",
-    "GEOMETRY",
-    "candidates_at",
-    "lacking",
-    "lacking_parts",
-    "priors_of_geometry",
-    "with_needs_met",
-]
-
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius", "drum-radius", "layer-thickness")
 """Effects that are the geometry which a calibration fits."""
 BALANCING = frozenset({"payload-mass", "payload-centre", "cell-offset", "cell-thermal"})

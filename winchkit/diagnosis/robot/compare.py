@@ -24,8 +24,6 @@ from winchkit.effects.catalogue import Catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["RobotCompared", "compare_robot", "compared_robot"]
-
 
 @dataclass(frozen=True)
 class RobotCompared:

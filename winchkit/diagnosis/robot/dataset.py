@@ -20,8 +20,6 @@ from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["LEAST_POSES", "RobotDataset", "prepare_poses"]
-
 LEAST_POSES = 10
 """Least number of poses, of a data set and of a run that is a fold of its own (rule of thumb)."""
 _ANGLE_TOLERANCE = 0.02

@@ -81,13 +81,6 @@ from winchkit.model.stages import Stage
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = [
-    "RobotAnswer",
-    "RobotSelection",
-    "answer_of",
-    "diagnose_robot",
-]
-
 _REPEAT = "drive to some ten of these poses twice: the noise of the instruments is not known"
 _WHOLE = "numbers of the geometry together may fit another cause that depends on the pose"
 _LEAST_FALL, _LARGEST_RATIO = 0.7, 1.1

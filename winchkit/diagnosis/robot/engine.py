@@ -24,8 +24,6 @@ from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import base_of
 
-__all__ = ["PoseSelection", "TrajectorySelection"]
-
 
 class PoseSelection(SelectionEngine):
     """Selection among hypotheses on a robot's poses.

@@ -68,8 +68,6 @@ from winchkit.model.robot.identification.tracker import (
 from winchkit.model.robot.robot import standing
 from winchkit.model.stages import At, Stage
 
-__all__ = ["POSED", "Equations", "continuous", "start_pose"]
-
 POSED = ("closure", "position", "rotation", "swivel", "gauge", "statics")
 """Kinds that depend on the pose, in their order."""
 _NEWTON_STEPS, _FORCE_STEP, _LEAST_SLOPE, _FORCE_TOLERANCE = 8, 1e-4, 0.05, 1e-9

@@ -29,23 +29,6 @@ from winchkit.diagnosis.robot.variance_components import PoseNoise
 from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.model.robot.rotation import rotation_by, skew
 
-__all__ = [
-    "UNITS",
-    "Errors",
-    "FittedModel",
-    "column_names",
-    "errors_in_noise",
-    "errors_of",
-    "held_out_rms",
-    "least_noise",
-    "noise_rms",
-    "output_fits_in_noise",
-    "output_fits_of",
-    "refuted_outputs",
-    "rms",
-    "signal_rms",
-]
-
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
 _LEAST_SINGULAR_VALUE = 1e-9

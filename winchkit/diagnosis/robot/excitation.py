@@ -11,8 +11,6 @@ from winchkit.model.robot.rotation import rotation_of, rotation_vector
 if TYPE_CHECKING:
     from winchkit.diagnosis.robot.preparation import Preparation
 
-__all__ = ["missing_pose_excitation"]
-
 _LEAST_ROTATION = np.radians(1.0)
 """Rotation of the platform below which a note says that it never turned, rad; rule of thumb."""
 _LEAST_POSES = 40

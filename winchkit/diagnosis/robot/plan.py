@@ -25,8 +25,6 @@ from winchkit.effects.term import Term
 from winchkit.model.robot import angles_of
 from winchkit.runs.run import Channel, Run
 
-__all__ = ["PosePlan", "plan_poses"]
-
 _HIGH_POWER = 0.9
 """Power from which on a question counts as answered."""
 _MOST = 6

@@ -39,19 +39,6 @@ from winchkit.model.robot.identification.pose_design import (
 )
 from winchkit.runs.poses import Measured, joined
 
-__all__ = [
-    "POSES",
-    "POSE_CANDIDATES",
-    "PoseCandidates",
-    "PoseOffer",
-    "Question",
-    "next_pose_runs",
-    "pose_offers",
-    "reach",
-    "simulated_poses",
-    "usable",
-]
-
 _CANDIDATES = 60
 """Random poses per kind; theory: the best of 59 is among the best 5 % with a probability of 95 %, 1
 − 0.95⁵⁹."""

@@ -43,16 +43,6 @@ from winchkit.model.stages import Stage
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = [
-    "Preparation",
-    "balanced",
-    "calibrated_on",
-    "estimated_noise",
-    "fitted_point",
-    "own_effects",
-    "prepare_selection",
-]
-
 _MOST_IMBALANCE = 0.2
 """Unexplained imbalance over the standard deviation of tensions above which the balance is left
 out; rule of thumb."""

@@ -10,8 +10,6 @@ from winchkit.effects.term import Term
 from winchkit.schema.profiles.robot import LineSpec, PriorName, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
-__all__ = ["FIELDS", "GeometryPrior", "profile_with_geometry"]
-
 Point = tuple[float, float, float]
 FIELDS: dict[str, PriorName] = {
     "exit-point": "exit_point",

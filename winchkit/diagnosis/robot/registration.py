@@ -32,8 +32,6 @@ from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.model.robot.rotation import rotation_by, rotation_vector
 from winchkit.schema.profiles.instruments import ImuSpec
 
-__all__ = ["Registration", "datum_notes", "registration_of"]
-
 _GROSS = 10e-3
 """Rms position error above which readings are registered first, m: with cables of 0.5 m the second
 order of a length is then 0.1 mm, five times the noise of a tracker."""

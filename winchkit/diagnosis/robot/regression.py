@@ -33,8 +33,6 @@ from winchkit.model.robot.identification.tracker import Tracker
 from winchkit.model.stages import At, Stage
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = ["COPIES", "LinearizationPoint", "PoseRegression"]
-
 COPIES = 5
 """Rows per number with a prior, distributed over the folds."""
 _GROUPS = 5

@@ -24,8 +24,6 @@ from winchkit.diagnosis.regression.base import Folds, Regression, Segment
 from winchkit.diagnosis.robot.equations import continuous
 from winchkit.diagnosis.robot.regression import COPIES, LinearizationPoint, PoseRegression
 
-__all__ = ["TrajectoryRegression", "regression_at"]
-
 _BLOCKS = 24
 """Blocks of time for the rank test and the jackknife; as for poses."""
 _GROUPS = 5

@@ -22,8 +22,6 @@ from winchkit.diagnosis.robot.equations import POSED
 from winchkit.model.robot.identification.variance_components import START as COMMON
 from winchkit.model.robot.identification.variance_components import re_estimated
 
-__all__ = ["START", "PoseNoise", "Stack", "noise_of", "repeated_differences"]
-
 START: Mapping[str, float] = {
     **{kind: COMMON[kind] for kind in ("closure", "position", "rotation", "swivel")},
     "gauge": COMMON["cable_length"],

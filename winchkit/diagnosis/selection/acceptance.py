@@ -20,15 +20,6 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = [
-    "MIN_GAIN",
-    "RELEVANT_RATIO",
-    "Fitted",
-    "best_accepted",
-    "is_accepted",
-    "predicts_better",
-]
-
 Fitted = tuple[SelectionEngine, Fit, Noise]
 """A fit with its noise and the engine that they are of."""
 

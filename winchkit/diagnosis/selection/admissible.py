@@ -13,8 +13,6 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.series import orders_of
 
-__all__ = ["admissible", "best_of_each"]
-
 
 def admissible(ranked: Iterable[Score], present: Hypothesis, rows: int) -> list[Score]:
     """Scores of the candidates that the model does not contain yet, best first.

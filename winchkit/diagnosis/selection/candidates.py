@@ -9,8 +9,6 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 
-__all__ = ["Point", "points", "with_grid", "with_grid_points"]
-
 Point = tuple[Effect, dict[str, float], list[dict[str, float]]]
 """An effect, a point of its shape grid, and its values of a usual size there."""
 

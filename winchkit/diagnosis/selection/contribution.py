@@ -8,8 +8,6 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 
-__all__ = ["ordered_by_contribution"]
-
 
 def ordered_by_contribution(engine: SelectionEngine, result: SelectionResult) -> SelectionResult:
     """The result with its additions in the order of forward selection among themselves.

@@ -38,9 +38,6 @@ from winchkit.effects.series import harmonic_series
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["LastValue", "SelectionEngine", "Trial"]
-
-
 Kept = TypeVar("Kept")
 
 

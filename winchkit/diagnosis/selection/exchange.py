@@ -14,11 +14,6 @@ from winchkit.diagnosis.selection.acceptance import MIN_GAIN
 from winchkit.diagnosis.selection.engine import SelectionEngine, Trial
 from winchkit.diagnosis.selection.scores import Score
 
-__all__ = [
-    "Exchange",
-    "pair_exchange",
-]
-
 _MARGIN = 0.1
 """Share of the term's explained χ² by which the linear prediction may miss the target."""
 

@@ -18,8 +18,6 @@ from winchkit.diagnosis.regression.projection import partialled_out
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["explained_by_initial_states"]
-
 _LEAST_SHARE_FROM_REST = 0.5
 """Share of its explained χ² that an effect with memory must explain from rest; screened."""
 

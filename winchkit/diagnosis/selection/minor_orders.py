@@ -13,8 +13,6 @@ from winchkit.diagnosis.regression.projection import inverse_normal
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.series import harmonic_series, single_orders
 
-__all__ = ["significant_orders"]
-
 
 def significant_orders(
     regression: Regression, fitted: Fit, noise: Noise, penalty_per_parameter: float

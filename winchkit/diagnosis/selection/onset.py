@@ -29,8 +29,6 @@ from winchkit.effects.effect import Effect, Parameter
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["best_onset", "onset_of"]
-
 _MOST_ONSETS = 1000
 """Bounds the spacing where runs are long."""
 _EVERY = 16

@@ -34,8 +34,6 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.series import orders_of
 from winchkit.effects.term import Term
 
-__all__ = ["Periodogram", "further_orders", "has_orders", "periodogram"]
-
 _LEVEL = 0.01
 """Probability that the largest power of all scanned orders exceeds the threshold by chance;
 convention, as the score's."""

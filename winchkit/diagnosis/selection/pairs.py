@@ -18,8 +18,6 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.regression.projection import explained_ss_of_sets
 from winchkit.diagnosis.selection.scores import Projected, Score
 
-__all__ = ["Pair", "screened_pairs"]
-
 _SUPPRESSION_RATIO = 1.5
 """Joint over summed single explained χ² from which a pair counts as mutually masking; screened."""
 _UNIDENTIFIABLE = 1e-5

@@ -26,15 +26,6 @@ from winchkit.diagnosis.regression.noise import Noise, satterthwaite_dof
 from winchkit.diagnosis.regression.projection import inverse_information
 from winchkit.diagnosis.selection.signatures import Candidate, Signatures
 
-__all__ = [
-    "Projected",
-    "Score",
-    "null_maxima",
-    "score",
-    "score_by_chance",
-    "zero_score",
-]
-
 _NOTHING = 1e-300
 """Floor of a squared length that is divided by; numerical."""
 _SIMULATIONS = 400

@@ -21,8 +21,6 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["Candidate", "Signatures", "signatures", "updated_signatures"]
-
 
 @dataclass(frozen=True)
 class Candidate:

@@ -12,13 +12,6 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = [
-    "other_grid_point",
-    "shape_at_bound",
-    "starting_values",
-    "truncated_series",
-]
-
 
 def shape_at_bound(term: Term) -> bool:
     """Whether a shape parameter is at its bound or the values are physically impossible."""

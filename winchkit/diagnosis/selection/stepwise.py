@@ -30,12 +30,6 @@ from winchkit.diagnosis.selection.scores import Score, null_maxima
 from winchkit.diagnosis.selection.starting_values import other_grid_point
 from winchkit.effects.term import Term
 
-__all__ = [
-    "SelectionResult",
-    "initial_result",
-    "stepwise_selection",
-]
-
 _SHORT_LIST = 5
 """Candidates that are fitted per step; computing cost; measured: the accepted
 candidate was the first by score in 15 of 17 steps, else the second."""

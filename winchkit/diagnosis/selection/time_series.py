@@ -31,8 +31,6 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["TimeSeriesSelection"]
-
 _LARGEST_EXTRAPOLATION = 0.2
 """Variance of a held-out group's prediction over the noise's above which five blocks of time
 replace groups; theory: it lifts a held-out error by √1.2 = 1.095, to the limit `_AT_NOISE` of the

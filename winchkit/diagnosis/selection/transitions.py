@@ -24,8 +24,6 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.effects.transition import TRANSITION, with_free_transition
 
-__all__ = ["scanned_transitions", "with_fitted_transitions"]
-
 _STEPS = 8
 """Transitions that are tried between the smallest and the largest one."""
 _SHARP = 1.1

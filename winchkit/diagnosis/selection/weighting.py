@@ -25,8 +25,6 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 
-__all__ = ["Reweighted", "reweighted"]
-
 _NO_WORSE = 1.01
 """Ratio of held-out errors that no output may exceed under equal weights; screened, decision 14."""
 

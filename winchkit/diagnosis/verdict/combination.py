@@ -24,8 +24,6 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
 
-__all__ = ["combination_of_set", "combination_of_term"]
-
 _STRONG = 0.9
 """Correlation above which parameters of an effect are reported as a combination; convention:
 variance inflation factor 1/(1 − ρ²) of 5 (Belsley, Kuh & Welsch 1980)."""

@@ -12,14 +12,6 @@ from winchkit.diagnosis.regression.projection import orthonormal
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.verdict.spline_alternatives import Columns, CurveFamily, curves
 
-__all__ = [
-    "BasisProducts",
-    "Curve",
-    "PartialRegression",
-    "basis_products",
-    "ranked_curves",
-]
-
 UNIDENTIFIABLE = 1e-7
 """Squared length left of a unit column below which a direction is not identifiable; numerical."""
 _LEAST_SQUARED_LENGTH = 1e-300

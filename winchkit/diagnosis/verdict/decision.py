@@ -28,18 +28,6 @@ from winchkit.diagnosis.results import OutputFit, Verdict
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.model.stages import OUTPUT_UNITS
 
-__all__ = [
-    "AT_NOISE",
-    "MOSTLY",
-    "Measured",
-    "excess",
-    "measured",
-    "output_fits",
-    "remaining_share",
-    "verdict_of",
-    "white_noise",
-]
-
 AT_NOISE = 1.1
 """Largest ratio of an error to its noise at which nothing is missing: 20 % of its power."""
 _EXPLAINED, MOSTLY = 0.1, 0.5

@@ -34,8 +34,6 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 
-__all__ = ["EquivalenceSet", "equivalence_set", "pairs_of"]
-
 _MOST_RIVALS = 6
 """Rivals that are refitted."""
 _SCORE_MARGIN = 40.0

@@ -20,8 +20,6 @@ from winchkit.effects.term import Term
 from winchkit.fit_statistics import FitStatistics, FittedParameter, correlations_of
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["fit_statistics"]
-
 
 def fit_statistics(
     regression: Regression,

@@ -26,8 +26,6 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["reduced_law", "simplified", "with_first_members"]
-
 
 def simplified(
     engine: SelectionEngine,

@@ -29,8 +29,6 @@ from winchkit.diagnosis.verdict.curve_fits import Curve, PartialRegression, rank
 from winchkit.diagnosis.verdict.decision import AT_NOISE, excess
 from winchkit.diagnosis.verdict.spline_alternatives import PLACES, curves
 
-__all__ = ["better_curve", "predictable_share"]
-
 MARGIN = 0.1
 """Share of what a step explains by which a curve must explain more; see docs/methods.md."""
 _TRIED = 3

@@ -16,8 +16,6 @@ from winchkit.effects.term import Term
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["implausible", "implausible_value", "plausible_range"]
-
 _ROUNDING = 1e-6
 """Distance from a bound, in typical sizes, that counts as at the bound; numerical."""
 _CHECK = "check sign, unit, torque constant, gravity"

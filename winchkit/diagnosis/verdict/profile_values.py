@@ -17,8 +17,6 @@ from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.steps import standing_of
 from winchkit.effects.term import Term
 
-__all__ = ["file_model", "held", "refitted_steps"]
-
 
 def file_model(engine: SelectionEngine, start: Hypothesis, noise: Noise) -> Fit:
     """The profile's effects at their file values; offsets and initial states are fitted."""

@@ -23,16 +23,6 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import LEAST_TEMPERATURE_RANGE, variables_of
 from winchkit.model.variables import ANGLES, COMPOUND
 
-__all__ = [
-    "PLACES",
-    "Columns",
-    "CurveFamily",
-    "Law",
-    "curves",
-    "laws_over",
-    "linear_splines",
-]
-
 _KNOTS = 20
 """Knots of the linear B-splines; screened; varied."""
 _TAILS = 0.001

@@ -22,12 +22,6 @@ from winchkit.errors import ConnectionLost, DeviceRefused, Fault, FileError, NoR
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.units import convert, dimension_of
 
-__all__ = [
-    "ProcessDecoder",
-    "ProcessInstrument",
-    "ProcessLine",
-]
-
 _REAL32_BITS = 32
 """CiA 301, data type 0008h."""
 _TINIEST = 1e-30

@@ -38,8 +38,6 @@ from winchkit.drivers.slow import SlowDevices
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.errors import ConnectionLost, WinchkitError, class_name
 
-__all__ = ["main"]
-
 _BATCH = 1e-3
 """Readings that come within it are sent together, s: it adds to their age, and each message wakes a
 thread beside the control loop."""

@@ -13,8 +13,6 @@ from winchkit.drivers.stream.line import StreamLine
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.device import DeviceSpec
 
-__all__ = ["InstrumentSpec", "Line", "LineSpec", "line_of"]
-
 Line = ModbusLine | StreamLine
 
 

@@ -14,18 +14,6 @@ from typing import Any, NamedTuple
 from winchkit.drivers.publisher import Sampled
 from winchkit.drivers.reading import Quality
 
-__all__ = [
-    "COUNTS",
-    "Kind",
-    "Messages",
-    "RawReading",
-    "State",
-    "json_message",
-    "message",
-    "raw_reading_of",
-    "reading_message",
-]
-
 _HEAD = struct.Struct("<BI")
 _READING = struct.Struct("<H3dI4d")
 

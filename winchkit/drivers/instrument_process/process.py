@@ -31,8 +31,6 @@ from winchkit.drivers.instrument_process.messages import (
 from winchkit.drivers.instrument_process.separate import SeparateInstrument, SeparateLine
 from winchkit.errors import ConnectionLost, WinchkitError, error_of
 
-__all__ = ["InstrumentProcess"]
-
 _MODULE = "winchkit.drivers.instrument_process.child"
 _CHUNK = 1 << 16
 """Bytes: capacity of a pipe on Linux."""

@@ -15,8 +15,6 @@ from winchkit.drivers.reading import Sensor
 from winchkit.drivers.stream.instrument import StreamInstrument
 from winchkit.errors import ConnectionLost, error_of
 
-__all__ = ["SeparateInstrument", "SeparateLine", "Serving"]
-
 _LOOK = 0.1
 """Between two looks at whether the process still responds to a request, s."""
 _PATIENCE = 1.0

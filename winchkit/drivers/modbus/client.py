@@ -29,8 +29,6 @@ from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.modbus import ReadBlock
 
-__all__ = ["ModbusClient"]
-
 _CLOSES = 3
 """Connections in a row that end after one answer: a line that fails does not do so thrice."""
 _NEVER = 1 << 30

@@ -7,8 +7,6 @@ from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.words import number_of, words_of
 from winchkit.schema.devices.modbus import REGISTERS, CommandSpec, ReadBlock
 
-__all__ = ["identity", "send"]
-
 
 async def send(client: ModbusClient, instrument: Instrument, command: CommandSpec) -> None:
     """Unlock and write; raises NoReply, DeviceRefused, ConnectionLost."""

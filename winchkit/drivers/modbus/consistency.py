@@ -11,8 +11,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Consistency"]
-
 _AFTER_CONTRADICTION = 20
 """Consistent readings in a row that are required after a contradiction."""
 _FLOATS_AT_FIRST = 5

@@ -14,8 +14,6 @@ from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.modbus import FieldSpec, ModbusSpec, Order, ReadBlock
 from winchkit.units import convert, dimension_of
 
-__all__ = ["Decoded", "Decoder"]
-
 _TINIEST = 1e-30
 """A float below it, but not zero, is no measurement: its bytes stand in another order."""
 _TINIEST_SHARE = 1e-12

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from winchkit.schema.bench import Deviation
 
-__all__ = ["Deviations"]
-
 _NOT_TOGETHER: set[Deviation] = {"transaction-0", "answers-twice"}
 
 

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["AnswerGate", "Event", "Framing", "Kind", "Request", "crc16", "request_of"]
-
 Framing = Literal["rtu", "tcp"]
 Kind = Literal["crc", "malformed", "late", "resynchronised"]
 _READS = (3, 4)

@@ -18,8 +18,6 @@ from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.modbus import ReadBlock
 
-__all__ = ["Instrument"]
-
 _STALLED = 0.01
 """By which this process may be late with an answer that came just in time, s."""
 _FRESH = 0.06

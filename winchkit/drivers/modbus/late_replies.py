@@ -25,8 +25,6 @@ from dataclasses import dataclass, field
 from winchkit.drivers.reading import REPLY_HORIZON
 from winchkit.schema.devices.modbus import ReadBlock
 
-__all__ = ["LISTENING", "LateReplies"]
-
 LISTENING = 4e-3
 """Longer than a frame and the silence after it take at any usual baud rate, s."""
 _REMEMBERED = 3.0

@@ -15,8 +15,6 @@ from winchkit.drivers.sharing import RECONNECT, LineShare, next_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
-__all__ = ["ModbusLine"]
-
 _OPENING, _POLL = 1.0, 0.01
 """s that a command waits for a line that is being opened, a few attempts to connect; and between
 two looks."""

@@ -17,8 +17,6 @@ from winchkit.drivers.modbus.deviations import Deviations
 from winchkit.drivers.modbus.frames import Event, Kind, Request, request_of
 from winchkit.drivers.modbus.transactions import Transactions
 
-__all__ = ["TcpAnswerGate"]
-
 _HEAD = 6
 """Bytes of transaction, protocol and length."""
 _LONGEST = 254

@@ -8,8 +8,6 @@ from winchkit.drivers.modbus.late_replies import LISTENING
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.modbus import ModbusSpec, ReadBlock
 
-__all__ = ["Exchange", "exchange", "silence_of", "wire_times"]
-
 _REQUEST = 8
 """Bytes of a read request: unit, function, address, count and check sum."""
 _ANSWER = 5

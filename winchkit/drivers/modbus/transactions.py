@@ -9,8 +9,6 @@ close to it.
 
 from __future__ import annotations
 
-__all__ = ["LAST", "Transactions"]
-
 LAST = 65_000
 """The library begins again at 1 after it."""
 _SIZE = 256

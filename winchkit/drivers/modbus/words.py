@@ -7,8 +7,6 @@ from collections.abc import Mapping
 
 from winchkit.schema.devices.modbus import REGISTERS, Order, ValueType
 
-__all__ = ["number_of", "words_of"]
-
 _FORMAT: dict[ValueType, str] = {"u16": ">H", "i16": ">h", "u32": ">I", "i32": ">i", "f32": ">f"}
 
 

@@ -20,8 +20,6 @@ from winchkit.errors import ConnectionLost, DeviceRefused, NoReply
 from winchkit.schema.bench import BusSpec
 from winchkit.schema.devices.stream import AskSpec
 
-__all__ = ["Conversation", "exchange_time"]
-
 _COMMAND_TIME = 2.0
 """A balance tares when it has come to rest, s."""
 _STOP_TRIES = 3

@@ -22,8 +22,6 @@ from winchkit.schema.devices.stream import (
 from winchkit.schema.template import parts_of
 from winchkit.units import convert
 
-__all__ = ["Decoded", "Decoder", "Meaning", "ParsedFrame", "check_sum"]
-
 _NUMBER = re.compile(r" *[+-]? *(?:[0-9]+\.?[0-9]*|\.[0-9]+) *")
 _PADDING = " _"
 _FLAGS: dict[Says, Quality] = {

@@ -10,8 +10,6 @@ from typing import NamedTuple
 
 from winchkit.schema.devices.stream import StreamSpec
 
-__all__ = ["BinaryFraming", "Framing", "Piece", "TextFraming", "framing_of"]
-
 
 class Piece(NamedTuple):
     """A frame without its terminator."""

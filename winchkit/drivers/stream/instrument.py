@@ -21,8 +21,6 @@ from winchkit.drivers.stream.parser import (
 from winchkit.errors import ConnectionLost
 from winchkit.schema.devices.device import DeviceSpec
 
-__all__ = ["StreamInstrument", "Wire"]
-
 _JITTER = 0.8
 """Two frames come at least this share of a conversion apart."""
 

@@ -14,8 +14,6 @@ from winchkit.drivers.stream.port import Port, open_serial
 from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NoReply
 from winchkit.schema.bench import BusSpec
 
-__all__ = ["StreamLine"]
-
 _LISTEN = 0.05
 """A command waits at most this long for a line that listens, s."""
 

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 from winchkit.schema.template import Part
 
-__all__ = ["Match", "Matcher", "fits"]
-
 _ANY = r"[\x20-\x7e]"
 
 

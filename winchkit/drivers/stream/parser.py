@@ -11,15 +11,6 @@ from winchkit.errors import Fault, FileError
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.stream import StreamSpec
 
-__all__ = [
-    "Item",
-    "ParserCounts",
-    "StreamParser",
-    "asking_whether_fresh",
-    "stream_of",
-    "talking",
-]
-
 
 @dataclass(slots=True)
 class ParserCounts:

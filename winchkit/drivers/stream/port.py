@@ -18,8 +18,6 @@ from winchkit.schema.bench import BusSpec
 if TYPE_CHECKING:
     import serial
 
-__all__ = ["Chunk", "Port", "SerialPort", "open_serial", "set_latency"]
-
 _LATENCY_TIMERS = Path("/sys/bus/usb-serial/devices")
 _HOST_LATENCY = 1e-3
 """Of a port without a timer of its own, s."""

@@ -36,14 +36,6 @@ from winchkit.model.robot.kinematics import Geometry, Pose, structure_matrix
 from winchkit.model.robot.wrench import gravity_wrench, weight_by_payload
 from winchkit.schema.profiles.robot import PlatformSpec
 
-__all__ = [
-    "balance",
-    "force_basis",
-    "hanging_balance",
-    "hanging_residual",
-    "wrench_residual",
-]
-
 _SEEN = 1e-6
 """Singular values of a structure matrix below this share of the largest count as zero: rule of
 thumb, far above rounding and far below a robot that can be controlled."""

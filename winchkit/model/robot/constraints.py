@@ -61,28 +61,6 @@ from winchkit.model.robot.kinematics import (
 from winchkit.model.robot.rotation import angle_rates, angles_of, rotation_of, rotation_vector
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = [
-    "ZERO_STD",
-    "Constraint",
-    "Strain",
-    "Winding",
-    "by_geometry",
-    "by_pose",
-    "cable_length",
-    "closure",
-    "closure_by_geometry",
-    "closure_residual",
-    "mean_offset",
-    "position",
-    "rotation",
-    "rotation_by_pose",
-    "rotation_residual",
-    "swivel",
-    "swivel_residual",
-    "winding_of",
-    "wrapped",
-]
-
 _TURN = 2 * np.pi
 
 ZERO_STD = {"swivel": 0.2, "cable_length": 0.05}

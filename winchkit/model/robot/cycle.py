@@ -16,8 +16,6 @@ from winchkit.model.robot.kernels import PLAIN, RobotKernels
 from winchkit.model.robot.kinematics import Pose
 from winchkit.model.robot.robot import Robot, cables_of
 
-__all__ = ["RobotCycle", "flat_pose"]
-
 _TOLERANCE = 1e-5
 """Last step, m and rad: Newton's method converges quadratically, so that the error after it is of
 the order of its square, 1e-10."""

@@ -44,17 +44,6 @@ from winchkit.model.stages import Signals
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.units import GRAVITY
 
-__all__ = [
-    "InverseDynamics",
-    "PlatformMotion",
-    "accelerations",
-    "dynamic_wrench",
-    "inverse_dynamics",
-    "mass_matrix",
-    "motion_of",
-    "sag",
-]
-
 _FEWEST = 4
 """A cubic spline with third derivatives continuous at the second and last but one pose (not-a-knot)
 has four coefficients at least."""

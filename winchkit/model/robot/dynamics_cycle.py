@@ -20,8 +20,6 @@ from winchkit.model.robot.kinematics import PLATFORM_DOF
 from winchkit.model.robot.robot import Robot, cables_of
 from winchkit.units import GRAVITY
 
-__all__ = ["DynamicTarget", "DynamicsCycle"]
-
 
 @dataclass(frozen=True, slots=True)
 class DynamicTarget:

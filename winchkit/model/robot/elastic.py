@@ -12,8 +12,6 @@ from math import inf, log, nan
 
 from winchkit.errors import UsageError
 
-__all__ = ["ElongationLaw", "Exponential", "Linear", "Quartic"]
-
 _STEPS = 60
 """Convergence is quadratic on the rising branch; a force still without a strain after 60 is not on
 it."""

@@ -13,8 +13,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["strain_of"]
-
 _NEWTON_STEPS = 30
 """At the least slope an error falls by a constant factor only, else quadratically: bound of the
 time, not of the accuracy."""

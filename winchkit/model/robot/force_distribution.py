@@ -13,20 +13,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 
-__all__ = [
-    "Feasibility",
-    "ForceLimits",
-    "Forces",
-    "approximate_forces",
-    "closed_form",
-    "distributed_forces",
-    "improved_closed_form",
-    "null_space",
-    "quadratic",
-    "steepest_force",
-    "wrench_feasibility",
-]
-
 _RANK = 1e-9
 """Singular values below this share of the largest count as zero: far above rounding (1e-16), far
 below those of a robot that can be controlled (rule of thumb)."""

@@ -27,8 +27,6 @@ from winchkit.model.robot.wrench import gravity_wrench, weight_hessian
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.units import GRAVITY
 
-__all__ = ["Found", "forward"]
-
 _TOLERANCE = 1e-10
 """Last step, m and rad: above rounding (1e-15 on 1 m), a thousandth of the resolution of a laser
 tracker (0.1 µm)."""

@@ -25,8 +25,6 @@ from winchkit.model.robot.kinematics import Geometry, Pose, lengths, structure_m
 from winchkit.model.robot.rotation import quaternion_of, rotation_from_quaternion
 from winchkit.schema.profiles.robot import PlatformSpec
 
-__all__ = ["ElasticCables", "Simulated", "cable_forces", "integrate"]
-
 
 @dataclass(frozen=True)
 class ElasticCables:

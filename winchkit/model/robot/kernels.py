@@ -18,8 +18,6 @@ from winchkit.model.robot.loops_pose import (
     turn,
 )
 
-__all__ = ["PLAIN", "CableLine", "RobotKernels", "compiled", "fastest"]
-
 Function = Callable[..., Any]
 
 

@@ -19,28 +19,10 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.model.robot.loops import LEAST_WRAP
-from winchkit.model.robot.rotation import angles_of, rotation_of
+from winchkit.model.robot.rotation import rotation_of
 
 if TYPE_CHECKING:
     from winchkit.schema.profiles.robot import RobotProfile
-
-__all__ = [
-    "PLATFORM_DOF",
-    "Geometry",
-    "Pose",
-    "Sensitivities",
-    "angles_of",
-    "geometry_of",
-    "home_of",
-    "lengths",
-    "linearised",
-    "rotation_of",
-    "sensitivities",
-    "structure_matrix",
-    "swivel_angle",
-    "swivel_sensitivities",
-    "wrap_angle",
-]
 
 PLATFORM_DOF = 6
 """Degrees of freedom of a platform; fewer cables leave it hanging."""

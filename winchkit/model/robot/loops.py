@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from math import atan2, floor, nan, pi, sqrt
 from typing import Any
 
-__all__ = ["LEAST_WRAP", "CableLine", "cables_loop", "motors_loop", "wound_angle"]
-
 Function = Callable[..., Any]
 _TURN = 2.0 * pi
 LEAST_WRAP = -1e-6

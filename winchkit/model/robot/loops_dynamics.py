@@ -10,8 +10,6 @@ from collections.abc import Callable
 from math import floor, pi
 from typing import Any
 
-__all__ = ["winches_loop", "wrench"]
-
 Function = Callable[..., Any]
 _TURN = 2.0 * pi
 

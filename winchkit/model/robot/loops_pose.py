@@ -6,8 +6,6 @@ from collections.abc import Callable
 from math import sin, sqrt
 from typing import Any
 
-__all__ = ["cholesky", "find_loop", "forces_loop", "normal", "straighten", "turn"]
-
 Function = Callable[..., Any]
 _SINGULAR = 1e-13
 """Of a pivot as a share of its diagonal element: five hundred times the rounding (2e-16), below

@@ -15,7 +15,6 @@ from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, dru
 from winchkit.model.line import Line
 from winchkit.model.robot.forward import Found, forward
 from winchkit.model.robot.identification.tracker import Tracker, declared_tracker
-from winchkit.model.robot.kernels import CableLine
 from winchkit.model.robot.kinematics import (
     Geometry,
     Pose,
@@ -24,12 +23,11 @@ from winchkit.model.robot.kinematics import (
     lengths,
     structure_matrix,
 )
+from winchkit.model.robot.loops import CableLine
 from winchkit.model.robot.wrench import gravity_wrench
 from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
 from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
-
-__all__ = ["Robot", "cables_of", "robot_of", "standing"]
 
 _TURN = 2 * np.pi
 _NEWTON_STEPS = 5

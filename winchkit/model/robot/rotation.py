@@ -14,18 +14,6 @@ from winchkit.arrays import Array
 _SERIES = 0.1
 """Angle below which coefficients come from their power series, rad: error below 1e-10."""
 
-__all__ = [
-    "angle_rates",
-    "angles_of",
-    "quaternion_of",
-    "rotation_by",
-    "rotation_from_quaternion",
-    "rotation_of",
-    "rotation_rates",
-    "rotation_vector",
-    "skew",
-]
-
 
 def rotation_of(roll: ArrayLike, pitch: ArrayLike, yaw: ArrayLike) -> Array:
     """R = Rz(yaw) Ry(pitch) Rx(roll), angles of shape (...), rad; returns (..., 3, 3).

@@ -18,8 +18,6 @@ from winchkit.model.robot.kinematics import Pose
 from winchkit.model.robot.rotation import rotation_by, rotation_vector
 from winchkit.model.smoothing_spline import SmoothingSpline
 
-__all__ = ["SmoothedMotion", "smoothed_motion"]
-
 
 class SmoothedMotion(NamedTuple):
     """Motion of the platform and the uncertainty of its acceleration."""

@@ -8,8 +8,6 @@ from winchkit.arrays import Array
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.units import GRAVITY
 
-__all__ = ["gravity_wrench", "weight_by_payload", "weight_hessian"]
-
 _DOWN = np.array([0.0, 0.0, -GRAVITY])
 
 

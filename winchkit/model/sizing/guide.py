@@ -9,8 +9,6 @@ from winchkit.model.sizing import parts
 from winchkit.model.sizing.row import Row, down, up
 from winchkit.schema.profiles.sizing import BeltChoice, ScrewChoice, SizeSpec
 
-__all__ = ["guide_rows"]
-
 
 def guide_rows(spec: SizeSpec) -> Iterator[Row]:
     """Requirements of the screw and of the belt, where the specification has them."""

@@ -9,21 +9,6 @@ from math import acos, hypot, pi, sin, sqrt
 
 from winchkit.errors import UsageError
 
-__all__ = [
-    "BUCKLES",
-    "STANDARD_MODULES",
-    "belt_length",
-    "belt_module",
-    "centre_distance",
-    "critical_speed",
-    "drum_turns",
-    "motor_power",
-    "motor_speed",
-    "motor_torque",
-    "screw_diameter",
-    "transmission_efficiency",
-]
-
 BUCKLES = {
     "supported-supported": pi,
     "fixed-supported": 3.926602,

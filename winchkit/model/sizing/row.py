@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Decimal
 from typing import Literal
 
-__all__ = ["Row", "down", "up"]
-
 _EXACT = 1e-6
 """Relative: declared decimals of six digits agree."""
 

@@ -17,8 +17,6 @@ from winchkit.model.sizing.guide import guide_rows
 from winchkit.model.sizing.row import Row, down, up
 from winchkit.schema.profiles.sizing import SizeSpec
 
-__all__ = ["Row", "sized"]
-
 
 @dataclass(frozen=True)
 class _Drive:

@@ -15,8 +15,6 @@ from winchkit.report.figures.figure import Axis
 from winchkit.report.words.numbers import plain
 from winchkit.report.words.vocabulary import VARIABLE_NAMES
 
-__all__ = ["Range", "Reading", "range_of", "reading"]
-
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)
 """Round steps between ticks, of one decade."""
 _FEWEST = 3

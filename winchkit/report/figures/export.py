@@ -18,8 +18,6 @@ from winchkit.report.html.svg import file_svg
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["png", "require_png", "write_figures"]
-
 _POINTS_PER_INCH = 72.0
 """Of PostScript and matplotlib."""
 _DPI = 192.0

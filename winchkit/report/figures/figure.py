@@ -17,8 +17,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.plain_json import significant
 
-__all__ = ["Axis", "Cells", "Figure", "Panel", "RunMark", "Series", "Table"]
-
 _DIGITS = 7
 """Significant digits of data in a file: the float of the run, without its rounding errors."""
 _FORMULA_SIGNS = ("=", "+", "-", "@", "\t", "\r")

@@ -14,8 +14,6 @@ from winchkit.report.words.headline import worst_outputs
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 
-__all__ = ["error_ladder", "fleet_ladders", "present"]
-
 _ROW = 30.0
 """px per output: a line of text and a bar."""
 _LEAST, _MOST = 0.8, 1.3

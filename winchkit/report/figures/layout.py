@@ -20,9 +20,6 @@ from winchkit.report.figures.figure import Axis, Cells, Figure, Panel, Series
 from winchkit.report.figures.tokens import STYLES
 from winchkit.report.words.numbers import plain
 
-__all__ = ["NARROW", "WIDE", "Area", "Rule", "Scene", "Shape", "Text", "density_levels",
-           "scene_of", "signed_levels"]  # fmt: skip
-
 WIDE, NARROW = 700, 340
 """Widths of the two layouts of a page, px."""
 _MARGIN_LEFT, _MARGIN_RIGHT = 50, 12

@@ -15,13 +15,6 @@ from winchkit.report.figures.residuals import Residuals
 from winchkit.report.words.numbers import Scale, percent
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
-__all__ = [
-    "map_figures",
-    "map_reading",
-    "map_text",
-    "signed",
-]
-
 
 def map_text(drawn: ResidualMap, scale: Scale) -> str:
     """``over free length and load 93 %, most +1.2 mm at 3 m, 196 N``."""

@@ -21,8 +21,6 @@ from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.model.variables import VARIABLE_UNITS
 from winchkit.report.figures.reduction import bin_means, filled_edges
 
-__all__ = ["NUMBER", "Trace", "trace_over", "traces", "unit_of"]
-
 NUMBER = "number"
 """Number of the pose, for an error that no variable explains."""
 _BINS = 12

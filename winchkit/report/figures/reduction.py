@@ -22,16 +22,6 @@ from winchkit.diagnosis.residuals.attribution import (
 from winchkit.model.variables import VARIABLE_UNITS
 from winchkit.report.words.sentence import CLEAR_ORDER
 
-__all__ = [
-    "Curve",
-    "bin_edges",
-    "bin_means",
-    "curve_of",
-    "decimated",
-    "filled_edges",
-    "strongest",
-]
-
 _FEW = 5
 """Distinct values up to which each is a bin of its own, such as loads."""
 

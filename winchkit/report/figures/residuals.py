@@ -32,8 +32,6 @@ from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 from winchkit.units import GRAVITY
 
-__all__ = ["OutputFigures", "Residuals", "residual_figures", "run_names"]
-
 _INTERVALS = 300
 """Intervals of a time figure whose extremes are drawn: about two px each."""
 _DOTS = 1500

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["DARK", "LIGHT", "STYLES", "Style", "style_sheet", "token_sheet"]
-
 LIGHT = {
     "surface": "#FFFFFF",
     "bg": "#F6F7F9",

@@ -18,12 +18,6 @@ from winchkit.report.words.sentence import capital, main_patterns, where_text
 from winchkit.report.words.steps import has_other_law
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, variable_name
 
-__all__ = [
-    "open_law_figures",
-    "unexplained_curve",
-    "unexplained_figures",
-]
-
 
 def unexplained_curve(answer: Answer, where: Attribution) -> tuple[Array, Array]:
     """Mean of the variable and of the residual in every bin, (bins,) each, SI."""

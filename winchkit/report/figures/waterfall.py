@@ -11,8 +11,6 @@ from winchkit.diagnosis.results import Step
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 
-__all__ = ["GEOMETRY_NAME", "REFITTED_NAME", "Waterfall", "errors_without", "waterfall_of"]
-
 GEOMETRY_NAME = "the whole geometry"
 """Name of the change of a robot's model in which all of its geometry is fitted."""
 REFITTED_NAME = "refitted values"

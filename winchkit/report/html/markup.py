@@ -10,19 +10,6 @@ from typing import Any
 
 from winchkit.plain_json import without_nan
 
-__all__ = [
-    "Markup",
-    "compact",
-    "details",
-    "element",
-    "folded",
-    "formula",
-    "inline",
-    "join",
-    "section",
-    "table",
-]
-
 _SUBSCRIPT = re.compile(r"(?<=\w)_(\w+)")
 
 

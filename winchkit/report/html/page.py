@@ -12,8 +12,6 @@ from winchkit.report.figures.tokens import DARK, LIGHT, STYLES, style_sheet, tok
 from winchkit.report.html.markup import Markup, element, inline
 from winchkit.report.html.svg import page_svg
 
-__all__ = ["figure_block", "page"]
-
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src blob:"
 _ZOOM = (
     ("in", "+", "Enlarge"),

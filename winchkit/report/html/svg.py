@@ -17,8 +17,6 @@ from winchkit.report.figures.layout import NARROW, WIDE, Area, Scene, Shape, Tex
 from winchkit.report.figures.tokens import LIGHT, STYLES
 from winchkit.report.html.markup import Markup, compact, element, join
 
-__all__ = ["file_svg", "page_svg"]
-
 _UNIT = 1000.0
 """Side of the view box of an area, whose shapes are in shares of it; 1000 is a tenth of a pixel."""
 _FONT = "Inter, system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif"

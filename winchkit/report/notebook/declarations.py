@@ -12,8 +12,6 @@ from winchkit.schema.profiles.winch import EffectTable
 from winchkit.schema.quantity import Quantity
 from winchkit.units import UNITS
 
-__all__ = ["declared_rows"]
-
 _LEFT_OUT = {"name", "description", "ledger", "effect", "rules"}
 
 

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     from winchkit.calibration.robot.calibrate import Calibrated
 
-__all__ = ["answer_figure", "calibration_figure", "result_figure", "run_figure"]
-
 _OUTPUT_HEIGHT, _CHANNEL_HEIGHT, _POSE_HEIGHT = 2.5, 1.15, 2.0
 """Inches per output, channel and pose trace."""
 _POINTS = 4000

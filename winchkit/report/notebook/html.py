@@ -26,18 +26,6 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal
     from winchkit.diagnosis.plan import Plan
 
-__all__ = [
-    "addition_cell",
-    "answer_cell",
-    "calibration_cell",
-    "comparison_cell",
-    "diagnosis_cell",
-    "fit_cell",
-    "plan_cell",
-    "profile_cell",
-    "run_cell",
-]
-
 _TONES = {
     "adequate": "#2b7a4b",
     "explained": "#2b7a4b",

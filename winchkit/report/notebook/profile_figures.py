@@ -17,8 +17,6 @@ from winchkit.schema.profiles.winch import WinchProfile
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["robot_figure", "winch_figure"]
-
 _LENGTHS = 400
 """Points of a curve, one for two or three pixels."""
 _TURN = 2 * np.pi

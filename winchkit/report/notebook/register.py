@@ -15,8 +15,6 @@ from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__: list[str] = []
-
 for _kind, _renderer in (
     (Run, Renderer(text.run_screen, html.run_cell, figures.run_figure)),
     (WinchProfile, Renderer(text.profile_screen, html.profile_cell, winch_figure)),

@@ -14,8 +14,6 @@ from winchkit.errors import UsageError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["BLACK", "BLUE", "GREY", "ORANGE", "WIDTH", "Size", "new_figure"]
-
 BLACK, BLUE, ORANGE, GREY = "#333333", "#0072B2", "#D55E00", "#999999"
 _STYLE: dict[Any, Any] = {
     "font.size": 8,

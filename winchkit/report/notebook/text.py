@@ -21,21 +21,6 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal
     from winchkit.diagnosis.plan import Plan
 
-__all__ = [
-    "addition_screen",
-    "answer_screen",
-    "calibration_screen",
-    "comparison_screen",
-    "diagnosis_screen",
-    "fit_screen",
-    "plan_screen",
-    "profile_screen",
-    "run_head",
-    "run_rows",
-    "run_screen",
-    "screen",
-]
-
 _LINES = 24
 """Lines of a terminal window."""
 _CHANNELS = 12

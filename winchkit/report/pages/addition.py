@@ -23,8 +23,6 @@ from winchkit.report.words.sentence import (
 )
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, meaning, values_text
 
-__all__ = ["addition_sections", "addition_sentence"]
-
 
 def addition_sections(
     addition: Addition,

@@ -19,15 +19,6 @@ if TYPE_CHECKING:
     from winchkit.calibration.cell.static_effects import StaticDiagnosis
     from winchkit.schema.calibration import CalibrationPoint, CellCalibration
 
-__all__ = [
-    "cell_figures",
-    "effect_lines",
-    "figures",
-    "names",
-    "report_lines",
-    "report_page",
-]
-
 
 def names(unit: str) -> tuple[str, str, str]:
     """Names of the coefficients for readings in a unit."""

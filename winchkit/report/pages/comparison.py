@@ -17,8 +17,6 @@ from winchkit.report.words.numbers import percent, quantity, scale_for, signific
 from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
-__all__ = ["comparison_sections", "distance_text"]
-
 _NEXT = (
     "A comparison quantifies the error, not its cause. This command names the missing effect, or "
     "states that there is none:"

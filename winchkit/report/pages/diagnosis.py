@@ -27,8 +27,6 @@ from winchkit.report.words.sentence import (
 )
 from winchkit.report.words.vocabulary import VERDICT_NAMES, listed
 
-__all__ = ["sections"]
-
 
 def sections(
     answer: Answer,

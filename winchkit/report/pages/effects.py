@@ -18,8 +18,6 @@ from winchkit.report.words.numbers import plain, scale_for
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed, meaning, parameter_name
 
-__all__ = ["effects_html"]
-
 _INTERVALS = 120
 """Intervals of the drawn signature, each with its lowest and highest value."""
 _SIDE = 480

@@ -28,17 +28,6 @@ from winchkit.report.words.vocabulary import (
     variable_name,
 )
 
-__all__ = [
-    "effect_text",
-    "error_rows",
-    "error_texts",
-    "shared_effects_html",
-    "shared_effects_text",
-    "shared_errors_html",
-    "shared_errors_text",
-    "winch_rows",
-]
-
 _FOLLOWED = 3
 """Variables of an attribution in one cell of a table."""
 _CAUSES = 4

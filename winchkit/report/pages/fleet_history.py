@@ -16,8 +16,6 @@ from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
 from winchkit.report.words.numbers import unbroken
 
-__all__ = ["fleet_history_html"]
-
 _MOST_FIGURES = 24
 """Parameters that are drawn, most significant first; a longer page is not read."""
 _SIDE = 340

@@ -12,11 +12,6 @@ from winchkit.report.words.columns import aligned
 from winchkit.report.words.numbers import scale_for
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, meaning
 
-__all__ = [
-    "ladder_html",
-    "ladder_text",
-]
-
 _SIGN = {"add": "+", "remove": "−"}
 _ROOM = 1.05
 """Of the largest error: no bar ends at the frame."""

@@ -22,18 +22,6 @@ from winchkit.report.pages.parts import drawings
 from winchkit.report.reproducibility import Command
 from winchkit.report.words.headline import size_texts, worst_outputs
 
-__all__ = [
-    "addition_figures",
-    "addition_html",
-    "comparison_figures",
-    "comparison_html",
-    "report_figures",
-    "report_html",
-    "residuals_of",
-    "residuals_of_addition",
-    "residuals_of_comparison",
-]
-
 
 def report_html(
     answer: WinchAnswer,

@@ -16,9 +16,6 @@ from winchkit.report.words.numbers import unbroken
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed
 
-__all__ = ["bullets", "code_block", "compared_text", "data", "drawings", "lead",
-           "output_card"]  # fmt: skip
-
 _ICONS = {
     "adequate": '<circle cx="8" cy="8" r="6"/><path d="M5.2 8.2l2 2 3.6-4.2"/>',
     "explained": (

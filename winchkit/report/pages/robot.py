@@ -35,16 +35,6 @@ from winchkit.report.words.numbers import scale_for
 from winchkit.report.words.sentence import capital, where_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
-__all__ = [
-    "pose_figures",
-    "robot_addition_figures",
-    "robot_addition_html",
-    "robot_comparison_figures",
-    "robot_comparison_html",
-    "robot_report_figures",
-    "robot_report_html",
-]
-
 _SPREAD = 0.25
 """Of the distance between two places: points of equal value are drawn beside each other."""
 _CHANGED = 1.02

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from winchkit.calibration.robot.pose_design import NextPose
     from winchkit.calibration.robot.prediction import PoseErrors
 
-__all__ = ["calibration_figures", "calibration_html", "headline", "largest_changes"]
-
 _MM = 1e3
 _MOST = 5
 """Parameters in the lead, largest change first; the table has all."""

@@ -8,8 +8,6 @@ from winchkit.report.words.numbers import percent
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 from winchkit.runs.sanity.finding import Finding
 
-__all__ = ["caveat_text", "finding_texts", "used_text"]
-
 _CAVEATS = {
     "inverted-sign": "the sign of a channel looks inverted: no effect is looked for; import it "
     "with a minus, --column CHANNEL=-COLUMN, or negate it",

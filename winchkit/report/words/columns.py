@@ -7,8 +7,6 @@ from textwrap import wrap
 
 from winchkit.report.words.numbers import unbroken
 
-__all__ = ["aligned", "hanging", "paragraph"]
-
 _WIDTH = 80
 """Characters of a terminal."""
 

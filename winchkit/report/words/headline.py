@@ -8,15 +8,6 @@ from winchkit.diagnosis.results import Comparison, OutputError, OutputFit
 from winchkit.report.words.numbers import quantity, scale_for, significant
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 
-__all__ = [
-    "AT_NOISE",
-    "at_noise",
-    "comparison_headline",
-    "noise_text",
-    "size_texts",
-    "worst_outputs",
-]
-
 AT_NOISE = 1.15
 """Largest ratio of an error to its noise at which it counts as noise."""
 

@@ -10,19 +10,6 @@ from dataclasses import dataclass
 from math import floor, isfinite, isnan, log10
 from re import compile as pattern
 
-__all__ = [
-    "Scale",
-    "between",
-    "grouped",
-    "percent",
-    "plain",
-    "quantity",
-    "scale_for",
-    "significant",
-    "unbroken",
-    "with_std",
-]
-
 _DEG = 57.29577951308232
 _LADDERS: dict[str, tuple[tuple[float, str, float], ...]] = {
     "m": ((1e-4, "µm", 1e-6), (1.0, "mm", 1e-3), (float("inf"), "m", 1.0)),

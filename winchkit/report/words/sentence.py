@@ -14,24 +14,6 @@ from winchkit.report.words.numbers import percent, scale_for, significant
 from winchkit.report.words.steps import cause
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
 
-__all__ = [
-    "CLEAR_ORDER",
-    "capital",
-    "changes_text",
-    "error_text",
-    "gain_text",
-    "headline",
-    "main_patterns",
-    "moved_outputs",
-    "often_per_turn",
-    "remaining_patterns",
-    "remaining_text",
-    "sentence",
-    "still_text",
-    "where_text",
-    "worse_text",
-]
-
 _MOVED = 1.05
 """Ratio of held-out errors before and after above which a sentence names the output: 5 % is seen in
 two digits."""

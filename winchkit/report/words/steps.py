@@ -16,16 +16,6 @@ from winchkit.report.words.vocabulary import (
     variable_name,
 )
 
-__all__ = [
-    "alike",
-    "cause",
-    "doubt_texts",
-    "has_other_law",
-    "lowered_most",
-    "step_text",
-    "step_title",
-]
-
 _DISTINCT = 20.0
 """Angle between two signatures from which the data distinguish them, °."""
 _LOWERED = 1.01

@@ -9,23 +9,6 @@ from winchkit.diagnosis.results import Combination, Estimate, series_orders
 from winchkit.effects.series import fundamentals
 from winchkit.report.words.numbers import between, with_std
 
-__all__ = [
-    "OUTPUT_NAMES",
-    "VARIABLE_NAMES",
-    "VERDICT_NAMES",
-    "clause",
-    "combination_text",
-    "estimate_text",
-    "interval_text",
-    "kind",
-    "listed",
-    "meaning",
-    "parameter_name",
-    "parameter_unit",
-    "values_text",
-    "variable_name",
-]
-
 VERDICT_NAMES = {
     "adequate": "Adequate",
     "explained": "Explained",

@@ -26,14 +26,6 @@ from winchkit.runs.log import Note, known_event
 from winchkit.runs.recording.log_file import is_written
 from winchkit.runs.run import Run
 
-__all__ = [
-    "cut_off",
-    "read_bytes",
-    "read_csv",
-    "read_events",
-    "read_lines",
-]
-
 _PIECE = 1 << 20
 """Bytes read at a time, so that a large file needs no memory of its size."""
 

@@ -10,8 +10,6 @@ from typing import Any
 
 from winchkit.runs.run_writer import RunWriter
 
-__all__ = ["CSV_MARK", "EVENT_MARK", "CsvWriter"]
-
 CSV_MARK = "# written by winchkit"
 """First line of a CSV file of winchkit, each of whose lines ends with a line feed.
 

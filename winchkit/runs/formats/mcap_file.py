@@ -16,25 +16,6 @@ import zstandard
 from winchkit.runs.formats.mcap_records import MARK, Body, Messages, Op, Record, records
 from winchkit.runs.layout import Signal, Source
 
-__all__ = [
-    "CDR",
-    "COLUMNS",
-    "COUNTERS",
-    "END",
-    "EVENTS",
-    "LOG",
-    "MARK",
-    "METADATA",
-    "PROFILE",
-    "SCHEMA",
-    "TOPIC",
-    "McapFile",
-    "message_definition",
-    "message_name",
-    "row_schema",
-    "texts",
-]
-
 PROFILE = "winchkit"
 TOPIC = "run"
 SCHEMA = "winchkit.Row"

@@ -22,11 +22,11 @@ from winchkit.runs.formats.mcap_file import (
     END,
     EVENTS,
     LOG,
-    MARK,
     METADATA,
     TOPIC,
 )
 from winchkit.runs.formats.mcap_records import (
+    MARK,
     Body,
     Damage,
     Messages,
@@ -41,14 +41,6 @@ from winchkit.runs.formats.mcap_records import (
 from winchkit.runs.layout import Layout, Samples, Source, read_layout
 from winchkit.runs.log import Log, Note, aligned, known_event, log_of_run, tables_in
 from winchkit.runs.run import Run
-
-__all__ = [
-    "McapContent",
-    "read_content",
-    "read_mcap",
-    "read_mcap_log",
-    "samples_of",
-]
 
 
 @dataclass

@@ -15,22 +15,6 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "MARK",
-    "Body",
-    "Damage",
-    "Messages",
-    "Op",
-    "Record",
-    "chunk_content",
-    "is_intact",
-    "joint_after",
-    "next_chunk",
-    "pack_messages",
-    "records",
-    "whole_chunk",
-]
-
 MARK = b"\x89MCAP0\r\n"
 """First and last bytes of a file."""
 _HEAD = struct.Struct("<BQ")

@@ -10,8 +10,6 @@ from mcap.writer import Writer
 from winchkit.runs.formats.mcap_file import COLUMNS, METADATA, PROFILE, SCHEMA, TOPIC, row_schema
 from winchkit.runs.run_writer import RunWriter
 
-__all__ = ["McapWriter"]
-
 
 class McapWriter(RunWriter):
     """An MCAP file without chunks, since a chunk would delay rows until it is full."""

@@ -8,11 +8,6 @@ from winchkit.errors import Fault, FileError, UsageError
 from winchkit.runs.log import Log
 from winchkit.runs.run import Run
 
-__all__ = [
-    "write_mf4",
-    "write_parquet",
-]
-
 
 def write_mf4(log: Log, path: str | Path) -> None:
     """Write a log as MDF 4, a group per source with its time stamps, from the first sample of any.

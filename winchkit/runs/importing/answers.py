@@ -9,28 +9,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, suggest
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE, read_unit
 from winchkit.schema.mapping import CHANNELS, EXCEL, STAMP
 from winchkit.schema.plausible import typed_quantity
-from winchkit.units import UNITS, suggest
-
-__all__ = [
-    "CONSTANTS",
-    "STORAGE",
-    "Answers",
-    "ColumnAnswer",
-    "answers_of",
-    "as_ours",
-    "permitted",
-    "read_column",
-    "read_constant",
-    "read_modulo",
-    "with_options",
-]
+from winchkit.units import UNITS
 
 _COLUMN = re.compile(
     r"\s*(?:(?P<file>[^=]+):)?\s*(?P<channel>[\w.]+)\s*=\s*(?P<minus>-\s*(?=\S))?(?P<source>.*?)\s*"

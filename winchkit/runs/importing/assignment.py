@@ -9,8 +9,6 @@ from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import SpelledUnit
 
-__all__ = ["Assignment", "Candidate", "Choice", "Confidence", "Guess", "Question"]
-
 _MEASURED = {"actual", "act", "ist", "measured", "meas"}
 _PREFERRED = {
     *_MEASURED,

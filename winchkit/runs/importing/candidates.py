@@ -33,8 +33,6 @@ from winchkit.runs.importing.unit_spelling import (
 from winchkit.runs.importing.winches import FEWEST, choose_channels
 from winchkit.schema.mapping import DATE, MATRIX
 
-__all__ = ["choose"]
-
 _BY_DIMENSION = {
     "time": "time",
     "angle": "motor_angle",

@@ -13,8 +13,6 @@ from winchkit.runs.importing.formats.stamps import read_stamps
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import COUNTS
 
-__all__ = ["ChosenColumn", "Work", "clock_of", "clock_values", "is_counted", "is_whole"]
-
 
 @dataclass(eq=False)
 class ChosenColumn:

@@ -15,16 +15,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of, clock_values, is_counted
 
-__all__ = [
-    "CLOCKS",
-    "USUAL_COUNTS",
-    "Ratio",
-    "beyond_rating",
-    "from_velocity",
-    "likely_counts",
-    "ratio_of",
-]
-
 _CLEAR = 0.98
 """Least correlation of angle and integral at which their ratio is used."""
 _TOLERANCE = 0.02

@@ -25,8 +25,6 @@ from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_settling import as_others, by_convention, started
 from winchkit.schema.mapping import DATE
 
-__all__ = ["guess_columns"]
-
 
 def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     """Guess what the columns of a table are.

@@ -11,8 +11,6 @@ from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.table import Column, Table
 
-__all__ = ["axes_of", "likely_axis"]
-
 _MOST = 64
 """Axes of one table."""
 _ROWS = 10

@@ -16,8 +16,6 @@ from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.table import Table
 from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedLog
 
-__all__ = ["guess_by", "mapping_id", "mapping_of", "write_mapping"]
-
 
 def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping:
     """Mapping of the logs that were imported.

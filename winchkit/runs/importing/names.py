@@ -13,8 +13,6 @@ from functools import cache
 
 from winchkit.runs.columns import column_dimension
 
-__all__ = ["CURRENT", "IGNORED", "Meaning", "meaning_of", "words_of"]
-
 IGNORED = ""
 """Channel of a set point, an error, a status word: known and not used."""
 CURRENT = "current"

@@ -15,8 +15,6 @@ from winchkit.runs.importing.chosen import ChosenColumn, Work
 from winchkit.runs.importing.names import words_of
 from winchkit.schema.mapping import VECTOR
 
-__all__ = ["quaternion_order", "settle_orientation"]
-
 _ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
 _OPEN = re.compile(r"(a )?r(ot)? ?[xyz]")
 """Names of components of a rotation, which may be fixed angles or a rotation vector."""

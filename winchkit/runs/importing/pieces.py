@@ -16,8 +16,6 @@ from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.streams import Stream, Streams
 
-__all__ = ["Jump", "jumps_of", "pieces_of"]
-
 _MOST = 5
 """Jumps of a recording; more large steps are motions between slow samples."""
 _TIMES = 10.0

@@ -8,8 +8,6 @@ from collections.abc import Mapping, Sequence
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import Column
 
-__all__ = ["body_of", "chosen_body", "complete_sets", "quaternion_names", "vector_names"]
-
 _NOT_A_BODY = re.compile(
     r"^(rigid body|rigid body marker|marker|bone|type|name|position|rotation|orientation|"
     r"mean marker error|marker quality|trajectories|pose pose|pose|transform)$"

@@ -14,8 +14,6 @@ from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SH
 from winchkit.schema.mapping import DATE
 from winchkit.units import UNITS
 
-__all__ = ["ask_columns", "ask_units", "axis_question"]
-
 _SHOWN = 8
 """Names listed in a question; about one line."""
 

@@ -24,8 +24,6 @@ from winchkit.schema.mapping import ImportMapping
 from winchkit.schema.read import read_mapping
 from winchkit.units import UNITS
 
-__all__ = ["has_angle", "metadata_of", "read_mapped", "run_of", "whole_run", "with_angle"]
-
 _INTEGRAL = (
     "no column has the motor angle: it is the integral of motor_velocity from 0, so that its "
     "absolute value is unknown and an offset of the velocity is a drift of the angle"

@@ -10,8 +10,6 @@ import numpy as np
 from winchkit.runs.importing.chosen import Work
 from winchkit.runs.importing.table import Table
 
-__all__ = ["LOG_TIME", "SOURCE_STAMP", "delays", "has_two_clocks", "without_stamps"]
-
 SOURCE_STAMP, LOG_TIME = "header.stamp", "log_time"
 """Names of the columns of a topic."""
 

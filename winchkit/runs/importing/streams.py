@@ -21,8 +21,6 @@ from winchkit.runs.importing.stored.numbers import range_of, restored
 from winchkit.runs.importing.table import Column, Table
 from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP, VECTOR
 
-__all__ = ["Stream", "Streams", "merged", "streams_of"]
-
 _STILL = 0.01
 """Share of repeated stamps that are left out; with more of them the clock is too coarse."""
 _FEWEST = 20

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 
-__all__ = ["LARGEST", "Column", "Table", "named_apart", "refuse_size"]
-
 LARGEST = 1 << 30
 """Largest size of a file, of its unpacked content and of its numbers, bytes."""
 

@@ -28,8 +28,6 @@ from winchkit.runs.importing.winches import stem_of
 from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
 from winchkit.units import GRAVITY, UNITS
 
-__all__ = ["as_others", "by_convention", "is_alike", "started"]
-
 _TURN = 2 * math.pi
 _AXES = (
     {"platform_x", "platform_y", "platform_z"},

@@ -14,18 +14,6 @@ from functools import lru_cache
 
 from winchkit.units import GRAVITY, UNITS
 
-__all__ = [
-    "BRIDGE",
-    "COUNTS",
-    "COUNT_RATE",
-    "SHARE",
-    "SpelledUnit",
-    "is_unit_row",
-    "named_unit",
-    "read_unit",
-    "split_unit",
-]
-
 COUNTS, COUNT_RATE, SHARE, BRIDGE = "counts", "counts per second", "share", "bridge"
 
 

@@ -12,8 +12,6 @@ from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.table import Column
 from winchkit.schema.mapping import DATE
 
-__all__ = ["FEWEST", "choose_channels", "stem_of"]
-
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"gauche", "droite"}, {"front", "rear"})
 _MOVING = ("motor_angle", "motor_velocity", "motor_torque")
 _SINGLE = ("motor_angle", "motor_torque", "tension", "cable_length", "load")

@@ -32,8 +32,6 @@ from winchkit.runs.layout import Layout, Samples, write_layout
 from winchkit.runs.recording.log_file import require_in_place
 from winchkit.runs.recording.writer import LogWriter
 
-__all__ = ["ChannelLog"]
-
 
 class ChannelLog(LogWriter):
     """One topic per source, and topics of events and counters."""

@@ -21,16 +21,6 @@ from winchkit.errors import Fault, FileError, UsageError
 from winchkit.regular_file import regular
 from winchkit.runs.recording.rotation import parts_beside
 
-__all__ = [
-    "Lock",
-    "begin_log",
-    "create",
-    "is_written",
-    "lock_file",
-    "refuse_written",
-    "require_in_place",
-]
-
 _BUFFER = 1 << 20
 """Bytes: one write per second or less at the rates of a bench."""
 _PATIENCE = 2.0

@@ -9,8 +9,6 @@ from winchkit.runs.layout import Layout
 from winchkit.runs.recording.rotation import Rotation
 from winchkit.runs.recording.writer import LogWriter, Watch
 
-__all__ = ["open_log"]
-
 
 def open_log(
     path: Path,

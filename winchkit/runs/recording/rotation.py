@@ -10,8 +10,6 @@ from typing import Self
 from winchkit.errors import UsageError
 from winchkit.units import UNITS, parse
 
-__all__ = ["Rotation", "part_path", "parts_beside"]
-
 _BYTES = {"kB": 1e3, "MB": 1e6, "GB": 1e9}
 _LIMIT = re.compile(r"\s*([0-9.]+)\s*([A-Za-z]+)\s*")
 _SMALLEST, _SHORTEST = 10e3, 1.0

@@ -16,8 +16,6 @@ from winchkit.runs.recording.writer import LogWriter
 from winchkit.runs.run_writer import RunWriter
 from winchkit.runs.writer import kind_for
 
-__all__ = ["RowLog"]
-
 
 class RowLog(LogWriter):
     """Rows at the samples of the slowest instrument."""

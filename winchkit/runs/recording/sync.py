@@ -6,8 +6,6 @@ import errno
 import os
 import threading
 
-__all__ = ["SYNC_PERIOD", "Syncer"]
-
 SYNC_PERIOD = 0.8
 """Period of fsync, s: written data reach the disk within a second."""
 _CANNOT = (errno.EINVAL, errno.ENOTSUP, errno.EROFS)

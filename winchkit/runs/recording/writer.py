@@ -12,8 +12,6 @@ from winchkit.runs.layout import Layout, Samples
 from winchkit.runs.recording.log_file import begin_log, create
 from winchkit.runs.recording.rotation import Rotation, part_path
 
-__all__ = ["LogWriter", "Watch"]
-
 Watch = Callable[[int], None]
 """Called with the descriptor of every file that is written."""
 

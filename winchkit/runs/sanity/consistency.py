@@ -13,8 +13,6 @@ from winchkit.runs.sanity.factors import Slope, named_factor, slope_text
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.local_noise import local_noise
 
-__all__ = ["INCONSISTENT", "velocity_consistency"]
-
 INCONSISTENT = "inconsistent-velocity"
 """Code of the finding on a velocity that is not the derivative of the motor angle."""
 

@@ -7,8 +7,6 @@ from math import floor, log, log10, pi
 
 from winchkit.units import GRAVITY
 
-__all__ = ["KNOWN_FACTORS", "Slope", "named_factor", "slope_text"]
-
 _TOLERANCE = 0.05
 """Relative difference that errors of a profile's values may make on top of the uncertainty."""
 _SIGMAS = 3.0

@@ -19,8 +19,6 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import share
 
-__all__ = ["ON_GROUND", "ground_mask", "load_on_ground"]
-
 ON_GROUND = "load-on-ground"
 _FORCES = ("tension", "motor_torque")
 """The first one of a run decides: static friction may hold a load without torque, not the cell."""

@@ -19,8 +19,6 @@ from winchkit.runs.sanity.repeated_values import constant, repeated_values
 from winchkit.runs.sanity.sampling import sampling
 from winchkit.runs.sanity.saturation import saturated
 
-__all__ = ["Inspection", "inspect_run"]
-
 _INSTRUMENTS = {"tension", "tension_gross", "load", "load_gross", "motor_torque", "cable_length"}
 """Channels that no trajectory generator sets, so that a limit is one of the instrument."""
 

@@ -17,8 +17,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["local_noise", "smallest_differences", "sorted_quantile"]
-
 _ORDERS = (1, 2, 3)
 """Orders of differences: higher ones hardly remove more of a smooth signal, and lose degrees of
 freedom."""

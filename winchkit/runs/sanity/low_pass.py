@@ -21,8 +21,6 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.quantisation import quantisation_noise
 
-__all__ = ["low_pass"]
-
 _BINS = 64
 """Frequencies of the spectrum up to half the sampling rate: blocks of 128 samples."""
 _FALL = 30.0

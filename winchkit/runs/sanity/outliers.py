@@ -14,8 +14,6 @@ from winchkit.runs.sanity.local_noise import sorted_quantile
 from winchkit.runs.sanity.quantisation import quantisation_noise, resolution
 from winchkit.runs.sanity.text import size
 
-__all__ = ["outlier_mask", "outlier_masks", "outliers"]
-
 _LIMIT = 12.0
 """Local standard deviations: beyond 8 in none of 10¹⁵ Gaussian samples, and room for tails."""
 _AGREEMENT = 0.25

@@ -27,8 +27,6 @@ from winchkit.runs.sanity.local_noise import local_noise, smallest_differences, 
 from winchkit.runs.sanity.sampling import with_lost_samples
 from winchkit.runs.sanity.text import size
 
-__all__ = ["quantisation_noise", "quantised", "resolution", "resolutions"]
-
 _BINS = 8192
 """Bins of the histogram of the differences: with `_BINS_PER_STEP` it shows steps down to 1/512 of
 the largest difference."""

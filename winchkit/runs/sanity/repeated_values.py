@@ -14,8 +14,6 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import share, size
 
-__all__ = ["constant", "repeated_values"]
-
 _LEAST_SHARE = 0.2
 """Share of repeated values that is reported; fewer hardly change a spectrum. Rule of thumb."""
 _LEAST_CHANGES = 20

@@ -21,8 +21,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.runs.sanity.quantisation import quantisation_noise
 
-__all__ = ["mean_error", "noise_before_rounding"]
-
 _HARMONICS = 8
 """Harmonics of the mean rounding error; numerical: 93 % of its mean square without noise, all of it
 from a noise of a tenth of the step; the rest is taken as white."""

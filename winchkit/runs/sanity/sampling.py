@@ -11,8 +11,6 @@ from winchkit.runs.run import Run, lost_samples
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import counted, share
 
-__all__ = ["sampling", "with_lost_samples"]
-
 _JITTER = 0.05
 """Standard deviation of the intervals, relative to their mean, that is reported."""
 _LEAST_SAMPLES = 20

@@ -12,8 +12,6 @@ from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.text import share, size
 
-__all__ = ["saturated"]
-
 _LEAST_SAMPLES = 5
 """Fewer equal samples at an end are an extremum that the resolution flattens. Rule of thumb."""
 _TIES = 0.01

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["counted", "share", "size"]
-
 
 def size(value: float, unit: str) -> str:
     """A value with three digits and its unit: ``0.0238 N m``."""

@@ -14,8 +14,6 @@ from winchkit.schema.devices.stream import StreamSpec
 from winchkit.schema.table import Rule, Table
 from winchkit.units import dimension_of
 
-__all__ = ["TABLES", "DeviceSpec"]
-
 TABLES = ("servo", "modbus", "stream", "process")
 """One for each kind of device."""
 

@@ -16,8 +16,6 @@ from math import isfinite, pi
 from winchkit.errors import UsageError, suggest
 from winchkit.schema.quantity import Marker
 
-__all__ = ["DriveUnit", "UnitProduct", "product_of"]
-
 _TURN = 2 * pi
 _UNITS: dict[str, tuple[float, int, int]] = {
     "rad": (1.0, 1, 0),

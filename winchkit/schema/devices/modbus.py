@@ -19,20 +19,6 @@ from winchkit.schema.quantity import (
 from winchkit.schema.table import Rule, Table
 from winchkit.units import dimension_of
 
-__all__ = [
-    "REGISTERS",
-    "BusLink",
-    "CommandSpec",
-    "DecimalsSpec",
-    "FieldSpec",
-    "ModbusSpec",
-    "Order",
-    "ReadBlock",
-    "StatusMeaning",
-    "UnlockStep",
-    "ValueType",
-]
-
 StatusMeaning = Literal[
     "fault", "overload", "underload", "stable", "unstable", "net", "zero", "valid", "busy"
 ]

@@ -19,8 +19,6 @@ from winchkit.schema.quantity import (
 from winchkit.schema.table import Rule, Table
 from winchkit.units import dimension_of
 
-__all__ = ["ProcessCommand", "ProcessSpec"]
-
 
 @dataclass(frozen=True)
 class ProcessCommand(Table):

@@ -11,15 +11,6 @@ from winchkit.schema.host_loss import VendorWatchdog, unknown_mechanism
 from winchkit.schema.quantity import Duration, Flag, Quantity, Whole, WholeNumber
 from winchkit.schema.table import Rule, Table
 
-__all__ = [
-    "Encoder",
-    "Mode",
-    "OptionSpec",
-    "PdoSpec",
-    "QuirkSpec",
-    "ServoSpec",
-]
-
 
 @dataclass(frozen=True)
 class QuirkSpec(Table):

@@ -22,19 +22,6 @@ from winchkit.schema.table import Rule, Table
 from winchkit.schema.template import Part, fields_of, length_of, parts_of
 from winchkit.units import dimension_of
 
-__all__ = [
-    "NUMBERS",
-    "AskSpec",
-    "BinarySpec",
-    "ChecksumSpec",
-    "FreshSpec",
-    "LinkSpec",
-    "Says",
-    "StatusBitsSpec",
-    "StreamSpec",
-    "UnitSpec",
-]
-
 Says = Literal[
     "good",
     "overload",

@@ -16,8 +16,6 @@ from winchkit.errors import Fault, FileError
 from winchkit.regular_file import regular
 from winchkit.schema.eds.repair import Findings, Section, canonical, canonical_key, mend
 
-__all__ = ["EdsText", "read_eds_text"]
-
 _LARGEST = 8_000_000
 """Bytes: an EDS has some hundred kilobytes; a wrong file does not fill the memory."""
 _SECTION = re.compile(r"\[\s*(.*?)\s*\]\s*$")

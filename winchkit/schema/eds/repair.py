@@ -7,14 +7,6 @@ from dataclasses import dataclass, field
 
 from winchkit.errors import Fault
 
-__all__ = [
-    "Findings",
-    "Section",
-    "canonical",
-    "canonical_key",
-    "mend",
-]
-
 _OBJECT = re.compile(r"([0-9A-F]{4})(?:SUB([0-9A-F]{1,2})|(NAME))?$", re.IGNORECASE)
 _OBJECT_KEYS = (
     "ObjectType",

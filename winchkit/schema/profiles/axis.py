@@ -17,8 +17,6 @@ from winchkit.schema.profiles.winch import (
 )
 from winchkit.schema.table import Rule
 
-__all__ = ["AxisProfile"]
-
 _UNIT_DRUM = DrumSpec("grooved", winding_radius=1.0, groove_pitch=0.0)
 """A radius of 1 m: lengths of the line are then angles of the joint."""
 

@@ -17,17 +17,6 @@ from winchkit.errors import UsageError, suggest
 from winchkit.schema.quantity import Marker, Quantity
 from winchkit.schema.table import Rule, Table
 
-__all__ = [
-    "UNKNOWN",
-    "CellsSpec",
-    "FrameSpec",
-    "ImuSpec",
-    "InstrumentSpec",
-    "LengthCountersSpec",
-    "SwivelsSpec",
-    "TrackerSpec",
-]
-
 UNKNOWN = "unknown"
 Vector = tuple[float, float, float]
 Unknown = Literal["unknown"]

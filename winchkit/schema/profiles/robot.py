@@ -22,8 +22,6 @@ from winchkit.schema.quantity import (
 )
 from winchkit.schema.table import Rule, Table
 
-__all__ = ["FittedSpec", "HomeSpec", "LineSpec", "PlatformSpec", "PriorSpec", "RobotProfile"]
-
 Point = tuple[Length, Length, Length]
 
 PriorName = Literal[

@@ -17,18 +17,6 @@ from winchkit.schema.quantity import (
 )
 from winchkit.schema.table import Rule, Table
 
-__all__ = [
-    "BeltChoice",
-    "DrumChoice",
-    "EfficiencySpec",
-    "GearboxChoice",
-    "MotorChoice",
-    "RequirementSpec",
-    "ScrewChoice",
-    "SizeSpec",
-    "WormSpec",
-]
-
 Share = Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)]
 Power = Annotated[float, Quantity("power", 0.0, above=True)]
 Turning = Annotated[float, Quantity("angular speed", 0.0, above=True)]

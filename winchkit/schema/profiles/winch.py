@@ -22,22 +22,6 @@ from winchkit.schema.quantity import (
 )
 from winchkit.schema.table import Rule, Table
 
-__all__ = [
-    "LAYERED",
-    "SHORTHANDS",
-    "CableSpec",
-    "DrumSpec",
-    "EffectTable",
-    "GearboxSpec",
-    "GuideSpec",
-    "LedgerEntry",
-    "MotorSpec",
-    "PathSpec",
-    "PulleySpec",
-    "ReferenceSpec",
-    "WinchProfile",
-]
-
 
 @dataclass(frozen=True)
 class LedgerEntry(Table):

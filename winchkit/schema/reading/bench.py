@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from winchkit.errors import FileError
+from winchkit.errors import FileError, suggest
 from winchkit.schema.bench import BenchSpec, latch_path
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.profiles.robot import RobotProfile
@@ -26,9 +26,7 @@ from winchkit.schema.simbench import (
     WinchTruth,
     dotted_keys,
 )
-from winchkit.units import GRAVITY, suggest
-
-__all__ = ["bench", "sim_bench"]
+from winchkit.units import GRAVITY
 
 ROLES = ("servo", "cell", "load", "length", "temperature")
 _MEASURED = {"cell": "force", "load": "force", "length": "length", "temperature": "temperature"}

@@ -8,8 +8,6 @@ from __future__ import annotations
 import re
 from bisect import bisect_right
 
-__all__ = ["Key", "line_of", "lines_of_keys"]
-
 Key = tuple[str | int, ...]
 """A place in a file: keys, and positions within arrays counted from 0."""
 

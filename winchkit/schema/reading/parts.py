@@ -15,8 +15,6 @@ from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.source import Source
 from winchkit.schema.reading.tables import read_table
 
-__all__ = ["Reading"]
-
 T = TypeVar("T")
 _PARTS_OF_A_WINCH = "drum", "cable", "path", "guide", "pulley"
 

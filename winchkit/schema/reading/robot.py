@@ -12,8 +12,6 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.parts import Reading
 
-__all__ = ["robot"]
-
 
 def robot(
     reading: Reading, tree: dict[str, Any], read_winch: Callable[[Path], WinchProfile]

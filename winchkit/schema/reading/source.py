@@ -10,12 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.arguments import path_of
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, suggest
 from winchkit.regular_file import regular
 from winchkit.schema.reading.lines import Key, line_of, lines_of_keys
-from winchkit.units import suggest
-
-__all__ = ["KINDS", "Source", "open_source", "spelled"]
 
 KINDS = (
     "winch",

@@ -11,14 +11,11 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_t
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from winchkit.errors import Fault
+from winchkit.errors import Fault, suggest
 from winchkit.schema.quantity import Marker
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.source import Source
 from winchkit.schema.table import BrokenRules
-from winchkit.units import suggest
-
-__all__ = ["marker_at", "read_table"]
 
 T = TypeVar("T")
 

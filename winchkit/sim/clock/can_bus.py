@@ -11,8 +11,6 @@ from typing import Any
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.buses import Wire
 
-__all__ = ["SimulatedCanBus", "SimulatedCanPort"]
-
 _FRAME_BITS = 47
 """Bits of a data frame of an 11-bit identifier without its data, interframe space included."""
 _STUFFED_BITS = 34

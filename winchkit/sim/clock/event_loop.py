@@ -7,8 +7,6 @@ from asyncio import base_events
 from collections.abc import Callable
 from typing import Any, Protocol
 
-__all__ = ["SimulatedEventLoop"]
-
 _LATENCY = 2e-4
 """Delay from one end of a connection to the other, s."""
 _FIRST_PORT = 20_000

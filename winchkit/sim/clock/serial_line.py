@@ -9,8 +9,6 @@ from contextlib import AbstractContextManager
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.instruments.stream import StreamInstrument
 
-__all__ = ["SimulatedSerialLine"]
-
 _TICK = 2e-3
 """s, as of the line in real time."""
 _TIMEOUT = 0.1

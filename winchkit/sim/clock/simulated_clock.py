@@ -18,8 +18,6 @@ from typing import Any
 
 from winchkit.errors import WinchkitError
 
-__all__ = ["SimulatedClock", "SimulatedEvent", "SimulatedLock", "SimulatedThread"]
-
 
 class _Waiter:
     """One wait of one thread; it is woken once."""

@@ -13,11 +13,6 @@ from winchkit.sim.drive.power import HALT, PowerStage, State
 from winchkit.sim.drive.shaft import Shaft
 from winchkit.sim.drive.units import SCALES
 
-__all__ = [
-    "Actions",
-    "guard_options",
-]
-
 _POSITIVE = (0x6083, 0x6084, 0x6085, 0x609A, 0x60C5, 0x60C6)
 """Objects whose value zero would give a ramp without end."""
 

@@ -13,8 +13,6 @@ from winchkit.sim.drive.shaft import Shaft
 from winchkit.sim.drive.status import StatusBits
 from winchkit.sim.drive.units import wrapped
 
-__all__ = ["Axis"]
-
 _LEAST_SLICE = 2e-5
 """Shorter times are left to the next call, s."""
 

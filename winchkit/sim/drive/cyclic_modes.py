@@ -9,14 +9,6 @@ from winchkit.sim.drive.demand import Demand, SetPoints, Windows, approach
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = [
-    "CyclicPosition",
-    "CyclicTorque",
-    "CyclicVelocity",
-    "InterpolatedPosition",
-    "MovingAverage",
-]
-
 
 class MovingAverage:
     """Mean of a signal over the last ``duration`` s; without a duration the signal itself."""

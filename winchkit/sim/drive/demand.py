@@ -9,8 +9,6 @@ from typing import Protocol
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = ["Demand", "SetPoints", "Windows", "approach"]
-
 
 def approach(value: float, goal: float, step: float) -> float:
     """Move ``value`` towards ``goal`` by at most ``step``."""

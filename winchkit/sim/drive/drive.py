@@ -22,8 +22,6 @@ from winchkit.sim.drive.settings import Settings
 from winchkit.sim.drive.shaft import HoldingBrake, Shaft
 from winchkit.sim.drive.status import StatusBits
 
-__all__ = ["SimDrive"]
-
 _BOOT_SHARE = 0.8
 """Default boot time as a share of the longest one that the device file declares."""
 _HEARTBEAT_LOST = FaultKind(0x8130)

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from winchkit.errors import UsageError
-from winchkit.units import suggest
-
-__all__ = ["CONDITIONS", "FAULTS", "FaultKind", "known"]
+from winchkit.errors import UsageError, suggest
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,6 @@ from winchkit.sim.drive.demand import Demand, SetPoints, Windows, approach
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = ["HOMING_METHODS", "Homing", "Switches"]
-
 _START = 1 << 4
 _REACHED, _ATTAINED, _ERROR = 1 << 10, 1 << 12, 1 << 13
 _SWITCH, _ZERO = 1, 2

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 
-__all__ = ["Line"]
-
 _SLOW = 0.3
 """Delay of a slow SDO answer, s."""
 _STORM_PERIOD = 1e-3

@@ -8,8 +8,6 @@ from enum import IntEnum
 from winchkit.errors import FileError
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 
-__all__ = ["Mode", "check_objects", "modes_of", "supported"]
-
 
 class Mode(IntEnum):
     """Values of 6060h; the value less one is the mode's bit in 6502h."""

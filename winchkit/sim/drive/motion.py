@@ -19,8 +19,6 @@ from winchkit.sim.drive.settings import Settings
 from winchkit.sim.drive.shaft import HoldingBrake
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = ["Motion"]
-
 _STANDSTILL = 0.05
 """Speed below which a ramp has ended, rad/s."""
 _PATIENCE = 0.5

@@ -9,8 +9,6 @@ from math import inf
 
 from winchkit.sim.drive.object_dictionary import Abort, ObjectDictionary
 
-__all__ = ["Heartbeats", "NmtState", "emergency_frame", "error_register"]
-
 _HISTORY = 0x1003
 """CiA 301: pre-defined error field."""
 _CONSUMER = 0x1016

@@ -16,8 +16,6 @@ from winchkit.errors import Fault, FileError
 from winchkit.python_can import import_python_can
 from winchkit.schema.eds.eds import read_eds_text
 
-__all__ = ["Abort", "Entry", "Guard", "Key", "ObjectDictionary", "Value", "read_eds"]
-
 Key = tuple[int, int]
 """Index and sub-index."""
 Value = int | bytes

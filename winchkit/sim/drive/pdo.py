@@ -8,8 +8,6 @@ from math import inf
 
 from winchkit.sim.drive.object_dictionary import Abort, Entry, Key, ObjectDictionary
 
-__all__ = ["Pdos"]
-
 _INVALID = 1 << 31
 """Bit 31 of sub-index 1 (CiA 301): the PDO does not exist."""
 _NO_RTR = 1 << 30

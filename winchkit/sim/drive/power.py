@@ -8,18 +8,6 @@ from typing import NamedTuple
 
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 
-__all__ = [
-    "FAULT_RESET",
-    "HALT",
-    "TRANSITIONS",
-    "Command",
-    "Order",
-    "PowerStage",
-    "State",
-    "Transition",
-    "command_of",
-]
-
 FAULT_RESET = 0x0080
 HALT = 0x0100
 """Bits 7 and 8 of the control word 6040h (CiA 402)."""

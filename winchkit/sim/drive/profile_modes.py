@@ -9,14 +9,6 @@ from winchkit.sim.drive.demand import Demand, SetPoints, Windows, approach
 from winchkit.sim.drive.settings import Settings
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = [
-    "Move",
-    "Moves",
-    "ProfilePosition",
-    "ProfileTorque",
-    "ProfileVelocity",
-]
-
 
 @dataclass(frozen=True)
 class Move:

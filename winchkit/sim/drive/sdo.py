@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from winchkit.sim.drive.object_dictionary import Abort, Key, ObjectDictionary
 
-__all__ = ["SdoServer"]
-
 _DOWNLOAD_SEGMENT, _DOWNLOAD, _UPLOAD, _UPLOAD_SEGMENT, _ABORT = range(5)
 _SEGMENT = 7
 """Data bytes in a segment (CiA 301)."""

@@ -9,8 +9,6 @@ from winchkit.schema.devices.servo import ServoSpec
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 from winchkit.sim.drive.units import units_of
 
-__all__ = ["Limits", "Settings"]
-
 _RPM = 2 * pi / 60
 _RAMP_FROM = 3000 * _RPM
 """Final speed of ramps that are declared as times, rad/s."""

@@ -7,12 +7,6 @@ from typing import Protocol
 
 from winchkit.sim.plant.servo import DriveCommand
 
-__all__ = [
-    "HoldingBrake",
-    "Reading",
-    "Shaft",
-]
-
 
 class Reading(Protocol):
     """Readings of the drive's sensors with noise, SI."""

@@ -7,8 +7,6 @@ from winchkit.sim.drive.motion import Motion
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 from winchkit.sim.drive.power import State
 
-__all__ = ["StatusBits"]
-
 _VOLTAGE, _REMOTE, _REACHED, _LIMIT = 1 << 4, 1 << 9, 1 << 10, 1 << 11
 
 

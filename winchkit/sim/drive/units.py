@@ -9,8 +9,6 @@ from winchkit.schema.devices.drive_unit import product_of
 from winchkit.schema.devices.servo import ServoSpec
 from winchkit.sim.drive.object_dictionary import ObjectDictionary
 
-__all__ = ["SCALES", "Units", "units_of", "wrapped"]
-
 _TURN = 2 * pi
 SCALES = (0x608F, 0x6091, 0x6092, 0x6076, 0x60A8, 0x60A9)
 """Objects that determine units."""

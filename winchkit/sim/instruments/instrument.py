@@ -7,16 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from math import isfinite, nan
 from typing import ClassVar, NamedTuple
 
-from winchkit.errors import UsageError
+from winchkit.errors import UsageError, suggest
 from winchkit.schema.devices.modbus import StatusMeaning
-from winchkit.units import suggest
-
-__all__ = [
-    "Converted",
-    "Converter",
-    "SimulatedInstrument",
-    "status_word",
-]
 
 _FAST, _SLOW = 0.05, 0.5
 """Time constants of the two averages whose difference indicates motion, s."""

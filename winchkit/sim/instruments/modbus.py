@@ -19,15 +19,6 @@ from winchkit.schema.devices.modbus import (
 from winchkit.sim.instruments.instrument import SimulatedInstrument, status_word
 from winchkit.units import convert, dimension_of, factor
 
-__all__ = [
-    "ModbusInstrument",
-    "counts_of",
-    "decimals_of",
-    "encode",
-    "encode_number",
-    "in_unit_of",
-]
-
 _BITS = {"u16": 16, "i16": 16, "u32": 32, "i32": 32}
 _DECIMALS = 2
 """Of a simulated indicator, as usual for some hundred newtons."""

@@ -20,11 +20,6 @@ from winchkit.errors import ConnectionLost
 from winchkit.sim.clock.simulated_clock import SimulatedClock, SimulatedThread
 from winchkit.sim.instruments.modbus import ModbusInstrument
 
-__all__ = [
-    "ModbusLine",
-    "PtyCable",
-]
-
 _AT_ONCE = 4096
 """Bytes: more than a frame (256), the buffer of a pseudo-terminal."""
 _WAIT = 0.05

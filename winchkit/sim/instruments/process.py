@@ -16,8 +16,6 @@ from winchkit.sim.drive.pdo import Pdos
 from winchkit.sim.drive.sdo import SdoServer
 from winchkit.sim.instruments.instrument import SimulatedInstrument, status_word
 
-__all__ = ["ProcessInstrument"]
-
 _NMT = {0x01: NmtState.OPERATIONAL, 0x02: NmtState.STOPPED, 0x80: NmtState.PRE_OPERATIONAL}
 _RESET = (0x81, 0x82)
 _SYNC = 0x1005

@@ -11,8 +11,6 @@ from winchkit.sim.instruments.instrument import SimulatedInstrument
 from winchkit.sim.instruments.stream_frames import Speech, State, example_unit
 from winchkit.units import convert, dimension_of, factor
 
-__all__ = ["StreamInstrument", "shown_by"]
-
 
 class StreamInstrument(SimulatedInstrument):
     """One device on a serial line, with input :meth:`receive` and output :meth:`take_output`.

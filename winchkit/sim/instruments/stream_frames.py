@@ -17,17 +17,6 @@ from winchkit.schema.devices.stream import (
 )
 from winchkit.schema.template import Part, fields_of
 
-__all__ = [
-    "NumberStyle",
-    "Speech",
-    "State",
-    "example_fields",
-    "example_unit",
-    "number_of",
-    "style_of",
-    "write_line",
-]
-
 
 @dataclass(frozen=True)
 class NumberStyle:

@@ -14,8 +14,6 @@ from pathlib import Path
 from winchkit.errors import ConnectionLost
 from winchkit.sim.instruments.stream import StreamInstrument
 
-__all__ = ["StreamLine"]
-
 _TICK = 2e-3
 """s: a conversion is sent that much late, a tenth of the period of a cell of 50 Hz."""
 _JOIN = 5.0

@@ -12,7 +12,7 @@ from pathlib import Path
 from time import monotonic
 from types import TracebackType
 
-from winchkit.errors import NotPermitted, UsageError
+from winchkit.errors import NotPermitted, UsageError, suggest
 from winchkit.schema.bench import BenchSpec, BusSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import ALL, Step
@@ -27,9 +27,6 @@ from winchkit.sim.live.real_time import TICK, serve
 from winchkit.sim.live.robot import LiveRobot
 from winchkit.sim.live.winch import LiveWinch
 from winchkit.sim.plant.hanging_load import Load
-from winchkit.units import suggest
-
-__all__ = ["LiveBench"]
 
 _OVERRUN = 0.02
 """Lateness of a tick from which it is counted, s."""

@@ -14,8 +14,6 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.quantity import Quantity
 from winchkit.units import UNITS
 
-__all__ = ["bench_toml", "is_written_here", "write_bench"]
-
 _MARK = "# written by winchkit: the bench of a simulation"
 """First line, by which a later simulation knows that it may write over the file."""
 

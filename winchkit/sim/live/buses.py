@@ -20,14 +20,6 @@ from winchkit.errors import ConnectionLost, UsageError
 from winchkit.multicast import MulticastPort
 from winchkit.schema.bench import BusSpec
 
-__all__ = [
-    "CanPort",
-    "Carried",
-    "Interface",
-    "Wire",
-    "wired",
-]
-
 
 @dataclass(frozen=True, slots=True)
 class Carried:

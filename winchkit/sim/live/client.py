@@ -12,8 +12,6 @@ from pathlib import Path
 from winchkit.errors import ConnectionLost, DeviceRefused
 from winchkit.schema.programme import Step
 
-__all__ = ["REFUSED", "address_file", "answer", "is_simulated", "send"]
-
 REFUSED = "refused: "
 """Start of the reply to a line that could not be executed."""
 _TIMEOUT = 5.0

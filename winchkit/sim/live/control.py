@@ -7,13 +7,11 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from winchkit.errors import FileError, UsageError, WinchkitError
+from winchkit.errors import FileError, UsageError, WinchkitError, suggest
 from winchkit.schema.programme import ALL
 from winchkit.sim.live.bench import LiveBench
 from winchkit.sim.live.client import REFUSED, address_file
-from winchkit.units import parse, suggest
-
-__all__ = ["HELP", "ControlServer", "obey"]
+from winchkit.units import parse
 
 HELP = """\
 load WINCH MASS     attach another load, e.g. load A 32 kg (WINCH may be all)

@@ -14,8 +14,6 @@ from winchkit.sim.instruments.process import ProcessInstrument
 from winchkit.sim.instruments.stream import StreamInstrument, shown_by
 from winchkit.units import dimension_of, factor
 
-__all__ = ["Instrument", "device_of", "instruments_of"]
-
 Instrument = ModbusInstrument | StreamInstrument | ProcessInstrument
 Send = Callable[[int, bytes], None]
 """Sends an identifier and data to a CAN bus."""

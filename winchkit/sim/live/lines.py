@@ -17,8 +17,6 @@ from winchkit.sim.instruments.stream import StreamInstrument
 from winchkit.sim.instruments.stream_line import StreamLine
 from winchkit.sim.live.instruments import Instrument
 
-__all__ = ["Line", "Placed", "open_line"]
-
 Line = ModbusLine | StreamLine | SimulatedSerialLine
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import threading
 import time
 
-__all__ = ["PacedClock"]
-
 _SLACK = 0.008
 """s: two cycles of 4 ms; a drive then reacts to the host's silence as late as a real one would."""
 _PATIENCE = 1.0

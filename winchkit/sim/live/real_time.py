@@ -6,8 +6,6 @@ from collections.abc import Callable
 
 from winchkit.sim.live.buses import CanPort
 
-__all__ = ["TICK", "serve"]
-
 TICK = 2e-3
 """Period at which the timers of simulated devices are evaluated, s."""
 

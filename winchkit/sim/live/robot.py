@@ -13,8 +13,6 @@ from winchkit.schema.simbench import SimBench
 from winchkit.sim.robot.build import build_robot
 from winchkit.sim.robot.tracker import SimTracker
 
-__all__ = ["LiveRobot"]
-
 
 class LiveRobot:
     """Platform, cable ends and tracker of a simulated bench; not thread-safe.

@@ -9,7 +9,7 @@ from math import inf
 from pathlib import Path
 from random import Random
 
-from winchkit.errors import FileError, NotPermitted, UsageError
+from winchkit.errors import FileError, NotPermitted, UsageError, suggest
 from winchkit.schema.bench import DeviceRef, WinchWiring
 from winchkit.schema.devices.servo import ServoSpec
 from winchkit.schema.profiles.winch import WinchProfile
@@ -21,9 +21,6 @@ from winchkit.sim.instruments.process import ProcessInstrument
 from winchkit.sim.live.instruments import device_of, instruments_of
 from winchkit.sim.plant.hanging_load import Load
 from winchkit.sim.plant.plant import WinchPlant
-from winchkit.units import suggest
-
-__all__ = ["LiveWinch"]
 
 _QUANTITIES = {
     "cell": "tension",

@@ -10,19 +10,6 @@ from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Quantity
 from winchkit.sim.physics.state import State
 
-__all__ = [
-    "HOOKS",
-    "Expansion",
-    "ForceDrift",
-    "Physics",
-    "RotationalViscosity",
-    "Stiffness",
-    "ThermalForce",
-    "Viscosity",
-    "motor_direction",
-    "winding_direction",
-]
-
 Stiffness = Annotated[float, Quantity("stiffness", 0.0, above=True)]
 Viscosity = Annotated[float, Quantity("viscosity")]
 RotationalViscosity = Annotated[float, Quantity("rotational viscosity")]

@@ -18,15 +18,6 @@ from winchkit.schema.quantity import (
 from winchkit.sim.physics.base import Physics, Stiffness, winding_direction
 from winchkit.sim.physics.state import State
 
-__all__ = [
-    "FiveCornerDrum",
-    "GivingJoint",
-    "StickyPlace",
-    "TemperatureCrosstalk",
-    "TorqueCrosstalk",
-    "WanderingLength",
-]
-
 
 @dataclass
 class FiveCornerDrum(Physics):

@@ -19,16 +19,6 @@ from winchkit.sim.physics.presliding import relax
 from winchkit.sim.physics.state import State
 from winchkit.units import GRAVITY
 
-__all__ = [
-    "CreepingCable",
-    "ElasticCable",
-    "HeavyCable",
-    "LaggingCable",
-    "LoadLever",
-    "SoftFrame",
-    "WarmCable",
-]
-
 _WARM = 20.0
 """Degrees Celsius: reference temperature of lengths (ISO 1)."""
 

@@ -11,18 +11,6 @@ from winchkit.schema.quantity import Force, Number, PositiveDuration, PositiveFo
 from winchkit.sim.physics.base import ForceDrift, Physics, ThermalForce
 from winchkit.sim.physics.state import State
 
-__all__ = [
-    "BentCell",
-    "ClippingCell",
-    "DriftingCell",
-    "LateLength",
-    "LeakingCurrent",
-    "ShiftedCell",
-    "SlowCell",
-    "StretchedCell",
-    "WarmCell",
-]
-
 
 @dataclass
 class StretchedCell(Physics):

@@ -15,8 +15,6 @@ from winchkit.sim.physics.base import Physics, Stiffness
 from winchkit.sim.physics.pulley import pressure
 from winchkit.sim.physics.state import State
 
-__all__ = ["MaxwellPulleys"]
-
 _ELEMENTS = 4
 """The chords of four elements differ from the parabola of infinitely many by at most 1.6 % (1/64)
 of the sliding force."""

@@ -24,25 +24,6 @@ from winchkit.sim.physics.base import (
 from winchkit.sim.physics.presliding import relax
 from winchkit.sim.physics.state import State
 
-__all__ = [
-    "Balancer",
-    "Cogging",
-    "GrowingDrag",
-    "HangingJoint",
-    "HeavyRotor",
-    "LossyGear",
-    "MotorDrag",
-    "MotorGrease",
-    "MotorStiction",
-    "OneWayGrease",
-    "PreslidingMotor",
-    "RippledMotor",
-    "RoughPlace",
-    "SlowTorque",
-    "UnbalancedDrum",
-    "WeakMotor",
-]
-
 AngularSpeed = Annotated[float, Quantity("angular speed", 0.0, above=True)]
 Efficiency = Annotated[float, Quantity("ratio", 0.0, 1.0, above=True)]
 

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, get_args, get_type_hints
 
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.quantity import Quantity
 from winchkit.schema.simbench import dotted_keys
-from winchkit.units import UNITS, suggest
-
-__all__ = ["number_names", "overridden", "read_numbers", "with_unit"]
+from winchkit.units import UNITS
 
 
 def _markers(kind: type[Any]) -> dict[str, Quantity]:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import ceil
 
-__all__ = ["relax"]
-
 _SMALL = 0.2
 """Step of the classical Runge-Kutta method in relaxation distances: its error (0.2^5/120) is 3e-6
 of the limit."""

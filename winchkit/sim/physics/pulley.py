@@ -11,15 +11,6 @@ from winchkit.sim.physics.base import Physics, Stiffness, Viscosity, winding_dir
 from winchkit.sim.physics.presliding import relax
 from winchkit.sim.physics.state import State
 
-__all__ = [
-    "CreepPulleys",
-    "HeavyPulleys",
-    "PreslidingPulleys",
-    "StickyPulleys",
-    "ViscousPulleys",
-    "pressure",
-]
-
 
 def pressure(before: float, after: float, wrap: float) -> float:
     """Force on the axle of a pulley between two tensions, N (Eq. 22)."""

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from winchkit.errors import Fault, FileError
+from winchkit.errors import Fault, FileError, suggest
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.simbench import HiddenSpec
 from winchkit.sim.physics import beyond, cable, instruments, maxwell, motor, pulley, winding
 from winchkit.sim.physics.base import Physics
 from winchkit.sim.physics.parameters import number_names, read_numbers, with_unit
-from winchkit.units import suggest
-
-__all__ = ["PHYSICS", "build", "declared", "listed_physics", "scaled"]
 
 PHYSICS: dict[str, type[Physics]] = {
     "fat drum": winding.FatDrum,

@@ -12,17 +12,6 @@ from winchkit.schema.quantity import Angle, Duration, Length, Number, PositiveNu
 from winchkit.sim.physics.base import Physics, motor_direction
 from winchkit.sim.physics.state import State
 
-__all__ = [
-    "EccentricDrum",
-    "FatDrum",
-    "GuideOffset",
-    "LooseGear",
-    "Slip",
-    "ThickLayers",
-    "WavyGear",
-    "WrongRatio",
-]
-
 _SLIP_TIME = 0.4
 """s: short against a stroke, many steps of the integration."""
 

@@ -9,8 +9,6 @@ from math import floor, hypot, pi, sqrt
 from winchkit.errors import UsageError
 from winchkit.schema.profiles.winch import WinchProfile
 
-__all__ = ["Drum", "drum_of"]
-
 _TURN = 2 * pi
 CLIMB = 0.1
 """Angle over which a cable climbs to the next turn of a spiral, rad; zero in Eq. 2."""

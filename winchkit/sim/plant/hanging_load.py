@@ -8,8 +8,6 @@ from typing import Protocol
 
 from winchkit.units import GRAVITY
 
-__all__ = ["HangingLoad", "Load"]
-
 _DAMPING_RATIO = 0.4
 """Damping ratio of a fibre cable with its load; that of a steel cable is lower."""
 _STIFF = 1.0

@@ -9,8 +9,6 @@ from winchkit.errors import UsageError
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.sim.plant.drum import Drum, drum_of
 
-__all__ = ["Kinematics"]
-
 
 @dataclass(frozen=True)
 class Kinematics:

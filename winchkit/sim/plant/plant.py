@@ -19,8 +19,6 @@ from winchkit.sim.plant.kinematics import Kinematics
 from winchkit.sim.plant.sensors import Instruments, Measurement
 from winchkit.sim.plant.servo import DriveCommand, Servo
 
-__all__ = ["Measurement", "WinchPlant"]
-
 MAX_STEP = 1e-3
 """s: a quarter of the servo's lag (rule of thumb)."""
 _SMALLEST_INERTIA_SHARE = 0.05

@@ -9,12 +9,6 @@ from typing import NamedTuple
 from winchkit.schema.simbench import NoiseSpec
 from winchkit.sim.physics.state import State
 
-__all__ = [
-    "Instruments",
-    "Measurement",
-    "Noise",
-]
-
 
 class Noise:
     """Zero-mean Gaussian noise of standard deviation ``sigma``, sampled at any times.

@@ -7,8 +7,6 @@ from typing import NamedTuple
 
 from winchkit.errors import UsageError
 
-__all__ = ["DriveCommand", "Servo"]
-
 _LAG = 0.004
 """s, of each of two lags in series: a velocity loop of 40 Hz (1/(2π·4 ms))."""
 _POSITION_GAIN = 25.0

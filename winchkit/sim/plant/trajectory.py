@@ -7,8 +7,6 @@ from math import copysign, sqrt
 
 from winchkit.errors import UsageError
 
-__all__ = ["SCurve", "plan"]
-
 
 @dataclass(frozen=True)
 class SCurve:

@@ -16,8 +16,6 @@ from winchkit.sim.robot.cable_end import CableEnd, Coupling
 from winchkit.sim.robot.platform import Body, CablePlatform, Pulleys
 from winchkit.sim.robot.rotation import rotation
 
-__all__ = ["BuiltRobot", "build_robot"]
-
 _BALANCED = 1e-6
 """Largest unbalanced force at home, as a share of the weight."""
 

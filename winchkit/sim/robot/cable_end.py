@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from winchkit.arrays import Array
 from winchkit.sim.robot.platform import CablePlatform
 
-__all__ = ["CableEnd", "Coupling"]
-
 _LEAST_STEP = 5e-4
 """Shorter times of the platform are left to the next call, s: every instrument has its winch
 advance by itself."""

@@ -21,8 +21,6 @@ from collections.abc import Callable
 from math import atan2, cos, nan, pi, sin, sqrt
 from typing import Any
 
-__all__ = ["CABLE", "ROW", "WORK", "cables", "compiled_step", "rotated", "solve", "step"]
-
 CABLE, ROW, WORK = 10, 8, 72
 """Floats of a cable, of a row of results, and of the working space: lengths of the sequences above.
 """

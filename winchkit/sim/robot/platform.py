@@ -20,8 +20,6 @@ from winchkit.arrays import Array
 from winchkit.sim.robot.mechanics import CABLE, ROW, WORK, cables, compiled_step, step
 from winchkit.units import GRAVITY
 
-__all__ = ["Body", "CablePlatform", "Pulleys"]
-
 _STEP = 2.5e-3
 """s: a fortieth of the period of a platform on stiff cables (10 Hz); rule of thumb, the rule is
 stable with any step."""

@@ -7,8 +7,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.sim.robot.mechanics import rotated
 
-__all__ = ["quaternion", "rotation", "turned"]
-
 _UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 

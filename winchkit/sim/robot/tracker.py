@@ -12,8 +12,6 @@ from winchkit.schema.sim_platform import TrackerTruth
 from winchkit.sim.robot.platform import CablePlatform
 from winchkit.sim.robot.rotation import quaternion, rotation, turned
 
-__all__ = ["SimTracker"]
-
 _ROUNDING = 1e-6
 """A sum of ticks reaches an instant but for this, s; else the datagram waits for another tick."""
 

@@ -22,8 +22,6 @@ from winchkit.web.bench import messages
 from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 
-__all__ = ["BEGINS_NOTHING", "Browser", "Inbox", "counting", "received"]
-
 BEGINS_NOTHING = frozenset(
     {"show", "leave", "release", "alive", "programme", "end_programme", "end_record"}
 )

@@ -20,8 +20,6 @@ from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import UsageError
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["drive_objects", "drive_settings", "read_setting", "write_setting"]
-
 
 def drive_objects(spec: BenchSpec, status: Mapping[str, Any], winch: str) -> dict[str, Any]:
     """What ``winchkit info`` shows of a drive, in groups.

@@ -9,8 +9,6 @@ from winchkit.bench.cells.instruments import device_of
 from winchkit.drivers.can.tools.decode import KnownNode, decode, known_node
 from winchkit.schema.bench import BenchSpec
 
-__all__ = ["FrameWords"]
-
 _LAST = 60
 """Of the last frames that are shown."""
 

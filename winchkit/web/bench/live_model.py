@@ -24,8 +24,6 @@ from winchkit.schema.bench import BenchSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_winch
 
-__all__ = ["CHANNELS", "LiveModel"]
-
 CHANNELS = (
     "cable_length", "length", "tension", "load", "cable_speed", "commanded_speed",
     "motor_angle", "motor_torque", "motor_velocity", "temperature",

@@ -12,8 +12,6 @@ from winchkit.model.robot import Pose
 from winchkit.schema.bench import BenchSpec
 from winchkit.web.robot import pose_picture
 
-__all__ = ["LiveRobot"]
-
 _AGREE = 0.02
 """Largest difference between a cable length by its drum and by the geometry, m, of
 ``winchkit.bench.robot.platform``."""

@@ -13,8 +13,6 @@ from typing import Any
 
 from winchkit.errors import UsageError
 
-__all__ = ["Message", "change", "decoded", "length", "name", "signed_speed", "speed", "text"]
-
 Message = Mapping[str, Any]
 
 _LARGEST = 4_000

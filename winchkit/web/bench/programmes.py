@@ -21,8 +21,6 @@ from winchkit.schema.programme import Programme
 from winchkit.schema.read import load
 from winchkit.schema.robot_programme import RobotProgramme
 
-__all__ = ["Programmes"]
-
 _DIGITS = 6
 _NO_NAME = re.compile(r"[^\w.-]+")
 

@@ -13,8 +13,6 @@ from winchkit.arrays import Array
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.writer import write_csv
 
-__all__ = ["trip_file", "trip_run"]
-
 _CHANNELS = {
     "motor_angle": ("motor_angle", "rad"),
     "motor_velocity": ("motor_velocity", "rad/s"),

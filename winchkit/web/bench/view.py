@@ -46,8 +46,6 @@ from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.trip_file import trip_file
 
-__all__ = ["BenchView"]
-
 _LOGGER = logging.getLogger(__name__)
 
 _PERIOD = 0.05

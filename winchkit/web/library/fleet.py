@@ -14,8 +14,6 @@ from winchkit.plain_json import significant
 from winchkit.report.fleet_text import change_text, odd_texts
 from winchkit.web.library.runs import Library
 
-__all__ = ["Fleet"]
-
 _DIGITS = 4
 
 

@@ -25,8 +25,6 @@ from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.web.state import Judgement
 
-__all__ = ["Library", "LibraryRun"]
-
 _MOST_READ = 2000
 """Files that are read for the list; an index has them at once."""
 _POINTS = 1600

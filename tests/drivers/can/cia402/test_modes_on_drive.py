@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from drive_on_bus import INERTIA, DriveOnBus, bus_spec, device
+from drive_on_bus import DriveOnBus, bus_spec, device
+from flywheel import INERTIA
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec

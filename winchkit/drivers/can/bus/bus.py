@@ -28,13 +28,6 @@ from winchkit.drivers.scheduling import event_of, thread_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
 
-__all__ = [
-    "SDO_SIZE",
-    "CanBus",
-    "FrameTime",
-    "Handler",
-]
-
 _DRIFT = 2e-4
 """At most by how much two clocks run apart."""
 _LATE = 0.02

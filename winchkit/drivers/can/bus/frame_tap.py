@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-__all__ = ["FrameTap", "SeenFrame"]
-
 _KEPT = 200
 """Frames of any identifier."""
 

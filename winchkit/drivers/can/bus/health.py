@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-__all__ = ["BusHealth", "BusState", "ErrorTally"]
-
 _CONTROLLER, _BUS_OFF, _RESTARTED = 0x004, 0x040, 0x100
 """Classes of an error frame (linux/can/error.h: CAN_ERR_CRTL, CAN_ERR_BUSOFF, CAN_ERR_RESTARTED).
 """

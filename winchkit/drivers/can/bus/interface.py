@@ -18,14 +18,6 @@ from winchkit.errors import ConnectionLost
 from winchkit.multicast import MulticastPort
 from winchkit.schema.bench import BusSpec
 
-__all__ = [
-    "Interface",
-    "open_interface",
-    "queue_full",
-    "sends_remote",
-    "simulated_interface",
-]
-
 _STAMPED = {"pcan", "kvaser", "ixxat", "vector", "neovi", "nican"}
 """Interfaces whose time stamps are the hardware's or its driver's."""
 _NO_BITRATE = ("virtual", "udp_multicast")

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from winchkit.errors import NotPermitted
 
-__all__ = ["ADVISED", "FrameKind", "Load", "frame_bits", "load_of"]
-
 ADVISED = 0.7
 """Share of a bus that cyclic traffic may take; the rest is for SDO, emergencies and repeats."""
 _STEP = 1e-4

@@ -20,8 +20,6 @@ import can
 
 from winchkit.drivers.can.bus.health import BusState
 
-__all__ = ["Frame", "SocketCan", "parse_socketcan"]
-
 _FRAME = struct.Struct("=IB3x8s")
 _SIZE = _FRAME.size
 _EXTENDED, _REMOTE, _ERROR = 1 << 31, 1 << 30, 1 << 29

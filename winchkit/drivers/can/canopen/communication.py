@@ -5,8 +5,6 @@ from __future__ import annotations
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.errors import DeviceRefused, NotPermitted
 
-__all__ = ["set_communication"]
-
 _SYNC, _EMCY = 0x080, 0x080
 _PRODUCES = 1 << 30
 """Of 1005h: the device sends SYNC itself."""

@@ -6,15 +6,6 @@ from typing import Any
 
 from canopen.objectdictionary import datatypes
 
-__all__ = [
-    "configured_value",
-    "declared",
-    "fixed_mapping",
-    "mapped_objects",
-    "unmappable",
-    "writable",
-]
-
 _RPDO, _TPDO, _MAPPING = 0x1400, 0x1800, 0x200
 
 

@@ -25,18 +25,6 @@ from winchkit.drivers.can.canopen.pdo_parameters import MOST_PDOS
 from winchkit.drivers.can.cia402.modes import MODES, modes_of
 from winchkit.drivers.can.cia402.option_codes import OPTIONS
 
-__all__ = [
-    "ALWAYS",
-    "PDO_BITS",
-    "DriveDescription",
-    "HostLoss",
-    "OptionEntry",
-    "PdoEntry",
-    "describe",
-    "host_loss_ways",
-    "lacking",
-]
-
 _NEEDED = {
     "PP": (0x607A, 0x6081, 0x6083),
     "PV": (0x60FF,),

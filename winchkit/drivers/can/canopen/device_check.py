@@ -35,8 +35,6 @@ from winchkit.schema.host_loss import HARDWARE, VENDOR
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.source import open_source
 
-__all__ = ["EdsReport", "check_drive", "check_process", "host_loss_problem"]
-
 _NODE = 1
 """For which the EDS is read: $NODEID of its identifiers."""
 _INVALID, _IDENTIFIER = 1 << 31, 0x7FF

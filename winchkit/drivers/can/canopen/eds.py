@@ -12,8 +12,6 @@ from canopen.objectdictionary import eds as _canopen_eds
 from winchkit.errors import Fault, FileError
 from winchkit.schema.eds.eds import read_eds_text
 
-__all__ = ["read_eds"]
-
 
 def read_eds(path: Path, node: int) -> tuple[Any, tuple[Fault, ...]]:
     """Object dictionary of an EDS or DCF for a node id, with warnings; raises FileError."""

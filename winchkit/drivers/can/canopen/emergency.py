@@ -6,8 +6,6 @@ import struct
 from collections import deque
 from dataclasses import dataclass
 
-__all__ = ["Emergency", "EmergencyLog", "error_text", "parse_emergency"]
-
 _TEXT: dict[int, str] = {
     0x0000: "no error",
     0x1000: "generic error",

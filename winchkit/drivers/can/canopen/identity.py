@@ -8,8 +8,6 @@ from pathlib import Path
 
 from winchkit import catalog
 
-__all__ = ["SERVO_PROFILE", "Identity", "fitting_device"]
-
 _NUMBER = re.compile(r"^\s*(VendorNumber|ProductNumber)\s*=\s*(\w+)\s*$", re.MULTILINE)
 SERVO_PROFILE = 402
 """Device profile number in the lower 16 bits of 1000h: CiA 402, drives."""

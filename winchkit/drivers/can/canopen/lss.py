@@ -20,8 +20,6 @@ from winchkit.drivers.can.bus.bus import Handler
 from winchkit.drivers.can.canopen.identity import Identity
 from winchkit.errors import DeviceRefused, NoReply, UsageError
 
-__all__ = ["BIT_RATES", "UNCONFIGURED", "LssLine", "LssPort", "check_bitrate", "check_node"]
-
 BIT_RATES = {
     1_000_000: 0,
     800_000: 1,

@@ -10,15 +10,6 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import ClassVar
 
-__all__ = [
-    "NMT_STATES",
-    "HeartbeatConsumer",
-    "HeartbeatProducer",
-    "NmtState",
-    "command_text",
-    "state_text",
-]
-
 
 class NmtState(IntEnum):
     """NMT state, as the state byte of a heartbeat has it."""

@@ -19,18 +19,6 @@ from winchkit.drivers.can.canopen.sdo_client import sdo_client
 from winchkit.drivers.scheduling import lock_of
 from winchkit.errors import ConnectionLost, DeviceRefused, FileError, NoReply, NotPermitted
 
-__all__ = [
-    "ABSENT",
-    "ObjectPort",
-    "Objects",
-    "SdoNode",
-    "Value",
-    "is_signed",
-    "object_name",
-    "read_dictionary",
-    "variables",
-]
-
 Value = int | float | str
 """Of an object: numbers, and texts."""
 

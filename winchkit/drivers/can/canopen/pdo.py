@@ -10,8 +10,6 @@ from typing import Any
 from winchkit.errors import Fault, FileError
 from winchkit.schema.devices.servo import PdoSpec
 
-__all__ = ["MappedObject", "PdoCodec", "joint_layout", "parse_object"]
-
 _CHARACTER = {(8, False): "B", (16, False): "H", (32, False): "I", (64, False): "Q"}
 _CHARACTER |= {(bits, True): char.lower() for (bits, _), char in list(_CHARACTER.items())}
 

@@ -10,8 +10,6 @@ from winchkit.drivers.can.canopen.pdo import PdoCodec, parse_object
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import PdoSpec
 
-__all__ = ["MOST_PDOS", "Direction", "cob_id", "codecs", "set_up"]
-
 Direction = Literal["tpdo", "rpdo"]
 
 _INVALID = 1 << 31

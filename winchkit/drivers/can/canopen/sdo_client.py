@@ -10,8 +10,6 @@ from canopen.sdo import client as library
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.scheduling import event_of
 
-__all__ = ["sdo_client"]
-
 _SdoClient: Any = library.SdoClient
 _OBJECT = slice(1, 4)
 """Bytes of an SDO frame with index and sub-index (CiA 301)."""

@@ -42,8 +42,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import Fault, FileError, NotPermitted, WinchkitError
 from winchkit.schema.devices.device import DeviceSpec
 
-__all__ = ["AxisFeedback", "Cia402Axis"]
-
 _STALE_SYNCS, _STALE_BEATS = 5, 2
 """Feedback that is older than both of these does not show the drive's state any more."""
 _LATE_REPLY = 0.05

@@ -21,12 +21,6 @@ from winchkit.drivers.can.cia402.state_machine import (
 )
 from winchkit.errors import Fault, FileError, NotPermitted
 
-__all__ = [
-    "Command",
-    "Commander",
-    "SetPoint",
-]
-
 _ACKNOWLEDGED = 1 << 12
 
 

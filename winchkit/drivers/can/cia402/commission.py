@@ -25,8 +25,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import DeviceRefused, NoReply, NotPermitted
 from winchkit.schema.devices.servo import OptionSpec, ServoSpec
 
-__all__ = ["Commissioned", "WatchSpec", "await_booted", "commission"]
-
 _START, _PRE_OPERATIONAL = 0x01, 0x80
 """NMT command specifiers "start remote node" and "enter pre-operational" (CiA 301)."""
 _STOP_TIME = 3.0

@@ -7,8 +7,6 @@ from collections.abc import Iterator
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.errors import DeviceRefused, NotPermitted
 
-__all__ = ["set_cycle"]
-
 _EXPONENTS = (-3, -4, -5, -6, -2)
 """Of ten in 60C2h:2, ms first as most drives accept it; beside them 0.1 ms, 0.01 ms, µs and 10 ms.
 """

@@ -16,19 +16,6 @@ from winchkit.drivers.can.cia402.state_machine import STATE_BITS, STATES, State,
 from winchkit.drivers.can.cia402.units import Scale
 from winchkit.errors import Fault, FileError
 
-__all__ = [
-    "ERROR",
-    "MODE",
-    "POSITION",
-    "STATUS",
-    "VELOCITY",
-    "AxisFeedback",
-    "FeedbackHealth",
-    "Gathering",
-    "check_feedback",
-    "counter_range",
-]
-
 Key = tuple[int, int]
 
 STATUS, POSITION, VELOCITY, TORQUE = (0x6041, 0), (0x6064, 0), (0x606C, 0), (0x6077, 0)

@@ -10,8 +10,6 @@ from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.cia402.units import Scale
 from winchkit.errors import NotPermitted
 
-__all__ = ["DriveLimits", "LimitsAtShaft", "read_limits", "set_limits"]
-
 _U32_OFF = 0xFFFFFFFF
 """6065h and 607Fh: all bits set switch the limit off (CiA 402 for 6065h; drives do so for 607Fh).
 """

@@ -10,8 +10,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["change_mode", "require_mode", "rest_targets", "supported_modes"]
-
 _MODE_TIME = 0.5
 """s: a drive changes its mode within some cycles of its control; as long as an SDO request may take
 (rule of thumb)."""

@@ -9,21 +9,6 @@ from functools import cached_property
 
 from winchkit.drivers.can.cia402.state_machine import StatusBit
 
-__all__ = [
-    "ACCELERATION",
-    "AT_ONCE",
-    "MODES",
-    "START",
-    "TARGETS",
-    "Homing",
-    "OperationMode",
-    "Target",
-    "homing_state",
-    "mode_named",
-    "modes_of",
-    "status_words",
-]
-
 Key = tuple[int, int]
 
 START = 1 << 4

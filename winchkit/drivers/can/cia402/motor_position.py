@@ -20,8 +20,6 @@ from winchkit.drivers.can.cia402.standstill import Standstill
 from winchkit.errors import DeviceRefused
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["KeptPosition", "MotorPosition"]
-
 Key = tuple[int, int]
 """Index and sub-index of an object."""
 

@@ -8,8 +8,6 @@ from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import OptionSpec
 
-__all__ = ["BY_6007", "OPTIONS", "OptionCode", "merged", "read_options", "set_options"]
-
 _RAMPS = {
     1: "slow down on the deceleration ramp",
     2: "slow down on the quick-stop ramp",

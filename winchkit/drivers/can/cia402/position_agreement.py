@@ -23,8 +23,6 @@ from dataclasses import dataclass
 from math import inf, isfinite, tau
 from typing import NamedTuple
 
-__all__ = ["PositionAgreement"]
-
 _SHORT, _LONG = 0.25, 4.0
 """Windows, s. With one of 4 s a tenth of a short one's speed is compared; a longer one would delay
 what it finds by more cable than it finds earlier."""

@@ -12,8 +12,6 @@ from math import inf
 
 from winchkit.errors import NotPermitted
 
-__all__ = ["PositionCounter"]
-
 _DELAY = 0.25
 """By which a value may be older than the SYNC that it answers, s: a drive or a computer that stands
 still for longer is missed by its heartbeat."""

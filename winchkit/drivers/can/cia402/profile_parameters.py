@@ -11,16 +11,6 @@ from winchkit.drivers.can.cia402.units import Scale
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = [
-    "HERE",
-    "HomingSpec",
-    "check_homing",
-    "keeps_zero",
-    "set_homing",
-    "set_profile",
-    "set_quick_stop",
-]
-
 _RAMP_SPEED = 3000 * 2 * pi / 60
 """Speed that a ramp declared as a time reaches from standstill, rad/s."""
 _MS = 1e-3

@@ -10,8 +10,6 @@ from __future__ import annotations
 from winchkit.drivers.can.bus.bus import SDO_SIZE, CanBus
 from winchkit.drivers.can.cia402.state_machine import State, state_of
 
-__all__ = ["SdoStop"]
-
 _REQUEST, _REPLY = 0x600, 0x580
 _WRITE = bytes.fromhex("2B40600002000000")
 _WROTE = bytes.fromhex("604060")

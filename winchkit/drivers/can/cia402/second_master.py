@@ -15,8 +15,6 @@ from winchkit.drivers.can.canopen.nmt import command_text
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 
-__all__ = ["SecondMaster"]
-
 _NMT, _SDO_REQUEST, _HEARTBEAT = 0x000, 0x600, 0x700
 _FURTHER_SERVERS = range(0x1201, 0x1280)
 _RPDOS = range(0x1400, 0x1600)

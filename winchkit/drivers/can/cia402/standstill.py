@@ -15,8 +15,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["PolledStandstill", "Standstill"]
-
 _WINDOW = 0.04
 """For which the position has to stay where it is, s."""
 _CREEP = 0.05

@@ -9,25 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 
-__all__ = [
-    "DISABLE_VOLTAGE",
-    "ENABLE_OPERATION",
-    "FAULT_RESET",
-    "HALT",
-    "QUICK_STOP",
-    "SHUTDOWN",
-    "STATES",
-    "STATE_BITS",
-    "SWITCH_ON",
-    "TRANSITIONS",
-    "RequestedState",
-    "State",
-    "StatusBit",
-    "Transition",
-    "control_word",
-    "state_of",
-]
-
 
 class State(IntEnum):
     """States of the power state machine; UNKNOWN is a status word that fits none."""

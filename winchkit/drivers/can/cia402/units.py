@@ -10,8 +10,6 @@ from winchkit.errors import NotPermitted
 from winchkit.schema.devices.drive_unit import product_of
 from winchkit.schema.devices.servo import ServoSpec
 
-__all__ = ["Scale", "Units", "read_scale", "read_units", "scale_of"]
-
 _TURN = 2 * pi
 _I32, _I16 = 2**31 - 1, 2**15 - 1
 _COARSEST = 16

@@ -7,8 +7,6 @@ from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.modes import MODES
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, MS, Mechanism, Silence
 
-__all__ = ["RPDO_TIMEOUT", "RpdoTimeout", "SyncLoss"]
-
 RPDO_TIMEOUT = 0x8250
 """EMCY error code of CiA 301."""
 _US = 1e-6

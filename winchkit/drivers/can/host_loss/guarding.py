@@ -13,8 +13,6 @@ from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, MS, Mechanism, Silence
 from winchkit.errors import NotPermitted
 
-__all__ = ["FACTOR", "Guarding", "GuardingWatch", "guard_time"]
-
 FACTOR = 3
 """Life time factor: the drive tolerates two lost polls."""
 _LONG_GUARD_TIME, _LONG_FACTOR = 1.0, 60

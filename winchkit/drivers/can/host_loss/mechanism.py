@@ -16,17 +16,6 @@ from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec
 from winchkit.drivers.clock import Clock
 
-__all__ = [
-    "HEARTBEAT_LOST",
-    "LIFE_SIGNS",
-    "MS",
-    "Heartbeat",
-    "Mechanism",
-    "Silence",
-    "Terms",
-    "consumer_entry",
-]
-
 HEARTBEAT_LOST = 0x8130
 """EMCY error code of CiA 301: life guard or heartbeat error."""
 LIFE_SIGNS = 3

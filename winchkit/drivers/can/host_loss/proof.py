@@ -15,8 +15,6 @@ from winchkit.drivers.can.host_loss.mechanism import Mechanism, Silence
 from winchkit.drivers.clock import Clock
 from winchkit.errors import NoReply, NotPermitted
 
-__all__ = ["HostLoss", "Proof", "bring_back", "prove", "reaction"]
-
 _PRE_OPERATIONAL, _START = 0x80, 0x01
 _PATIENCE = 0.4
 """For its answer beyond its limit, s."""

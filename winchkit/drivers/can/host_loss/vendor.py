@@ -8,8 +8,6 @@ from winchkit.drivers.can.host_loss.cyclic import RpdoTimeout
 from winchkit.drivers.can.host_loss.mechanism import LIFE_SIGNS, Mechanism, Silence
 from winchkit.schema.host_loss import VENDOR, VendorObject, VendorWatchdog
 
-__all__ = ["VendorWatch"]
-
 
 class VendorWatch(RpdoTimeout):
     """Writes the declared objects and ends the host's frames that the watchdog listens to."""

@@ -20,8 +20,6 @@ from winchkit.errors import ConnectionLost, NotPermitted
 from winchkit.schema.devices.servo import ServoSpec
 from winchkit.schema.host_loss import HARDWARE, VENDOR
 
-__all__ = ["HostWatch"]
-
 _POLL = 0.005
 """s: a tenth of the shortest usual heartbeat (50 ms)."""
 _BEATS = 4

@@ -24,28 +24,6 @@ from winchkit.drivers.can.tools.scan import identity_of
 from winchkit.errors import DeviceRefused, Fault, FileError, NotPermitted, UsageError
 from winchkit.regular_file import read_text
 
-__all__ = [
-    "RESTORE",
-    "STORE",
-    "Config",
-    "Difference",
-    "Setting",
-    "check_fits",
-    "check_quiet",
-    "described",
-    "difference",
-    "fitting_config",
-    "named_setting",
-    "one_setting",
-    "read_config",
-    "read_config_file",
-    "restore",
-    "settings",
-    "store",
-    "write_config",
-    "write_config_file",
-]
-
 Key = tuple[int, int]
 
 STORE, RESTORE = (0x1010, b"save"), (0x1011, b"load")

@@ -18,8 +18,6 @@ from winchkit.drivers.can.cia402.state_machine import FAULT_RESET, HALT, state_o
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.servo import PdoSpec
 
-__all__ = ["Decoded", "KnownNode", "decode", "known_node", "write_frames"]
-
 _CONTROL = {
     0x00: "disable voltage",
     0x02: "quick stop",

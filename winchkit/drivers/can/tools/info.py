@@ -12,8 +12,6 @@ from winchkit.drivers.can.cia402.option_codes import OPTIONS
 from winchkit.drivers.can.cia402.state_machine import state_of
 from winchkit.drivers.can.tools.scan import identity_of
 
-__all__ = ["ENTRIES", "DriveInfo", "Noted", "read_info"]
-
 _ROWS = {row.index: row for row in OPTIONS.values()}
 
 ENTRIES: dict[str, tuple[tuple[int, int, str], ...]] = {

@@ -20,8 +20,6 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import DeviceRefused, NoReply
 from winchkit.schema.bench import BenchSpec, BusSpec
 
-__all__ = ["Found", "RawNode", "identity_of", "named_after", "scan"]
-
 NODES = range(1, 128)
 _DEVICE_TYPE, _SERIAL = b"\x00\x10\x00", b"\x18\x10\x04"
 """Index and sub-index of 1000h and 1018h:4 as SDO carries them."""

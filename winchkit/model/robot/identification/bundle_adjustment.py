@@ -35,22 +35,6 @@ from winchkit.model.robot.identification.pose_estimation import (
 )
 from winchkit.model.robot.kinematics import Pose
 
-__all__ = [
-    "Equations",
-    "Linear",
-    "Loss",
-    "Progress",
-    "Rows",
-    "Solution",
-    "State",
-    "Unknowns",
-    "Weights",
-    "leverage",
-    "linearise",
-    "place",
-    "solve",
-]
-
 Mask = NDArray[np.bool_]
 Loss = Literal["least-squares", "huber", "cauchy"]
 Progress = Callable[[int, float], None]

@@ -8,8 +8,6 @@ from winchkit.arrays import Array
 from winchkit.model.robot.kinematics import Geometry, sensitivities, wrap_angle
 from winchkit.model.robot.rotation import skew
 
-__all__ = ["length_hessian"]
-
 
 def length_hessian(geometry: Geometry, position: Array, rotation: Array) -> Array:
     """Second derivatives of the lengths by position and rotation vector, (p, n, 6, 6).

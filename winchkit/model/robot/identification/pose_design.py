@@ -19,27 +19,10 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.robot.force_distribution import ForceLimits, wrench_feasibility
-from winchkit.model.robot.kinematics import (
-    PLATFORM_DOF,
-    Geometry,
-    Pose,
-    lengths,
-    rotation_of,
-    structure_matrix,
-)
+from winchkit.model.robot.kinematics import PLATFORM_DOF, Geometry, Pose, lengths, structure_matrix
+from winchkit.model.robot.rotation import rotation_of
 from winchkit.model.robot.wrench import gravity_wrench
 from winchkit.schema.profiles.robot import PlatformSpec
-
-__all__ = [
-    "chosen_in_turn",
-    "determinant_gain",
-    "in_box",
-    "is_held",
-    "middle_and_half",
-    "noncentrality",
-    "pose_information",
-    "random_poses",
-]
 
 _PULLING = ForceLimits(0.0, float("inf"))
 _RIDGE = 1e-9

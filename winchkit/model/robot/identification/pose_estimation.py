@@ -17,8 +17,6 @@ from winchkit.arrays import Array
 from winchkit.model.robot.kinematics import Pose
 from winchkit.model.robot.rotation import angles_of, rotation_by, rotation_of
 
-__all__ = ["Iteration", "estimated_pose", "moved_pose", "start_pose"]
-
 _STRIDE = 0.3
 """Longest step of a coordinate, m or rad: rule of thumb, within which lengths are nearly linear."""
 

@@ -47,18 +47,6 @@ from winchkit.model.robot.rotation import (
 from winchkit.schema.profiles.instruments import FrameSpec
 from winchkit.schema.profiles.robot import RobotProfile
 
-__all__ = [
-    "Tracker",
-    "declared_tracker",
-    "left_jacobian",
-    "pose_behind",
-    "reading_of",
-    "registered",
-    "registration",
-    "tracked_position",
-    "tracked_rotation",
-]
-
 _ROUNDS = 30
 """The closed form and the linear step converge linearly, since each keeps what the other has found;
 rule of thumb, `_SETTLED` ends them before."""

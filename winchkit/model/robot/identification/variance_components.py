@@ -23,8 +23,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["START", "Component", "re_estimated"]
-
 START: Mapping[str, float] = {
     "closure": 5e-5,
     "position": 5e-5,

@@ -22,20 +22,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.runs.importing.streams import Streams
 
-__all__ = [
-    "LEAST_OVERLAP",
-    "Agreement",
-    "Peak",
-    "Signal",
-    "agreement_at",
-    "correlated",
-    "independent_count",
-    "interval_of",
-    "rival_of",
-    "signals_by_base",
-    "vertex_of",
-]
-
 _MOST = 200_000
 """Most samples of the common time base."""
 LEAST_OVERLAP = 0.4

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.clocks.lag import Agreement, agreement_of, shifted, span_of
+from winchkit.runs.importing.clocks.cross_correlation import Agreement
+from winchkit.runs.importing.clocks.lag import agreement_of, shifted, span_of
 from winchkit.runs.importing.streams import Stream, Streams
-
-__all__ = ["Joint", "joined"]
 
 _SIGNIFICANT = 3.0
 """Standard deviations of a drift that is applied, and of a lag that contradicts the stamps."""

@@ -18,8 +18,6 @@ from winchkit.runs.importing.clocks.cross_correlation import (
 from winchkit.runs.importing.clocks.multilateration import pose_agreement
 from winchkit.runs.importing.streams import Streams
 
-__all__ = ["Agreement", "agreement_of", "shifted", "span_of"]
-
 _PAIRS = (
     ("motor_angle", "motor_angle"),
     ("tension", "tension"),

@@ -34,8 +34,6 @@ from winchkit.runs.importing.clocks.cross_correlation import (
 )
 from winchkit.runs.importing.streams import Streams
 
-__all__ = ["pose_agreement"]
-
 _COORDINATES = ("platform_x", "platform_y", "platform_z")
 _LEAST_LINES = 3
 """Two differences of squared lengths determine a position in a plane."""

@@ -15,8 +15,6 @@ from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import read_unit
 
-__all__ = ["is_expression", "with_derived"]
-
 _OPERATOR = re.compile(r"\s*([-+*])\s*")
 
 

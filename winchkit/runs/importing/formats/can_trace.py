@@ -13,8 +13,6 @@ from pathlib import Path
 
 from winchkit.regular_file import regular
 
-__all__ = ["TRACE", "TRACED", "is_can_trace", "trace_advice"]
-
 TRACED = 20_000
 """Bytes in which a trace is recognised."""
 TRACE = (

@@ -18,8 +18,6 @@ from winchkit.runs.importing.formats.cells import is_missing, number
 from winchkit.runs.importing.table import Column
 from winchkit.runs.importing.unit_spelling import SpelledUnit, read_unit
 
-__all__ = ["has_unit", "with_cell_units"]
-
 _QUANTITY = re.compile(r"([+\-−]?[\d.,'\s]*\d[.,]?(?:[eE][+-]?\d+)?)\s*([^\d\s.,+\-][^\d]{0,11})")
 _SHARE = 0.8
 """Least share of the cells with text that have a number and a unit; others are faults."""

@@ -10,8 +10,6 @@ import numpy as np
 
 from winchkit.arrays import Array
 
-__all__ = ["is_missing", "number", "numbers"]
-
 _MISSING = {
     *("", "nan", "-nan", "+nan", "n/a", "na", "#n/a", "#nv", "#na", "null", "none", "-", "--"),
     *("---", "invalid", "no data", "nodata", "1.#qnan", "-1.#ind", "1.#ind", "missing", "?"),

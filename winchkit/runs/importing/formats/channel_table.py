@@ -18,8 +18,6 @@ from winchkit.runs.importing.names import meaning_of
 from winchkit.runs.importing.table import Column, Table, named_apart
 from winchkit.runs.importing.unit_spelling import read_unit, split_unit
 
-__all__ = ["by_channel"]
-
 _VALUE = re.compile(
     r"[_ ]*(value|val|reading|data|double|float|wert|valeur|valor|valore)s?[_ ]*", re.I
 )

@@ -13,8 +13,6 @@ from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import Table, refuse_size
 from winchkit.runs.importing.unit_spelling import split_unit
 
-__all__ = ["read_numpy", "read_parquet"]
-
 _OBJECTS = (
     "has Python objects, which may hold code; load it in Python where you trust it, and write its "
     "arrays by numpy.savez"

@@ -13,17 +13,6 @@ from winchkit.runs.importing.formats.cell_units import has_unit
 from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.formats.stamps import is_stamp
 
-__all__ = [
-    "BLANKS",
-    "FEWEST",
-    "Dialect",
-    "decode",
-    "find_dialect",
-    "has_cell_units",
-    "split_line",
-    "whole_lines",
-]
-
 BLANKS = " "
 _DELIMITERS = ("\t", ";", "|", ",", BLANKS)
 _CALLED = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", BLANKS: "blanks"}

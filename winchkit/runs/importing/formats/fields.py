@@ -9,8 +9,6 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-__all__ = ["fields_of", "numbers_of", "stamp_of"]
-
 _LONGEST = 64
 """Most elements of an array in a message; longer ones are images and point clouds."""
 _HEADER = re.compile(r"(\w+\.)?header\.")

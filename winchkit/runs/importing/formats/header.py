@@ -15,8 +15,6 @@ from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.names import meaning_of
 from winchkit.runs.importing.unit_spelling import is_unit_row, read_unit, split_unit
 
-__all__ = ["KEYS", "Header", "keyed_width", "read_header"]
-
 Row = tuple[int, list[str]]
 """Line number and cells."""
 _COMMENT = re.compile(r"^\s*[#%!;*/]+\s*")

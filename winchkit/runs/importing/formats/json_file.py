@@ -20,8 +20,6 @@ from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import Table
 from winchkit.runs.importing.unit_spelling import split_unit
 
-__all__ = ["is_json", "read_json"]
-
 _DEEPEST = 6
 """Nesting of objects that is read; recordings have two or three levels."""
 _FEWEST = 2

@@ -19,8 +19,6 @@ from winchkit.errors import Fault, RunError, UsageError
 from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import Table, refuse_size
 
-__all__ = ["read_hdf5", "read_mat"]
-
 _DEEPEST = 8
 """Nesting of structures that is read; those of Simulink have up to five levels."""
 _HEADER, _COMPRESSED = 128, 15

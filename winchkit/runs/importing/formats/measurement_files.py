@@ -18,8 +18,6 @@ from winchkit.errors import Fault, RunError, UsageError, WinchkitError
 from winchkit.runs.importing.formats.variables import column_of
 from winchkit.runs.importing.table import Column, Table, named_apart, refuse_size
 
-__all__ = ["read_mdf", "read_tdms"]
-
 _NUMBERS = "fiub"
 """Kinds of arrays (NumPy) that hold numbers or truth values."""
 _TIMES = "mM"

@@ -19,8 +19,6 @@ from winchkit.runs.importing.formats.fields import numbers_of, stamp_of
 from winchkit.runs.importing.source_stamps import LOG_TIME, SOURCE_STAMP
 from winchkit.runs.importing.table import Column, Table, named_apart
 
-__all__ = ["read_messages"]
-
 
 @dataclass(frozen=True)
 class _Message:

@@ -16,8 +16,6 @@ from winchkit.runs.importing.formats.header import Row
 from winchkit.runs.importing.formats.text import table_of_rows
 from winchkit.runs.importing.table import Table
 
-__all__ = ["read_capture"]
-
 _QUALISYS, _TRC = b"NO_OF_FRAMES", b"PathFileType"
 _NAMES = {"MARKER_NAMES", "BODY_NAMES"}
 _LEADING = {"frame": "Frame", "frame#": "Frame", "time": "Time [s]"}

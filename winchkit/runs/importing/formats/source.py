@@ -14,8 +14,6 @@ from winchkit.runs.importing.formats.channel_table import by_channel
 from winchkit.runs.importing.formats.split_stamps import joined_stamps
 from winchkit.runs.importing.table import LARGEST, Table
 
-__all__ = ["read_table"]
-
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 

@@ -11,8 +11,6 @@ import numpy as np
 
 from winchkit.runs.importing.table import Column, Table
 
-__all__ = ["joined_stamps"]
-
 _FRACTIONS = {"nano": 1e-9, "micro": 1e-6, "milli": 1e-3}
 """Seconds of one unit of the fraction."""
 _SHORT = {"n": "nano", "u": "micro", "m": "milli"}

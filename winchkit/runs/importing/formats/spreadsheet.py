@@ -14,8 +14,6 @@ from winchkit.runs.importing.formats.header import Row
 from winchkit.runs.importing.formats.text import table_of_rows
 from winchkit.runs.importing.table import Table, named_apart, refuse_size
 
-__all__ = ["read_workbook"]
-
 
 def read_workbook(path: str, data: bytes) -> Table:
     """Read a workbook.

@@ -15,8 +15,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.schema.mapping import EXCEL
 
-__all__ = ["Stamps", "epoch_unit", "is_stamp", "read_stamps"]
-
 _CLOCK = (
     r"(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2})(?:[.,:](?P<fraction>\d{1,12}))?)?"
     r"\s*(?P<half>[AaPp]\.?[Mm]\.?)?"

@@ -27,8 +27,6 @@ from winchkit.runs.importing.formats.header import KEYS, Header, Row, keyed_widt
 from winchkit.runs.importing.formats.stamps import is_stamp
 from winchkit.runs.importing.table import Column, Table, named_apart
 
-__all__ = ["read_text_table", "table_of_rows"]
-
 _AHEAD = 3
 """Rows of numbers after a header that confirm it."""
 _BLOCK = 4096

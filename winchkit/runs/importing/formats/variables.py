@@ -11,8 +11,6 @@ from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.table import Column, Table, named_apart
 from winchkit.runs.importing.unit_spelling import read_unit, split_unit
 
-__all__ = ["column_of", "table_of_arrays"]
-
 _WIDEST = 200
 """Most columns of one matrix; a larger one is an image or a table of another kind."""
 

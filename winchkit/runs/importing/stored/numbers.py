@@ -15,8 +15,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.schema.mapping import MAGNITUDE, MODULO, TWOS, VECTOR
 
-__all__ = ["Wrap", "range_of", "restored", "wrap_of"]
-
 _FIELDS = (2.0**16, 2.0**24, 2.0**32)
 """Ranges of the fields of counters, whose numbers may be negative ones stored without a sign."""
 _FEWEST = 20

@@ -15,8 +15,6 @@ from winchkit.runs.importing.stored.sign_bits import LostSign, lost_sign
 from winchkit.runs.importing.unit_spelling import COUNTS, SHARE
 from winchkit.schema.mapping import DATE, MODULO
 
-__all__ = ["settle_stored"]
-
 _TURN = 2 * math.pi
 _RANGES = tuple(2.0**bits for bits in range(8, 33))
 """Ranges of counters: a byte to a double word."""

@@ -14,8 +14,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.schema.mapping import MAGNITUDE, TWOS
 
-__all__ = ["LostSign", "lost_sign"]
-
 _BITS = range(8, 33)
 """Widths of counters: a byte to a double word."""
 _WORDS = (16, 24, 32)
