@@ -42,19 +42,7 @@ _LONGEST_VALUE = 40
 def require_type(value: object, kind: type | tuple[type, ...], name: str) -> None:
     """Raise UsageError unless a value is of a type.
 
-    Parameters
-    ----------
-    value
-        Argument of a call.
-    kind
-        Type that it must have, or several of which it must have one.
-    name
-        Of the argument.
-
-    Raises
-    ------
-    UsageError
-        With the argument, the value and the call that returns such an object.
+    Raises UsageError with the argument, the value and the call that returns such an object.
     """
     if isinstance(value, kind):
         return
@@ -68,19 +56,8 @@ def require_type(value: object, kind: type | tuple[type, ...], name: str) -> Non
 def require_types(values: object, kind: type | tuple[type, ...], name: str) -> None:
     """Raise UsageError unless values are a sequence, such as a list, of objects of a type.
 
-    Parameters
-    ----------
-    values
-        Argument of a call; an empty sequence is accepted.
-    kind
-        Type that each must have, or several of which it must have one.
-    name
-        Of the argument.
-
-    Raises
-    ------
-    UsageError
-        With the argument, the first wrong value and the call that returns such an object.
+    ``values``: argument of a call; an empty sequence is accepted. Raises UsageError with the
+    argument, the first wrong value and the call that returns such an object.
     """
     kinds = kind if isinstance(kind, tuple) else (kind,)
     if not isinstance(values, Sequence) or isinstance(values, str | bytes):
@@ -95,19 +72,7 @@ def require_types(values: object, kind: type | tuple[type, ...], name: str) -> N
 def require_each(winches: object, kind: type, name: str) -> None:
     """Raise UsageError unless an argument maps names to sequences of objects of a type.
 
-    Parameters
-    ----------
-    winches
-        Argument of a call: a list by name of a winch.
-    kind
-        Type that each object of the lists must have.
-    name
-        Of the argument.
-
-    Raises
-    ------
-    UsageError
-        With the argument, the first wrong value and what to pass.
+    Raises UsageError with the argument, the first wrong value and what to pass.
     """
     if not isinstance(winches, Mapping):
         raise UsageError(
@@ -120,22 +85,7 @@ def require_each(winches: object, kind: type, name: str) -> None:
 def path_of(value: object, name: str = "path") -> Path:
     """Argument that names a file or a folder.
 
-    Parameters
-    ----------
-    value
-        Argument of a call.
-    name
-        Of the argument.
-
-    Returns
-    -------
-    Path
-        The path.
-
-    Raises
-    ------
-    UsageError
-        For anything that is neither text nor a path.
+    Raises UsageError for anything that is neither text nor a path.
     """
     if not isinstance(value, str | os.PathLike) or isinstance(os.fspath(value), bytes):
         raise UsageError(f"{name} is {_shown(value)}; pass the path of a file or folder")
@@ -145,24 +95,7 @@ def path_of(value: object, name: str = "path") -> Path:
 def number(call: str, name: str, value: object) -> float:
     """Argument that is a finite number, in SI.
 
-    Parameters
-    ----------
-    call
-        Name of the call.
-    name
-        Of the argument.
-    value
-        Argument of the call.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    UsageError
-        For text, None, True, and for what is not finite.
+    Raises UsageError for text, None, True, and for what is not finite.
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise UsageError(f"{call}: {name} is {_shown(value)}; pass a number in SI units")
@@ -174,26 +107,7 @@ def number(call: str, name: str, value: object) -> float:
 def positive(call: str, name: str, value: object, most: float = math.inf) -> float:
     """Argument that is a number above zero, in SI.
 
-    Parameters
-    ----------
-    call
-        Name of the call.
-    name
-        Of the argument.
-    value
-        Argument of the call.
-    most
-        Largest value.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    UsageError
-        For anything else, and for what is larger.
+    Raises UsageError for anything else, and for what is larger.
     """
     found = number(call, name, value)
     if found <= 0:

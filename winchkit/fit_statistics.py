@@ -217,12 +217,7 @@ _FIGURES = ("method", "data", "n_observations", "n_unknowns", "dof", "chi_square
 def correlations_of(names: Sequence[str], covariance: Any) -> tuple[Correlation, ...]:
     """Correlations above 0.5 in size, largest first.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the q values.
-    covariance : ndarray of shape (q, q)
-        A value of no variance correlates with none.
+    ``names``: of the q values. ``covariance`` (q, q).
     """
     std = [sqrt(max(float(covariance[i, i]), 0.0)) for i in range(len(names))]
     pairs = [

@@ -35,12 +35,7 @@ _SENDER = 0xFFF00000 + 12
 class MulticastPort:
     """An open group; raises OSError, ImportError without msgpack, ValueError for no address.
 
-    Parameters
-    ----------
-    group : str
-        IPv4 or IPv6 address.
-    port : int
-        UDP port.
+    ``group``: IPv4 or IPv6 address.
     """
 
     def __init__(self, group: str, port: int) -> None:

@@ -86,15 +86,7 @@ def convert(value: float, unit: str, dimension: str) -> float:
 def number_and_unit(text: str) -> tuple[float, str] | None:
     """Split ``"60 mm"`` or ``"60mm"``; the unit is empty where there is none.
 
-    Parameters
-    ----------
-    text : str
-        Quantity as written or typed.
-
-    Returns
-    -------
-    tuple of float and str, or None
-        Number in that unit, and the unit; None for a text that does not start with a number.
+    Returns: number in that unit, and the unit; None for a text that does not start with a number.
     """
     found = _QUANTITY.fullmatch(text.strip())
     return (float(found[1]), found[2]) if found else None

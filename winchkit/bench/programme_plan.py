@@ -41,27 +41,9 @@ def plan_programme(
 ) -> ProgrammePlan:
     """Plan one repeat of a motion programme within the limits of a bench.
 
-    Parameters
-    ----------
-    programme : Programme
-        The motion programme.
-    limits : mapping
-        Limits by winch.
-    start : mapping of str to float
-        Cable length by winch, m; where the programme has repeats a winch begins at the length at
-        which a repeat ends.
-
-    Returns
-    -------
-    ProgrammePlan
-        Lengths over time.
-
-    Raises
-    ------
-    UsageError
-        For a winch that the bench lacks.
-    NotPermitted
-        For a length, a speed or an acceleration beyond the limits, with the number of the step.
+    ``start``: cable length by winch, m; where the programme has repeats a winch begins at the
+    length at which a repeat ends. Raises UsageError for a winch that the bench lacks; NotPermitted
+    for a length, a speed or an acceleration beyond the limits, with the number of the step.
     """
     here = dict(start)
     if programme.repeat > 1:

@@ -27,17 +27,7 @@ _LEAST_TRAVEL = 0.5
 
 
 def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
-    """Whether an effect changes an output by far more than that varies, in words.
-
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        The fitted model.
-    index
-        Of the effect.
-    """
+    """Whether an effect changes an output by far more than that varies, in words."""
     if not isinstance(regression, TimeSeriesRegression):
         return None
     hypothesis = fit.hypothesis

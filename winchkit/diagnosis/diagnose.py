@@ -329,21 +329,7 @@ def with_offsets_where_better(
 ) -> tuple[Dataset, Found]:
     """Result with an offset per run, where one is found that predicts held-out blocks better.
 
-    Parameters
-    ----------
-    dataset
-        Runs of the result.
-    found
-        Result without further offsets.
-    again
-        Result on a data set with offsets.
-    final
-        Engine, fitted model and noise of a result.
-
-    Returns
-    -------
-    tuple
-        Data set and result, the given ones where offsets are not needed.
+    Returns: data set and result, the given ones where offsets are not needed.
     """
     engine, fitted, noise = final(found)
     offset = with_run_offsets(dataset, engine.regression, fitted)

@@ -221,15 +221,7 @@ class Step:
 def series_orders(values: Mapping[str, Estimate]) -> list[tuple[int, Estimate]]:
     """Whole orders of an effect with their amplitudes, largest first.
 
-    Parameters
-    ----------
-    values : mapping of str to Estimate
-        Parameters of an effect; those of a series are numbered.
-
-    Returns
-    -------
-    list of tuple of int and Estimate
-        Empty for an effect without an order or an amplitude.
+    Returns: empty for an effect without an order or an amplitude.
     """
     suffixes = [name.removeprefix(_ORDER) for name in values if name.startswith(_ORDER)]
     found = [

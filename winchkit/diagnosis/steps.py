@@ -49,18 +49,7 @@ def steps_of(
 ) -> tuple[Step, ...]:
     """Every addition with its equivalence set, values and held-out gain.
 
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    result
-        Result of the selection.
-    sets
-        Equivalence set of every addition.
-    dataset
-        Runs of the winch, for combinations that have a name; None for a robot.
-    spread
-        Uncertainty of the unknowns of the final model, where it is known already.
+    ``dataset``: runs of the winch, for combinations that have a name; None for a robot.
     """
     final, noise, regression = result.final, result.noise, engine.regression
     out = []
@@ -118,17 +107,7 @@ def is_small(standing: Standing, others: Iterable[Standing]) -> bool:
 def standing_of(
     without: Mapping[str, float], outputs: Mapping[str, OutputFit], own: Sequence[str]
 ) -> Standing:
-    """Standing of a step by the held-out errors of the model without it.
-
-    Parameters
-    ----------
-    without
-        Held-out errors without the step, by output.
-    outputs
-        Errors of the file and of the final model.
-    own
-        Outputs on which the step acts.
-    """
+    """Standing of a step by the held-out errors of the model without it."""
     noise = {name: output.noise_rms for name, output in outputs.items()}
     after = {name: output.heldout_rms_after for name, output in outputs.items()}
     before = {name: output.heldout_rms_before for name, output in outputs.items()}
@@ -151,22 +130,7 @@ def with_standing(
 ) -> Step:
     """A step with its share, law and doubts.
 
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    result
-        Result of the selection.
-    step
-        The step.
-    index
-        Of its term in the final model.
-    standing
-        Its standing.
-    curve
-        A free curve that explains more, and by which share of what the step explains.
-    small
-        Whether another step of the same outputs explains ten times as much.
+    ``small``: whether another step of the same outputs explains ten times as much.
     """
     doubts = list(_doubts(engine, result, step, index, curve))
     if not standing.certain:

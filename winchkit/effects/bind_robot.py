@@ -75,20 +75,7 @@ def robot_terms(
 
 
 def declared_terms(profile: RobotProfile, catalogue: Catalogue) -> list[Term]:
-    """Terms of the robot's own tables alone. Raises FileError with every fault.
-
-    Parameters
-    ----------
-    profile : RobotProfile
-        The robot.
-    catalogue : Catalogue
-        Effects.
-
-    Returns
-    -------
-    list of Term
-        Terms of the robot's own tables.
-    """
+    """Terms of the robot's own tables alone. Raises FileError with every fault."""
     terms, faults = _bind(profile, catalogue)
     if faults:
         raise FileError(faults)
@@ -98,34 +85,13 @@ def declared_terms(profile: RobotProfile, catalogue: Catalogue) -> list[Term]:
 def check_robot(profile: RobotProfile, catalogue: Catalogue | None = None) -> list[Fault]:
     """Every fault of the effects that a robot declares itself.
 
-    Parameters
-    ----------
-    profile : RobotProfile
-        The robot.
-    catalogue : Catalogue, optional
-        Effects; by default all.
-
-    Returns
-    -------
-    list of Fault
-        Faults with the lines of the file.
+    ``catalogue``: by default all. Returns: faults with the lines of the file.
     """
     return _bind(profile, catalogue or load_catalogue())[1]
 
 
 def lines_with_home_length(profile: RobotProfile) -> set[str]:
-    """Lines whose home length the profile has as an effect already.
-
-    Parameters
-    ----------
-    profile : RobotProfile
-        The robot.
-
-    Returns
-    -------
-    set[str]
-        Names of lines.
-    """
+    """Lines whose home length the profile has as an effect already."""
     own = (table for table in _single(profile.effect) if table.id == _HOME_LENGTH)
     return {str(table.values["line"]) for table in own if "line" in table.values}
 

@@ -47,15 +47,7 @@ class Signature:
 def usual_values(effect: Effect) -> dict[str, float]:
     """Values of typical size: amplitudes at their typical value, shapes at their default.
 
-    Parameters
-    ----------
-    effect : Effect
-        The effect.
-
-    Returns
-    -------
-    dict
-        SI, by parameter.
+    Returns: SI, by parameter.
     """
     sizes = {p.name: p.typical for p in effect.parameters if p.role == "amplitude"}
     return effect.null | sizes | dict(effect.probes[-1] if effect.probes else {})
@@ -64,17 +56,7 @@ def usual_values(effect: Effect) -> dict[str, float]:
 def signature(effect: Effect, values: Values | None = None) -> Signature:
     """Signature of an effect on the standard motion, or of a robot's effect on the standard poses.
 
-    Parameters
-    ----------
-    effect : Effect
-        Any effect of the catalogue or of the user.
-    values : mapping, optional
-        Parameter values, SI; by default those of typical size.
-
-    Returns
-    -------
-    Signature
-        Changes of the outputs.
+    ``values``: parameter values, SI; by default those of typical size.
     """
     values = usual_values(effect) if values is None else values
     if effect.of_robots:
@@ -98,17 +80,7 @@ def sparkline(values: Array, width: int = _WIDTH) -> str:
 
     Each bar is the value of its interval farthest from the median, so that spikes are visible.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Any unit; NaN where missing.
-    width : int
-        Number of bars.
-
-    Returns
-    -------
-    str
-        Unicode block characters.
+    ``values`` (n,): any unit; NaN where missing. Returns: Unicode block characters.
     """
     finite = values[np.isfinite(values)]
     if not len(finite):
@@ -128,18 +100,7 @@ def sparkline(values: Array, width: int = _WIDTH) -> str:
 
 
 def card(effect: Effect) -> str:
-    """The card as text of at most 80 columns.
-
-    Parameters
-    ----------
-    effect : Effect
-        The effect.
-
-    Returns
-    -------
-    str
-        Several lines.
-    """
+    """The card as text of at most 80 columns."""
     paragraphs = [
         ("What", effect.what),
         ("Formula", effect.formula),
@@ -161,18 +122,7 @@ def card(effect: Effect) -> str:
 
 
 def in_control(effect: Effect) -> str:
-    """Whether the length and tension of an open winch use an effect, or the reason why not.
-
-    Parameters
-    ----------
-    effect : Effect
-        The effect.
-
-    Returns
-    -------
-    str
-        A sentence.
-    """
+    """Whether the length and tension of an open winch use an effect, or the reason why not."""
     reason = effect.not_in_control
     return f"left out: {reason}" if reason else "used for a winch's length or tension"
 
@@ -180,17 +130,7 @@ def in_control(effect: Effect) -> str:
 def card_data(effect: Effect, width: int = _SAMPLES) -> dict[str, Any]:
     """The card as data, SI; ``width`` samples of the signature at most.
 
-    Parameters
-    ----------
-    effect : Effect
-        The effect.
-    width : int
-        Largest number of samples of the signature.
-
-    Returns
-    -------
-    dict
-        As ``winchkit effects ID --json`` prints it.
+    Returns: as ``winchkit effects ID --json`` prints it.
     """
     drawn = signature(effect)
     return {
@@ -267,20 +207,7 @@ def _plausible(effect: Effect) -> list[str]:
 
 
 def parameter_kind(effect: Effect, parameter: Parameter) -> str:
-    """Kind of a parameter: an amplitude, a phase, a shape, a whole order, or fixed.
-
-    Parameters
-    ----------
-    effect : Effect
-        The effect.
-    parameter : Parameter
-        One of its parameters.
-
-    Returns
-    -------
-    str
-        One or two words.
-    """
+    """Kind of a parameter: an amplitude, a phase, a shape, a whole order, or fixed."""
     if effect.polar and parameter.name == effect.polar[1]:
         return "phase"
     return "whole order" if parameter.whole else parameter.role

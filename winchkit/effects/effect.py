@@ -257,15 +257,7 @@ class Effect:
 def told_apart(first: Effect, second: Effect) -> str:
     """Run that distinguishes two effects, from the card that names the other one.
 
-    Parameters
-    ----------
-    first, second : Effect
-        Two effects.
-
-    Returns
-    -------
-    str
-        A sentence; empty where no card has one.
+    Returns: empty where no card has one.
     """
     if second.id not in first.confused_with and first.id in second.confused_with:
         return second.told_apart

@@ -132,15 +132,6 @@ def check_own(effect_id: str, path: Path, taken: Container[object]) -> None:
     """Check the name and the file of a user effect before its computation.
 
     Raises UsageError for an invalid or existing id, FileError for a file that exists.
-
-    Parameters
-    ----------
-    effect_id : str
-        Id of the new effect.
-    path : Path
-        Its Python file.
-    taken : Container[object]
-        Existing ids.
     """
     if path.suffix != ".py":
         raise UsageError(f"'{path}' is not a Python file; name it {path.stem or 'mine'}.py")
@@ -159,15 +150,6 @@ def write_own(term: Term, effect_id: str, path: Path) -> None:
     """Write an empirical term as a file of a user effect.
 
     Raises FileError where the file exists or cannot be written.
-
-    Parameters
-    ----------
-    term : Term
-        Empirical effect with its values.
-    effect_id : str
-        Id of the new effect.
-    path : Path
-        Its Python file.
     """
     effect = term.effect
     facts: dict[str, object] = {
@@ -188,14 +170,7 @@ def write_own(term: Term, effect_id: str, path: Path) -> None:
 def write_wave_on_drum(order: int, effect_id: str, path: Path) -> None:
     """Write a sine of the wound length as a file of a user effect; raises as above.
 
-    Parameters
-    ----------
-    order : int
-        Periods per drum turn.
-    effect_id : str
-        Id of the new effect.
-    path : Path
-        Its Python file.
+    ``order``: periods per drum turn.
     """
     _write(DRUM.format(id=effect_id, order=order, file=path.name), path)
 

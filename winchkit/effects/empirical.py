@@ -38,34 +38,14 @@ _NEEDS: Mapping[str, tuple[Need, ...]] = {
 def empirical_id(output: str, variable: str) -> str:
     """Id of the curve of an output over a variable.
 
-    Parameters
-    ----------
-    output : str
-        ``cable_length``, ``tension`` or ``motor_torque``.
-    variable : str
-        Name of a variable.
-
-    Returns
-    -------
-    str
-        ``empirical-OUTPUT-VARIABLE`` with hyphens.
+    ``output``: ``cable_length``, ``tension`` or ``motor_torque``. Returns:
+    ``empirical-OUTPUT-VARIABLE`` with hyphens.
     """
     return f"empirical-{output}-{variable}".replace("_", "-")
 
 
 def variable_of(effect: Effect) -> str:
-    """The variable of an empirical effect.
-
-    Parameters
-    ----------
-    effect : Effect
-        An empirical effect.
-
-    Returns
-    -------
-    str
-        Name of the variable.
-    """
+    """The variable of an empirical effect."""
     return next(v for o in _AT for v in VARIABLES if empirical_id(o, v) == effect.id)
 
 
@@ -82,17 +62,7 @@ def heights(values: Values) -> list[float]:
 def placed(effect: Effect, low: float, high: float) -> Effect:
     """A spline over the range of the data; an effect over an angle is unchanged.
 
-    Parameters
-    ----------
-    effect : Effect
-        An empirical effect.
-    low, high : float
-        Range of its variable, SI.
-
-    Returns
-    -------
-    Effect
-        Effect with knots over the range.
+    ``low``, ``high``: range of its variable, SI.
     """
     ends = {"low": (low,), "high": (high,)}
     parameters = tuple(replace(p, grid=ends.get(p.name, p.grid)) for p in effect.parameters)

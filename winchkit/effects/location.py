@@ -18,19 +18,9 @@ _BELOW = 0.1
 def located(effect: Effect, motions: Sequence[At]) -> Effect:
     """An effect with the grids of its places in the range of the data.
 
-    Parameters
-    ----------
-    effect : Effect
-        Any effect; one without such a grid is returned unchanged.
-    motions : sequence of At
-        Motion of every run.
-
-    Returns
-    -------
-    Effect
-        Grids in the units of their parameters: ``low + share (high − low)`` for a place
-        (``Parameter.over``), ``share (high − low)`` for an extent (``Parameter.along``), whose
-        lower bound is a tenth of the least: the data do not show a smaller one.
+    Returns: grids in the units of their parameters: ``low + share (high − low)`` for a place
+    (``Parameter.over``), ``share (high − low)`` for an extent (``Parameter.along``), whose lower
+    bound is a tenth of the least: the data do not show a smaller one.
     """
     if not any(p.over or p.along for p in effect.parameters):
         return effect

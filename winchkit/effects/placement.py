@@ -28,17 +28,7 @@ class LineEffect(Effect):
 def at_line(effect: Effect, line: str) -> LineEffect:
     """An effect placed on one line.
 
-    Parameters
-    ----------
-    effect : Effect
-        An effect that may act on one line.
-    line : str
-        Name of the line.
-
-    Returns
-    -------
-    LineEffect
-        Effect with the id ``EFFECT/LINE``.
+    Returns: effect with the id ``EFFECT/LINE``.
     """
     own = {f.name: getattr(effect, f.name) for f in fields(Effect)}
     own["id"] = f"{effect.id}/{line}"
@@ -52,17 +42,7 @@ def with_home_lengths(effect: Effect, lines: Sequence[str]) -> Effect:
     The cables are strained at home too, by unknown tensions. The law gives the strain relative to
     home, and the home lengths absorb the difference.
 
-    Parameters
-    ----------
-    effect : Effect
-        A law of the cable.
-    lines : sequence of str
-        Names of lines.
-
-    Returns
-    -------
-    Effect
-        Effect with a further parameter per line, m.
+    Returns: effect with a further parameter per line, m.
     """
     place = line_of_effect(effect)
     on = [line for line in lines if place in ("", line)]
@@ -76,53 +56,19 @@ def with_home_lengths(effect: Effect, lines: Sequence[str]) -> Effect:
 
 
 def base_of(effect: Effect) -> str:
-    """Id of an effect without its place.
-
-    Parameters
-    ----------
-    effect : Effect
-        A placed effect, or one without a place.
-
-    Returns
-    -------
-    str
-        Id in the catalogue.
-    """
+    """Id of an effect without its place."""
     return effect.base if isinstance(effect, LineEffect) else effect.id
 
 
 def line_of_effect(effect: Effect) -> str:
-    """Line on which an effect is placed; empty where it acts on all.
-
-    Parameters
-    ----------
-    effect : Effect
-        A placed effect, or one without a place.
-
-    Returns
-    -------
-    str
-        Name of the line.
-    """
+    """Line on which an effect is placed; empty where it acts on all."""
     return effect.line if isinstance(effect, LineEffect) else ""
 
 
 def placements(effect: Effect, lines: Sequence[str], *, moving: bool = False) -> Iterator[Effect]:
     """Every placement of an effect on a robot.
 
-    Parameters
-    ----------
-    effect : Effect
-        The effect.
-    lines : sequence of str
-        Names of all lines.
-    moving : bool
-        Whether the robot moves; else it is at rest at its poses.
-
-    Yields
-    ------
-    Iterator[Effect]
-        Placed effects.
+    ``moving``: else it is at rest at its poses.
     """
     places = effect.places(moving=moving)
     if places & {"all", "platform"}:

@@ -21,15 +21,7 @@ _ORDER = "order"
 def harmonic_series(terms: Sequence[Term]) -> Term:
     """Terms of one effect with an order as one term.
 
-    Parameters
-    ----------
-    terms : sequence of Term
-        Of the same effect, single orders or series, the main order first.
-
-    Returns
-    -------
-    Term
-        With the id of the effect.
+    ``terms``: of the same effect, single orders or series, the main order first.
     """
     singles = [single for term in terms for single, _ in single_orders(term)]
     if len(singles) == 1:
@@ -61,17 +53,7 @@ def single_orders(
 ) -> Iterator[tuple[Term, dict[str, float]]]:
     """The orders of a term as terms of their own, each with its standard deviations.
 
-    Parameters
-    ----------
-    term : Term
-        A series, or any other term, which is yielded unchanged.
-    std : mapping, optional
-        Standard deviations by parameter.
-
-    Yields
-    ------
-    tuple of Term and dict
-        One per order, in the order of the series.
+    Yields: one per order, in the order of the series.
     """
     std, single = dict(std or {}), term.effect.single
     if single is None:
@@ -96,16 +78,9 @@ def orders_of(term: Term) -> tuple[int, ...]:
 def fundamentals(orders: Sequence[int]) -> tuple[int, ...]:
     """At most two numbers of which every order is a multiple, such as pole pairs and slots.
 
-    Parameters
-    ----------
-    orders : sequence of int
-        Orders per turn.
-
-    Returns
-    -------
-    tuple of int
-        The greatest common divisor where it is above 1; else the smallest order and the greatest
-        common divisor of its non-multiples; empty where that is 1 or there are fewer than 3 orders.
+    ``orders``: orders per turn. Returns: the greatest common divisor where it is above 1; else the
+    smallest order and the greatest common divisor of its non-multiples; empty where that is 1 or
+    there are fewer than 3 orders.
     """
     if len(orders) < 3:
         return ()

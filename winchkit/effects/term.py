@@ -24,26 +24,8 @@ _ORDERS_IN_LABEL = 6
 def act(effect: Effect, values: Values, value: Any, at: At) -> Any:
     """Apply an effect to the value of its stage.
 
-    Parameters
-    ----------
-    effect : Effect
-        The effect.
-    values : mapping
-        Its parameter values, SI.
-    value : array or object
-        Value of the stage.
-    at : At
-        Further inputs.
-
-    Returns
-    -------
-    array or object
-        Of the type and shape of ``value``.
-
-    Raises
-    ------
-    FileError
-        With file and line where the function of the effect raises or returns another shape.
+    ``values``: its parameter values, SI. Returns: of the type and shape of ``value``. Raises
+    FileError with file and line where the function of the effect raises or returns another shape.
     """
     try:
         after = effect.apply(value, at, values)

@@ -49,17 +49,7 @@ def _rounded(direction: Array, rate: Array, transition: float) -> Array:
 def with_transitions(effect: Effect, transitions: Mapping[str, float]) -> Effect:
     """An effect with other transitions by default.
 
-    Parameters
-    ----------
-    effect : Effect
-        Any effect; one without a transition is returned itself.
-    transitions : mapping of str to float
-        By the unit of the rate, rad/s or m/s.
-
-    Returns
-    -------
-    Effect
-        With the same law.
+    ``transitions``: by the unit of the rate, rad/s or m/s. Returns: with the same law.
     """
     return replace(
         effect,

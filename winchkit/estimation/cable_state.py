@@ -95,14 +95,7 @@ class CableEstimator:
     ) -> None:
         """Take a profile and its effects.
 
-        Parameters
-        ----------
-        profile
-            Winch profile.
-        terms
-            Effects with their values.
-        weight
-            Load where no instrument measures one, N.
+        ``weight``: load where no instrument measures one, N.
         """
         used = [term for term in terms if not term.effect.not_in_control]
         self.at_rest = Line(profile, modifiers_of(t for t in used if not t.effect.memory))
@@ -124,15 +117,7 @@ class CableEstimator:
     def update(self, sample: Sample) -> CableState:
         """Update with one sample.
 
-        Parameters
-        ----------
-        sample
-            With a finite motor angle.
-
-        Returns
-        -------
-        CableState
-            True length, tension and correction of the cell.
+        Returns: True length, tension and correction of the cell.
         """
         before = self._before(sample)
         step = max(sample.time - before.time, _SHORTEST)

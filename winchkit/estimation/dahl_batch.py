@@ -25,30 +25,9 @@ def dahl_batch(
 ) -> Array:
     """Dahl friction along a path.
 
-    Parameters
-    ----------
-    position : (n,) array
-        m.
-    limit : float or (n,) array
-        F_c, N.
-    stiffness
-        σ, N/m.
-    shape
-        β.
-    start
-        Force at the first sample as a share of the limit, -1 to 1.
-    kernels
-        Compiled loops, or plain Python.
-
-    Returns
-    -------
-    (n,) array
-        N.
-
-    Raises
-    ------
-    UsageError
-        For shapes that do not fit.
+    ``position`` (n,): m. ``limit`` (n,): F_c, N. ``stiffness``: σ, N/m. ``shape``: β. ``start``:
+    force at the first sample as a share of the limit, -1 to 1. Returns (n,): N. Raises UsageError
+    for shapes that do not fit.
 
     Notes
     -----

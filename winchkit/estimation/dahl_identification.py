@@ -31,17 +31,8 @@ identified: a condition of 1e10 leaves six of the sixteen digits (rule of thumb)
 def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> Array:
     """Covariance of least-squares estimates under correlated residuals.
 
-    Parameters
-    ----------
-    residuals : (n,) array
-    jacobian : (n, p) array
-    lengths
-        Samples of each run.
-
-    Returns
-    -------
-    (p, p) array
-        NaN for parameters without influence, and for those that are not identifiable.
+    ``residuals`` (n,). ``jacobian`` (n, p). Returns (p, p): NaN for parameters without influence,
+    and for those that are not identifiable.
 
     Notes
     -----
@@ -66,12 +57,7 @@ def covariance_of(residuals: Array, jacobian: Array, lengths: Sequence[int]) -> 
 def correlation_time(residuals: Array, lengths: Sequence[int]) -> float:
     """Integrated correlation time in samples, at least 1.
 
-    Parameters
-    ----------
-    residuals : (n,) array
-        Of all runs, one after the other.
-    lengths
-        Samples of each run.
+    ``residuals`` (n,).
 
     Notes
     -----

@@ -38,28 +38,10 @@ def cluster_outcomes(
 ) -> Iterator[Outcome]:
     """Outcomes of tasks as they end, in any order.
 
-    Parameters
-    ----------
-    due : sequence of Task
-        The tasks.
-    jobs : int, optional
-        Processes of this computer, by default by its cores and memory.
-    scheduler : str, optional
-        Address of an existing scheduler, such as ``tcp://host:8786``.
-    work : callable
-        Function that makes an outcome of a task.
-
-    Yields
-    ------
-    Outcome
-        Of a lost worker the task is given to another one.
-
-    Raises
-    ------
-    UsageError
-        Without Dask; for workers with another version of winchkit.
-    ConnectionLost
-        For a scheduler that does not answer, or has no workers any more.
+    ``jobs``: processes of this computer, by default by its cores and memory. ``scheduler``: address
+    of an existing scheduler, such as ``tcp://host:8786``. Raises UsageError without Dask; for
+    workers with another version of winchkit; ConnectionLost for a scheduler that does not answer,
+    or has no workers any more.
     """
     try:
         dask: Any = import_module("dask")

@@ -46,15 +46,7 @@ class ProfileOfRuns:
 
 
 def described(file: RunFile, profile: ProfileOfRuns | None = None) -> list[Row]:
-    """Rows of a file: one per winch, or one with its fault.
-
-    Parameters
-    ----------
-    file : RunFile
-        The file.
-    profile : ProfileOfRuns, optional
-        Profile of the runs.
-    """
+    """Rows of a file: one per winch, or one with its fault."""
     own = {"path": file.path, "size": file.size, "mtime": file.mtime}
     digest, run, mapping, info = "", None, None, None
     try:
@@ -77,20 +69,9 @@ def described(file: RunFile, profile: ProfileOfRuns | None = None) -> list[Row]:
 def library_winch(path: str, prefix: str, metadata: str = "") -> str:
     """Name of a winch in the library.
 
-    Parameters
-    ----------
-    path : str
-        Path of the run below the library.
-    prefix : str
-        Prefix of the winch's columns.
-    metadata : str
-        Metadata ``winch`` of the run.
-
-    Returns
-    -------
-    str
-        The first folder of the path that does not begin with a date, followed by ``/`` and the
-        prefix where the run has prefixes; without such a folder the prefix or the metadata.
+    ``metadata``: metadata ``winch`` of the run. Returns: the first folder of the path that does not
+    begin with a date, followed by ``/`` and the prefix where the run has prefixes; without such a
+    folder the prefix or the metadata.
     """
     folders = PurePosixPath(path).parts[:-1]
     named = next((name for name in folders if not _DATE.fullmatch(name)), "")

@@ -38,13 +38,7 @@ class RunFile:
 
 
 def run_files(library: Path) -> Iterator[RunFile]:
-    """Files below a folder that may be runs, in the order of their paths.
-
-    Parameters
-    ----------
-    library : Path
-        The folder; folders whose name begins with a dot are left out.
-    """
+    """Files below a folder that may be runs, in the order of their paths."""
     above: dict[Path, tuple[tuple[Path, int], ...]] = {}
     for place, folders, names in os.walk(library):
         folder = Path(place)

@@ -41,17 +41,9 @@ class LibraryHistory:
 def common_effects(sets: Iterable[Sequence[str]]) -> tuple[str, ...]:
     """Choose one effect for every set of effects that the sessions cannot distinguish.
 
-    Parameters
-    ----------
-    sets : iterable of sequence of str
-        Equivalence sets of all sessions, each with the effect first that its diagnosis named.
-
-    Returns
-    -------
-    tuple of str
-        The effect that is in most sets, then that in most of the others, and so on: the name of a
-        cause is the same in all sessions. Of effects in equally many sets the one that most
-        diagnoses named.
+    Returns: the effect that is in most sets, then that in most of the others, and so on: the name
+    of a cause is the same in all sessions. Of effects in equally many sets the one that most
+    diagnoses named.
     """
     left = [tuple(one) for one in sets if one]
     chosen: list[str] = []

@@ -58,13 +58,7 @@ def profile_of_runs(profile: str | Path) -> ProfileOfRuns:
 
 
 def indexed(folder: str | Path) -> Partitions:
-    """Tables of a folder; raises FileError where it has no index, or is not there.
-
-    Parameters
-    ----------
-    folder : str or Path
-        Folder of the runs.
-    """
+    """Tables of a folder; raises FileError where it has no index, or is not there."""
     if not path_of(folder, "folder").is_dir():
         raise FileError(Fault("no such folder of runs", str(folder)))
     tables = Partitions(Path(folder))
@@ -76,12 +70,7 @@ def indexed(folder: str | Path) -> Partitions:
 def profile_path(profile: str | Path, winch: str) -> Path:
     """File of a winch's profile; raises FileError.
 
-    Parameters
-    ----------
-    profile : str or Path
-        Profile, or a folder with ``WINCH.toml`` for each winch (``/`` as ``-``).
-    winch : str
-        Name of the winch in the library.
+    ``profile``: profile, or a folder with ``WINCH.toml`` for each winch (``/`` as ``-``).
     """
     from winchkit.catalog import find
 

@@ -87,21 +87,7 @@ class Partitions:
     ) -> None:
         """Remove rows and add others; the caller holds the lock.
 
-        Parameters
-        ----------
-        table
-            Name of the table.
-        drop
-            Whether a row of a touched partition is removed.
-        touched
-            Partitions that may have such rows.
-        rows
-            Rows to add.
-
-        Raises
-        ------
-        FileError
-            Where a partition cannot be written; it then is as before.
+        Raises FileError where a partition cannot be written; it then is as before.
 
         Notes
         -----

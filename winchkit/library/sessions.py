@@ -26,13 +26,7 @@ class SessionRun:
     """Mapping by which it is read, below the library."""
 
     def read(self, library: Path) -> Run:
-        """Read it; raises FileError.
-
-        Parameters
-        ----------
-        library : Path
-            Folder of the library.
-        """
+        """Read it; raises FileError."""
         from winchkit.runs.read import read_run
 
         mapping = None if self.mapping is None else library / self.mapping
@@ -52,11 +46,6 @@ class WinchSession:
 
 def winch_sessions(tables: Partitions) -> list[WinchSession]:
     """Sessions of a library, by winch and time.
-
-    Parameters
-    ----------
-    tables : Partitions
-        Tables of the library.
 
     Notes
     -----

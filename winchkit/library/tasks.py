@@ -77,18 +77,8 @@ def task_of(
 ) -> Task:
     """Task of a session; raises FileError where its winch has no profile.
 
-    Parameters
-    ----------
-    tables : Partitions
-        Tables of the library.
-    session : WinchSession
-        Runs of one winch.
-    profile : str or Path
-        Profile, or a folder with ``WINCH.toml`` for each winch (``/`` as ``-``).
-    effects : tuple of (str, str)
-        Names and texts of files of user effects.
-    band : float, optional
-        Cut-off of the torque's low-pass, Hz.
+    ``profile``: profile, or a folder with ``WINCH.toml`` for each winch (``/`` as ``-``). ``band``:
+    cut-off of the torque's low-pass, Hz.
     """
     path = profile_path(profile, session.winch)
     known = profile_of_runs(path)
@@ -131,10 +121,7 @@ def failed(task: Task, reason: str) -> Outcome:
 def stored_result(found: Mapping[str, Any]) -> str:
     """JSON of a diagnosis as a table keeps it, at most 20 kB; ``dropped`` names omitted parts.
 
-    Parameters
-    ----------
-    found : mapping
-        Dictionary that ``winchkit diagnose --json`` prints.
+    ``found``: dictionary that ``winchkit diagnose --json`` prints.
     """
     stored = {name: found[name] for name in _STORED}
     stored["candidates"] = stored["candidates"][:_CANDIDATES]

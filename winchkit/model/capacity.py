@@ -45,15 +45,8 @@ class Capacity:
 def capacity(profile: WinchProfile) -> Capacity:
     """Capacity of a profile's drum, by ``drum.width`` and ``drum.flange_radius``.
 
-    Parameters
-    ----------
-    profile : WinchProfile
-        Its drum declares ``width`` (grooved) or ``flange_radius`` (layered), m.
-
-    Returns
-    -------
-    Capacity
-        NaN where the dimension is not declared.
+    ``profile``: its drum declares ``width`` (grooved) or ``flange_radius`` (layered), m. Returns:
+    NaN where the dimension is not declared.
 
     Notes
     -----
@@ -123,16 +116,9 @@ def length_at(profile: WinchProfile, turns: float) -> float:
 def safe_lengths(profile: WinchProfile) -> tuple[float, float]:
     """Free cable lengths between a full drum and the last two dead wraps, m.
 
-    Parameters
-    ----------
-    profile : WinchProfile
-        With ``reference.cable_length``, m, and ``reference.wound_turns``.
-
-    Returns
-    -------
-    shortest, longest : float
-        m; ``shortest`` is NaN where neither width nor flange is declared, both are NaN without a
-        reference.
+    ``profile``: with ``reference.cable_length``, m, and ``reference.wound_turns``. Returns: m;
+    ``shortest`` is NaN where neither width nor flange is declared, both are NaN without a
+    reference.
     """
     return length_at(profile, capacity(profile).turns), length_at(profile, DEAD_WRAPS)
 
@@ -140,17 +126,8 @@ def safe_lengths(profile: WinchProfile) -> tuple[float, float]:
 def wrap_ratio(friction: float, turns: float = DEAD_WRAPS) -> float:
     """Ratio of the cable's tension to the force on its clamp behind dead wraps.
 
-    Parameters
-    ----------
-    friction : float
-        Coefficient μ between cable and drum.
-    turns : float
-        Dead wraps n.
-
-    Returns
-    -------
-    float
-        e^(2π μ n) (Euler-Eytelwein): 3.5 for two wraps at μ = 0.1.
+    ``friction``: coefficient μ between cable and drum. ``turns``: dead wraps n. Returns: e^(2π μ n)
+    (Euler-Eytelwein): 3.5 for two wraps at μ = 0.1.
     """
     return float(np.exp(_TURN * friction * turns))
 
@@ -160,17 +137,8 @@ def drum_warnings(
 ) -> Iterator[tuple[str, str]]:
     """Warnings about ends of the stroke that exceed the drum's capacity.
 
-    Parameters
-    ----------
-    profile : WinchProfile
-        Without ``reference.wound_turns`` there are no warnings.
-    shortest, longest : float, optional
-        Free lengths to which the winch may move, m; by default that of the reference.
-
-    Yields
-    ------
-    tuple of str
-        Key of the profile, and message.
+    ``profile``: without ``reference.wound_turns`` there are no warnings. ``shortest``, ``longest``:
+    free lengths to which the winch may move, m; by default that of the reference.
     """
     reference = profile.reference
     if not reference.wound_turns:

@@ -42,19 +42,9 @@ estimated from what remains; with fewer samples differences are taken."""
 def direction(rate: Array, noise: float, creep: float) -> Array:
     """Expected direction of a motion whose rate is known with noise.
 
-    Parameters
-    ----------
-    rate : (n,) array
-        Rates of one run, in any unit.
-    noise : float
-        Their standard deviation, in the same unit.
-    creep : float
-        Rate that has a direction whatever its noise, in the same unit.
-
-    Returns
-    -------
-    (n,) array
-        Mean of the sign of the true rate, −1 to 1.
+    ``rate`` (n,): rates of one run, in any unit. ``noise``: their standard deviation, in the same
+    unit. ``creep``: rate that has a direction whatever its noise, in the same unit. Returns (n,):
+    mean of the sign of the true rate, −1 to 1.
 
     Notes
     -----
@@ -85,17 +75,7 @@ def is_smoother(measured: Array, differences: Array) -> bool:
     Jitter of the time stamps adds noise to differences of the angle and none to the velocity that a
     drive reports; a velocity that is quantised or filtered has more noise or does not agree.
 
-    Parameters
-    ----------
-    measured : (n,) array
-        Measured rate.
-    differences : (n,) array
-        Rate by differences of the angle, in the same unit.
-
-    Returns
-    -------
-    bool
-        Whether to use the measured rate.
+    ``measured`` (n,). ``differences`` (n,): rate by differences of the angle, in the same unit.
     """
     spread = float(np.std(differences))
     if spread == 0.0 or float(np.std(measured - differences)) > _AGREES * spread:
@@ -318,17 +298,8 @@ def _by_number(x: Array) -> Array:
 def shifted(signal: Array, time: Array, later: float) -> Array:
     """The signal ``later`` seconds later, by cubic Hermite interpolation; constant at the ends.
 
-    Parameters
-    ----------
-    signal, time : (n,) array
-        Signal, and its times, s.
-    later : float
-        Shift, s; negative for an earlier signal.
-
-    Returns
-    -------
-    (n,) array
-        In the unit of the signal.
+    ``signal``, ``time`` (n,): signal, and its times, s. ``later``: shift, s; negative for an
+    earlier signal. Returns (n,): in the unit of the signal.
     """
     if later == 0.0 or len(time) < 2:
         return signal
@@ -345,17 +316,8 @@ def shifted(signal: Array, time: Array, later: float) -> Array:
 def with_turning_points(x: Array) -> tuple[Array, NDArray[np.intp]]:
     """Insert the extrema between samples into a signal.
 
-    Parameters
-    ----------
-    x : (n,) array
-        Signal.
-
-    Returns
-    -------
-    signal : (m,) array
-        Samples and extrema in order of time.
-    where : (n,) array of int
-        Indices of the samples in it.
+    ``x`` (n,). Returns: ``signal`` (m,): samples and extrema in order of time; ``where`` (n,) of
+    int.
 
     Notes
     -----

@@ -146,15 +146,7 @@ class Squared:
 def drum_of(profile: WinchProfile) -> Spiral | Archimedean | Grooved | Squared:
     """The winding law that a profile declares; its layers grow by the cable diameter by default.
 
-    Parameters
-    ----------
-    profile : WinchProfile
-        The profile.
-
-    Returns
-    -------
-    Spiral or Archimedean or Grooved or Squared
-        Winding law with dimensions in m.
+    Returns: winding law with dimensions in m.
     """
     spec = profile.drum
     growth = spec.layer_growth if spec.layer_growth is not None else profile.cable.diameter

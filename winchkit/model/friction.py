@@ -28,21 +28,9 @@ def tension_after(
 ) -> Array:
     """Tension behind a pulley with Coulomb and viscous friction (Eq. 20–23).
 
-    Parameters
-    ----------
-    before : array_like
-        T0, N. All shapes broadcast.
-    wrap : float
-        Wrap angle α, rad.
-    friction : array_like
-        Coefficient μ, signed, |μ| < 1.
-    drag : array_like
-        Viscous force d = F_v v, signed, N.
-
-    Returns
-    -------
-    array
-        T1 with T1 − T0 = μ N(T0, T1) + d, N.
+    ``before``: T0, N. All shapes broadcast. ``wrap``: wrap angle α, rad. ``friction``: coefficient
+    μ, signed, |μ| < 1. ``drag``: viscous force d = F_v v, signed, N. Returns: T1 with T1 − T0 = μ
+    N(T0, T1) + d, N.
 
     Notes
     -----
@@ -60,17 +48,8 @@ def tension_after(
 def coulomb_ratio(friction: Array, wrap: float) -> Array:
     """T1/T0 over a pulley with Coulomb friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1.
 
-    Parameters
-    ----------
-    friction : array
-        Coefficient μ, signed.
-    wrap : float
-        Wrap angle α, rad.
-
-    Returns
-    -------
-    array
-        T1/T0, of the shape of ``friction``.
+    ``friction``: coefficient μ, signed. ``wrap``: wrap angle α, rad. Returns: T1/T0, of the shape
+    of ``friction``.
     """
     return tension_after(1.0, wrap, friction)
 
@@ -78,17 +57,8 @@ def coulomb_ratio(friction: Array, wrap: float) -> Array:
 def capstan_ratio(friction: Array, wrap: float) -> Array:
     """T1/T0 of a cable that slides around ``wrap`` rad: e^(μ α), μ signed (Eq. 19).
 
-    Parameters
-    ----------
-    friction : array
-        Coefficient μ, signed.
-    wrap : float
-        Wrap angle α, rad.
-
-    Returns
-    -------
-    array
-        T1/T0, of the shape of ``friction``.
+    ``friction``: coefficient μ, signed. ``wrap``: wrap angle α, rad. Returns: T1/T0, of the shape
+    of ``friction``.
     """
     return np.asarray(np.exp(friction * wrap))
 
@@ -96,21 +66,7 @@ def capstan_ratio(friction: Array, wrap: float) -> Array:
 def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float) -> Array:
     """Coefficient μc + (μs − μc) e^(−(v/vs)²), unsigned; speeds in m/s.
 
-    Parameters
-    ----------
-    speed : array
-        m/s, any shape.
-    coulomb : float
-        μc.
-    static : float
-        μs.
-    stribeck_speed : float
-        vs, m/s.
-
-    Returns
-    -------
-    array
-        Of the shape of ``speed``.
+    ``speed``: m/s, any shape. ``stribeck_speed``: vs, m/s. Returns: of the shape of ``speed``.
     """
     fallen = np.exp(-((speed / stribeck_speed) ** 2))
     return np.asarray(coulomb * (1 - fallen) + static * fallen)
@@ -119,23 +75,8 @@ def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float)
 def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape: float) -> float:
     """Dahl friction after a monotone move, exact at a constant limit F_c (Eq. 25).
 
-    Parameters
-    ----------
-    force : float
-        Friction before the move, N.
-    moved : float
-        Signed displacement, m.
-    limit : float
-        F_c, N.
-    stiffness : float
-        σ, N/m.
-    shape : float
-        Exponent β.
-
-    Returns
-    -------
-    float
-        N.
+    ``force``: friction before the move, N. ``moved``: signed displacement, m. ``limit``: F_c, N.
+    ``stiffness``: σ, N/m. ``shape``: exponent β. Returns: N.
     """
     # Plain floats and branches only, since winchkit.estimation compiles this function.
     if limit <= 0.0:
@@ -157,23 +98,8 @@ def dahl(
 ) -> Array:
     """Dahl friction along a motion, with a limit F_c that may change.
 
-    Parameters
-    ----------
-    position : (n,) array
-        m.
-    limit : (n,) array
-        F_c, N.
-    stiffness : float
-        σ, N/m.
-    shape : float
-        Exponent β.
-    start : float
-        Force at the first sample as a share of the limit, −1 to 1.
-
-    Returns
-    -------
-    (n,) array
-        N.
+    ``position`` (n,): m. ``limit`` (n,): F_c, N. ``stiffness``: σ, N/m. ``shape``: exponent β.
+    ``start``: force at the first sample as a share of the limit, −1 to 1. Returns (n,): N.
 
     Notes
     -----

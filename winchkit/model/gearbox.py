@@ -63,18 +63,9 @@ class Gearbox:
     def motor_torque(self, drum_torque: float, *, lowering: bool = False) -> float:
         """Motor torque against a drum torque at constant speed.
 
-        Parameters
-        ----------
-        drum_torque : float
-            N m.
-        lowering : bool
-            Whether the load drives the gearbox.
-
-        Returns
-        -------
-        float
-            N m: drum_torque/(u η) when lifting, drum_torque η'/u when lowering. NaN for lowering
-            with a self-locking gearbox, which needs a driving torque that η does not determine.
+        ``drum_torque``: N m. Returns: N m: drum_torque/(u η) when lifting, drum_torque η'/u when
+        lowering. NaN for lowering with a self-locking gearbox, which needs a driving torque that η
+        does not determine.
         """
         if lowering:
             held = drum_torque * self.back_efficiency / self.ratio
@@ -87,28 +78,8 @@ def worm_stage(
 ) -> GearStage:
     """Stage of a worm and a worm wheel, u = teeth/starts (Eq. 14 with z1 and z2 exchanged).
 
-    Parameters
-    ----------
-    starts : int
-        Threads of the worm.
-    teeth : int
-        Teeth of the wheel.
-    lead_angle : float
-        γ, rad.
-    friction : float
-        Coefficient μ on the flanks.
-    pressure_angle : float
-        α_n, rad.
-
-    Returns
-    -------
-    GearStage
-        Ratio and both efficiencies.
-
-    Raises
-    ------
-    UsageError
-        For values outside their ranges.
+    ``lead_angle``: γ, rad. ``friction``: coefficient μ on the flanks. ``pressure_angle``: α_n, rad.
+    Raises UsageError for values outside their ranges.
 
     Notes
     -----

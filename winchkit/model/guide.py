@@ -98,17 +98,8 @@ def guide_warnings(
 ) -> Iterator[tuple[str, str]]:
     """Warnings about a fleet angle beyond the limit on a grooved drum.
 
-    Parameters
-    ----------
-    profile : WinchProfile
-        Its guide is assumed to be above the cable on an empty drum.
-    shortest : float, optional
-        Shortest free length of the winch, m; by default that of a full drum, else the reference.
-
-    Yields
-    ------
-    tuple of str
-        Key of the profile, and message.
+    ``profile``: its guide is assumed to be above the cable on an empty drum. ``shortest``: shortest
+    free length of the winch, m; by default that of a full drum, else the reference.
     """
     if profile.guide is None or not profile.drum.groove_pitch:
         return

@@ -68,21 +68,9 @@ def over_pulleys(
 ) -> Array:
     """Tension behind a chain of pulleys without memory.
 
-    Parameters
-    ----------
-    tension : array_like, (n,)
-        Known tension in front of the first pulley, N.
-    wraps : sequence of float
-        Wrap angles in the order of computation, rad.
-    towards : array_like, (n,)
-        Cable speed in the direction of computation, m/s.
-    law : Eyelets or Bearings
-        Friction law of every pulley.
-
-    Returns
-    -------
-    (n,) array
-        Tension behind the last pulley, N.
+    ``tension`` (n,): known tension in front of the first pulley, N. ``wraps``: wrap angles in the
+    order of computation, rad. ``towards`` (n,): cable speed in the direction of computation, m/s.
+    Returns (n,): tension behind the last pulley, N.
     """
     carried, speed = np.asarray(tension, dtype=float), np.asarray(towards, dtype=float)
     for wrap in wraps:
@@ -95,15 +83,7 @@ def presliding_step(step: Step) -> PulleyStep:
 
     The same source runs as plain Python or, with a compiled ``step``, is compiled by numba.
 
-    Parameters
-    ----------
-    step : Step
-        Function as :func:`dahl_step`.
-
-    Returns
-    -------
-    PulleyStep
-        Function of force, tension, displacement and parameters of one pulley.
+    ``step``: function as :func:`dahl_step`.
     """
 
     def pulley_step(  # noqa: PLR0917 - numba takes no keywords
@@ -168,26 +148,11 @@ def eq27_tension(
 ) -> Array:
     """Solve Eq. 27 of the winding-device paper for the tension at the load cell.
 
-    Parameters
-    ----------
-    platform : array_like, (n,)
-        Tension T_p at the platform, N.
-    towards : array_like, (n,)
-        Displacement x of the cable towards the platform since friction was zero, m.
-    loss : sequence of float
-        Loss factors λ_j > 0 of the pulleys, Σ λ < 1.
-    stiffness : float
-        Presliding stiffness σ, N/m.
-
-    Returns
-    -------
-    (n,) array
-        T, N, with T + Σ s T λ_j (1 − e^(−σ|x|/(λ_j T))) = T_p and s the sign of x.
-
-    Raises
-    ------
-    UsageError
-        For loss factors without a solution.
+    ``platform`` (n,): tension T_p at the platform, N. ``towards`` (n,): displacement x of the cable
+    towards the platform since friction was zero, m. ``loss``: loss factors λ_j > 0 of the pulleys,
+    Σ λ < 1. ``stiffness``: presliding stiffness σ, N/m. Returns (n,): T, N, with T + Σ s T λ_j (1 −
+    e^(−σ|x|/(λ_j T))) = T_p and s the sign of x. Raises UsageError for loss factors without a
+    solution.
 
     Notes
     -----

@@ -35,19 +35,8 @@ def linear(decay: Array, drive: Array, start: float) -> Array:
 def play(x: Array, gap: float, start: float = 0.0) -> Array:
     """Output of a backlash (play operator).
 
-    Parameters
-    ----------
-    x : (n,) array
-        Input.
-    gap : float
-        Width of the backlash, in the unit of ``x``.
-    start : float
-        Initial position within the gap as a share of it, −½ to ½; 0 is the middle.
-
-    Returns
-    -------
-    (n,) array
-        In the unit of ``x``.
+    ``x`` (n,). ``gap``: width of the backlash, in the unit of ``x``. ``start``: initial position
+    within the gap as a share of it, −½ to ½; 0 is the middle. Returns (n,): in the unit of ``x``.
     """
     low = x - gap / 2
     high = x + gap / 2
@@ -70,19 +59,8 @@ def first_order_lag(
 ) -> Array:
     """First-order low-pass, exact for an input that is linear between samples.
 
-    Parameters
-    ----------
-    x, time : (n,) array
-        Input, and its times, s.
-    time_constant : float
-        s; zero returns ``x``.
-    start : float, optional
-        Output at the first sample; by default the first input.
-
-    Returns
-    -------
-    (n,) array
-        In the unit of ``x``.
+    ``x``, ``time`` (n,): input, and its times, s. ``time_constant``: s; zero returns ``x``.
+    ``start``: by default the first input. Returns (n,): in the unit of ``x``.
     """
     if time_constant <= 0 or not len(x):
         return x.copy()

@@ -194,16 +194,7 @@ class SmoothingSpline:
     def fit(cls, time: Array, signal: Array) -> SmoothingSpline:
         """Smoother whose weight maximises the restricted likelihood of a signal.
 
-        Parameters
-        ----------
-        time : (n,) array
-            s, increasing, n ≥ 4.
-        signal : (n,) array
-            Without NaN.
-
-        Returns
-        -------
-        SmoothingSpline
+        ``time`` (n,): s, increasing, n ≥ 4. ``signal`` (n,): without NaN.
 
         Notes
         -----
@@ -254,17 +245,8 @@ class SmoothingSpline:
     def smoothed(self, signal: Array, derivative: int = 0) -> Array:
         """Smoothed signal or one of its derivatives at the samples.
 
-        Parameters
-        ----------
-        signal : (n,) array
-            At the times of the smoother.
-        derivative : int
-            Order, 0 to 2.
-
-        Returns
-        -------
-        (n,) array
-            In the unit of the signal over s to the power of the order.
+        ``signal`` (n,). ``derivative``: order, 0 to 2. Returns (n,): in the unit of the signal over
+        s to the power of the order.
         """
         return self._at_samples(self._coefficients(signal), derivative)
 
@@ -299,15 +281,7 @@ class SmoothingSpline:
     def std(self, derivative: int) -> Array:
         """Standard deviation of a derivative of the signal to which the weight was fitted.
 
-        Parameters
-        ----------
-        derivative : int
-            Order, 0 to 2.
-
-        Returns
-        -------
-        (n,) array
-            Of the posterior under white jerk: noise and what the penalty smooths away.
+        ``derivative``: order, 0 to 2. Returns: (n,).
 
         Notes
         -----
@@ -330,15 +304,7 @@ class SmoothingSpline:
     def typical_std(self, derivative: int) -> float:
         """Standard deviation of a derivative far from the ends of even samples.
 
-        Parameters
-        ----------
-        derivative : int
-            Order, 0 to 2.
-
-        Returns
-        -------
-        float
-            As :meth:`std`, without its recursion.
+        ``derivative``: order, 0 to 2. Returns: as :meth:`std`, without its recursion.
 
         Notes
         -----

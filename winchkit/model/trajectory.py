@@ -80,22 +80,8 @@ def _ramp(speed: float, acceleration: float, jerk: float) -> tuple[float, float]
 def plan(distance: float, speed: float, acceleration: float, jerk: float) -> Trajectory:
     """The fastest move from rest to rest within limits.
 
-    Parameters
-    ----------
-    distance : float
-        Signed, m.
-    speed, acceleration, jerk : float
-        Positive limits, m/s, m/s^2 and m/s^3.
-
-    Returns
-    -------
-    Trajectory
-        Seven phases of constant jerk.
-
-    Raises
-    ------
-    UsageError
-        For a limit that is not positive, or a distance that is not finite.
+    ``distance``: signed, m. ``speed``, ``acceleration``, ``jerk``: positive limits, m/s, m/s^2 and
+    m/s^3. Raises UsageError for a limit that is not positive, or a distance that is not finite.
 
     References
     ----------

@@ -16,18 +16,7 @@ from winchkit.units import format_quantity
 
 
 def read_document(path: Path) -> Any:
-    """Parse a profile with its comments and layout. Raises FileError.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    Any
-        Document of tomlkit.
-    """
+    """Parse a profile with its comments and layout. Raises FileError."""
     try:
         return tomlkit.parse(read_text(path))
     except OSError as error:
@@ -37,15 +26,7 @@ def read_document(path: Path) -> Any:
 
 
 def write_document(document: Any, path: Path) -> None:
-    """Write a document, empty lists of tables left out. Raises FileError.
-
-    Parameters
-    ----------
-    document : Any
-        Document of tomlkit.
-    path : Path
-        The file.
-    """
+    """Write a document, empty lists of tables left out. Raises FileError."""
     for name in ("effect", "ledger"):
         if name in document and not len(document[name]):
             del document[name]
@@ -65,18 +46,7 @@ def tables(document: Any, name: str) -> AoT:
 
 
 def effect_tables(document: Any) -> AoT:
-    """The ``[[effect]]`` tables.
-
-    Parameters
-    ----------
-    document : Any
-        Document of tomlkit.
-
-    Returns
-    -------
-    AoT
-        Array of tables, part of the document.
-    """
+    """The ``[[effect]]`` tables."""
     return tables(document, "effect")
 
 

@@ -46,14 +46,7 @@ def write_fitted(source: Path, fitted: Sequence[Fitted], out: Path, judged: Judg
 
     Raises FileError where a file cannot be read or written.
 
-    Parameters
-    ----------
-    source, out : Path
-        The profile, and its copy.
-    fitted : sequence of Fitted
-        Effects with values and standard deviations.
-    judged : Judged
-        Runs and held-out errors for the ledger.
+    ``source``, ``out``: the profile, and its copy.
     """
     document = read_document(source)
     note(document, "add", fitted[-1].term.effect.id, judged)
@@ -69,16 +62,7 @@ def write_without(
     A robot's effect on one line is ``EFFECT/LINE``. Raises FileError where the profile has no such
     effect or a file cannot be read or written.
 
-    Parameters
-    ----------
-    source, out : Path
-        The profile, and its copy.
-    effect_id : str
-        The removed effect.
-    fitted : sequence of Fitted
-        The other effects, refitted.
-    judged : Judged
-        Runs and held-out errors for the ledger.
+    ``source``, ``out``: the profile, and its copy.
     """
     document = read_document(source)
     short = {SHORTHANDS[key]: key for key in shorthands(document)}

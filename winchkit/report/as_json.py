@@ -20,15 +20,7 @@ from winchkit.report.words.sentence import changes_text, sentence
 def report_json(answer: Answer) -> dict[str, Any]:
     """A diagnosis as ``winchkit diagnose --json`` prints it.
 
-    Parameters
-    ----------
-    answer : Answer
-        Of a winch or a robot.
-
-    Returns
-    -------
-    dict
-        Values in SI.
+    Returns: values in SI.
     """
     diagnosis, ladder = answer.diagnosis, waterfall_of(answer)
     if isinstance(answer, RobotAnswer):

@@ -46,21 +46,7 @@ class ChangeText:
 
 
 def history_text(history: FleetHistory, swapped: Sequence[Swap] = ()) -> str:
-    """Report of a fleet's history for a terminal.
-
-    Parameters
-    ----------
-    history : FleetHistory
-        Changes and differences.
-    swapped : sequence of Swap
-        Winches that have each other's profiles.
-
-    Returns
-    -------
-    str
-        Lines: changes, the most significant first, then winches beyond a limit without a change,
-        winches that differ from the others, and exchanged profiles.
-    """
+    """Report of a fleet's history for a terminal."""
     lines = [line for pair in history.changed for line in _changed(*pair)]
     lines += [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
     lines += [line for pair in history.odd for line in odd_texts(*pair)]
@@ -75,19 +61,7 @@ def history_text(history: FleetHistory, swapped: Sequence[Swap] = ()) -> str:
 
 
 def change_text(parameter: FleetParameter, winch: WinchHistory) -> ChangeText:
-    """Words of a change that was tested.
-
-    Parameters
-    ----------
-    parameter : FleetParameter
-        The parameter.
-    winch : WinchHistory
-        One of its winches, with a change.
-
-    Returns
-    -------
-    ChangeText
-    """
+    """Words of a change that was tested."""
     change = winch.change
     assert change is not None, "a change that was tested is there"
     since = "over the sessions"
@@ -127,19 +101,7 @@ def _changed(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
 
 
 def odd_texts(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
-    """Two lines of a winch that differs from the others.
-
-    Parameters
-    ----------
-    parameter : FleetParameter
-        The parameter.
-    winch : WinchHistory
-        The winch.
-
-    Yields
-    ------
-    str
-    """
+    """Two lines of a winch that differs from the others."""
     own = _value(winch.value, winch.std, parameter.unit)
     others = _value(parameter.common, parameter.common_std, parameter.unit)
     name = f"{parameter.effect} {parameter.parameter}"
@@ -152,36 +114,14 @@ def odd_texts(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
 
 
 def beyond_text(parameter: FleetParameter, winch: WinchHistory) -> str:
-    """Sentence on a winch beyond a limit.
-
-    Parameters
-    ----------
-    parameter : FleetParameter
-        The parameter.
-    winch : WinchHistory
-        The winch.
-
-    Returns
-    -------
-    str
-    """
+    """Sentence on a winch beyond a limit."""
     own = _value(winch.value, winch.std, parameter.unit)
     name = f"{parameter.effect} {parameter.parameter}"
     return f"winch {winch.winch}: {name} {own}, {_limit(winch, parameter.unit)}"
 
 
 def swap_text(swap: Swap) -> str:
-    """Sentence on exchanged profiles.
-
-    Parameters
-    ----------
-    swap : Swap
-        Winches that have each other's profiles.
-
-    Returns
-    -------
-    str
-    """
+    """Sentence on exchanged profiles."""
     names, p_value = swap.winches, f"p = {swap.p_value:.1g}"
     following = (*names[1:], names[0])
     pairs = [f"{own} fits that of {other}" for own, other in zip(names, following, strict=True)]
@@ -217,15 +157,7 @@ def _value(value: float, std: float, unit: str) -> str:
 def day_text(time: float) -> str:
     """Date of a time in s since 1970; in words where there is none.
 
-    Parameters
-    ----------
-    time : float
-        UTC, s.
-
-    Returns
-    -------
-    str
-        ``2026-03-01``.
+    ``time``: UTC, s. Returns: ``2026-03-01``.
     """
     if not isfinite(time):
         return "no earlier bound" if time < 0 else "no later bound"

@@ -72,18 +72,7 @@ _STEP_LINES = 12
 def report_text(answer: Answer, *, verbose: bool = False) -> str:
     """A diagnosis as text.
 
-    Parameters
-    ----------
-    answer : Answer
-        Of a winch or a robot.
-    verbose : bool
-        Whether to add how the result was reached: contributions, angles, correlations, scores,
-        detectable effects and further runs.
-
-    Returns
-    -------
-    str
-        Lines of at most 80 characters, at most 29 unless ``verbose``.
+    Returns: lines of at most 80 characters, at most 29 unless ``verbose``.
     """
     diagnosis = answer.diagnosis
     limits = _limits(answer)
@@ -137,19 +126,8 @@ def step_lines(
 ) -> list[str]:
     """Every step with its doubts below.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of a winch or a robot.
-    without : sequence of mapping of str to float
-        Held-out errors of the final model without each step, SI.
-    most : int, optional
-        Number of lines from which further steps are counted only.
-
-    Returns
-    -------
-    list of str
-        Lines of at most 80 characters.
+    ``without``: held-out errors of the final model without each step, SI. ``most``: number of lines
+    from which further steps are counted only. Returns: lines of at most 80 characters.
     """
     lines: list[str] = []
     errors = [*without, *[{}] * len(diagnosis.steps)]
@@ -166,15 +144,7 @@ def step_lines(
 def compare_text(comparison: Comparison) -> str:
     """A comparison as text: errors per output, and their attribution to variables.
 
-    Parameters
-    ----------
-    comparison : Comparison
-        The comparison.
-
-    Returns
-    -------
-    str
-        Text of at most 80 columns.
+    Returns: text of at most 80 columns.
     """
     attributed: list[str] = []
     for name, error in comparison.outputs.items():
@@ -195,15 +165,7 @@ def compare_text(comparison: Comparison) -> str:
 def addition_text(addition: Addition | Removal) -> str:
     """An added or removed effect as text: fitted values, and held-out errors.
 
-    Parameters
-    ----------
-    addition : Addition or Removal
-        The added or removed effect.
-
-    Returns
-    -------
-    str
-        Text of at most 80 columns.
+    Returns: text of at most 80 columns.
     """
     fitted = []
     for term, every in addition.terms:
@@ -231,21 +193,8 @@ def error_lines(
 ) -> list[str]:
     """Held-out errors per output as lines.
 
-    Parameters
-    ----------
-    outputs : mapping of str to OutputFit
-        Errors by output.
-    extended : bool
-        Whether the model was changed, so that there are errors before and after.
-    data : str
-        Kind of data, ``runs`` or ``poses``.
-    offsets : sequence of RunOffset
-        Offsets that every run has for itself, whether it is held out or not.
-
-    Returns
-    -------
-    list of str
-        Lines of at most 80 characters.
+    ``data``: kind of data, ``runs`` or ``poses``. ``offsets``: offsets that every run has for
+    itself, whether it is held out or not. Returns: lines of at most 80 characters.
     """
     head = ["held-out error, rms", "before", "after", "noise"]
     rows = [head if extended else [head[0], "error", "noise"]]

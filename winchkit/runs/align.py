@@ -23,21 +23,9 @@ MAY_LACK = "motor_torque"
 def values_at(times: Array, values: Array, moments: Array, max_gap: float) -> Array:
     """Linear interpolation of samples.
 
-    Parameters
-    ----------
-    times : (n,) array
-        Strictly increasing times, s.
-    values : (n, k) array
-        Samples.
-    moments : (m,) array
-        Times of the result, s.
-    max_gap : float
-        Longest interval over which samples are interpolated, s.
-
-    Returns
-    -------
-    (m, k) array
-        NaN where a neighbouring sample is missing or the interval is longer.
+    ``times`` (n,): strictly increasing times, s. ``values`` (n, k). ``moments`` (m,): times of the
+    result, s. ``max_gap``: longest interval over which samples are interpolated, s. Returns (m, k):
+    NaN where a neighbouring sample is missing or the interval is longer.
     """
     found = np.full((len(moments), values.shape[1]), np.nan)
     if not len(times):

@@ -12,15 +12,7 @@ from winchkit.runs.recording.log_file import refuse_written
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write a file completely or not at all; raises FileError, UsageError for an open log.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    data : bytes
-        Its content.
-    """
+    """Write a file completely or not at all; raises FileError, UsageError for an open log."""
     refuse_written([path])
     beside = path.with_name(f".{path.name}.new")
     try:

@@ -51,15 +51,8 @@ _THIRD = sqrt(20.0)
 def holds_of(angle: Array) -> list[slice] | None:
     """Stretches at rest of all winches.
 
-    Parameters
-    ----------
-    angle : (p, n) array
-        Motor angles of n lines in the order of time, rad; NaN where missing.
-
-    Returns
-    -------
-    list of slice or None
-        Rows of each hold; None where the rows are no log, but a pose each.
+    ``angle`` (p, n): motor angles of n lines in the order of time, rad; NaN where missing. Returns:
+    None where the rows are no log, but a pose each.
     """
     found = _tolerance(angle)
     if found is None:
@@ -74,10 +67,7 @@ def holds_of(angle: Array) -> list[slice] | None:
 def is_log(angle: Array) -> bool:
     """Whether rows are samples of a motion, whose noise is far below its spread.
 
-    Parameters
-    ----------
-    angle : (p, n) array
-        Motor angles of n lines in the order of time, rad; NaN where missing.
+    ``angle`` (p, n): motor angles of n lines in the order of time, rad; NaN where missing.
     """
     return _tolerance(angle) is not None
 
@@ -138,14 +128,7 @@ def _stretches(angle: Array, tolerance: Array) -> list[slice]:
 def averaged(values: Array, holds: list[slice], *, angles: bool = False) -> Array:
     """Means over holds of what was measured, (h, …); NaN where nothing was.
 
-    Parameters
-    ----------
-    values : (p, ...) array
-        Measurements by row; NaN where missing.
-    holds : list of slice
-        Rows of each hold.
-    angles : bool
-        Whether values are angles, whose mean is the circular one.
+    ``values`` (p, ...): NaN where missing.
     """
     out = np.full((len(holds), *values.shape[1:]), np.nan)
     for number, rows in enumerate(holds):

@@ -198,15 +198,7 @@ class RunSummary:
 def summary_of(run: Run) -> RunSummary:
     """Summarise a run.
 
-    Parameters
-    ----------
-    run : Run
-        The run.
-
-    Returns
-    -------
-    RunSummary
-        Size, rate, gaps and missing values.
+    Returns: size, rate, gaps and missing values.
     """
     in_time = run.metadata.get("time") != "row number" and len(run) > 1
     constant = tuple(name for name in run if _is_constant(run, name))

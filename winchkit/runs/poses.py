@@ -147,23 +147,8 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
 def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> Samples | None:
     """Rows of logs of a robot in motion.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Runs of the robot.
-    profile : RobotProfile
-        The robot.
-
-    Returns
-    -------
-    Samples or None
-        None where the runs are poses: a row each, or logs with at least ten holds that have a
-        quarter of the rows.
-
-    Raises
-    ------
-    RunError
-        As :func:`read_poses`.
+    Returns: None where the runs are poses: a row each, or logs with at least ten holds that have a
+    quarter of the rows. Raises RunError as :func:`read_poses`.
     """
     faults = [fault for run in runs for fault in _faults(run, profile)]
     if faults:
@@ -202,15 +187,7 @@ def _stands_still(measured: Measured, profile: RobotProfile) -> bool:
 def joined(parts: Sequence[Measured]) -> Measured:
     """Concatenated poses of several parts.
 
-    Parameters
-    ----------
-    parts : sequence of Measured
-        Measurements at poses of one robot.
-
-    Returns
-    -------
-    Measured
-        All poses in order.
+    Returns: all poses in order.
     """
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS

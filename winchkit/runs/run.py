@@ -42,15 +42,8 @@ _WHOLE = 0.05
 def lost_samples(time: Array) -> NDArray[np.bool_]:
     """Intervals in which samples were lost.
 
-    Parameters
-    ----------
-    time : (n,) array
-        Stamps, s, increasing.
-
-    Returns
-    -------
-    (n - 1,) array of bool
-        Longer than 2.5 median intervals, or a whole number of them to 5 %.
+    ``time`` (n,): stamps, s, increasing. Returns (n - 1,) of bool: longer than 2.5 median
+    intervals, or a whole number of them to 5 %.
     """
     steps = np.diff(time)
     if not len(steps):

@@ -15,18 +15,7 @@ _LONG_RESPONSE = 0.5
 
 
 def bench_warnings(spec: BenchSpec) -> Iterator[tuple[tuple[str, ...], str]]:
-    """Key and message for each limit of a bench file that is valid but unusual.
-
-    Parameters
-    ----------
-    spec : BenchSpec
-        The bench.
-
-    Yields
-    ------
-    Iterator[tuple[tuple[str, ...], str]]
-        Key as a tuple, and message.
-    """
+    """Key and message for each limit of a bench file that is valid but unusual."""
     for name, winch in spec.winch.items():
         yield from _of_limits(("winch", name, "limits"), winch.limits, cell=winch.cell is not None)
     for name, bus in spec.bus.items():

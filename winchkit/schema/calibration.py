@@ -115,15 +115,7 @@ class TareBook(Table):
 def tare_book_path(bench_path: str) -> str:
     """File of a bench's tares, beside its bench file.
 
-    Parameters
-    ----------
-    bench_path : str
-        Path of the bench file.
-
-    Returns
-    -------
-    str
-        ``bench.tares.toml`` for ``bench.toml``.
+    Returns: ``bench.tares.toml`` for ``bench.toml``.
     """
     stem = bench_path.removesuffix(".toml")
     return f"{stem}.tares.toml"

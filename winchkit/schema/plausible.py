@@ -41,19 +41,7 @@ LARGEST: Mapping[str, Bound] = {
 def check_size(value: float, dimension: str, text: object) -> float:
     """The value, where it is finite and not beyond its dimension's bound; raises UsageError.
 
-    Parameters
-    ----------
-    value : float
-        SI value.
-    dimension : str
-        Name of the dimension.
-    text : object
-        The value as written, for the message.
-
-    Returns
-    -------
-    float
-        The value.
+    ``value``: SI value.
     """
     if not math.isfinite(value):
         raise UsageError(f"'{text}' must be finite; leave the key out where there is no value")
@@ -69,11 +57,6 @@ def check_size(value: float, dimension: str, text: object) -> float:
 def typed_quantity(text: str, dimension: str) -> float:
     """``"0.1m/s"`` or ``"0.1 m/s"`` in SI; raises UsageError.
 
-    Parameters
-    ----------
-    text : str
-        Number with unit, as people type it.
-    dimension : str
-        Name of the dimension.
+    ``text``: number with unit, as people type it.
     """
     return check_size(parse(text, dimension), dimension, text)

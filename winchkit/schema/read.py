@@ -88,20 +88,8 @@ def read_profile(path: PathLike) -> WinchProfile:
 def read_winch(path: PathLike) -> WinchProfile:
     """Read the profile of a winch for what needs its drum.
 
-    Parameters
-    ----------
-    path : str or Path
-        File in TOML of the kind ``winch``, or the name of a shipped one.
-
-    Returns
-    -------
-    WinchProfile
-        In SI.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file, and for an axis.
+    ``path``: file in TOML of the kind ``winch``, or the name of a shipped one. Returns: in SI.
+    Raises FileError with every fault of the file, and for an axis.
     """
     return _read(_located("profiles", path), "winch", WinchProfile)
 
@@ -172,20 +160,9 @@ def read_programme(path: PathLike) -> Programme:
 def read_robot_programme(path: PathLike) -> RobotProgramme:
     """Read a programme of a robot's platform.
 
-    Parameters
-    ----------
-    path : str or Path
-        File in TOML of the kind ``robot-programme``, or the name of a shipped one.
-
-    Returns
-    -------
-    RobotProgramme
-        Poses, arcs, blended corners and holds, in SI.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file, each with its line.
+    ``path``: file in TOML of the kind ``robot-programme``, or the name of a shipped one. Returns:
+    poses, arcs, blended corners and holds, in SI. Raises FileError with every fault of the file,
+    each with its line.
     """
     return _read(_located("sim", path), "robot-programme", RobotProgramme)
 
@@ -214,20 +191,8 @@ def read_simbench(path: PathLike) -> SimBench:
 def read_device(path: PathLike) -> DeviceSpec:
     """Read a device file.
 
-    Parameters
-    ----------
-    path : PathLike
-        TOML file of the kind ``device``, or the name of a shipped one.
-
-    Returns
-    -------
-    DeviceSpec
-        In SI.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file.
+    ``path``: TOML file of the kind ``device``, or the name of a shipped one. Returns: in SI. Raises
+    FileError with every fault of the file.
     """
     return _read(_located("devices", path), "device", DeviceSpec)
 
@@ -256,20 +221,8 @@ def read_size(path: PathLike) -> SizeSpec:
 def read_calibration(path: PathLike) -> CellCalibration:
     """Read the calibration of a load cell.
 
-    Parameters
-    ----------
-    path : PathLike
-        TOML file of the kind ``calibration``.
-
-    Returns
-    -------
-    CellCalibration
-        In SI.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file.
+    ``path``: TOML file of the kind ``calibration``. Returns: in SI. Raises FileError with every
+    fault of the file.
     """
     return _read(path, "calibration", CellCalibration)
 
@@ -277,20 +230,8 @@ def read_calibration(path: PathLike) -> CellCalibration:
 def read_tares(path: PathLike) -> TareBook:
     """Read the host's tares of a bench.
 
-    Parameters
-    ----------
-    path : PathLike
-        TOML file of the kind ``tares``.
-
-    Returns
-    -------
-    TareBook
-        In SI.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file.
+    ``path``: TOML file of the kind ``tares``. Returns: in SI. Raises FileError with every fault of
+    the file.
     """
     return _read(path, "tares", TareBook)
 
@@ -319,20 +260,7 @@ def read_mapping(path: PathLike) -> ImportMapping:
 def read_any(path: PathLike) -> Declared:
     """Read a declaration of the kind that it declares.
 
-    Parameters
-    ----------
-    path : PathLike
-        TOML file of any kind.
-
-    Returns
-    -------
-    Declared
-        In SI.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file.
+    Returns: in SI. Raises FileError with every fault of the file.
     """
     return load(path).value
 
@@ -340,22 +268,7 @@ def read_any(path: PathLike) -> Declared:
 def load(path: PathLike, kind: str | None = None) -> Declaration:
     """Read a declaration with its warnings; ``kind``, if given, is required.
 
-    Parameters
-    ----------
-    path : PathLike
-        TOML file.
-    kind : str, optional
-        Required kind.
-
-    Returns
-    -------
-    Declaration
-        Value and warnings.
-
-    Raises
-    ------
-    FileError
-        With every fault of the file.
+    Raises FileError with every fault of the file.
     """
     reading = Reading(open_source(path))
     found = reading.source.kind

@@ -23,18 +23,7 @@ class Part:
 
 
 def parts_of(template: str) -> tuple[Part, ...]:
-    """Pieces of a template in order; raises UsageError with its fault.
-
-    Parameters
-    ----------
-    template : str
-        Text with fields in braces.
-
-    Returns
-    -------
-    tuple[Part, ...]
-        Literal texts and fields.
-    """
+    """Pieces of a template in order; raises UsageError with its fault."""
     try:
         pieces = list(Formatter().parse(template))
     except ValueError as error:
@@ -60,20 +49,7 @@ def length_of(parts: tuple[Part, ...]) -> int | None:
 
 
 def fields_of(parts: tuple[Part, ...], line: str) -> dict[str, str] | None:
-    """Text of the fields in a line, piece by piece from the left; None where it does not fit.
-
-    Parameters
-    ----------
-    parts : tuple[Part, ...]
-        Template.
-    line : str
-        Received line.
-
-    Returns
-    -------
-    dict, optional
-        Texts by field.
-    """
+    """Text of the fields in a line, piece by piece from the left; None where it does not fit."""
     fields: dict[str, str] = {}
     for part, after in zip(parts, (*parts[1:], None), strict=True):
         if part.literal:

@@ -22,18 +22,7 @@ uncertainty, and stay plausible."""
 
 
 def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
-    """Read the declared profile of every winch on the bench.
-
-    Parameters
-    ----------
-    bench : SimBench
-        The simulated bench.
-
-    Returns
-    -------
-    dict
-        By winch.
-    """
+    """Read the declared profile of every winch on the bench."""
     from winchkit.schema.read import read_winch
 
     if bench.platform is not None:
@@ -50,16 +39,6 @@ def programme_path(name: str) -> Path:
     """Path of a motion programme: a file, or one shipped beside the simulated benches.
 
     Raises FileError with the shipped ones.
-
-    Parameters
-    ----------
-    name : str
-        Path, or shipped name.
-
-    Returns
-    -------
-    Path
-        An existing file.
     """
     for path in (Path(name), folder("sim") / f"{name}.toml"):
         if path.is_file():
@@ -76,23 +55,9 @@ def programme_path(name: str) -> Path:
 def hiding(bench: SimBench, physics: Sequence[str]) -> SimBench:
     """Replace the hidden effects of every winch.
 
-    Parameters
-    ----------
-    bench : SimBench
-        The simulated bench.
-    physics : sequence of str
-        Names, such as ``"elastic rope"`` at its typical size, or with values,
-        ``"elastic rope, axial_stiffness=80 kN"``; ``none`` hides nothing.
-
-    Returns
-    -------
-    SimBench
-        A copy.
-
-    Raises
-    ------
-    FileError
-        For an unknown name, with the known ones.
+    ``physics``: names, such as ``"elastic rope"`` at its typical size, or with values,
+    ``"elastic rope, axial_stiffness=80 kN"``; ``none`` hides nothing. Returns: a copy. Raises
+    FileError for an unknown name, with the known ones.
     """
     specs = tuple(_spec(text) for text in physics if text != "none")
     build(specs)

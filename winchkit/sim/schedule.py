@@ -126,26 +126,10 @@ def schedule(
 ) -> list[RunPlan]:
     """Schedule all repeats of a programme, with a new run at every change of load.
 
-    Parameters
-    ----------
-    programme : Programme
-        The motion programme.
-    limits : mapping
-        Limits by winch.
-    length, load_mass : mapping
-        Initial cable length, m, and mass, kg, by winch.
-
-    Returns
-    -------
-    list of RunPlan
-        The first run starts at the length where a repeat ends, so that all repeats have the same
-        motion.
-
-    Raises
-    ------
-    FileError
-        For a step of an unknown winch or beyond a winch's length limits, and for a programme
-        without motion and hold.
+    ``length``, ``load_mass``: initial cable length, m, and mass, kg, by winch. Returns: the first
+    run starts at the length where a repeat ends, so that all repeats have the same motion. Raises
+    FileError for a step of an unknown winch or beyond a winch's length limits, and for a programme
+    without motion and hold.
     """
     _check_names(programme, list(limits))
     layout = _Layout(limits, dict(length), dict(load_mass))

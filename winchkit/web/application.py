@@ -47,21 +47,7 @@ def application(
     robot: RobotWork,
     bench: BenchView | None = None,
 ) -> Starlette:
-    """The page as an ASGI application.
-
-    Parameters
-    ----------
-    workspace : Workspace
-        Runs and profile of the Diagnose view.
-    token : str
-        Of the URL.
-    library : Library
-        Runs of the folder.
-    robot : RobotWork
-        Profile and poses of the Robot view.
-    bench : BenchView, optional
-        The bench, where one is attached.
-    """
+    """The page as an ASGI application."""
     listeners = _Listeners()
     workspace.changed = listeners.wake
     fleet = Fleet(library, workspace.effects)
@@ -363,16 +349,7 @@ def open_robot(
 ) -> None:
     """Open a robot's profile or its poses in the thread of the workspace.
 
-    Parameters
-    ----------
-    workspace : Workspace
-        Whose thread works, and which shows faults.
-    robot : RobotWork
-        What opens them.
-    runs : sequence of str or Path
-        Recordings of poses.
-    profile : str, optional
-        Name or file.
+    ``workspace``: whose thread works, and which shows faults.
     """
     workspace.task("calibrating", lambda: robot.open(runs, profile))
 

@@ -19,17 +19,7 @@ from winchkit.web.state import State
 def candidate_card(state: State, effect_id: str) -> dict[str, Any]:
     """Card of a candidate of a diagnosis, with its signature.
 
-    Parameters
-    ----------
-    state : State
-        With a diagnosis.
-    effect_id : str
-        The candidate.
-
-    Raises
-    ------
-    UsageError
-        Without a diagnosis, and for an effect that is no candidate.
+    Raises UsageError without a diagnosis, and for an effect that is no candidate.
     """
     answer = state.diagnosed
     engine, result = answer.engine, answer.result

@@ -84,18 +84,8 @@ class OutputCurves:
     def over_time(self, first: float, last: float, points: int) -> dict[str, Any]:
         """A part of the curves, reduced to the extremes of every pixel.
 
-        Parameters
-        ----------
-        first, last : float
-            Part of the time, s.
-        points : int
-            Largest number of points.
-
-        Returns
-        -------
-        dict
-            ``x``, ``measured``, ``predicted`` in the unit of the output, ``residual`` in that of
-            the residual, marks of the runs, and units.
+        ``first``, ``last``: part of the time, s. Returns: ``x``, ``measured``, ``predicted`` in the
+        unit of the output, ``residual`` in that of the residual, marks of the runs, and units.
         """
         part = slice(*np.searchsorted(self.time, [first, last + 1e-9]))
         lines = [self.measured[part], self.predicted[part], self.residual[part] / self.scale.worth]
@@ -126,12 +116,8 @@ class OutputCurves:
     ) -> dict[str, Any]:
         """Residual over each of some variables, at the same samples.
 
-        Parameters
-        ----------
-        order : tuple of str and int, optional
-            An angle, and the periods per turn of the residual over it.
-        variables : sequence of str
-            The variables; by default those that explain most of it.
+        ``order``: an angle, and the periods per turn of the residual over it. ``variables``: by
+        default those that explain most of it.
         """
         compared = np.flatnonzero(np.isfinite(self.residual))
         kept = _thinned(compared)
@@ -155,17 +141,10 @@ class OutputCurves:
     def main_variable(self, change: Array) -> tuple[str, int | None] | None:
         """The variable over which a change of the prediction is drawn.
 
-        Parameters
-        ----------
-        change : (n,) array
-            What a candidate adds to the prediction, SI.
-
-        Returns
-        -------
-        tuple of str and (int or None), or None
-            What explains most of the change: an angle with the periods per turn of a sine over it,
-            or a variable without periods by its η² over bins; a part of a turn, over which every
-            trend resembles a sine, is thus no period. None where nothing explains a fifth of it.
+        ``change`` (n,): what a candidate adds to the prediction, SI. Returns: what explains most of
+        the change: an angle with the periods per turn of a sine over it, or a variable without
+        periods by its η² over bins; a part of a turn, over which every trend resembles a sine, is
+        thus no period. None where nothing explains a fifth of it.
         """
         known = np.isfinite(self.residual) & np.isfinite(change)
         own = change[known] - np.mean(change[known]) if known.any() else change[known]
@@ -183,14 +162,8 @@ class OutputCurves:
     def signature(self, change: Array, variable: str, order: int | None) -> dict[str, Any]:
         """Residual and the change by a candidate over a variable, both as means over bins.
 
-        Parameters
-        ----------
-        change : (n,) array
-            What the candidate adds to the prediction, SI.
-        variable : str
-            Name of the variable.
-        order : int or None
-            Periods per turn, where the variable is an angle.
+        ``change`` (n,): what the candidate adds to the prediction, SI. ``order``: periods per turn,
+        where the variable is an angle.
         """
         compared = np.flatnonzero(np.isfinite(self.residual) & np.isfinite(change))
         kept = _thinned(compared)
@@ -238,19 +211,8 @@ def curves_of(
 ) -> dict[str, OutputCurves]:
     """Curves of every output.
 
-    Parameters
-    ----------
-    regression : TimeSeriesRegression
-        Runs and model.
-    residual : (rows,) array
-        Measured less predicted.
-    noise : dict
-        Rms of the noise by output, SI.
-
-    Returns
-    -------
-    dict
-        By output, in the order of the data set.
+    ``residual`` (rows,). ``noise``: rms of the noise by output, SI. Returns: by output, in the
+    order of the data set.
     """
     recordings = regression.dataset.recordings
     traces = traces_of(regression, residual)
@@ -282,18 +244,7 @@ def curves_of(
 
 
 def recorded_curves(runs: Sequence[Run]) -> dict[str, OutputCurves]:
-    """Outputs of runs as they were recorded, before they are compared.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        Runs of one winch.
-
-    Returns
-    -------
-    dict
-        By output, of those that a run has.
-    """
+    """Outputs of runs as they were recorded, before they are compared."""
     out: dict[str, OutputCurves] = {}
     for output in OUTPUT_UNITS:
         own = [run for run in runs if output in run and len(run.time) > 1]

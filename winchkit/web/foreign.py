@@ -44,18 +44,9 @@ def is_run(path: Path) -> bool:
 def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Columns of a file of another program with the channels that they may be.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    answers : mapping, optional
-        ``columns`` as the command line takes them (``tension=F [N]``), constants by name, and
-        ``options`` of the command line that answer a question (``--signed "torque"``).
-
-    Raises
-    ------
-    FileError
-        Where no reader knows the file.
+    ``answers``: ``columns`` as the command line takes them (``tension=F [N]``), constants by name,
+    and ``options`` of the command line that answer a question (``--signed "torque"``). Raises
+    FileError where no reader knows the file.
     """
     guess = guess_columns(read_table(path), _answers(answers or {}))
     columns = {column.source: column for column in guess.table.columns}
@@ -100,19 +91,8 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
 def imported(path: Path, answers: Mapping[str, Any]) -> Run:
     """The run of a file with the answers of the page.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    answers : mapping
-        As for :func:`preview`; ``load_mass`` besides.
-
-    Raises
-    ------
-    UsageError
-        Where something is still not known.
-    RunError
-        With every fault of the file.
+    ``answers``: as for :func:`preview`; ``load_mass`` besides. Raises UsageError where something is
+    still not known; RunError with every fault of the file.
     """
     guess = guess_columns(read_table(path), _answers(answers))
     if guess.questions:

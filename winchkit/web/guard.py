@@ -32,15 +32,7 @@ _HOSTS = {"127.0.0.1", "localhost", "[::1]"}
 
 
 class Guard:
-    """Refuses foreign hosts, foreign origins and missing tokens, and sets the headers.
-
-    Parameters
-    ----------
-    app : ASGI application
-        What answers the permitted requests.
-    token : str
-        Token of the URL.
-    """
+    """Refuses foreign hosts, foreign origins and missing tokens, and sets the headers."""
 
     def __init__(self, app: ASGIApp, token: str) -> None:
         self.app = app

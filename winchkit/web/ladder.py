@@ -91,20 +91,9 @@ def ladder(
 ) -> dict[str, Any]:
     """Rows and columns of the ladder.
 
-    Parameters
-    ----------
-    answer : WinchAnswer
-        Diagnosis of the present profile.
-    history : sequence of Rung
-        Earlier profiles of the page, the oldest first.
-    beside : Diagnosis, optional
-        Another one, whose errors are given in the same units.
-
-    Returns
-    -------
-    dict
-        ``columns`` with unit and noise floor; ``rows`` of kind ``history``, ``today``,
-        ``candidate`` or ``floor``, each with its errors as text and over the noise floor.
+    ``beside``: another one, whose errors are given in the same units. Returns: ``columns`` with
+    unit and noise floor; ``rows`` of kind ``history``, ``today``, ``candidate`` or ``floor``, each
+    with its errors as text and over the noise floor.
     """
     diagnosis = answer.diagnosis
     today = {name: out.heldout_rms_before for name, out in diagnosis.outputs.items()}
@@ -175,19 +164,7 @@ def ladder(
 def card(
     answer: WinchAnswer, effect: Effect, values: Mapping[str, Estimate], distinct: Sequence[str]
 ) -> dict[str, Any]:
-    """Content of the card of a candidate.
-
-    Parameters
-    ----------
-    answer : WinchAnswer
-        Diagnosis of the present profile.
-    effect : Effect
-        The candidate.
-    values : mapping of str to Estimate
-        Its fitted values.
-    distinct : sequence of str
-        Effects that these runs cannot distinguish from it.
-    """
+    """Content of the card of a candidate."""
     runs = [
         run
         for run in answer.diagnosis.next_runs

@@ -23,23 +23,7 @@ from winchkit.web.state import State, Version
 def refit(state: State, effect: str, dataset: Dataset, catalogue: Catalogue, folder: Path) -> State:
     """State with an effect in the profile, its refitted errors and curves, not yet diagnosed.
 
-    Parameters
-    ----------
-    state : State
-        With a diagnosis.
-    effect : str
-        Effect to add.
-    dataset : Dataset
-        Runs of the state, prepared for its profile.
-    catalogue : Catalogue
-        Effects.
-    folder : Path
-        For the file of the new profile.
-
-    Raises
-    ------
-    UsageError
-        Without a diagnosis, and for an unknown effect.
+    Raises UsageError without a diagnosis, and for an unknown effect.
     """
     answer = state.answer
     if answer is None:

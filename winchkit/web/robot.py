@@ -50,13 +50,7 @@ _NO_MASS = (20.0, 150.0)
 
 
 def is_robot(name: str) -> bool:
-    """Whether a profile, by name or file, is that of a robot; False where it cannot be read.
-
-    Parameters
-    ----------
-    name : str
-        Name or path.
-    """
+    """Whether a profile, by name or file, is that of a robot; False where it cannot be read."""
     try:
         return isinstance(read_any(find("profiles", name)), RobotProfile)
     except WinchkitError:
@@ -76,13 +70,7 @@ class _State:
 
 
 class RobotWork:
-    """State of the Robot view.
-
-    Parameters
-    ----------
-    folder : Path
-        Of the server's own, for the calibrated profile.
-    """
+    """State of the Robot view."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -154,12 +142,8 @@ class RobotWork:
     def picture(self, row: int, limits: tuple[float, float] | None = None) -> dict[str, Any]:
         """Cables and platform at a pose.
 
-        Parameters
-        ----------
-        row : int
-            Pose of the recording; 0 is home, 1 the first recorded one.
-        limits : (float, float), optional
-            Of the cable forces, N.
+        ``row``: pose of the recording; 0 is home, 1 the first recorded one. ``limits``: of the
+        cable forces, N.
         """
         robot, pose, tension = self._at(row)
         low, high = limits or self._limits(robot)
@@ -174,20 +158,9 @@ class RobotWork:
     def slice(self, height: float, row: int, limits: tuple[float, float]) -> dict[str, Any]:
         """Wrench feasibility at a height, with the rotation of a pose.
 
-        Parameters
-        ----------
-        height : float
-            z of the platform's origin, m.
-        row : int
-            Pose whose rotation is taken.
-        limits : (float, float)
-            Of the cable forces, N.
-
-        Returns
-        -------
-        dict
-            ``x``, ``y``: centres of cells, m; ``margin``: distance of all forces from their limits,
-            N, None where no forces balance the weight.
+        ``height``: z of the platform's origin, m. ``limits``: of the cable forces, N. Returns:
+        ``x``, ``y``: centres of cells, m; ``margin``: distance of all forces from their limits, N,
+        None where no forces balance the weight.
         """
         robot, pose, _ = self._at(row)
         exits = robot.geometry.exit_point
@@ -277,16 +250,8 @@ class RobotWork:
 def pose_picture(robot: Robot, pose: Pose, tension: Array, source: str) -> dict[str, Any]:
     """Platform and cables at a pose.
 
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    pose : Pose
-        One pose.
-    tension : (n,) array
-        Cable forces, N; NaN where one is not known.
-    source : str
-        ``measured``, ``computed`` or ``none``.
+    ``tension`` (n,): cable forces, N; NaN where one is not known. ``source``: ``measured``,
+    ``computed`` or ``none``.
     """
     anchors = robot.geometry.anchor_point
     position, rotation = pose.position[0], pose.rotation[0]

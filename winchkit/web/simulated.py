@@ -18,15 +18,7 @@ _ENDING = 0.5
 
 
 class simulated_bench:
-    """Runs a simulated bench in a process of its own; gives its bench file.
-
-    Parameters
-    ----------
-    name : str
-        Of the catalogue, or a file.
-    folder : Path
-        For the bench file.
-    """
+    """Runs a simulated bench in a process of its own; gives its bench file."""
 
     def __init__(self, name: str, folder: Path) -> None:
         self.name = name

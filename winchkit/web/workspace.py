@@ -66,14 +66,7 @@ class _Work:
 class Workspace:
     """State of the Diagnose view and the one thread that changes it.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the server's own, for dropped files and profiles.
-    effects : sequence of str
-        Files with effects of the user's own.
-    changed : callable
-        Called, from the working thread, whenever there is something new to show.
+    ``changed``: called, from the working thread, whenever there is something new to show.
     """
 
     def __init__(
@@ -150,15 +143,7 @@ class Workspace:
         return self.task("undoing", self._undo)
 
     def compare(self, profile: int | str, runs: Sequence[str]) -> Future[None]:
-        """Show another profile, or other runs, beside the present ones.
-
-        Parameters
-        ----------
-        profile : int or str
-            Number of a version of the present profile, or the name or file of another one.
-        runs : sequence of str
-            Loaded runs to compare with it.
-        """
+        """Show another profile, or other runs, beside the present ones."""
         return self.task("diagnosing beside", lambda: self._compare(profile, runs))
 
     def swap(self) -> Future[None]:

@@ -51,18 +51,7 @@ def survey() -> tuple[Item, ...]:
 
 
 def instrument_reading(*, scheduled: bool) -> Item:
-    """Process that reads the instruments of Modbus and serial lines, with real time requested.
-
-    Parameters
-    ----------
-    scheduled : bool
-        Whether the process that does so may have a real-time priority.
-
-    Returns
-    -------
-    Item
-        Refused where other programs may delay the readings.
-    """
+    """Process that reads the instruments of Modbus and serial lines, with real time requested."""
     process = "Modbus and serial lines are read by the instrument process"
     if scheduled:
         return Item("instruments", True, f"{process}, with real-time priority")

@@ -72,25 +72,9 @@ class TensionSetting:
 def greatest_stiffness(cable: CableSpec, length: float, declared: float | None) -> float:
     """Upper bound of the stiffness of a cable, N/m.
 
-    Parameters
-    ----------
-    cable : CableSpec
-        Of the winch's profile.
-    length : float
-        Free length, m.
-    declared : float or None
-        Declared by the caller, N/m.
-
-    Returns
-    -------
-    float
-        Declared value, else axial stiffness of the profile, else that of a steel bar of the
-        cable's diameter, divided by the length.
-
-    Raises
-    ------
-    UsageError
-        Where nothing is known of the cable.
+    ``length``: free length, m. ``declared``: declared by the caller, N/m. Returns: declared value,
+    else axial stiffness of the profile, else that of a steel bar of the cable's diameter, divided
+    by the length. Raises UsageError where nothing is known of the cable.
     """
     if declared is not None:
         return declared

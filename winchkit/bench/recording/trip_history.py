@@ -28,10 +28,7 @@ _WORDS = {
 class TripHistory:
     """A sampler of the control loop that keeps the newest cycles, and stops soon after a trip.
 
-    Parameters
-    ----------
-    cycle : float
-        Period of control, s.
+    ``cycle``: period of control, s.
     """
 
     def __init__(self, cycle: float) -> None:
@@ -39,13 +36,7 @@ class TripHistory:
         self._at: float | None = None
 
     def __call__(self, snapshot: BenchSnapshot) -> None:
-        """Take a cycle; cheap, for the control thread.
-
-        Parameters
-        ----------
-        snapshot : BenchSnapshot
-            Of the newest cycle.
-        """
+        """Take a cycle; cheap, for the control thread."""
         if not snapshot.tripped:
             self._at = None
         elif self._at is None:
@@ -56,18 +47,10 @@ class TripHistory:
     def to_dict(self, newest: BenchSnapshot) -> dict[str, Any] | None:
         """The trip and the cycles around it as JSON has them; None where nothing is tripped.
 
-        Parameters
-        ----------
-        newest : BenchSnapshot
-            Of now: what is tripped and what still forbids motion.
-
-        Returns
-        -------
-        dict or None
-            ``at``: time of the trip on the bench's clock, s; ``tripped`` and ``blocked``: message
-            and forbidden direction of each; ``time``: of the cycles, s from the trip; ``winch``:
-            channels by winch, in SI, None for what is not known; ``events``: time from the trip and
-            words.
+        Returns: ``at``: time of the trip on the bench's clock, s; ``tripped`` and ``blocked``:
+        message and forbidden direction of each; ``time``: of the cycles, s from the trip;
+        ``winch``: channels by winch, in SI, None for what is not known; ``events``: time from the
+        trip and words.
         """
         at = self._at
         if at is None:

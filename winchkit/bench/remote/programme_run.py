@@ -29,29 +29,9 @@ class ProgrammeRun:
     :data:`~winchkit.bench.control.dead_man.LIFE_SIGN`, also during a hold; while a question waits
     for its answer the winches are disabled, and none is needed.
 
-    Parameters
-    ----------
-    bench : Bench
-        The open bench.
-    client : Client
-        Who commands.
-    path : str or Path
-        Programme file.
-    folder : str or Path
-        Of the runs.
-    suffix : str
-        Format, ``.csv`` or ``.mcap``.
-    replace : bool
-        Write over earlier runs of a programme of this name.
-
-    Raises
-    ------
-    FileError
-        For a programme that cannot be read.
-    UsageError
-        For another kind of file, and where earlier runs would be lost.
-    NotPermitted
-        Where another client commands a winch.
+    ``suffix``: format, ``.csv`` or ``.mcap``. Raises FileError for a programme that cannot be read;
+    UsageError for another kind of file, and where earlier runs would be lost; NotPermitted where
+    another client commands a winch.
     """
 
     def __init__(
@@ -94,13 +74,10 @@ class ProgrammeRun:
     def state(self) -> dict[str, Any]:
         """Where it is, as JSON has it.
 
-        Returns
-        -------
-        dict
-            ``name``, ``repeats`` and ``steps`` (None for a robot's); ``repeat`` and ``step`` under
-            way, 0 before the first; ``does``: the step in words; ``asks``: a question that waits
-            for :meth:`answer`, empty without one; ``ended``; ``error``: what ended it early;
-            ``files`` that were written.
+        Returns: ``name``, ``repeats`` and ``steps`` (None for a robot's); ``repeat`` and ``step``
+        under way, 0 before the first; ``does``: the step in words; ``asks``: a question that waits
+        for :meth:`answer`, empty without one; ``ended``; ``error``: what ended it early; ``files``
+        that were written.
         """
         declared = self._declared
         return {

@@ -21,12 +21,7 @@ class OwnerGone(ConnectionLost):
 class Requests:
     """One request after another over a socket, each with the answer of its number.
 
-    Parameters
-    ----------
-    connection : socket
-        To the owner.
-    patience : float
-        Time to wait for an answer, s.
+    ``patience``: time to wait for an answer, s.
     """
 
     def __init__(self, connection: socket.socket, patience: float) -> None:

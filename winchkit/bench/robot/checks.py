@@ -41,23 +41,8 @@ def require_within_limits(
 ) -> None:
     """Raise NotPermitted where a motion, or a stop on its way, would exceed a limit.
 
-    Parameters
-    ----------
-    robot : Robot
-        The robot.
-    planned : PlatformTrajectory
-        The motion.
-    limits : mapping of str to LimitSpec
-        By line.
-    tension : ForceLimits
-        Of the force distribution.
-    deceleration : float
-        Of a stop along the path, m/s^2.
-
-    Raises
-    ------
-    NotPermitted
-        With the place on the path, the cable, its value and the limit.
+    ``deceleration``: of a stop along the path, m/s^2. Raises NotPermitted with the place on the
+    path, the cable, its value and the limit.
     """
     found = [
         *_length_faults(robot.names, planned, limits),

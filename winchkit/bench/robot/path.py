@@ -82,25 +82,10 @@ class Path:
 def paths_through(start: Pose, waypoints: Sequence[Waypoint], scale: float) -> list[Path]:
     """Smooth paths from a pose through waypoints, each from a stop to the next one.
 
-    Parameters
-    ----------
-    start : Pose
-        The first pose.
-    waypoints : sequence of Waypoint
-        Where to go. A corner is blended by a curve of Bézier of degree five with no curvature at
-        its ends, of at most half of the adjacent lines.
-    scale : float
-        ρ, m.
-
-    Returns
-    -------
-    list of Path
-        Those of length zero are left out.
-
-    Raises
-    ------
-    UsageError
-        For an arc through points on a line, or a rotation beyond 160 degrees.
+    ``waypoints``: where to go. A corner is blended by a curve of Bézier of degree five with no
+    curvature at its ends, of at most half of the adjacent lines. ``scale``: ρ, m. Returns: those
+    of length zero are left out. Raises UsageError for an arc through points on a line, or a
+    rotation beyond 160 degrees.
     """
     here = Waypoint(start.position[0], start.rotation[0])
     paths = []

@@ -52,26 +52,10 @@ class Planner:
     ) -> list[PlatformTrajectory]:
         """Plan motions through waypoints and compare them with all limits.
 
-        Parameters
-        ----------
-        waypoints : sequence of Waypoint
-            Poses to go to; the platform stops at each that is not blended.
-        start : Pose
-            Pose at which it begins, one.
-        speed, acceleration : float, optional
-            Of the platform, m/s and m/s²; by default the limits of ``[robot]``.
-
-        Returns
-        -------
-        list of PlatformTrajectory
-            One from each stop to the next.
-
-        Raises
-        ------
-        UsageError
-            For what is no pose, or no number.
-        NotPermitted
-            For a limit that would be exceeded on the way, or by a stop.
+        ``waypoints``: poses to go to; the platform stops at each that is not blended. ``speed``,
+        ``acceleration``: of the platform, m/s and m/s²; by default the limits of ``[robot]``.
+        Raises UsageError for what is no pose, or no number; NotPermitted for a limit that would be
+        exceeded on the way, or by a stop.
         """
         for waypoint in waypoints:
             if not all(np.isfinite(part).all() for part in (waypoint.position, waypoint.rotation)):
@@ -98,19 +82,7 @@ class Planner:
 def moved(pose: Pose, change: Mapping[str, float], *, relative: bool) -> Pose:
     """A pose with some of its coordinates replaced or changed.
 
-    Parameters
-    ----------
-    pose : Pose
-        One pose.
-    change : mapping of str to float
-        ``x``, ``y``, ``z`` in m, ``roll``, ``pitch``, ``yaw`` in rad.
-    relative : bool
-        Whether they are added.
-
-    Returns
-    -------
-    Pose
-        One pose.
+    ``change``: ``x``, ``y``, ``z`` in m, ``roll``, ``pitch``, ``yaw`` in rad.
     """
     new = _six(pose)
     for name, value in change.items():
@@ -122,18 +94,7 @@ def moved(pose: Pose, change: Mapping[str, float], *, relative: bool) -> Pose:
 
 
 def coordinates_of(pose: Pose) -> dict[str, float]:
-    """One pose as x, y, z (m), roll, pitch and yaw (rad).
-
-    Parameters
-    ----------
-    pose : Pose
-        One pose.
-
-    Returns
-    -------
-    dict of str to float
-        By name.
-    """
+    """One pose as x, y, z (m), roll, pitch and yaw (rad)."""
     return {name: float(value) for name, value in zip(_COORDINATES, _six(pose), strict=True)}
 
 

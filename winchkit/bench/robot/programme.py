@@ -27,19 +27,7 @@ Motions = list[PlatformTrajectory | float]
 def programme_files(programme: RobotProgramme, folder: str | Path, suffix: str) -> list[Path]:
     """Files that a programme writes, one per repeat.
 
-    Parameters
-    ----------
-    programme : RobotProgramme
-        The programme.
-    folder : str or Path
-        Of the files.
-    suffix : str
-        Format, ``.csv`` or ``.mcap``.
-
-    Returns
-    -------
-    list of Path
-        In order.
+    ``suffix``: format, ``.csv`` or ``.mcap``. Returns: in order.
     """
     numbers = range(1, programme.repeat + 1)
     return [Path(folder) / f"{programme.name}-{n}{suffix}" for n in numbers]
@@ -50,26 +38,8 @@ def planned_motions(
 ) -> tuple[Motions, Pose]:
     """Plan one repeat and compare it with all limits; nothing moves.
 
-    Parameters
-    ----------
-    planner : Planner
-        The robot and its limits.
-    programme : RobotProgramme
-        The programme.
-    start : Pose
-        Pose at its beginning, one.
-
-    Returns
-    -------
-    motions : list
-        Motions from stop to stop, and holds in s.
-    end : Pose
-        Pose at the end.
-
-    Raises
-    ------
-    NotPermitted
-        For a limit that would be exceeded, with the number of the step.
+    Returns: ``motions``: motions from stop to stop, and holds in s. Raises NotPermitted for a limit
+    that would be exceeded, with the number of the step.
     """
     out: Motions = []
     here = at = start
@@ -103,36 +73,11 @@ def run_robot_programme(
 ) -> list[Path]:
     """Run a programme of the platform, and log one run per repeat.
 
-    Parameters
-    ----------
-    bench : Bench
-        An open bench with a robot.
-    programme : RobotProgramme
-        The programme.
-    folder : str or Path
-        Of the files.
-    suffix : str
-        Format, ``.csv`` or ``.mcap``.
-    progress : callable, optional
-        Called with repeat and number of the motion or hold.
-    check : callable, optional
-        Called before each motion and every 20 ms of a hold; what it raises ends the programme.
-    replace_files : bool
-        Write over earlier runs of a programme of this name.
-
-    Returns
-    -------
-    list of Path
-        Files written, in order.
-
-    Raises
-    ------
-    UsageError
-        Before any motion, where a file exists and is not to be replaced.
-    NotPermitted
-        Before any motion, for a limit that would be exceeded on the way.
-    MotionError
-        Whatever stops a motion; rows logged until then are kept.
+    ``suffix``: format, ``.csv`` or ``.mcap``. ``check``: called before each motion and every 20 ms
+    of a hold; what it raises ends the programme. Returns: files written, in order. Raises
+    UsageError before any motion, where a file exists and is not to be replaced; NotPermitted before
+    any motion, for a limit that would be exceeded on the way; MotionError: whatever stops a motion;
+    rows logged until then are kept.
 
     Notes
     -----

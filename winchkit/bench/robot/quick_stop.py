@@ -18,20 +18,9 @@ _LEAST = 0.1
 def quick_stop_ramps(planned: PlatformTrajectory, arms: Array, deceleration: float) -> Array:
     """Decelerations of the motors in a quick stop during a motion, (n,), rad/s^2.
 
-    Parameters
-    ----------
-    planned : PlatformTrajectory
-        The motion.
-    arms : (n,) array
-        Cable per motor angle, without sign, m/rad.
-    deceleration : float
-        Of the fastest cable, m/s^2.
-
-    Returns
-    -------
-    (n,) array
-        In proportion to the largest speeds of the cables; of a cable slower than a tenth of the
-        fastest, as if it had this speed.
+    ``arms`` (n,): cable per motor angle, without sign, m/rad. ``deceleration``: of the fastest
+    cable, m/s^2. Returns (n,): in proportion to the largest speeds of the cables; of a cable slower
+    than a tenth of the fastest, as if it had this speed.
 
     Notes
     -----

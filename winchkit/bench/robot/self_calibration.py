@@ -219,25 +219,7 @@ def recorded_poses(
 ) -> Run:
     """Measure poses, a row each.
 
-    Parameters
-    ----------
-    rows : iterator of (m,) arrays
-        Time and values of the channels; each is measured when it is asked for.
-    bench : Bench
-        Whose robot it is.
-    name : str
-        Of the run.
-    keep : callable
-        Called with the poses so far after each.
-    first : Run, optional
-        Poses that were measured before, to which these are added.
-    session : str
-        In which the tracker was set up once, for the metadata of the run.
-
-    Returns
-    -------
-    Run
-        Motor angles and tensions of the lines, and poses of the platform.
+    ``rows``, iterator of (m,) arrays.
     """
     lines = bench.robot.robot.names
     units = {

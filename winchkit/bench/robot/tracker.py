@@ -63,22 +63,7 @@ class MeanPose(NamedTuple):
 def parse_pose(datagram: bytes, now: float) -> TrackedPose:
     """Read a datagram.
 
-    Parameters
-    ----------
-    datagram : bytes
-        JSON.
-    now : float
-        Time of its arrival, s.
-
-    Returns
-    -------
-    TrackedPose
-        The pose.
-
-    Raises
-    ------
-    ValueError
-        With the reason, for what is no pose.
+    ``now``: time of its arrival, s. Raises ValueError with the reason, for what is no pose.
     """
     if len(datagram) > _LONGEST:
         raise ValueError(f"{len(datagram)} bytes (limit {_LONGEST})")
@@ -110,15 +95,8 @@ def _numbers(told: dict[str, Any], key: str, count: int) -> list[float]:
 def mean_pose(poses: list[TrackedPose]) -> MeanPose:
     """Mean of poses that differ by noise.
 
-    Parameters
-    ----------
-    poses : list of TrackedPose
-        One at least.
-
-    Returns
-    -------
-    MeanPose
-        Position, and the rotation whose quaternion is the mean direction.
+    ``poses``: one at least. Returns: position, and the rotation whose quaternion is the mean
+    direction.
     """
     places = np.array([pose.position for pose in poses])
     turns = np.array([pose.quaternion for pose in poses])

@@ -70,21 +70,8 @@ def plan_along(
 ) -> PlatformTrajectory:
     """Plan an S-curve along a path, and the cables with it.
 
-    Parameters
-    ----------
-    robot : Robot
-        The robot with its effects.
-    path : Path
-        Path of the platform.
-    limits : ForceLimits
-        Of the force distribution.
-    speed, acceleration : float
-        Along the path, m/s and m/s^2; rotation counts as ρ times its angle.
-
-    Returns
-    -------
-    PlatformTrajectory
-        Not yet compared with the limits of the winches.
+    ``speed``, ``acceleration``: along the path, m/s and m/s^2; rotation counts as ρ times its
+    angle.
 
     Notes
     -----
@@ -109,17 +96,8 @@ def plan_along(
 def motion_at(path: Path, distance: Array, rate: Array, change: Array) -> PlatformMotion:
     """Motion of the platform at places of a path.
 
-    Parameters
-    ----------
-    path : Path
-        The path.
-    distance, rate, change : (k,) array
-        Along it, with first and second derivative by time, m, m/s and m/s².
-
-    Returns
-    -------
-    PlatformMotion
-        k samples.
+    ``distance``, ``rate``, ``change`` (k,): along it, with first and second derivative by time, m,
+    m/s and m/s². Returns: k samples.
     """
     first, second = path.derivatives(distance)
     velocity = first * rate[:, None]

@@ -31,18 +31,7 @@ _COLUMNS = ("load", "indicated", "std", "going", "series")
 
 
 def calibration_toml(calibration: CellCalibration) -> str:
-    """Text of a calibration file.
-
-    Parameters
-    ----------
-    calibration : CellCalibration
-        The calibration.
-
-    Returns
-    -------
-    str
-        TOML text.
-    """
+    """Text of a calibration file."""
     lines = [
         "schema = 1",
         'kind = "calibration"',
@@ -72,18 +61,7 @@ def calibration_toml(calibration: CellCalibration) -> str:
 
 
 def tares_toml(book: TareBook) -> str:
-    """Text of a bench's tare file.
-
-    Parameters
-    ----------
-    book : TareBook
-        Tares of the host.
-
-    Returns
-    -------
-    str
-        TOML text.
-    """
+    """Text of a bench's tare file."""
     lines = ["schema = 1", 'kind = "tares"', f"name = {json.dumps(book.name)}"]
     for name, tare in book.tare.items():
         unit = "m" if name.endswith(".length") else "N"
@@ -94,17 +72,7 @@ def tares_toml(book: TareBook) -> str:
 def write_text(path: str | Path, text: str) -> Path:
     """Write a file atomically; raises FileError.
 
-    Parameters
-    ----------
-    text : str
-        Content.
-    path : str or Path
-        File, replaced atomically.
-
-    Raises
-    ------
-    FileError
-        Where the file cannot be written.
+    ``path``: file, replaced atomically. Raises FileError where the file cannot be written.
     """
     target = Path(path)
     write_whole(target, text.encode())

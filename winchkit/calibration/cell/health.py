@@ -113,15 +113,7 @@ class Health:
 def examine(samples: Samples) -> Health:
     """Health of a load cell.
 
-    Parameters
-    ----------
-    samples
-        A few seconds of readings.
-
-    Raises
-    ------
-    RunError
-        For fewer than 20 usable readings.
+    ``samples``: a few seconds of readings. Raises RunError for fewer than 20 usable readings.
     """
     good = samples.usable & np.isfinite(samples.value)
     if int(good.sum()) < _FEWEST:
@@ -274,15 +266,7 @@ def _with_remarks(health: Health, duration: float) -> Health:
 def samples_of(rows: Sequence[tuple[float, float, float, bool, bool]]) -> Samples:
     """Samples from rows of time, raw counts, value, usable, saturated.
 
-    Parameters
-    ----------
-    rows : (n, 5) array
-        Time, s, raw counts, value, usable, saturated.
-
-    Returns
-    -------
-    Samples
-        Samples.
+    ``rows`` (n, 5): time, s, raw counts, value, usable, saturated.
     """
     time, raw, value, usable, saturated = (np.array(column) for column in zip(*rows, strict=True))
     return Samples(

@@ -15,22 +15,9 @@ _WEIGHTS = re.compile(r"([\d.,;\s]+?)\s*([a-zA-Z]+)")
 def plan(weights: str, series: int) -> tuple[CalibrationPoint, ...]:
     """Points to measure for weights such as ``"0 2 5 10 kg"``.
 
-    Parameters
-    ----------
-    weights
-        Increasing numbers and a unit of mass or force.
-    series
-        Number of series.
-
-    Returns
-    -------
-    tuple of CalibrationPoint
-        Increasing, then decreasing without repeating the largest load.
-
-    Raises
-    ------
-    UsageError
-        For weights that are not a list of increasing numbers with a unit.
+    ``weights``: increasing numbers and a unit of mass or force. Returns: increasing, then
+    decreasing without repeating the largest load. Raises UsageError for weights that are not a list
+    of increasing numbers with a unit.
     """
     found = _WEIGHTS.fullmatch(weights.strip())
     if found is None:
@@ -54,18 +41,7 @@ def plan(weights: str, series: int) -> tuple[CalibrationPoint, ...]:
 
 
 def spoken(point: CalibrationPoint) -> str:
-    """``5 kg (49.03 N, going up, series 1)``.
-
-    Parameters
-    ----------
-    point : CalibrationPoint
-        Requested load.
-
-    Returns
-    -------
-    str
-        Text for the operator.
-    """
+    """``5 kg (49.03 N, going up, series 1)``."""
     return (
         f"{point.load / GRAVITY:.4g} kg ({point.load:.4g} N, going {point.going}, "
         f"series {point.series})"

@@ -38,13 +38,9 @@ class CableForces:
     ) -> tuple[Array, Array | None]:
         """Cable forces at poses.
 
-        Returns
-        -------
-        force : (p, n) array
-            N: measured ones, else those nearest to ``middle`` that balance the weight.
-        by_payload : (p, n, 4) array or None
-            Derivatives by mass and centre of mass; zero for measured forces, None where no force
-            is computed.
+        Returns: ``force`` (p, n): N: measured ones, else those nearest to ``middle`` that balance
+        the weight; ``by_payload`` (p, n, 4): derivatives by mass and centre of mass; zero for
+        measured forces, None where no force is computed.
         """
         if self.middle is None:
             return self.tension, None

@@ -159,18 +159,7 @@ class Calibrated(Plotted, Tabular):
 
 
 def split(measured: Measured) -> tuple[Measured, Measured]:
-    """Split poses into those to fit and every tenth to hold out (none of fewer than ten).
-
-    Parameters
-    ----------
-    measured : Measured
-        All poses.
-
-    Returns
-    -------
-    tuple[Measured, Measured]
-        Poses to fit, and held-out poses.
-    """
+    """Split poses into those to fit and every tenth to hold out (none of fewer than ten)."""
     held = np.arange(len(measured)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
     return measured[~held], measured[held]
 

@@ -47,21 +47,7 @@ class Candidate:
 def candidates(
     equations: Equations, solution: Solution, weights: Weights, effects: tuple[str, ...]
 ) -> tuple[Candidate, ...]:
-    """Effects that would explain much of the remaining cost, the largest share first.
-
-    Parameters
-    ----------
-    equations, solution, weights
-        Of the fit.
-    effects : tuple of str
-        Effects in the fit already.
-
-    Returns
-    -------
-    tuple of Candidate
-        At most one law of elongation. Payloads, which act on tensions alone, and gear ratios, which
-        have a test of their own, are left out.
-    """
+    """Effects that would explain much of the remaining cost, the largest share first."""
     out = []
     for effect in EFFECTS:
         if effect.startswith(("payload", "gear-ratio")) or effect in effects:

@@ -80,17 +80,8 @@ class Instruments:
 def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
     """Instruments as the robot's file declares them.
 
-    Parameters
-    ----------
-    robot : Robot
-        With its profile.
-    measured : Measured
-        Poses, whose sessions get a frame each.
-
-    Returns
-    -------
-    Instruments
-        Numbers of what was not measured are not free.
+    ``measured``: poses, whose sessions get a frame each. Returns: numbers of what was not measured
+    are not free.
     """
     spec = robot.profile.instrument
     tracker = robot.tracker or declared_tracker(robot.profile)
@@ -128,24 +119,10 @@ def registered_instruments(
 ) -> Instruments:
     """Instruments with these numbers free, at the values of the closed-form registration.
 
-    Parameters
-    ----------
-    instruments : Instruments
-        Values of the numbers that are not free.
-    free : collection of str
-        Of :data:`NUMBERS`.
-    predicted : Pose
-        Poses by the motor angles alone, (p,); NaN where one was not found.
-    measured : Measured
-        Measurements at these poses.
-    imu : bool
-        Whether rotations are declared to be those of an IMU. Otherwise they are in the tracker's
-        frame if the registration fits them better so.
-
-    Returns
-    -------
-    Instruments
-        With ``free``.
+    ``instruments``: values of the numbers that are not free. ``free``: of :data:`NUMBERS`.
+    ``predicted``: poses by the motor angles alone, (p,); NaN where one was not found. ``imu``:
+    whether rotations are declared to be those of an IMU. Otherwise they are in the tracker's frame
+    if the registration fits them better so. Returns: with ``free``.
     """
     variants = [False] if imu or "frame" not in free else [True, False]
     found = [

@@ -26,15 +26,8 @@ _HOME = "home-length"
 def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
     """Values of a profile's effects that a calibration fits.
 
-    Returns
-    -------
-    dict
-        By effect the parameters of a law of elongation, or home lengths by line, SI.
-
-    Raises
-    ------
-    FileError
-        For a value that cannot be read.
+    Returns: by effect the parameters of a law of elongation, or home lengths by line, SI. Raises
+    FileError for a value that cannot be read.
     """
     out: dict[str, dict[str, float]] = {}
     faults: list[Fault] = []
@@ -264,22 +257,12 @@ def parameters_of(
 ) -> Parameters:
     """Parameters of geometry, winches, named effects and instruments.
 
-    Parameters
-    ----------
-    robot : Robot
-        Of n lines; its numbers are the nominal values.
-    effects : sequence of str
-        Beside those of the robot's profile. A law of elongation adds home lengths, since the
-        tension at home is unknown.
-    swivel, length_offset : bool
-        Whether the zeros of swivel angles and the offsets of length instruments are unknown.
-    instruments : Instruments, optional
-        Numbers of instruments that are unknown, with their starting values.
-
-    Raises
-    ------
-    UsageError
-        For an effect that a calibration cannot fit, or two laws of elongation.
+    ``robot``: of n lines; its numbers are the nominal values. ``effects``: beside those of the
+    robot's profile. A law of elongation adds home lengths, since the tension at home is unknown.
+    ``swivel``, ``length_offset``: whether the zeros of swivel angles and the offsets
+    of length instruments are unknown. ``instruments``: numbers of instruments that are unknown,
+    with their starting values. Raises UsageError for an effect that a calibration cannot fit, or
+    two laws of elongation.
     """
     own = own_effects(robot.profile)
     effects = tuple(dict.fromkeys((*effects, *own)))

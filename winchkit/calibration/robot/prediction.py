@@ -42,14 +42,8 @@ class PoseErrors:
 def errors_at(equations: Equations, values: Array, predicted: Pose | None = None) -> PoseErrors:
     """Predict every pose from its motor angles, and compare it with the measured one.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of the p poses to predict.
-    values : (q,) array
-        Parameters in fitted units.
-    predicted : Pose, optional
-        (p,), by the machine's numbers among `values`, where it is known already.
+    ``equations``: of the p poses to predict. ``values`` (q,): parameters in fitted units.
+    ``predicted``: (p,), by the machine's numbers among `values`, where it is known already.
     """
     found = predicted_poses(equations, values) if predicted is None else predicted
     unfound = int(np.count_nonzero(_known(equations) & ~np.isfinite(found.position[:, 0])))
@@ -69,19 +63,8 @@ def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array
 
     The held-out error of a robot whose positions are not measured.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of the p poses.
-    values : (q,) array
-        Parameters in fitted units.
-    weights : Weights
-        Standard deviations by kind.
-
-    Returns
-    -------
-    (p, n) array
-        m; NaN where a motor angle is missing.
+    ``equations``: of the p poses. ``values`` (q,): parameters in fitted units. Returns (p, n): m;
+    NaN where a motor angle is missing.
     """
     # Kinds that were not fitted have unknown zeros and take no part.
     sigma = {kind: weights.sigma.get(kind, np.inf) for kind in equations.kinds}
@@ -92,19 +75,9 @@ def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array
 def predicted_poses(equations: Equations, values: Array, start: Pose | None = None) -> Pose:
     """Forward kinematics of the motor angles, with strains by fixed-point iteration.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of the p poses to predict.
-    values : (q,) array
-        Parameters in fitted units.
-    start : Pose, optional
-        Where the iteration starts; by default at the measured poses.
-
-    Returns
-    -------
-    Pose
-        (p,); NaN where no pose was found. A search that fails starts again from home.
+    ``equations``: of the p poses to predict. ``values`` (q,): parameters in fitted units.
+    ``start``: by default at the measured poses. Returns: (p,); NaN where no pose was found. A
+    search that fails starts again from home.
     """
     geometry, slack = equations.geometry(values), equations.by_drum(values)
     dead = equations.robot.dead_length
@@ -149,15 +122,7 @@ def _known(equations: Equations) -> NDArray[np.bool_]:
 def rms(values: Sequence[float] | Array) -> float:
     """Root of the mean square of finite values; NaN without any.
 
-    Parameters
-    ----------
-    values : array, any shape
-        Values; NaN is ignored.
-
-    Returns
-    -------
-    float
-        In the unit of the values.
+    ``values``: NaN is ignored. Returns: in the unit of the values.
     """
     known = np.asarray(values)[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
@@ -174,12 +139,7 @@ def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
 def start_of(equations: Equations, values: Array | None = None) -> Pose:
     """Measured poses in the base frame; those of the home pose where one was not measured whole.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of the measured poses.
-    values : (q,) array, optional
-        Parameters with those of the instruments; by default the nominal ones.
+    ``values`` (q,): by default the nominal ones.
     """
     measured, home = equations.measured, equations.robot.home
     whole = np.all(np.isfinite(measured.angles), axis=1, keepdims=True)

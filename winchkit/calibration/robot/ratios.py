@@ -98,12 +98,7 @@ def _listed(lines: Sequence[str]) -> str:
 def ratios_of(equations: Equations, solution: Solution) -> Ratios:
     """Cable per motor turn of each line at the end of a fit.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of a robot of n lines.
-    solution : Solution
-        End of the fit.
+    ``equations``: of a robot of n lines.
     """
     parameters, names = equations.parameters, equations.robot.names
     values, scale = solution.state.values, parameters.std

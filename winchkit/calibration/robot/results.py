@@ -21,17 +21,7 @@ _SHOWN = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0))}
 def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[str, Any]:
     """The object that ``winchkit calibrate --json`` prints; SI, rms over poses.
 
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-    following : sequence of NextPose
-        Proposed poses.
-
-    Returns
-    -------
-    dict
-        SI; null where not finite.
+    Returns: SI; null where not finite.
     """
     after, angle = found.validation_after, found.validation_after.angle
     return {
@@ -82,16 +72,8 @@ def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[s
 def instruments_json(found: Calibrated) -> dict[str, Any]:
     """Numbers of the tracker that were fitted, with the datum; empty where none were.
 
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-
-    Returns
-    -------
-    dict
-        ``fitted``: names; ``undeclared``: those that the file does not declare unknown; ``frames``:
-        by session the pose of the base frame in the tracker's frame, SI; ``datum``.
+    Returns: ``fitted``: names; ``undeclared``: those that the file does not declare unknown;
+    ``frames``: by session the pose of the base frame in the tracker's frame, SI; ``datum``.
     """
     own = found.equations.instruments_at(found.values)
     if own is None or not own.free:
@@ -123,20 +105,7 @@ def _entry(estimate: Estimated) -> dict[str, Any]:
 
 
 def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
-    """Errors, parameters, unidentifiable directions, candidate effects, warnings, next poses.
-
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-    following : sequence of NextPose
-        Proposed poses.
-
-    Returns
-    -------
-    str
-        Lines for a terminal.
-    """
+    """Errors, parameters, unidentifiable directions, candidate effects, warnings, next poses."""
     return "\n".join(
         [
             *_errors(found),
@@ -153,15 +122,7 @@ def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
 def candidate_lines(found: Calibrated) -> list[str]:
     """Candidate effects in words.
 
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-
-    Returns
-    -------
-    list of str
-        One line per candidate effect.
+    Returns: one line per candidate effect.
     """
     return [
         f"the effect {c.effect} would explain {c.share * 100:.0f} % of the remaining cost; "
@@ -173,15 +134,7 @@ def candidate_lines(found: Calibrated) -> list[str]:
 def noise_words(found: Calibrated) -> str:
     """Standard deviation of each kind of measurement in words.
 
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-
-    Returns
-    -------
-    str
-        Standard deviations with units.
+    Returns: standard deviations with units.
     """
     return ", ".join(
         f"{kind.replace('_', ' ')} {_shown(sigma, NOISE[kind].unit)}"
@@ -190,18 +143,7 @@ def noise_words(found: Calibrated) -> str:
 
 
 def in_words(estimate: Estimated) -> tuple[str, str, str, str]:
-    """Nominal value, value, sigma and unit, rounded to the second digit of sigma.
-
-    Parameters
-    ----------
-    estimate : Estimated
-        Value with its uncertainty.
-
-    Returns
-    -------
-    tuple[str, str, str, str]
-        Columns of a table.
-    """
+    """Nominal value, value, sigma and unit, rounded to the second digit of sigma."""
     unit, worth = _SHOWN.get(estimate.parameter.unit, (estimate.parameter.unit, 1.0))
     std = estimate.std * worth
     if not (isfinite(std) and std > 0):

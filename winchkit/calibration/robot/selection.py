@@ -165,22 +165,9 @@ def fitted_with_instruments(
 ) -> tuple[Equations, Fitted]:
     """Fit the declared model, or the one with the instruments and ratios that the poses require.
 
-    Parameters
-    ----------
-    equations : Equations
-        As the robot's file declares them, at nominal values.
-    options : Options
-        Loss and known standard deviations.
-    progress : callable
-        Called with a line of progress.
-
-    Returns
-    -------
-    declared : Equations
-        Declared model at the values from which its fit starts: what the file has, and the
-        registration of what it declares unknown.
-    chosen : Fitted
-        The fit that is reported.
+    ``progress``: called with a line of progress. Returns: ``declared``: declared model at the
+    values from which its fit starts: what the file has, and the registration of what it declares
+    unknown.
     """
     declared, best = _fitted_with_tracker(equations, options, progress)
     best = _with_more(best, options, progress)

@@ -28,16 +28,7 @@ def calibration_statistics(
 ) -> FitStatistics:
     """Statistics of a fit of poses and parameters.
 
-    Parameters
-    ----------
-    equations : Equations
-        Of the p fitted poses.
-    solution : Solution
-        End of the fit.
-    weights : Weights
-        Standard deviations of the measurements, and the loss.
-    estimates : mapping of str to Estimated
-        Values by parameter, in the unit of files.
+    ``equations``: of the p fitted poses. ``estimates``: values by parameter, in the unit of files.
     """
     linear, parameters = solution.linear, equations.parameters
     free = parameters.std > 0

@@ -20,15 +20,8 @@ COORDINATES = {
 def read_pose(text: str) -> dict[str, float]:
     """Coordinates by name, m and rad; raises UsageError.
 
-    Parameters
-    ----------
-    text : str
-        ``NAME=QUANTITY``, separated by commas.
-
-    Returns
-    -------
-    dict of str to float
-        At least one; those that are not named keep their value.
+    ``text``: ``NAME=QUANTITY``, separated by commas. Returns: at least one; those that are not
+    named keep their value.
     """
     found: dict[str, float] = {}
     for part in text.split(","):

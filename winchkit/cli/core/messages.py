@@ -54,10 +54,7 @@ def suggest_next(*words: str | Sequence[str]) -> None:
 
     There is none beside JSON, nor of data that came from standard input.
 
-    Parameters
-    ----------
-    *words : str or sequence of str
-        The command after ``winchkit``, one word each; a sequence is one of files.
+    ``*words``: the command after ``winchkit``, one word each; a sequence is one of files.
     """
     context = click.get_current_context(silent=True)
     if context is None or context.params.get("as_json"):

@@ -114,10 +114,7 @@ def _bench_of_either(ctx: click.Context, param: click.Parameter, value: str | No
 def bench_argument(function: Callable[..., Any]) -> Callable[..., Any]:
     """The bench as an argument, and as the option ``-b`` that other commands have.
 
-    Parameters
-    ----------
-    function : callable
-        A command with the parameter ``bench``.
+    ``function``: a command with the parameter ``bench``.
     """
     argument = click.argument(
         "bench_file",

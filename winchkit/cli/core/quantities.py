@@ -18,21 +18,8 @@ def quantity(text: str, dimension: str) -> float:
 def check_typed(option: str, text: str, *dimensions: str, example: str = "") -> None:
     """Check a quantity of one of some dimensions that was typed for an option.
 
-    Parameters
-    ----------
-    option : str
-        Option or argument, for the message.
-    text : str
-        Value as typed.
-    dimensions : str
-        Dimensions that are accepted.
-    example : str
-        A valid value; by default 2 of the first unit.
-
-    Raises
-    ------
-    UsageError
-        With option, value, what is expected and an example.
+    ``example``: by default 2 of the first unit. Raises UsageError with option, value, what is
+    expected and an example.
     """
     faults = []
     for name in dimensions:

@@ -11,14 +11,8 @@ class Quantity(click.ParamType):  # type: ignore[type-arg]
     It stays the text that was typed, which messages repeat; the command converts it to SI by
     :mod:`winchkit.cli.core.quantities`.
 
-    Parameters
-    ----------
-    dimensions : str
-        Names of the dimensions of :data:`winchkit.units.UNITS` that are accepted.
-    example : str
-        A valid value, which an error message shows.
-    signed : bool
-        Whether a time may be below zero.
+    ``dimensions``: names of the dimensions of :data:`winchkit.units.UNITS` that are accepted.
+    ``signed``: whether a time may be below zero.
     """
 
     def __init__(self, *dimensions: str, example: str, signed: bool = False) -> None:

@@ -58,12 +58,7 @@ def forget_typed() -> None:
 class Readable(click.ParamType):  # type: ignore[type-arg]
     """A file to read, or standard input.
 
-    Parameters
-    ----------
-    what : str
-        What it is, for messages.
-    complete : callable, optional
-        Completion by the shell; by default files.
+    ``complete``: by default files.
     """
 
     def __init__(self, what: str, complete: Completer | None = None) -> None:

@@ -19,17 +19,7 @@ if TYPE_CHECKING:
 def asked(guess: Guess, answers: Answers) -> tuple[Guess, Answers]:
     """Ask the open questions on the terminal, and guess again with the answers.
 
-    Parameters
-    ----------
-    guess : Guess
-        Of one file.
-    answers : Answers
-        What the user has said so far.
-
-    Returns
-    -------
-    (Guess, Answers)
-        A guess without questions.
+    Returns: (Guess, Answers).
     """
     from winchkit.cli.files.import_table import tables_text
     from winchkit.runs.importing.guess import guess_columns

@@ -29,13 +29,7 @@ def shortened(paths: Sequence[str]) -> str:
 
 
 def alike(guesses: Sequence[Guess]) -> list[list[Guess]]:
-    """Guesses in groups of equal columns, units, notes and questions, in the order of the files.
-
-    Parameters
-    ----------
-    guesses : sequence of Guess
-        Of all files.
-    """
+    """Guesses in groups of equal columns, units, notes and questions, in the order of the files."""
     found: dict[Any, list[Guess]] = {}
     for guess in guesses:
         notes = (*guess.table.notes, *guess.notes)
@@ -48,15 +42,7 @@ def alike(guesses: Sequence[Guess]) -> list[list[Guess]]:
 def tables_text(group: Sequence[Guess]) -> str:
     """The guess of files of one kind as text: a line per column, notes, and what is not known.
 
-    Parameters
-    ----------
-    group : sequence of Guess
-        Equal assignments; the values are those of the first file.
-
-    Returns
-    -------
-    str
-        Columns that are not used stand at the end.
+    Returns: columns that are not used stand at the end.
     """
     from winchkit.report.words.columns import aligned
 
@@ -107,15 +93,7 @@ def _row(item: Assignment, column: Column) -> tuple[str, ...]:
 def entry_of(guess: Guess) -> dict[str, Any]:
     """The guess of one file for JSON.
 
-    Parameters
-    ----------
-    guess : Guess
-        Assignments.
-
-    Returns
-    -------
-    dict
-        Every column with its channel (null where it is not used), factor and origin.
+    Returns: every column with its channel (null where it is not used), factor and origin.
     """
     table = guess.table
     columns = {column.source: column for column in table.columns}

@@ -74,20 +74,8 @@ def without_copies(
 ) -> tuple[list[Run], tuple[Finding, ...]]:
     """Runs without those that are copies of longer ones.
 
-    Parameters
-    ----------
-    runs
-        Validated runs.
-    profile
-        Winch profile.
-
-    Returns
-    -------
-    kept : list of Run
-        In their order.
-    findings : tuple of Finding
-        ``repeats-are-copies`` of every run that was left out; value: the share of its rows that the
-        kept run has.
+    Returns: ``kept``: in their order; ``findings``: ``repeats-are-copies`` of every run that was
+    left out; value: the share of its rows that the kept run has.
 
     Notes
     -----

@@ -161,35 +161,11 @@ def prepare(
 ) -> Dataset:
     """Validate runs and build their data set.
 
-    Parameters
-    ----------
-    runs
-        Measured runs of one winch.
-    profile
-        Winch profile.
-    band
-        Cut-off of the torque's low-pass, Hz; None to choose it from sampling and residuals.
-    kept_cut_offs
-        Coefficients are kept up to this many cut-offs: 1 for fits, more for the rms of a filtered
-        signal, to which the transition band contributes.
-    decimate
-        Whether long runs are decimated as far as their signals allow.
-    fast
-        Whether a few samples at the end of a run are left out, so that its transforms are fast.
-    catalogue
-        Effects, those of the profile among them; by default all that are installed.
-
-    Returns
-    -------
-    Dataset
-        Motions, measured and nominal outputs, bands, repeats, and findings on the runs.
-
-    Raises
-    ------
-    RunError
-        With every fault of every run.
-    UsageError
-        If ``band`` is not a positive frequency.
+    ``band``: cut-off of the torque's low-pass, Hz; None to choose it from sampling and residuals.
+    ``kept_cut_offs``: coefficients are kept up to this many cut-offs: 1 for fits, more for the rms
+    of a filtered signal, to which the transition band contributes. ``catalogue``: by default all
+    that are installed. Raises RunError with every fault of every run; UsageError if ``band`` is not
+    a positive frequency.
     """
     require_types(runs, Run, "runs")
     require_type(profile, WinchProfile, "profile")
@@ -368,19 +344,8 @@ def assemble(
 ) -> Dataset:
     """Build the data set of runs that were validated before.
 
-    Parameters
-    ----------
-    runs
-        Valid runs of one winch, at least one.
-    profile
-        Winch profile.
-    filtering
-        Low-pass of the torque and decimation; None to choose the low-pass from the runs.
-
-    Returns
-    -------
-    Dataset
-        Motions, measured and nominal outputs, bands and repeats, without findings.
+    ``runs``: valid runs of one winch, at least one. ``filtering``: None to choose the low-pass from
+    the runs.
     """
     line, filtering = Line(profile), filtering or Filtering()
     clocks = [_clock(run) for run in runs]

@@ -58,11 +58,7 @@ class Decimation:
     def run(self, run: Run) -> Run:
         """Decimate a measured run.
 
-        Returns
-        -------
-        Run
-            Channels low-passed and decimated; NaN where more than half of the low-pass window is
-            NaN.
+        Returns: NaN where more than half of the low-pass window is NaN.
         """
         pieces = _pieces(run.time)
         channels = {
@@ -134,15 +130,7 @@ def _ordinal(number: int) -> str:
 def decimation_for(runs: Sequence[Run]) -> Decimation | None:
     """Decimation that the signals of all runs allow, by one factor.
 
-    Parameters
-    ----------
-    runs
-        Measured runs of one winch.
-
-    Returns
-    -------
-    Decimation or None
-        None where the runs together are short enough, or the signals too fast.
+    Returns: None where the runs together are short enough, or the signals too fast.
 
     Notes
     -----

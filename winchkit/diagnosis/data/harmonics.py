@@ -24,16 +24,9 @@ digits are left."""
 def half_of_samples_per_turn(angles: Iterable[Array]) -> int:
     """Highest order that samples of an angle resolve where it turns most slowly.
 
-    Parameters
-    ----------
-    angles : iterable of (n,) arrays
-        One for each run, rad.
-
-    Returns
-    -------
-    int
-        Half of the samples of the slowest whole turn (of the slowest motion where there is no
-        whole turn), at most 1000; 0 where nothing moves.
+    ``angles``, iterable of (n,) arrays: one for each run, rad. Returns: half of the samples of the
+    slowest whole turn (of the slowest motion where there is no whole turn), at most 1000; 0 where
+    nothing moves.
     """
     step = np.sort(np.abs(np.concatenate([np.zeros(1), *(np.diff(angle) for angle in angles)])))
     step = step[step > 0]
@@ -48,14 +41,8 @@ def sums_by_order(
 ) -> NDArray[np.complex128]:
     """Sums Σ x exp(ikθ) over samples, for the orders k from 1 to ``highest``, (highest,).
 
-    Parameters
-    ----------
-    angle, values : (n,) arrays
-        Angles θ, rad, and what is summed, x.
-    resolved : int
-        Order of whose period a cell is a thirty-second.
-    highest : int
-        Highest order.
+    ``angle``, ``values`` (n,): angles θ, rad, and what is summed, x. ``resolved``: order of whose
+    period a cell is a thirty-second. ``highest``: highest order.
 
     Notes
     -----
@@ -72,17 +59,8 @@ def sums_by_order(
 def strongest_harmonic(angle: Array, error: Array, orders: int) -> tuple[int, float] | None:
     """The order from 1 to ``orders`` whose sine explains most of a residual, and its share.
 
-    Parameters
-    ----------
-    angle, error : (n,) arrays
-        Angle, rad, and what is explained.
-    orders : int
-        Highest order.
-
-    Returns
-    -------
-    tuple of int and float, or None
-        None where there is no residual, or no order is identifiable: the angle hardly moves.
+    ``angle``, ``error`` (n,): angle, rad, and what is explained. ``orders``: highest order.
+    Returns: None where there is no residual, or no order is identifiable: the angle hardly moves.
 
     Notes
     -----

@@ -34,17 +34,9 @@ _FLOOR_SHARE = 1 / 3
 def contrasts(aligned: Array) -> tuple[Array, Array]:
     """Mean part and Helmert contrasts of repeats, each with the variance of one repeat's noise.
 
-    Parameters
-    ----------
-    aligned : (m, ...) array
-        Values of m repeats.
-
-    Returns
-    -------
-    mean : (...) array
-        The sum divided by √m.
-    differences : (m − 1, ...) array
-        (x₁ + … + x_j − j x_{j+1}) / √(j (j + 1)): orthogonal to the mean and to each other.
+    ``aligned`` (m, ...): values of m repeats. Returns: ``mean`` (...): the sum divided by √m;
+    ``differences`` (m − 1, ...): (x₁ + … + x_j − j x_{j+1}) / √(j (j + 1)): orthogonal to the mean
+    and to each other.
     """
     m = len(aligned)
     mean = aligned.sum(axis=0) / np.sqrt(m)
@@ -66,16 +58,9 @@ def wiener_filtered(signal: Array) -> Array:
 def shared_by_instruments(signal: Array, other: Array) -> Array:
     """Part of a signal that another instrument of the same quantity shows too.
 
-    Parameters
-    ----------
-    signal, other : (n,) array
-        Readings of the two, whose noise is independent, in one unit.
-
-    Returns
-    -------
-    (n,) array
-        The signal, each band scaled by the cross power of both over its own: the Wiener gain, since
-        only the quantity is in both (instrumental variable).
+    ``signal``, ``other`` (n,): readings of the two, whose noise is independent, in one unit.
+    Returns (n,): the signal, each band scaled by the cross power of both over its own: the Wiener
+    gain, since only the quantity is in both (instrumental variable).
     """
     own, beside = (np.asarray(dct(x, type=2, norm="ortho")) for x in (signal, other))
     return _band_filtered(own, own**2, own**2 - own * beside, beside**2)
@@ -84,17 +69,7 @@ def shared_by_instruments(signal: Array, other: Array) -> Array:
 def shared_by_repeats(signals: Sequence[Array], rows: Sequence[NDArray[np.intp]]) -> list[Array]:
     """Part of each signal that its repeats share, on its own samples.
 
-    Parameters
-    ----------
-    signals
-        One array per repeat.
-    rows
-        Per repeat the indices of the samples that correspond, all of one length.
-
-    Returns
-    -------
-    list of arrays
-        Zero where the repeats do not overlap.
+    ``signals``: one array per repeat. Returns: zero where the repeats do not overlap.
 
     Notes
     -----
@@ -145,14 +120,7 @@ def denoised_motions(
 ) -> list[Motion]:
     """Motions with denoised cable force, motor torque and temperature, one per run.
 
-    Parameters
-    ----------
-    line
-        Nominal model.
-    signals, motions
-        Measured inputs and the motion computed from them, one each per run.
-    repeats
-        Partition of the runs.
+    ``signals``, ``motions``: measured inputs and the motion computed from them, one each per run.
 
     Notes
     -----

@@ -49,19 +49,10 @@ def instrument_noise(
 ) -> dict[str, float]:
     """Standard deviation of the noise of instruments before their rounding.
 
-    Parameters
-    ----------
-    recordings : sequence of Recording
-        All runs of a winch.
-    resolution : mapping of str to float
-        Resolution by channel, SI.
-
-    Returns
-    -------
-    dict of str to float
-        One value per rounded channel, SI, by the mean over the runs of the variance after the
-        rounding. That of one run depends on where its signal lies between two steps: under a
-        constant load in the middle of a step no noise is visible at all.
+    ``resolution``: resolution by channel, SI. Returns: one value per rounded channel, SI, by the
+    mean over the runs of the variance after the rounding. That of one run depends on where its
+    signal lies between two steps: under a constant load in the middle of a step no noise is visible
+    at all.
     """
     out = {}
     for name, step in resolution.items():
@@ -83,18 +74,9 @@ def rounding_errors(
 ) -> Iterator[RoundingError]:
     """Rounding errors in an output of a run.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Data with the resolution of their channels.
-    run : int
-        Index of the run.
-    output : str
-        Measured and predicted output.
-    noise : mapping of str to float
-        Noise of the rounded channels before their rounding, SI (:func:`instrument_noise`).
-    change : (n,) array, optional
-        Change of the output by effects, SI: the rounding error is a function of the whole signal.
+    ``noise``: noise of the rounded channels before their rounding, SI (:func:`instrument_noise`).
+    ``change`` (n,): change of the output by effects, SI: the rounding error is a function of the
+    whole signal.
     """
     recording, resolution = dataset.recordings[run], dataset.resolution
     predicted = recording.nominal_smooth[output]

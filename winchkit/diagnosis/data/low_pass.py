@@ -72,21 +72,10 @@ class Compared:
 def torque_cut_off(runs: Sequence[Compared], speed: float, lost: float = 0.0) -> float:
     """Cut-off of the torque's low-pass, Hz, the same for all runs.
 
-    Parameters
-    ----------
-    runs
-        Torque of every run, at least one.
-    speed
-        Highest speed of the motor, rad/s.
-    lost
-        Share of the power above the noise that may lie above the cut-off.
-
-    Returns
-    -------
-    float
-        1.5 times the frequency of the highest order of a candidate at that speed, 20 Hz at least
-        and 0.4 of the lowest sampling rate at most. Where all above it is white noise, the highest
-        frequency at which a torque exceeds its noise, or 20 Hz or a tenth of the rate.
+    ``runs``: torque of every run, at least one. ``speed``: highest speed of the motor, rad/s.
+    Returns: 1.5 times the frequency of the highest order of a candidate at that speed, 20 Hz at
+    least and 0.4 of the lowest sampling rate at most. Where all above it is white noise, the
+    highest frequency at which a torque exceeds its noise, or 20 Hz or a tenth of the rate.
     """
     rate = min(run.rate for run in runs)
     usual = min(_TORQUE_BAND, rate / 10)

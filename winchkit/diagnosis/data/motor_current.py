@@ -13,21 +13,8 @@ from winchkit.schema.profiles.winch import WinchProfile
 def with_torques(runs: Sequence[Run], profile: WinchProfile) -> list[Run]:
     """Runs with a motor torque where only the motor current was recorded.
 
-    Parameters
-    ----------
-    runs
-        Recorded runs; those with a motor torque, or without a current, are left as they are.
-    profile
-        Profile with ``motor.torque_constant``, N m/A.
-
-    Returns
-    -------
-    list of Run
-
-    Raises
-    ------
-    RunError
-        Where a run has a current and nothing else to compare, and the profile no torque constant.
+    ``profile``: profile with ``motor.torque_constant``, N m/A. Raises RunError where a run has a
+    current and nothing else to compare, and the profile no torque constant.
     """
     faults: list[Fault] = []
     out = [_with_torque(run, profile, faults) for run in runs]

@@ -60,15 +60,7 @@ class Repeats:
 def find_repeats(signals: list[Signals]) -> list[Repeats]:
     """Partition all runs into sets of repeats.
 
-    Parameters
-    ----------
-    signals
-        Measured inputs, one per run.
-
-    Returns
-    -------
-    list of Repeats
-        A run without repeats is a set of its own.
+    ``signals``: measured inputs, one per run.
     """
     sets: list[tuple[list[int], list[float]]] = []
     for index, run in enumerate(signals):
@@ -193,15 +185,8 @@ class Outlying:
 def outlying_repeat(errors: Array) -> Outlying | None:
     """The repeat that differs most from the others, if that is significant.
 
-    Parameters
-    ----------
-    errors : (m, n) array
-        Residuals of one output of m repeats on corresponding samples; NaN where not compared.
-
-    Returns
-    -------
-    Outlying or None
-        None for fewer than three repeats.
+    ``errors`` (m, n): residuals of one output of m repeats on corresponding samples; NaN where not
+    compared. Returns: None for fewer than three repeats.
 
     Notes
     -----

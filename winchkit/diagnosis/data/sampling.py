@@ -33,15 +33,8 @@ _MOST_BINS = 8_000_000
 def bridged(values: Array) -> Array:
     """Interpolate missing values (NaN) linearly over the index.
 
-    Parameters
-    ----------
-    values : (n,) array
-        At least one of them finite.
-
-    Returns
-    -------
-    (n,) array
-        ``values`` itself where none is missing; the nearest value beyond the first and the last.
+    ``values`` (n,). Returns (n,): ``values`` itself where none is missing; the nearest value beyond
+    the first and the last.
     """
     known = np.isfinite(values)
     if known.all():
@@ -58,10 +51,7 @@ def bridged_channel(run: Run, name: str) -> Array | None:
 def gaps(time: Array) -> NDArray[np.intp]:
     """Indices of the last samples before gaps, (k,).
 
-    Parameters
-    ----------
-    time : (n,) array
-        s, increasing.
+    ``time`` (n,): s, increasing.
     """
     steps = np.diff(time)
     return np.flatnonzero(steps > _GAP * np.median(steps))
@@ -73,18 +63,9 @@ def even_instants(time: Array, angle: Array) -> Array | None:
     A logger may sample evenly and stamp late, or sample whenever it has time. The angle decides:
     it is a smooth motion over the times at which it was sampled.
 
-    Parameters
-    ----------
-    time : (n,) array
-        Stamps, s, increasing.
-    angle : (n,) array
-        Motor angle, rad.
-
-    Returns
-    -------
-    (n,) array or None
-        Instants, s; None where the stamps are even but for lost samples, or where the restricted
-        likelihood of the smoothing spline is larger over the stamps.
+    ``time`` (n,): stamps, s, increasing. ``angle`` (n,): motor angle, rad. Returns (n,): instants,
+    s; None where the stamps are even but for lost samples, or where the restricted likelihood of
+    the smoothing spline is larger over the stamps.
     """
     if Clock(time).even or len(time) < _LEAST_STAMPS or not np.ptp(angle):
         return None
@@ -127,12 +108,8 @@ def _nearest_even(time: Array) -> Array | None:
 def away_from(unknown: Mask, reach: int) -> Mask:
     """Samples whose differences over ``reach`` samples use no unknown one, (n,).
 
-    Parameters
-    ----------
-    unknown : (n,) array of bool
-        Samples without a value. All samples beyond both ends of a run are unknown too.
-    reach
-        Samples to either side that a difference needs.
+    ``unknown`` (n,) of bool: samples without a value. All samples beyond both ends of a run are
+    unknown too.
     """
     padded = np.pad(unknown, reach, constant_values=True).astype(float)
     return np.convolve(padded, np.ones(2 * reach + 1), mode="valid") < 0.5

@@ -70,20 +70,8 @@ def sign_and_scale(
 ) -> list[Finding]:
     """Findings ``inverted-sign`` and ``wrong-factor`` of tension, torque and load.
 
-    Parameters
-    ----------
-    runs
-        Validated runs.
-    profile
-        Winch profile.
-    catalogue
-        Effects; by default all that are installed.
-
-    Returns
-    -------
-    list of Finding
-        Value: slope of measured over predicted. Where tension and torque of a run are wrong by the
-        same factor, the load is.
+    ``catalogue``: by default all that are installed. Returns: value: slope of measured over
+    predicted. Where tension and torque of a run are wrong by the same factor, the load is.
     """
     wrong: dict[tuple[str, str, str], list[tuple[str, Slope]]] = {}
     every = _slopes(runs, profile, catalogue)
@@ -106,18 +94,9 @@ def sign_and_scale(
 def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
     """What explains a wrong slope of the cable length over its prediction, in words.
 
-    Parameters
-    ----------
-    slope
-        Measured over predicted.
-    slope_at
-        The same with the motor angle multiplied by a factor: a drum that winds in layers is not
-        linear.
-
-    Returns
-    -------
-    str
-        ``inverted sign of 'cable_length' or 'motor_angle'``; empty where nothing known explains it.
+    ``slope_at``: the same with the motor angle multiplied by a factor: a drum that winds in layers
+    is not linear. Returns: ``inverted sign of 'cable_length' or 'motor_angle'``; empty where
+    nothing known explains it.
     """
     either = "'cable_length' or 'motor_angle'"
     if slope < 0 and not _outside(abs(slope)):
@@ -139,15 +118,8 @@ def length_words(slope: float, slope_at: Callable[[float], float]) -> str:
 def mending_column(finding: Finding) -> str:
     """Value of ``import --column`` that corrects a channel with a wrong sign or unit.
 
-    Parameters
-    ----------
-    finding
-        Of :func:`sign_and_scale`.
-
-    Returns
-    -------
-    str
-        ``motor_torque=-motor_torque*0.1 [N m]``; empty for the load, which may be metadata.
+    ``finding``: of :func:`sign_and_scale`. Returns: ``motor_torque=-motor_torque*0.1 [N m]``; empty
+    for the load, which may be metadata.
     """
     channel, slope = finding.channel, finding.value
     if channel not in OUTPUT_UNITS:

@@ -57,21 +57,8 @@ def highest_frequency(
 ) -> float:
     """Frequency above which no more than a share of a signal's power beyond its white noise is, Hz.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Signal; NaN where it is missing.
-    rate
-        Samples per second.
-    signals
-        Number of signals that are tested together.
-    lost
-        That share; 1 % by default, 0 for the highest frequency that exceeds the noise.
-
-    Returns
-    -------
-    float
-        Zero where no frequency exceeds the noise.
+    ``values`` (n,): NaN where it is missing. ``rate``: samples per second. ``lost``: that share; 1
+    % by default, 0 for the highest frequency that exceeds the noise.
 
     Notes
     -----
@@ -156,16 +143,7 @@ class Band:
 def to_frequency(signal: Array, band: Band) -> Array:
     """Coefficients of a signal within its band.
 
-    Parameters
-    ----------
-    signal : (n,) or (many, n) array
-    band
-        Of n samples.
-
-    Returns
-    -------
-    (kept,) or (many, kept) array
-        Orthonormal DCT-II, low-passed.
+    ``signal`` (n,) or (many, n). ``band``: of n samples. Returns: (kept,) or (many, kept).
     """
     full: Array = np.asarray(dct(signal, type=2, norm="ortho"))
     gain = band.gain
@@ -207,18 +185,8 @@ def to_time(coefficients: Array, band: Band) -> Array:
 def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
     """Zero-phase 4th-order Butterworth low-pass.
 
-    Parameters
-    ----------
-    signal : (n,) array
-        Without gaps.
-    rate
-        Samples per second.
-    cut_off
-        Frequency at which half of the amplitude is left, Hz.
-
-    Returns
-    -------
-    (n,) array
+    ``signal`` (n,). ``rate``: samples per second. ``cut_off``: frequency at which half of the
+    amplitude is left, Hz. Returns: (n,).
     """
     band = Band(len(signal), rate, cut_off, kept_cut_offs=np.inf)
     return to_time(to_frequency(signal, band), band)
@@ -227,15 +195,7 @@ def low_pass(signal: Array, rate: float, cut_off: float) -> Array:
 def narrow_edges(frequency: Array) -> Array:
     """Edges of 24 logarithmic bands, merged where one holds no coefficient.
 
-    Parameters
-    ----------
-    frequency : (n,) array
-        Of the coefficients, sorted, Hz.
-
-    Returns
-    -------
-    (bands + 1,) array
-        From minus to plus infinity.
+    ``frequency`` (n,): of the coefficients, sorted, Hz. Returns: (bands + 1,).
     """
     positive = frequency[frequency > 0]
     if len(positive) < 2:
@@ -249,20 +209,9 @@ def narrow_edges(frequency: Array) -> Array:
 def smoothed(power: Array, dof: Array, order: int = 2) -> tuple[Array, Array]:
     """Smooth the logarithm of a spectrum over its bands; with the degrees of freedom of the result.
 
-    Parameters
-    ----------
-    power : (bands,) array
-        Mean square per band.
-    dof : (bands,) array
-        Degrees of freedom of each.
-    order : int
-        Of the differences that are penalised: the spectrum continues as a line beyond bands with
-        many degrees of freedom (2), or as a constant (1).
-
-    Returns
-    -------
-    power, dof : (bands,) arrays
-        Smoothed power, and 2 / Var(ln power).
+    ``power`` (bands,): mean square per band. ``dof`` (bands,). ``order``: of the differences that
+    are penalised: the spectrum continues as a line beyond bands with many degrees of freedom (2),
+    or as a constant (1). Returns (bands,): smoothed power, and 2 / Var(ln power).
 
     Notes
     -----
@@ -294,17 +243,7 @@ def smoothed(power: Array, dof: Array, order: int = 2) -> tuple[Array, Array]:
 def band_edges(frequency: Array, copies: int) -> Array:
     """Edges of about 14 logarithmic bands that each hold at least eight coefficients.
 
-    Parameters
-    ----------
-    frequency : (n,) array
-        Of the coefficients, sorted, Hz.
-    copies
-        Number of independent spectra that are pooled.
-
-    Returns
-    -------
-    (bands + 1,) array
-        From minus to plus infinity.
+    ``frequency`` (n,): of the coefficients, sorted, Hz. Returns: (bands + 1,).
     """
     positive = frequency[frequency > 0]
     if len(positive) < 2 * _LEAST_COEFFICIENTS:

@@ -47,15 +47,7 @@ torque is no noise: an AR(1) noise with a coefficient of 0.6 has 2.5."""
 def standstills(motion: Motion) -> list[slice]:
     """Standstills of the motor: the angle stays within its noise for longer than it does at a turn.
 
-    Parameters
-    ----------
-    motion
-        Nominal motion along the run.
-
-    Returns
-    -------
-    list of slice
-        Of five samples at least.
+    Returns: of five samples at least.
 
     Notes
     -----
@@ -93,17 +85,7 @@ def _within_noise(angle: Array) -> tuple[list[slice], float]:
 def spread_at_standstill(residual: Array, intervals: Sequence[slice]) -> tuple[float, float]:
     """Variance within intervals, pooled, and half their mean square successive difference.
 
-    Parameters
-    ----------
-    residual : (n,) array
-        Measured minus predicted.
-    intervals : sequence of slice
-        Each of two samples at least.
-
-    Returns
-    -------
-    tuple of float
-        Zeros without intervals. Both estimate the variance of white noise.
+    ``residual`` (n,). ``intervals``: each of two samples at least.
     """
     parts = [residual[interval] for interval in intervals]
     dof = max(1, sum(len(part) - 1 for part in parts))
@@ -115,18 +97,9 @@ def spread_at_standstill(residual: Array, intervals: Sequence[slice]) -> tuple[f
 def standstill_mask(measured: Array, nominal: Array, motion: Motion) -> NDArray[np.bool_]:
     """Samples at standstills whose torque is a reaction of static friction.
 
-    Parameters
-    ----------
-    measured, nominal : (n,) arrays
-        Motor torque and its prediction, N m.
-    motion
-        Nominal motion along the run.
-
-    Returns
-    -------
-    (n,) array of bool
-        All false where the residual is as steady at standstills as its noise, or where hardly
-        anything else is there.
+    ``measured``, ``nominal`` (n,): motor torque and its prediction, N m. Returns (n,) of bool: all
+    false where the residual is as steady at standstills as its noise, or where hardly anything else
+    is there.
     """
     mask = np.zeros(len(measured), dtype=bool)
     for interval in _reactions(measured - nominal, motion)[0]:
@@ -147,10 +120,7 @@ def _reactions(residual: Array, motion: Motion) -> tuple[list[slice], float]:
 def standstill_findings(runs: Iterable[tuple[str, Array, Array, Motion]]) -> list[Finding]:
     """Findings on runs whose torque is not compared at standstills.
 
-    Parameters
-    ----------
-    runs : iterable of tuple
-        Name, measured and predicted torque (n,) and nominal motion of each.
+    ``runs``: name, measured and predicted torque (n,) and nominal motion of each.
     """
     found = []
     for name, measured, nominal, motion in runs:

@@ -26,19 +26,7 @@ _LARGEST_TURN = 1e-3
 
 
 def is_at_rest(run: Run, profile: WinchProfile) -> bool:
-    """Whether a run has a tension under a known load, and no motion of the drum.
-
-    Parameters
-    ----------
-    run : Run
-        The run; its motor angle may be absent.
-    profile
-        Winch profile.
-
-    Returns
-    -------
-    bool
-    """
+    """Whether a run has a tension under a known load, and no motion of the drum."""
     if isinstance(profile, AxisProfile) or "tension" not in run:
         return False
     if "load" not in run and run.load_mass is None:
@@ -58,20 +46,7 @@ def _moves(values: Array) -> bool:
 
 
 def prepared_statics(runs: Sequence[Run], profile: WinchProfile) -> tuple[list[Run], list[str]]:
-    """Runs, those at rest with the channels of the cell alone, and notes on them.
-
-    Parameters
-    ----------
-    runs
-        Runs as recorded.
-    profile
-        Winch profile, whose reference is the motor angle where none was recorded.
-
-    Returns
-    -------
-    runs : list of Run
-    notes : list of str
-    """
+    """Runs, those at rest with the channels of the cell alone, and notes on them."""
     out, notes = [], []
     for run in runs:
         if not is_at_rest(run, profile):

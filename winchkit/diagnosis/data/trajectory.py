@@ -114,24 +114,8 @@ def _displacement(curve: CubicSpline, time: Array, delay: float) -> Array:
 def trajectory_of(samples: Samples, profile: RobotProfile) -> tuple[Measured, Trajectory]:
     """Samples that are compared, and the motion along them.
 
-    Parameters
-    ----------
-    samples : Samples
-        Rows of logs.
-    profile : RobotProfile
-        The robot.
-
-    Returns
-    -------
-    measured : Measured
-        Means over blocks.
-    trajectory : Trajectory
-        Motion at these.
-
-    Raises
-    ------
-    RunError
-        For a run with fewer than 50 samples, and where the motor angles fit no pose.
+    Returns: ``measured``: means over blocks. Raises RunError for a run with fewer than 50 samples,
+    and where the motor angles fit no pose.
     """
     robot = robot_of(profile)
     rows = samples.measured

@@ -30,20 +30,9 @@ _NORMAL = 1.4826
 def transient_mask(measured: Array, output: str, motion: Motion) -> Mask:
     """Samples of an output near a change of layer whose transient exceeds the noise.
 
-    Parameters
-    ----------
-    measured : (n,) array
-        N or N m.
-    output
-        ``tension`` or ``motor_torque``.
-    motion
-        Nominal motion along the run.
-
-    Returns
-    -------
-    (n,) array of bool
-        All false without a known weight or without layers. A step that the encoder's noise crosses
-        while the cable rests does not count.
+    ``measured`` (n,): N or N m. ``output``: ``tension`` or ``motor_torque``. Returns (n,) of bool:
+    all false without a known weight or without layers. A step that the encoder's noise crosses
+    while the cable rests does not count.
     """
     drum = drum_of(motion.at.profile)
     none = np.zeros(len(measured), dtype=bool)
@@ -65,17 +54,8 @@ def transient_mask(measured: Array, output: str, motion: Motion) -> Mask:
 def uncertain_force_mask(measured: Array, nominal: Array, motion: Motion) -> Mask:
     """Samples of a force whose acceleration is less certain than elsewhere and than the instrument.
 
-    Parameters
-    ----------
-    measured, nominal : (n,) arrays
-        Tension or torque, and its prediction.
-    motion
-        Nominal motion along the run.
-
-    Returns
-    -------
-    (n,) array of bool
-        All false where no force follows from the acceleration of unevenly sampled angles.
+    ``measured``, ``nominal`` (n,). Returns (n,) of bool: all false where no force follows from the
+    acceleration of unevenly sampled angles.
     """
     load, std = motion.load, motion.load_std
     if load is None or std is None or not std.any():
@@ -94,10 +74,7 @@ def with_neighbours(marked: Mask, clock: Clock) -> Mask:
 def white_noise(measured: Array) -> float:
     """Standard deviation of white noise, from second differences by their median absolute value.
 
-    Parameters
-    ----------
-    measured : (n,) array
-        Readings at equal intervals.
+    ``measured`` (n,).
     """
     second_differences = np.diff(measured, 2)
     return float(_NORMAL * np.median(np.abs(second_differences)) / np.sqrt(6))

@@ -38,23 +38,9 @@ below it most of the measured variance is not the motion."""
 def validate_runs(runs: Sequence[Run], profile: WinchProfile) -> list[str]:
     """Validate runs against a profile.
 
-    Parameters
-    ----------
-    runs
-        Measured runs.
-    profile
-        Winch profile that they are to be compared with.
-
-    Returns
-    -------
-    list of str
-        Notes on what is missing without being a fault.
-
-    Raises
-    ------
-    RunError
-        With every fault of every run: missing columns, constant or mostly missing channels, the
-        same run twice, a run of another winch.
+    Returns: notes on what is missing without being a fault. Raises RunError with every fault of
+    every run: missing columns, constant or mostly missing channels, the same run twice, a run of
+    another winch.
     """
     if not runs:
         raise RunError("no run given")
@@ -71,18 +57,6 @@ def without_constants(runs: Sequence[Run]) -> tuple[list[Run], list[Finding]]:
 
     There the instrument measures, but its resolution is coarser than what happens in this run.
     A channel that is constant in all runs stays, for :func:`validate_runs` to refuse.
-
-    Parameters
-    ----------
-    runs
-        Measured runs.
-
-    Returns
-    -------
-    list of Run
-        Runs without these channels.
-    list of Finding
-        One for each.
     """
     varies = {
         name for run in runs for name in OUTPUTS if name in run and not any(constant(run, name))

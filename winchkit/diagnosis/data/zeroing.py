@@ -49,22 +49,10 @@ def zeroed_anew(
 ) -> Finding | None:
     """Finding ``zeroed-anew``; value: standard deviation of the offset between repeats, SI.
 
-    Parameters
-    ----------
-    output
-        Output of the instrument.
-    differences
-        Contrasts of the residuals of repeats, each with the variance of one run's noise; NaN where
-        a sample is not compared.
-    thermal
-        Per difference its known regressors, (k, n), such as the difference of temperatures; None
-        for none.
-
-    Returns
-    -------
-    Finding or None
-        None where the means of the differences, beside the regressors, are within their variation
-        over eight blocks of time.
+    ``differences``: contrasts of the residuals of repeats, each with the variance of one run's
+    noise; NaN where a sample is not compared. ``thermal``: per difference its known regressors,
+    (k, n), such as the difference of temperatures; None for none. Returns: None where the means of
+    the differences, beside the regressors, are within their variation over eight blocks of time.
     """
     means, known = [], []
     for index, difference in enumerate(differences):
@@ -160,10 +148,7 @@ def angles_from_zero(runs: Sequence[Run]) -> list[Finding]:
 def is_random_walk(means: Array) -> bool:
     """Whether a random walk from zero, beside white noise, explains the level of block means.
 
-    Parameters
-    ----------
-    means
-        Block means of differences between repeats, or of runs about a common offset, (n, 8).
+    ``means``: block means of differences between repeats, or of runs about a common offset, (n, 8).
 
     Notes
     -----

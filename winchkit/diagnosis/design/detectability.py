@@ -41,17 +41,7 @@ class DetectionThreshold:
 def detectable(scores: tuple[Score, ...], threshold: DetectionThreshold) -> tuple[Detectable, ...]:
     """Smallest size of the main parameter of every effect that is detected with 90 % power.
 
-    Parameters
-    ----------
-    scores
-        Of all candidates beside the initial model.
-    threshold
-        Detection threshold.
-
-    Returns
-    -------
-    tuple of Detectable
-        Sorted by effect; NaN where no size within the parameter's bounds is detected.
+    Returns: NaN where no size within the parameter's bounds is detected.
 
     Notes
     -----

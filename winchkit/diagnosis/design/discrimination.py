@@ -50,20 +50,8 @@ def next_runs(
 ) -> tuple[NextRun, ...]:
     """Programmes that separate each pair best per minute, with their power.
 
-    Parameters
-    ----------
-    regression
-        Regression problem of the runs so far.
-    pairs
-        Effects to be separated, at their fitted values.
-    noise
-        Rms per output, SI.
-
-    Returns
-    -------
-    tuple of NextRun
-        At most two per pair; where no programme helps, what the card of the effect says, with NaN
-        power.
+    ``noise``: rms per output, SI. Returns: at most two per pair; where no programme helps, what the
+    card of the effect says, with NaN power.
     """
     if not pairs:
         return ()
@@ -91,17 +79,8 @@ def next_runs(
 def power_of(noncentrality: float, required: float = SEPARATED_AT) -> float:
     """Power of a χ² test with one degree of freedom.
 
-    Parameters
-    ----------
-    noncentrality
-        Noncentrality λ.
-    required
-        χ² that is required.
-
-    Returns
-    -------
-    float
-        P(χ²'(1, λ) > required).
+    ``noncentrality``: noncentrality λ. ``required``: χ² that is required. Returns: P(χ²'(1, λ) >
+    required).
     """
     return float(1 - chndtr(required, 1, max(noncentrality, 0.0)))
 
@@ -117,19 +96,9 @@ def separation(
 ) -> float:
     """Noncentrality λ of the first effect where the second may have any size.
 
-    Parameters
-    ----------
-    regression
-        Regression problem of the simulated programme.
-    first, second
-        Effects; without a second one the first beside nuisance parameters alone.
-    noise
-        Rms per output, SI.
-    known
-        Information of the runs so far; then the increase of λ by the programme: the second effect
-        has one size there and here.
-    repeats
-        How often the programme is run.
+    ``first``, ``second``: effects; without a second one the first beside nuisance parameters alone.
+    ``noise``: rms per output, SI. ``known``: information of the runs so far; then the increase of λ
+    by the programme: the second effect has one size there and here.
     """
     rows = _rows(regression, first, second, noise)
     if rows is None:

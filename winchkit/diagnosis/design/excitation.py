@@ -23,18 +23,7 @@ _SHARE_AT_ONE_SPEED = 0.75
 
 
 def missing_excitation(regression: TimeSeriesRegression) -> list[str]:
-    """Notes on missing repeats, loads, directions, reversals, speeds and temperatures.
-
-    Parameters
-    ----------
-    regression
-        Regression problem of the runs.
-
-    Returns
-    -------
-    list of str
-        One sentence each, with what to record.
-    """
+    """Notes on missing repeats, loads, directions, reversals, speeds and temperatures."""
     dataset = regression.dataset
     notes = []
     if not dataset.repeated:

@@ -91,20 +91,7 @@ def offers(
 ) -> list[Offer]:
     """Candidate programmes within an operating range, best first.
 
-    Parameters
-    ----------
-    regression
-        Regression problem of the runs so far.
-    pairs
-        Effects to be separated.
-    noise
-        Rms per output, SI.
-    effects
-        Effects whose detection is of interest.
-    threshold
-        Detection threshold.
-    operating_range
-        Operating range; None for that of the runs so far.
+    ``noise``: rms per output, SI. ``operating_range``: None for that of the runs so far.
     """
     dataset = regression.dataset
     operating_range = operating_range or range_of_runs(dataset)
@@ -165,21 +152,7 @@ def programme_of(
 ) -> Programme:
     """Motion programme of a kind for ``winchkit run``, repeated twice.
 
-    Parameters
-    ----------
-    dataset
-        Runs so far.
-    kind
-        Candidate programme.
-    name
-        Of the motion programme.
-    operating_range
-        Operating range; None for that of the runs so far.
-
-    Returns
-    -------
-    Programme
-        It begins and ends at the shortest length, so that its repeats are equal.
+    ``operating_range``: None for that of the runs so far.
     """
     operating_range = operating_range or range_of_runs(dataset)
     steps: list[Step] = []

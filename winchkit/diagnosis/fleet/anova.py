@@ -111,10 +111,7 @@ def errors_of(compared: Compared) -> dict[str, WinchErrors]:
 def shared_errors(winches: Mapping[str, Mapping[str, WinchErrors]]) -> dict[str, SharedError]:
     """Per output the common and the individual part of the errors of several winches.
 
-    Parameters
-    ----------
-    winches
-        Name to the errors of :func:`errors_of`.
+    ``winches``: name to the errors of :func:`errors_of`.
     """
     outputs = dict.fromkeys(output for errors in winches.values() for output in errors)
     out = {}

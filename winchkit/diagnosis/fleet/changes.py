@@ -109,13 +109,6 @@ def session_variance(series: Sequence[Series]) -> Variance:
 def change_of(series: Series, between: Variance) -> Change | None:
     """Largest change of a series; None with fewer than four sessions.
 
-    Parameters
-    ----------
-    series
-        Estimates of one winch.
-    between
-        Variance of the session effect.
-
     Notes
     -----
     Every step and the trend is a contrast with z ~ t(ν) under no change, ν the degrees of freedom

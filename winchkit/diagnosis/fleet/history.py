@@ -138,11 +138,6 @@ class FleetParameter:
     def deviations(self, winch: WinchHistory) -> Array:
         """Deviation of each session of a winch from the median winch, in standard deviations.
 
-        Parameters
-        ----------
-        winch
-            One of the winches.
-
         Notes
         -----
         (y − m) / √(s² + τ²) with m the median of the winches' present values, which one odd winch
@@ -201,12 +196,8 @@ def fleet_history(
 ) -> FleetHistory:
     """Changes over time and differences between winches of a fleet.
 
-    Parameters
-    ----------
-    estimates
-        Of one fixed set of effects, any order.
-    limits
-        (effect, parameter) to the value that must not be reached, SI, not zero.
+    ``estimates``: of one fixed set of effects, any order. ``limits``: (effect, parameter) to the
+    value that must not be reached, SI, not zero.
 
     Notes
     -----

@@ -32,14 +32,7 @@ class LimitDate:
 def limit_date(series: Series, between: Variance, limit: float) -> LimitDate | None:
     """Date at which the trend of a series reaches a limit; None where its rate leaves none.
 
-    Parameters
-    ----------
-    series
-        Estimates of one winch.
-    between
-        Variance of the session effect.
-    limit
-        Value of the parameter, SI, not zero.
+    ``limit``: value of the parameter, SI, not zero.
 
     Notes
     -----

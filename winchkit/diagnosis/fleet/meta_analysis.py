@@ -116,17 +116,8 @@ def shared_effects(
 def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict[str, float]:
     """Probability that noise alone makes at least one of all winches alarm (Šidák).
 
-    Parameters
-    ----------
-    found
-        Name to diagnosis.
-    chances
-        P-value of lack of fit per winch; NaN without repeats.
-
-    Returns
-    -------
-    dict
-        1 − (1 − p)^winches of each winch with an alarm and without a step.
+    ``chances``: P-value of lack of fit per winch; NaN without repeats. Returns: 1 − (1 − p)^winches
+    of each winch with an alarm and without a step.
     """
     return {
         winch: 1 - (1 - min(chances[winch], 1.0)) ** len(found)
@@ -138,14 +129,7 @@ def alarms(found: Mapping[str, Diagnosis], chances: Mapping[str, float]) -> dict
 def pooled(values: Mapping[str, tuple[float, float]], unit: str, *, reciprocal: bool) -> Pooled:
     """Mean over winches with homogeneity test and outlying winches.
 
-    Parameters
-    ----------
-    values
-        Name to value and standard deviation.
-    unit
-        Of the values.
-    reciprocal
-        Whether 1/value is pooled, in which the uncertainty is symmetric.
+    ``reciprocal``: whether 1/value is pooled, in which the uncertainty is symmetric.
     """
     names = list(values)
     x, s = np.array(list(values.values())).T

@@ -51,12 +51,8 @@ class PartialPooling:
 def partial_pooling(values: Array, stds: Array) -> PartialPooling:
     """Estimate the common value, the variance between winches and the pooled values.
 
-    Parameters
-    ----------
-    values
-        Own estimate of every winch, shape (n,).
-    stds
-        Their standard deviations, shape (n,), positive.
+    ``values``: own estimate of every winch, shape (n,). ``stds``: their standard deviations, shape
+    (n,), positive.
 
     Notes
     -----
@@ -84,12 +80,8 @@ def partial_pooling(values: Array, stds: Array) -> PartialPooling:
 def odd_p_values(values: Array, stds: Array) -> Array:
     """P-value of every winch of being one of the others, shape (n,); NaN with fewer than four.
 
-    Parameters
-    ----------
-    values
-        Own estimate of every winch, shape (n,).
-    stds
-        Their standard deviations, shape (n,), positive.
+    ``values``: own estimate of every winch, shape (n,). ``stds``: their standard deviations, shape
+    (n,), positive.
 
     Notes
     -----

@@ -65,18 +65,9 @@ def null_term(effect: Effect) -> Term:
 def common_terms(found: Mapping[str, Diagnosis], catalogue: Catalogue) -> tuple[Term, ...]:
     """Effects named in any diagnosis of a fleet, each equivalence set by one member.
 
-    Parameters
-    ----------
-    found
-        Any name (of a winch, of a session) to its diagnosis.
-    catalogue
-        Effects.
-
-    Returns
-    -------
-    tuple of Term
-        The effect that most diagnoses allow, for every set of :func:`shared_effects`, at its null;
-        orders as they were found.
+    ``found``: any name (of a winch, of a session) to its diagnosis. Returns: the effect that most
+    diagnoses allow, for every set of :func:`shared_effects`, at its null; orders as they were
+    found.
     """
     out: dict[str, Term] = {}
     for shared in shared_effects(found, catalogue):
@@ -102,32 +93,11 @@ def fit_session(
 ) -> tuple[SessionEstimate, ...]:
     """Fit a given set of effects, and those of the profile, to the runs of one session.
 
-    Parameters
-    ----------
-    runs
-        Runs of one winch and one session; repeats give the noise.
-    profile
-        The winch.
-    terms
-        Effects at their starting values, the same for all sessions. An effect that the profile has
-        starts at the profile's values.
-    winch
-        Name of the winch.
-    time
-        Start of the session, s since 1970 (UTC).
-    catalogue
-        Effects; by default all that are installed.
-
-    Returns
-    -------
-    tuple of SessionEstimate
-        Every fitted parameter of ``terms``, with the covariance of the linearised fit; of an effect
-        of the profile the whole value, not its difference from the profile.
-
-    Raises
-    ------
-    RunError
-        With every fault of every run.
+    ``terms``: effects at their starting values, the same for all sessions. An effect that the
+    profile has starts at the profile's values. ``time``: start of the session, s since 1970 (UTC).
+    ``catalogue``: by default all that are installed. Returns: every fitted parameter of ``terms``,
+    with the covariance of the linearised fit; of an effect of the profile the whole value, not its
+    difference from the profile. Raises RunError with every fault of every run.
 
     Notes
     -----

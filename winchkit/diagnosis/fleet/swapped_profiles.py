@@ -49,16 +49,10 @@ def swapped_profiles(
 ) -> tuple[Swap, ...]:
     """Cycles of winches whose profiles were exchanged, significant at 1 %.
 
-    Parameters
-    ----------
-    identified
-        Winch to its identified parameters, shape (p,): the declared values plus fitted errors.
-    covariances
-        Winch to their covariance, shape (p, p).
-    profiles
-        Winch to the parameters of its declared profile, shape (p,).
-    dof
-        Degrees of freedom of the covariances; infinite for known ones.
+    ``identified``: winch to its identified parameters, shape (p,): the declared values plus fitted
+    errors. ``covariances``: winch to their covariance, shape (p, p). ``profiles``: winch to the
+    parameters of its declared profile, shape (p,). ``dof``: degrees of freedom of the covariances;
+    infinite for known ones.
 
     Notes
     -----
@@ -108,16 +102,6 @@ def swapped_by_radius(
     catalogue: Catalogue,
 ) -> tuple[Swap, ...]:
     """Exchanged profiles by the cable length per motor angle, r/i on the first layer.
-
-    Parameters
-    ----------
-    parameters
-        Parameters of a fleet, of which one is that of drum-radius or gear-ratio; with both or
-        neither of them nothing is found.
-    profiles
-        Winch to its declared profile.
-    catalogue
-        Effects of the profiles.
 
     Notes
     -----

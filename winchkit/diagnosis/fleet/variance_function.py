@@ -34,17 +34,8 @@ _PRIOR_STD = 0.5
 def power_of_stated(values: Sequence[Array], stds: Sequence[Array]) -> float:
     """Power λ, 0 to 1, of the stated standard deviations in the true ones.
 
-    Parameters
-    ----------
-    values
-        Estimates of every winch in the order of time, (n,) each, SI.
-    stds
-        Their stated standard deviations.
-
-    Returns
-    -------
-    float
-        Posterior mean under λ ~ N(1, 0.5²), within its bounds.
+    ``values``: estimates of every winch in the order of time, (n,) each, SI. Returns: posterior
+    mean under λ ~ N(1, 0.5²), within its bounds.
     """
     cross, squares = 0.0, 0.0
     for own, stated in zip(values, stds, strict=True):
@@ -66,17 +57,7 @@ def power_of_stated(values: Sequence[Array], stds: Sequence[Array]) -> float:
 def moderated_stds(stds: Array, power: float) -> Array:
     """Standard deviations of one winch in proportion to a power of the stated ones.
 
-    Parameters
-    ----------
-    stds
-        Stated values, (n,).
-    power
-        λ.
-
-    Returns
-    -------
-    (n,) array
-        With the same mean variance.
+    ``stds``: stated values, (n,). ``power``: λ. Returns (n,): with the same mean variance.
     """
     relative = (stds / np.exp(np.mean(np.log(stds)))) ** (2 * power)
     return np.asarray(np.sqrt(relative * np.mean(stds**2) / np.mean(relative)))

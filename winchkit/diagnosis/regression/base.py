@@ -49,12 +49,7 @@ class Folds:
 class Regression(ABC):
     """A nonlinear regression problem with effects, nuisance parameters and initial states.
 
-    Parameters
-    ----------
-    segments
-        Rows of every output of every run, one after another.
-    n_runs
-        Number of runs, each of which has an initial state per effect with memory.
+    ``n_runs``: number of runs, each of which has an initial state per effect with memory.
 
     Attributes
     ----------
@@ -164,16 +159,7 @@ class Regression(ABC):
     def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
         """Change of the prediction by the effects of a hypothesis.
 
-        Parameters
-        ----------
-        hypothesis
-            Effects with their values and initial states.
-        outputs
-            Outputs whose rows are needed; the values of the other rows are undefined.
-
-        Returns
-        -------
-        ndarray of shape (n_rows,)
+        Returns: (n_rows,).
         """
 
     @abstractmethod
@@ -297,9 +283,7 @@ class Regression(ABC):
         upper bound. The columns of initial states of one term are computed together, since each
         run depends on its own state only.
 
-        Returns
-        -------
-        ndarray of shape (n_rows, n_unknowns)
+        Returns: (n_rows, n_unknowns).
         """
         here = self.change(self.hypothesis(vector, like))
         _, high = self.bounds(like)
@@ -339,13 +323,7 @@ class Regression(ABC):
 
 
 class Coarse(ABC):
-    """A regression on few samples, on which fits from several starting values begin.
-
-    Parameters
-    ----------
-    regression
-        The coarse regression.
-    """
+    """A regression on few samples, on which fits from several starting values begin."""
 
     def __init__(self, regression: Regression) -> None:
         self.regression = regression

@@ -55,14 +55,7 @@ def coarse_regression(regression: TimeSeriesRegression) -> CoarseTimeSeries | No
 class CoarseTimeSeries(Coarse):
     """Coarse regression of a winch's runs.
 
-    Parameters
-    ----------
-    whole
-        Regression of all samples.
-    regression
-        The coarse one.
-    chosen
-        Run of ``whole`` behind every run of the coarse regression.
+    ``chosen``: run of ``whole`` behind every run of the coarse regression.
     """
 
     regression: TimeSeriesRegression

@@ -45,17 +45,7 @@ class ValueCovariance:
 
 
 def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCovariance:
-    """Covariance of the nuisance parameters and values of a fit.
-
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Fitted model.
-    noise
-        Noise variance.
-    """
+    """Covariance of the nuisance parameters and values of a fit."""
     whitened = whitened_jacobian(regression, fit, noise)
     length = np.sqrt(np.sum(whitened**2, axis=0))
     there = np.flatnonzero(length > 0.0)
@@ -73,22 +63,8 @@ def value_covariance(regression: Regression, fit: Fit, noise: Noise) -> ValueCov
 def collinearity(regression: Regression, fit: Fit, noise: Noise, index: int) -> float:
     """Squared length of an effect's change over that of the part which the others cannot imitate.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Fitted model.
-    noise
-        Noise variance.
-    index
-        Of the effect in the hypothesis.
-
-    Returns
-    -------
-    float
-        Variance inflation factor of the effect at its fitted values, 1 where it is orthogonal to
-        the others' derivatives.
+    Returns: variance inflation factor of the effect at its fitted values, 1 where it is orthogonal
+    to the others' derivatives.
     """
     hypothesis = fit.hypothesis
     change = regression.change(hypothesis) - regression.change(hypothesis.without(index))

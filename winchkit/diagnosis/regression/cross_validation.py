@@ -39,17 +39,6 @@ _RIDGE = 1e-12
 def extrapolation(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> float:
     """Largest variance of a fold's prediction from the other folds, relative to the noise variance.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Fitted model, at which the prediction is linearised.
-    noise
-        Noise variance.
-    folds
-        Folds to be held out.
-
     Notes
     -----
     Computed per output in its unit: noise that is strongest at low frequencies makes an offset or a
@@ -81,9 +70,7 @@ def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Ar
 
     Initial states keep their own run's values, whatever is held out.
 
-    Returns
-    -------
-    ndarray of shape (n_folds,)
+    Returns: (n_folds,).
     """
     inverse_sigma = noise.inverse_sigma(regression)
     residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
@@ -96,9 +83,7 @@ def held_out(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Ar
 def left_out_steps(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -> Array:
     """Linearised change of the unknowns when each fold is left out.
 
-    Returns
-    -------
-    ndarray of shape (n_folds, n_unknowns)
+    Returns: (n_folds, n_unknowns).
     """
     inverse_sigma = noise.inverse_sigma(regression)
     residual = np.concatenate(regression.in_time(fit.residual * inverse_sigma))
@@ -133,15 +118,8 @@ def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -
 def signed_rank_p_value(before: Array, after: Array) -> float:
     """One-sided p-value of the Wilcoxon signed-rank test that an error decreased.
 
-    Parameters
-    ----------
-    before, after
-        Held-out χ² of every fold with the smaller and the larger model, shape (n_folds,).
-
-    Returns
-    -------
-    float
-        One with fewer than eight folds or no change at all.
+    ``before``, ``after``: held-out χ² of every fold with the smaller and the larger model, shape
+    (n_folds,). Returns: one with fewer than eight folds or no change at all.
 
     Notes
     -----

@@ -39,18 +39,7 @@ def discretization_error(
 ) -> Array:
     """Change of the effects' outputs on a finer time grid minus that on the samples.
 
-    Parameters
-    ----------
-    dataset
-        Runs of one winch.
-    segments
-        Rows of every output of every run.
-    hypothesis
-        Effects with their values and initial states.
-
-    Returns
-    -------
-    ndarray of shape (n_rows,)
+    Returns: (n_rows,).
     """
     out = np.zeros(segments[-1].rows.stop)
     if not hypothesis.terms:
@@ -71,18 +60,7 @@ def discretization_error(
 def without_discretization_error(regression: Regression, fit: Fit, inverse_sigma: Array) -> Array:
     """Residual minus the share, between zero and one, that the discretisation error explains.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Fitted model.
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-
-    Returns
-    -------
-    ndarray of shape (n_rows,)
+    ``inverse_sigma``: 1/σ of every row, shape (n_rows,). Returns: (n_rows,).
     """
     column = regression.discretization_error(fit.hypothesis)
     across = _beside(fit.jacobian * inverse_sigma[:, None], column * inverse_sigma)
@@ -145,21 +123,14 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
 def interpolated(values: Array) -> Array:
     """Cubic spline of evenly sampled values, with not-a-knot ends, at four times the rate.
 
+    ``values``: shape (n,), with n of at least 56.
+
     Notes
     -----
     The second derivatives M of a spline through values y at unit spacing satisfy M[i−1] + 4 M[i] +
     M[i+1] = 6 δ²y[i]; the inverse of this recurrence is the filter z^|k|/√12 with z = √3 − 2
     (Unser, Aldroubi & Eden 1993), whose value after 28 samples is 10⁻¹⁶. At a not-a-knot end M is
     δ²y itself, which adds a multiple of the solution z^k of the homogeneous recurrence.
-
-    Parameters
-    ----------
-    values
-        Shape (n,), with n of at least 56.
-
-    Returns
-    -------
-    ndarray of shape (4 (n − 1) + 1,)
     """
     pole = np.sqrt(3.0) - 2.0
     kernel = pole ** np.abs(np.arange(-_REACH, _REACH + 1)) / np.sqrt(12.0)

@@ -34,19 +34,8 @@ _WORSE = 1 / 740
 def overdispersed(regression: Regression, fit: Fit, noise: Noise) -> Noise:
     """Variance of every band where a residual may exceed the noise.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Model whose residual counts as unexplained.
-    noise
-        Noise variance.
-
-    Returns
-    -------
-    Noise
-        Variances and their degrees of freedom; ``rms`` remains that of the noise.
+    ``fit``: model whose residual counts as unexplained. Returns: variances and their degrees of
+    freedom; ``rms`` remains that of the noise.
 
     Notes
     -----
@@ -91,14 +80,8 @@ def _of_residual(regression: Regression, fit: Fit, noise: Noise) -> tuple[Array,
 def fits_worse(regression: Regression, rival: Fit, best: Fit, noise: Noise) -> bool:
     """Whether a rival fits worse than another model by more than a true effect may.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    rival, best
-        Fits under the same variances.
-    noise
-        These variances, with their degrees of freedom ν_b.
+    ``rival``, ``best``: fits under the same variances. ``noise``: these variances, with their
+    degrees of freedom ν_b.
 
     Notes
     -----

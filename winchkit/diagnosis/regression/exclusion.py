@@ -26,17 +26,7 @@ _MOST = 0.25
 def without_impacts(dataset: Dataset, hypothesis: Hypothesis) -> Dataset | None:
     """Data set without force and torque near impacts of the fitted effects.
 
-    Parameters
-    ----------
-    dataset
-        Runs of one winch.
-    hypothesis
-        Fitted hypothesis.
-
-    Returns
-    -------
-    Dataset or None
-        None where no sample is affected, or more than a quarter of all are.
+    Returns: None where no sample is affected, or more than a quarter of all are.
     """
     recordings = tuple(
         _without_impacts(recording, started(hypothesis, run))

@@ -18,19 +18,7 @@ def time_blocks(
 ) -> Folds:
     """Contiguous blocks of time of equal length within a run, the same for all its outputs.
 
-    Parameters
-    ----------
-    segments
-        Rows of every output of every run.
-    samples
-        Number of samples of every run.
-    wanted
-        Number of blocks of all runs together; every run has at least two.
-
-    Returns
-    -------
-    Folds
-        Blocks numbered from the first run's first one.
+    ``wanted``: number of blocks of all runs together; every run has at least two.
     """
     total = sum(samples)
     first, starts, counts = 0, [], []
@@ -51,15 +39,7 @@ def five_blocks(blocks: Folds) -> Folds:
 
 
 def group_folds(segments: Sequence[Segment], group_of_run: Sequence[int]) -> Folds | None:
-    """One fold per group of runs; None for a single group.
-
-    Parameters
-    ----------
-    segments
-        Rows of every output of every run.
-    group_of_run
-        Group of every run.
-    """
+    """One fold per group of runs; None for a single group."""
     count = len(set(group_of_run))
     if count < 2:
         return None

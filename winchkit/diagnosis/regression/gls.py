@@ -272,16 +272,8 @@ def starts_from_coarse_fits(
     None where one of the given starting values has a smaller χ² on all samples: the coarse
     regression is then no guide to which of them leads to the smallest.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    starts
-        Hypotheses of the same effects at several starting values.
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-    problem
-        The coarse regression.
+    ``starts``: hypotheses of the same effects at several starting values. ``inverse_sigma``: 1/σ of
+    every row, shape (n_rows,).
     """
     coarse = problem.coarse
     reduced = [coarse.reduced(start) for start in starts]

@@ -60,23 +60,9 @@ def profile_ends(
 ) -> tuple[Array, Array]:
     """Ends of profile-likelihood intervals of the effects' unknowns.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Fitted model.
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-    covariance
-        Covariance of the linearised fit, shape (n_unknowns, n_unknowns).
-    reach
-        Square root of the rise of χ² at the ends, shape (n_unknowns,).
-
-    Returns
-    -------
-    low, high : ndarray of shape (n_unknowns,)
-        Nuisance parameters, which are linear, and initial states have symmetric ends.
+    ``inverse_sigma``: 1/σ of every row, shape (n_rows,). ``covariance``: covariance of the
+    linearised fit, shape (n_unknowns, n_unknowns). ``reach``: square root of the rise of χ² at the
+    ends, shape (n_unknowns,). Returns: (n_unknowns,).
     """
     deviation = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     low, high = fit.vector - reach * deviation, fit.vector + reach * deviation
@@ -175,19 +161,7 @@ def whitened_jacobian(regression: Regression, fit: Fit, noise: Noise) -> Array:
 
 
 def spread_of(regression: Regression, fit: Fit, noise: Noise, blocks: Folds) -> Spread:
-    """Standard deviations and 95 % intervals of every unknown.
-
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Fitted model.
-    noise
-        Noise variance.
-    blocks
-        Blocks of time for the jackknife.
-    """
+    """Standard deviations and 95 % intervals of every unknown."""
     inverse_sigma = noise.inverse_sigma(regression)
     whitened = whitened_jacobian(regression, fit, noise)
     covariance_by_likelihood = inverse_normal(whitened)
@@ -255,14 +229,9 @@ class BetweenParts:
 def between_parts(shifts: Array, weights: Array, within: Array) -> BetweenParts:
     """Variance of common values by a random effect of every part.
 
-    Parameters
-    ----------
-    shifts : ndarray of shape (n_parts, n_unknowns)
-        Shift w (θ̂ − θ̂ of the part) of each common value by each part.
-    weights : ndarray of shape (n_parts, n_unknowns)
-        Share w of each part in the information on each unknown.
-    within : ndarray of shape (n_unknowns,)
-        Variance of the common values where all parts agree.
+    ``shifts`` (n_parts, n_unknowns): shift w (θ̂ − θ̂ of the part) of each common value by each
+    part. ``weights`` (n_parts, n_unknowns): share w of each part in the information on each
+    unknown. ``within`` (n_unknowns,).
 
     Notes
     -----
@@ -351,17 +320,7 @@ def _kinds_of_parts(regression: Regression) -> Iterator[list[NDArray[np.intp]]]:
 def estimates(
     regression: Regression, fit: Fit, spread: Spread
 ) -> list[tuple[Term, dict[str, Estimate]]]:
-    """Values of every effect of a fit with standard deviations, 95 % intervals and units.
-
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Fitted model.
-    spread
-        Uncertainty of its unknowns.
-    """
+    """Values of every effect of a fit with standard deviations, 95 % intervals and units."""
     at = regression.nuisance_columns.shape[1]
     out = []
     for term in fit.hypothesis.terms:

@@ -49,21 +49,9 @@ def lack_of_fit_test(
 ) -> LackOfFitTest:
     """F test of the mean of repeats against the pure error, in every band.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    residual
-        Measured minus predicted, shape (n_rows,).
-    jacobian
-        Derivative of the prediction by the fitted unknowns, shape (n_rows, n_unknowns).
-    noise
-        Noise variance from repeats.
-
-    Returns
-    -------
-    LackOfFitTest
-        With a NaN p-value where the noise is not from repeats.
+    ``residual``: measured minus predicted, shape (n_rows,). ``jacobian``: derivative of the
+    prediction by the fitted unknowns, shape (n_rows, n_unknowns). Returns: with a NaN p-value where
+    the noise is not from repeats.
 
     Notes
     -----

@@ -114,18 +114,11 @@ def noise_from_repeats(
 ) -> Noise:
     """Noise variance from the contrasts of repeated runs (pure error).
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    residual
-        Measured minus predicted, shape (n_rows,).
-    known
-        Signatures that may differ between repeats for a measured reason, such as the temperature,
-        shape (n_rows, k). Their contrasts are projected out where they are noticeable.
-    own
-        Derivatives by unknowns that every run has for itself, shape (n_rows, m). Their contrasts
-        are projected out and their degrees of freedom subtracted.
+    ``residual``: measured minus predicted, shape (n_rows,). ``known``: signatures that may differ
+    between repeats for a measured reason, such as the temperature, shape (n_rows, k). Their
+    contrasts are projected out where they are noticeable. ``own``: derivatives by unknowns that
+    every run has for itself, shape (n_rows, m). Their contrasts are projected out and their degrees
+    of freedom subtracted.
     """
     split = replicate_contrasts(regression, residual)
     count = len(regression.bands)
@@ -153,14 +146,8 @@ def noise_saturated(
 ) -> Noise:
     """Noise variance of the residual beside all candidate effects (saturated model).
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    residual
-        Measured minus predicted, shape (n_rows,).
-    columns
-        Derivatives by the unknowns and signatures of all candidates, shape (n_rows, p) in parts.
+    ``residual``: measured minus predicted, shape (n_rows,). ``columns``: derivatives by the
+    unknowns and signatures of all candidates, shape (n_rows, p) in parts.
 
     Notes
     -----
@@ -347,19 +334,10 @@ def sums_per_band(values: Array, bands: NDArray[np.intp], count: int) -> Array:
 def satterthwaite_dof(parts: Array, dof: Array, total: Array | None = None) -> Array:
     """Degrees of freedom of a sum of independently estimated variances.
 
-    Parameters
-    ----------
-    parts
-        Estimated parts of the variance, not negative, shape (k,) or (k, n).
-    dof
-        Their degrees of freedom, of the same shape, or (k, 1).
-    total
-        The whole variance where known parts are in it as well, shape (n,); by default the sum.
-
-    Returns
-    -------
-    ndarray of shape (n,), or a scalar
-        (Σ v)²/Σ (v²/ν); infinite where nothing is estimated.
+    ``parts``: estimated parts of the variance, not negative, shape (k,) or (k, n). ``dof``: their
+    degrees of freedom, of the same shape, or (k, 1). ``total``: the whole variance where known
+    parts are in it as well, shape (n,); by default the sum. Returns (n,): (Σ v)²/Σ (v²/ν); infinite
+    where nothing is estimated.
 
     References
     ----------

@@ -16,15 +16,9 @@ LEAST_EIGENVALUE = 1e-8
 def explained_ss(inner: Array, products: Array, least: float) -> float:
     """Sum of squares that a set of columns explains jointly.
 
-    Parameters
-    ----------
-    inner
-        Inner products of the columns after projection, shape (k, k). The columns had unit length
-        before the projection.
-    products
-        Inner products with the residual, shape (k,).
-    least
-        Eigenvalue of ``inner`` below which a direction is not identifiable and left out.
+    ``inner``: inner products of the columns after projection, shape (k, k). The columns had unit
+    length before the projection. ``products``: inner products with the residual, shape (k,).
+    ``least``: eigenvalue of ``inner`` below which a direction is not identifiable and left out.
     """
     return float(explained_ss_of_sets(inner[None], products[None], least)[0])
 
@@ -40,17 +34,9 @@ def explained_ss_of_sets(inner: Array, products: Array, least: float) -> Array:
 def orthonormal(columns: Array, most: int | None = None) -> Array:
     """Orthonormal basis of the space of some columns.
 
-    Parameters
-    ----------
-    columns
-        Shape (n_rows, k); columns of zeros and linearly dependent ones are dropped.
-    most
-        Maximum rank: the directions with the largest eigenvalues are kept, so that a short run
-        keeps degrees of freedom for the noise.
-
-    Returns
-    -------
-    ndarray of shape (n_rows, rank)
+    ``columns``: shape (n_rows, k); columns of zeros and linearly dependent ones are dropped.
+    ``most``: maximum rank: the directions with the largest eigenvalues are kept, so that a short
+    run keeps degrees of freedom for the noise. Returns: (n_rows, rank).
     """
     size = np.sqrt(np.sum(columns**2, axis=0))
     scaled = columns[:, size > 0] / size[size > 0]
@@ -71,15 +57,8 @@ def partialled_out(columns: Array, vector: Array) -> Array:
 def inverse_normal(columns: Array) -> Array:
     """Pseudo-inverse of the normal matrix: the covariance of unknowns with whitened derivatives.
 
-    Parameters
-    ----------
-    columns
-        Shape (n_rows, k), in units of any size.
-
-    Returns
-    -------
-    ndarray of shape (k, k)
-        Zero along columns of zeros and along directions that the rows do not determine.
+    ``columns``: shape (n_rows, k), in units of any size. Returns (k, k): zero along columns of
+    zeros and along directions that the rows do not determine.
     """
     return inverse_information(columns.T @ columns)
 
@@ -87,15 +66,8 @@ def inverse_normal(columns: Array) -> Array:
 def inverse_information(normal: Array) -> Array:
     """Pseudo-inverse of a normal matrix, whose rank does not depend on the units of its unknowns.
 
-    Parameters
-    ----------
-    normal
-        Inner products of whitened derivatives, (k, k).
-
-    Returns
-    -------
-    ndarray of shape (k, k)
-        As :func:`inverse_normal`.
+    ``normal``: inner products of whitened derivatives, (k, k). Returns (k, k): as
+    :func:`inverse_normal`.
     """
     size = np.sqrt(np.maximum(np.diag(normal), 0.0))
     outer = np.outer(size, size)

@@ -48,19 +48,7 @@ def with_run_offsets(
 ) -> Dataset | None:
     """Data set with an offset per run in every output whose run means a fit does not explain.
 
-    Parameters
-    ----------
-    dataset
-        Runs without repeats.
-    regression
-        Their regression.
-    fit
-        Fitted model.
-
-    Returns
-    -------
-    Dataset or None
-        None where no output has another offset in every run, or where repeats decide.
+    Returns: None where no output has another offset in every run, or where repeats decide.
     """
     if dataset.repeated:
         return None
@@ -75,22 +63,10 @@ def with_run_offsets(
 def offset_between_runs(regression: TimeSeriesRegression, fit: Fit, output: str) -> Finding | None:
     """Finding ``zeroed-anew`` of an output; value: standard deviation of the offset, SI.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fit
-        Fitted model; its unknowns stay free, in linear approximation with equal weights.
-    output
-        Output that is tested.
-
-    Returns
-    -------
-    Finding or None
-        None with fewer than two runs, or where the offsets are within the variation over eight
-        blocks of time of every run, F(k, 7 G) for k contrasts of G runs, or no larger than a random
-        walk from a common zero makes them. None also of a force or torque where the speed is a
-        setting of the runs: friction that depends on it would be taken for offsets.
+    Returns: None with fewer than two runs, or where the offsets are within the variation over eight
+    blocks of time of every run, F(k, 7 G) for k contrasts of G runs, or no larger than a random
+    walk from a common zero makes them. None also of a force or torque where the speed is a setting
+    of the runs: friction that depends on it would be taken for offsets.
     """
     dataset = regression.dataset
     if output != "cable_length" and is_setting([motion.motor_rate for motion in dataset.motions]):

@@ -43,13 +43,7 @@ from winchkit.model.stages import At, Stage
 
 
 class TimeSeriesRegression(Regression):
-    """Regression of a winch's runs on the effects of a hypothesis.
-
-    Parameters
-    ----------
-    dataset
-        Runs of one winch with its profile.
-    """
+    """Regression of a winch's runs on the effects of a hypothesis."""
 
     def __init__(self, dataset: Dataset) -> None:
         super().__init__(_segments(dataset), len(dataset.recordings))

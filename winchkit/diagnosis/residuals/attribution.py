@@ -87,17 +87,8 @@ def variables_of(recording: Recording) -> dict[str, Array]:
 def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attribution]:
     """Per output the variables that explain its residual, largest share first.
 
-    Parameters
-    ----------
-    regression
-        Regression problem.
-    residual : (rows,) array
-        Measured less predicted.
-
-    Returns
-    -------
-    list of Attribution
-        Those whose share exceeds 2 % and three standard deviations of its null distribution.
+    ``residual`` (rows,). Returns: those whose share exceeds 2 % and three standard deviations of
+    its null distribution.
     """
     out: list[Attribution] = []
     known = [variables_of(recording) for recording in regression.dataset.recordings]
@@ -131,18 +122,9 @@ def ranked(found: Iterable[_S]) -> list[_S]:
 def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribution]:
     """Per output and angle the order whose sine explains most of the residual variance.
 
-    Parameters
-    ----------
-    regression
-        Regression problem.
-    residual : (rows,) array
-        Measured less predicted.
-
-    Returns
-    -------
-    list of Attribution
-        Orders 1 to half the samples per turn, largest share first. The share is above 2 %, and
-        above what the largest of all orders explains of independent residuals in 1 % of cases.
+    ``residual`` (rows,). Returns: orders 1 to half the samples per turn, largest share first. The
+    share is above 2 %, and above what the largest of all orders explains of independent residuals
+    in 1 % of cases.
     """
     times = regression.in_time(residual)
     out = []
@@ -179,11 +161,7 @@ def chance_share(bins: int, kept: int) -> float:
 def binned_share(variable: Array, error: Array, kept: int) -> float:
     """Correlation ratio η² of a residual over bins of a variable, less its expectation.
 
-    Parameters
-    ----------
-    variable, error : (n,) arrays
-    kept
-        Number of independent values among them.
+    ``variable``, ``error`` (n,).
 
     Notes
     -----

@@ -84,12 +84,7 @@ class ResidualMap:
 def residual_maps(regression: TimeSeriesRegression, residual: Array) -> list[ResidualMap]:
     """Maps whose cells explain more of a residual than chance, per output the largest share first.
 
-    Parameters
-    ----------
-    regression
-        Regression problem.
-    residual : (rows,) array
-        Measured less predicted.
+    ``residual`` (rows,).
     """
     known = [variables_of(recording) for recording in regression.dataset.recordings]
     out: list[ResidualMap] = []

@@ -64,14 +64,8 @@ def traces_of(
 ) -> tuple[Trace, ...]:
     """Traces of every output of every run.
 
-    Parameters
-    ----------
-    regression
-        The runs.
-    residual
-        Measured less predicted, (n_rows,).
-    before
-        The same by the profile, where effects were named.
+    ``residual``: measured less predicted, (n_rows,). ``before``: the same by the profile, where
+    effects were named.
     """
     after = regression.in_time(residual)
     first = None if before is None else regression.in_time(before)

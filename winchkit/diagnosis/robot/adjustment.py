@@ -203,16 +203,7 @@ def adjusted(
 ) -> Adjusted:
     """Estimate of poses, geometry, effects and instruments' zeros at once.
 
-    Parameters
-    ----------
-    dataset
-        Poses of one robot.
-    terms
-        Effects at the values where the iteration starts.
-    sigma
-        Standard deviation per type of measurement, SI.
-    geometry
-        Numbers of the geometry with their priors.
+    ``sigma``: standard deviation per type of measurement, SI.
     """
     adjustment = _Adjustment(dataset, tuple(terms), tuple(geometry), {})
     state = _placed(adjustment, sigma)

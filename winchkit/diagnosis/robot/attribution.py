@@ -49,17 +49,9 @@ class _Share:
 def pose_attributions(regression: PoseRegression, errors: Errors) -> list[Attribution]:
     """Variables that explain the errors of each output, the largest share first.
 
-    Parameters
-    ----------
-    regression : PoseRegression
-        Of p poses.
-    errors : dict
-        By output, as :func:`winchkit.diagnosis.robot.errors.errors_of` returns them.
-
-    Returns
-    -------
-    list of Attribution
-        ``winch`` is the share of a constant per line, ``pose`` that of a constant per pose.
+    ``regression``: of p poses. ``errors``: by output, as
+    :func:`winchkit.diagnosis.robot.errors.errors_of` returns them. Returns: ``winch`` is the share
+    of a constant per line, ``pose`` that of a constant per pose.
     """
     variables, out = variables_of_poses(regression), []
     for output, error in on_cables(regression, errors).items():

@@ -89,15 +89,8 @@ def priors_of_geometry(
 ) -> list[GeometryPrior]:
     """Geometry as nuisance parameters.
 
-    Parameters
-    ----------
-    dataset
-        Poses of one robot.
-    catalogue
-        Effects.
-    fitted
-        Use the standard deviations that a calibration wrote into the profile, without which there
-        are no nuisance parameters; else the priors of a calibration.
+    ``fitted``: use the standard deviations that a calibration wrote into the profile, without which
+    there are no nuisance parameters; else the priors of a calibration.
     """
     out = []
     for name in GEOMETRY:

@@ -88,11 +88,8 @@ class RobotDataset(Dataset):
 def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
     """Read the poses of a robot's runs, or the samples of its logs in motion.
 
-    Raises
-    ------
-    RunError
-        With every fault of every run; for fewer than ten poses, or without redundancy beyond the
-        six coordinates of each pose.
+    Raises RunError with every fault of every run; for fewer than ten poses, or without redundancy
+    beyond the six coordinates of each pose.
     """
     require_types(runs, Run, "runs")
     require_type(robot, RobotProfile, "profile")

@@ -253,12 +253,7 @@ class RobotSelection:
 def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
     """Diagnosis of a selection.
 
-    Parameters
-    ----------
-    selection
-        Selection and judgement.
-    geometry
-        How the geometry was taken: ``file`` or ``refitted``.
+    ``geometry``: how the geometry was taken: ``file`` or ``refitted``.
     """
     engine, preparation = selection.engine, selection.preparation
     added = range(engine.n_initial_terms, len(selection.result.final.hypothesis.terms))

@@ -123,15 +123,8 @@ class Equations:
     def residuals(self, robot: Robot) -> dict[str, Array]:
         """Residuals by kind of a robot with its effects.
 
-        Parameters
-        ----------
-        robot : Robot
-            Of n lines.
-
-        Returns
-        -------
-        dict
-            (p, k) each, m, rad or N; NaN where something was not measured.
+        ``robot``: of n lines. Returns: (p, k) each, m, rad or N; NaN where something was not
+        measured.
         """
         measured, pose = self.dataset.measured, self.pose
         length = lengths(robot.geometry, pose.position, pose.rotation)

@@ -49,17 +49,8 @@ class FittedModel:
 def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Errors:
     """Errors by output.
 
-    Parameters
-    ----------
-    regression : PoseRegression
-        Of p poses.
-    residuals : mapping
-        Residuals by kind, (p, k), SI.
-
-    Returns
-    -------
-    dict
-        By output (p, n), (p, 3) or (p, k), SI; NaN where something was not measured.
+    ``regression``: of p poses. ``residuals``: residuals by kind, (p, k), SI. Returns: by output
+    (p, n), (p, 3) or (p, k), SI; NaN where something was not measured.
     """
     if regression.dataset.hangs:
         return _errors_of_hanging(regression, residuals)

@@ -94,21 +94,7 @@ def simulated_poses(
 ) -> tuple[Measured, Pose]:
     """Simulate measurements at random poses of a kind, without noise.
 
-    Parameters
-    ----------
-    regression : PoseRegression
-        With the poses so far.
-    robot : Robot
-        With the effects of the final model.
-    kind : PoseCandidates
-        Of the poses.
-
-    Returns
-    -------
-    Measured
-        NaN where nothing was measured so far.
-    Pose
-        Where pulling cables hold the platform.
+    Returns: NaN where nothing was measured so far.
     """
     rng = np.random.default_rng(_SEED)
     pose = _placed(regression, robot, kind, rng)
@@ -219,20 +205,8 @@ def next_pose_runs(
 ) -> tuple[NextRun, ...]:
     """Kinds of poses that separate pairs of effects.
 
-    Parameters
-    ----------
-    regression : PoseRegression
-        With the poses so far.
-    final : Hypothesis
-        The final model of the diagnosis.
-    pairs : sequence of pairs of Term
-        To separate.
-
-    Returns
-    -------
-    tuple of NextRun
-        Per pair the first kind with a power of 90 %, else the two best above 20 %; else the advice
-        of the effects' cards, with a power of NaN.
+    Returns: per pair the first kind with a power of 90 %, else the two best above 20 %; else the
+    advice of the effects' cards, with a power of NaN.
     """
     out: list[NextRun] = []
     for first, second in pairs:
@@ -257,23 +231,8 @@ def pose_offers(
 ) -> list[PoseOffer]:
     """Choose poses of every kind for a set of questions.
 
-    Parameters
-    ----------
-    regression : PoseRegression
-        With the poses so far.
-    final : Hypothesis
-        The final model of the diagnosis.
-    questions : sequence of Question
-        To be answered.
-    required : sequence of float
-        χ² at which each question counts as answered.
-    count : int
-        Poses per offer.
-
-    Returns
-    -------
-    list of PoseOffer
-        In ascending order of effort.
+    ``required``: χ² at which each question counts as answered. ``count``: poses per offer. Returns:
+    in ascending order of effort.
     """
     robot = regression.point.robot(final.terms)
     kinds = [kind for kind in POSE_CANDIDATES if usable(kind, regression.dataset)]

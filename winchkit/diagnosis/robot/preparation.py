@@ -61,21 +61,7 @@ def fitted_point(
 ) -> tuple[LinearizationPoint, tuple[Term, ...]]:
     """Geometry, poses and the profile's own effects at their best fit under a given noise.
 
-    Parameters
-    ----------
-    dataset
-        Poses of one robot.
-    terms
-        The profile's own effects.
-    sigma
-        Standard deviation per type of measurement, SI.
-    geometry
-        Numbers of the geometry that are nuisance parameters.
-
-    Returns
-    -------
-    point, terms
-        The linearisation point and the fitted effects.
+    ``sigma``: standard deviation per type of measurement, SI.
     """
     found = adjusted(dataset, terms, sigma, geometry)
     instruments = tuple(t for t in found.terms if t.effect.stage is Stage.TRACKER)
@@ -91,16 +77,7 @@ def estimated_noise(
 ) -> PoseNoise:
     """Variance components of the measurements beside all candidate effects.
 
-    Parameters
-    ----------
-    dataset
-        Poses of one robot.
-    terms
-        The profile's own effects.
-    geometry
-        Numbers of the geometry that are nuisance parameters.
-    candidates
-        Effects that may be missing; the noise is estimated beside all of them.
+    ``candidates``: effects that may be missing; the noise is estimated beside all of them.
     """
     candidates = tuple(candidates)
     found = PoseNoise(START, {}, from_repeats=False, unexplained=START)
@@ -252,17 +229,7 @@ class Preparation:
         return self.engine(self.prior, self.guess)
 
     def gain_of_geometry(self, engine: PoseSelection, model: Hypothesis, noise: Noise) -> float:
-        """Decrease of χ² by a free geometry, beyond its calibration's uncertainty.
-
-        Parameters
-        ----------
-        engine
-            Engine with the geometry of the file.
-        model
-            Effects beside which it is fitted.
-        noise
-            Noise beside them.
-        """
+        """Decrease of χ² by a free geometry, beyond its calibration's uncertainty."""
         point = engine.regression.point
         free = regression_at(replace(point, geometry=_from(self.prior, point.geometry)))
         hypothesis = replace(model, nuisances=())
@@ -305,12 +272,7 @@ def prepare_selection(
 ) -> Preparation:
     """Read poses, estimate their noise and collect the candidates.
 
-    Raises
-    ------
-    RunError
-        With every fault of every run.
-    FileError
-        For effects that do not bind.
+    Raises RunError with every fault of every run; FileError for effects that do not bind.
     """
     dataset = prepare_poses(runs, profile)
     own = robot_terms(profile, catalogue, moving=dataset.moves)

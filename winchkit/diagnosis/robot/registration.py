@@ -84,19 +84,7 @@ def registration_of(
 ) -> Registration:
     """Register readings that are far off, and numbers that are declared unknown.
 
-    Parameters
-    ----------
-    dataset : RobotDataset
-        Poses of one robot.
-    own : tuple of Term
-        The profile's own effects.
-    catalogue : Catalogue
-        Effects.
-
-    Returns
-    -------
-    Registration
-        Without effects where positions were not measured or the robot's numbers suffice.
+    Returns: without effects where positions were not measured or the robot's numbers suffice.
     """
     measured, names = dataset.measured, {term.effect.id for term in own}
     if not np.isfinite(measured.position).all(axis=1).any():

@@ -78,13 +78,7 @@ class LinearizationPoint:
 
 
 class PoseRegression(Regression):
-    """Regression of a robot's poses on the effects of a hypothesis.
-
-    Parameters
-    ----------
-    point
-        Poses, variance components and geometry.
-    """
+    """Regression of a robot's poses on the effects of a hypothesis."""
 
     def __init__(self, point: LinearizationPoint) -> None:
         self.point = point

@@ -34,11 +34,6 @@ class TrajectoryRegression(PoseRegression):
     """Regression of a robot's trajectory on the effects of a hypothesis.
 
     Initial states of effects with memory are zero at the start of each run.
-
-    Parameters
-    ----------
-    point
-        Samples, variance components and geometry.
     """
 
     @property

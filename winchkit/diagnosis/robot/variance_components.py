@@ -79,12 +79,7 @@ def repeated_differences(stack: Stack, pose: NDArray[np.intp]) -> Stack | None:
 
     Geometry and effects are the same at all repeats of a pose and take no part.
 
-    Parameters
-    ----------
-    stack : Stack
-        Of p rows.
-    pose : (p,) array
-        Number of the distinct pose of each row.
+    ``stack``: of p rows. ``pose`` (p,).
     """
     groups = [np.flatnonzero(pose == n) for n in range(int(pose.max()) + 1)]
     many = [g for g in groups if len(g) > 1]
@@ -100,15 +95,7 @@ def repeated_differences(stack: Stack, pose: NDArray[np.intp]) -> Stack | None:
 
 
 def noise_of(stack: Stack, repeats: Stack | None) -> PoseNoise:
-    """Noise by kind, from repeats where they have enough degrees of freedom.
-
-    Parameters
-    ----------
-    stack : Stack
-        Residuals with all columns of the saturated model.
-    repeats : Stack or None
-        Contrasts of repeated poses.
-    """
+    """Noise by kind, from repeats where they have enough degrees of freedom."""
     left, free = _components(stack)
     if repeats is not None:
         sigma, dof = _components(repeats)

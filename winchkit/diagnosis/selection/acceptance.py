@@ -55,16 +55,7 @@ def is_accepted(
 ) -> bool:
     """Whether a larger model predicts held-out data better.
 
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    present, larger
-        Fits of the smaller and the larger model.
-    noise
-        Noise variance.
-    largest_ratio
-        Largest ratio of held-out errors, after to before, of at least one output.
+    ``largest_ratio``: largest ratio of held-out errors, after to before, of at least one output.
 
     Notes
     -----

@@ -17,17 +17,7 @@ def ordered_by_contribution(engine: SelectionEngine, result: SelectionResult) ->
     one with which the error is least: the sum of the outputs' held-out mean squares, each in units
     of the noise.
 
-    Parameters
-    ----------
-    engine : SelectionEngine
-        Engine of the search.
-    result : SelectionResult
-        Its result.
-
-    Returns
-    -------
-    SelectionResult
-        The same model; the result itself where the order is that already.
+    Returns: the same model; the result itself where the order is that already.
     """
     hypothesis, noise, first = result.final.hypothesis, result.noise, engine.n_initial_terms
     added = list(range(first, len(hypothesis.terms)))

@@ -21,17 +21,6 @@ _MARGIN = 0.1
 class Exchange:
     """A place in the model that rivals of one effect may take.
 
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    present
-        Fit of the present model.
-    noise
-        Noise variance.
-    index
-        Index of the effect.
-
     Attributes
     ----------
     own : Term
@@ -98,16 +87,7 @@ _MOST_ADDITIONS = 3
 def pair_exchange(engine: SelectionEngine, present: Fit, noise: Noise, exchanged: int) -> Fit:
     """The present fit, or the best in which a pair replaces ``exchanged`` of its additions.
 
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    present
-        Fit of the present model.
-    noise
-        Noise variance.
-    exchanged
-        Number of additions to be replaced, one or two.
+    ``exchanged``: number of additions to be replaced, one or two.
     """
     added = range(engine.n_initial_terms, len(present.hypothesis.terms))
     if not 0 < len(added) <= _MOST_ADDITIONS:

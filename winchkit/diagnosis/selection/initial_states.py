@@ -31,18 +31,7 @@ def explained_by_initial_states(
 ) -> bool:
     """Whether the last effect of a fit explains mainly by its initial states.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    base
-        Fit without the effect.
-    fitted
-        Fit with it.
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-    penalty_per_parameter
-        ln n.
+    ``inverse_sigma``: 1/σ of every row, shape (n_rows,). ``penalty_per_parameter``: ln n.
 
     Notes
     -----

@@ -19,22 +19,8 @@ def significant_orders(
 ) -> Hypothesis:
     """Hypothesis without the orders of its series that decrease χ² by less than their penalty.
 
-    Parameters
-    ----------
-    regression : Regression
-        Data and model.
-    fitted : Fit
-        All effects fitted.
-    noise : Noise
-        Of the outputs.
-    penalty_per_parameter : float
-        Of the criterion, ln n for BIC.
-
-    Returns
-    -------
-    Hypothesis
-        That of the fit itself where every order stays; a series of which none is significant
-        stays whole.
+    ``penalty_per_parameter``: of the criterion, ln n for BIC. Returns: that of the fit itself where
+    every order stays; a series of which none is significant stays whole.
 
     Notes
     -----

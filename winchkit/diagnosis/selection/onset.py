@@ -47,22 +47,10 @@ def best_onset(
 ) -> tuple[float, float] | None:
     """Onset of an effect with the largest score, and that score.
 
-    Parameters
-    ----------
-    regression
-        The data and the model, as a rule the coarse one.
-    present
-        Model beside which the effect is added.
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-    effect
-        Effect with an onset, see :func:`onset_of`, and one amplitude.
-
-    Returns
-    -------
-    tuple or None
-        Time from a run's start, s, and the decrease of χ² by the effect from then on, the unknowns
-        of the model free; None where the data cannot show the effect.
+    ``inverse_sigma``: 1/σ of every row, shape (n_rows,). ``effect``: effect with an onset, see
+    :func:`onset_of`, and one amplitude. Returns: time from a run's start, s, and the decrease of χ²
+    by the effect from then on, the unknowns of the model free; None where the data cannot show the
+    effect.
     """
     parameter = onset_of(effect)
     if parameter is None or regression.missing_needs(effect):

@@ -95,23 +95,8 @@ def periodogram(
 ) -> Periodogram:
     """Periodogram of a residual over the orders of an effect.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    hypothesis
-        Model beside which the effect is added.
-    effect
-        Effect with an order, see :func:`has_orders`.
-    residual
-        Measured minus predicted, shape (n_rows,).
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-
-    Returns
-    -------
-    Periodogram
-        Outputs are summed; runs are added with their phases.
+    ``effect``: effect with an order, see :func:`has_orders`. ``residual``: measured minus
+    predicted, shape (n_rows,). ``inverse_sigma``: 1/σ of every row, shape (n_rows,).
     """
     first, count = _orders_per_turn(regression)
     if first > count or regression.missing_needs(effect):
@@ -176,24 +161,9 @@ def further_orders(
 ) -> tuple[Term, ...]:
     """Further orders of an effect that the residual of a fit contains.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    fitted
-        The fit; its orders of the effect are excluded.
-    effect
-        Effect with an order.
-    inverse_sigma
-        1/σ of every row, shape (n_rows,).
-    gain
-        Decrease of χ² that an order must exceed, from the residual (n_rows,): its penalty, or what
-        another effect would explain.
-
-    Returns
-    -------
-    tuple of Term
-        Orders with their values by linear approximation, the most certain first.
+    ``effect``: effect with an order. ``inverse_sigma``: 1/σ of every row, shape (n_rows,).
+    ``gain``: decrease of χ² that an order must exceed, from the residual (n_rows,): its penalty, or
+    what another effect would explain.
 
     Notes
     -----

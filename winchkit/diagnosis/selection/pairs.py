@@ -61,16 +61,7 @@ def screened_pairs(
 ) -> list[Pair]:
     """Pairs of candidates with a positive net gain, best first, each at its best grid points.
 
-    Parameters
-    ----------
-    projected
-        Signatures with the unknowns partialled out.
-    residual
-        Measured minus predicted, shape (n_rows,).
-    scores
-        Scores of all candidates at all grid points.
-    penalty_per_parameter
-        ln n.
+    ``residual``: measured minus predicted, shape (n_rows,). ``penalty_per_parameter``: ln n.
     """
     single_gain: dict[str, float] = {}
     for item in scores:

@@ -81,16 +81,7 @@ class Score:
 class Projected:
     """Signatures with the unknowns of the present model partialled out, under one noise variance.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    signatures
-        Signatures of all candidates.
-    jacobian
-        Derivative by the fitted unknowns, shape (n_rows, n_unknowns).
-    noise
-        Noise variance.
+    ``jacobian``: derivative by the fitted unknowns, shape (n_rows, n_unknowns).
 
     Attributes
     ----------
@@ -216,21 +207,8 @@ class Projected:
 def score_by_chance(penalty: float, columns: int, dof: float, candidates: int) -> float:
     """Score that noise alone exceeds for one of all candidates in at most 1 % of cases.
 
-    Parameters
-    ----------
-    penalty
-        Penalty of the effect's parameters.
-    columns
-        Number of amplitudes that are fitted linearly.
-    dof
-        Degrees of freedom of the noise variance where the effect acts.
-    candidates
-        Number of candidates at all points of their shape grids (Bonferroni).
-
-    Returns
-    -------
-    float
-        k F(k, ν), its quantile at 1 % over the candidates, less the penalty; at least zero.
+    ``candidates``: number of candidates at all points of their shape grids (Bonferroni). Returns: k
+    F(k, ν), its quantile at 1 % over the candidates, less the penalty; at least zero.
     """
     columns = max(1, columns)
     quantile = columns * float(fdtri(columns, min(dof, _MOST_DOF), 1 - _LEVEL / max(1, candidates)))
@@ -258,14 +236,8 @@ def _cross(regression: Regression, jacobian: Array, signatures: Signatures) -> t
 def score(projected: Projected, residual: Array, rows: int) -> list[Score]:
     """Scores of all candidates, best first.
 
-    Parameters
-    ----------
-    projected
-        Signatures with the unknowns partialled out.
-    residual
-        Measured minus predicted, shape (n_rows,).
-    rows
-        Sample size n of the BIC penalty.
+    ``residual``: measured minus predicted, shape (n_rows,). ``rows``: sample size n of the BIC
+    penalty.
     """
     products = projected.products(residual)
     out = []
@@ -302,9 +274,7 @@ def zero_score(item: Score, rows: int) -> Score:
 def null_maxima(projected: Projected, rows: int) -> Array:
     """Simulated null distribution of the largest score of all candidates, sorted.
 
-    Returns
-    -------
-    ndarray of shape (400,)
+    Returns: (400,).
     """
     candidates = projected.signatures.candidates
     if not candidates:

@@ -158,16 +158,7 @@ def signatures(
 ) -> Signatures:
     """Signatures of candidate effects beside a model.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    present
-        Model beside which the effects are added.
-    effects
-        Candidates.
-    coarse
-        Coarse regression, on which later changes of the columns are noticed; None for none.
+    ``coarse``: coarse regression, on which later changes of the columns are noticed; None for none.
     """
     writer = _ColumnWriter(regression, present, regression.outputs)
     tried = list(points(regression, effects))
@@ -220,18 +211,7 @@ def updated_signatures(
     the coarse regression only those which change there by 1 % or more. None where a further
     column of a candidate appears, or where there is no room for new candidates.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    present
-        The other model.
-    previous
-        Signatures beside another model; not valid afterwards.
-    effects
-        Candidates whose grids may have new points.
-    coarse
-        Coarse regression; None for none.
+    ``previous``: signatures beside another model; not valid afterwards. ``coarse``: None for none.
     """
     changed = [t for t in present.terms if t not in previous.model.terms]
     changed += [t for t in previous.model.terms if t not in present.terms]
@@ -378,10 +358,7 @@ def _multiply(
 ) -> None:
     """Inner products per noise band of some outputs, written into ``gram``.
 
-    Parameters
-    ----------
-    written
-        By output, places of the new columns among those that reach it; None for all.
+    ``written``: by output, places of the new columns among those that reach it; None for all.
     """
     for band, (output, _, _) in enumerate(regression.bands):
         own = found.reached[output]

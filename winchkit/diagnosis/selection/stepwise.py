@@ -93,15 +93,7 @@ class SelectionResult:
 def stepwise_selection(
     engine: SelectionEngine, known: Callable[[SelectionResult], None] = lambda result: None
 ) -> SelectionResult:
-    """Select effects for a model as long as it has a lack of fit and candidates are accepted.
-
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    known
-        Called before the search with the result of a search that ends there.
-    """
+    """Select effects for a model as long as it has a lack of fit and candidates are accepted."""
     first = initial_result(engine)
     lacking = _has_lack_of_fit(first.lack_of_fit_test, list(first.scores), first.threshold)
     start = replace(first, lack_of_fit_at_start=lacking, lack_of_fit=lacking)

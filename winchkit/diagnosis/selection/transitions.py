@@ -37,17 +37,8 @@ _SMALLEST, _LARGEST = 1e-3, 0.1
 def scanned_transitions(engine: TimeSeriesSelection, final: Fit, noise: Noise) -> dict[str, float]:
     """Transitions with which the friction of a model predicts held-out data better.
 
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    final, noise
-        Model of a search, with its noise.
-
-    Returns
-    -------
-    dict
-        By the unit of the rate, rad/s or m/s; empty where no error falls by 2 % and χ² by ln n.
+    Returns: by the unit of the rate, rad/s or m/s; empty where no error falls by 2 % and χ² by ln
+    n.
     """
     regression, coarse = engine.regression, engine.coarse
     out: dict[str, float] = {}

@@ -41,14 +41,7 @@ class Reweighted:
 def reweighted(engine: SelectionEngine, fitted: Fit, noise: Noise) -> Reweighted:
     """The same hypothesis refitted with equal weights in outputs that these predict better.
 
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    fitted
-        Fit under 1/σ weights.
-    noise
-        Noise variance.
+    ``fitted``: fit under 1/σ weights.
 
     Notes
     -----

@@ -38,21 +38,9 @@ def combination_of_set(
 ) -> Combination | None:
     """Combination of parameters that the data determine, whichever member of a set is true.
 
-    Parameters
-    ----------
-    terms
-        Members.
-    parameters
-        Their fitted values.
-    dataset
-        Runs of a winch; None for a robot.
-
-    Returns
-    -------
-    Combination or None
-        The cable per motor turn, mean over the runs, for a wrong radius or ratio. Otherwise the sum
-        of all amplitudes, each over its fitted value, which is one. None for a single effect, and
-        where a member has more than one amplitude.
+    ``dataset``: None for a robot. Returns: the cable per motor turn, mean over the runs, for a
+    wrong radius or ratio. Otherwise the sum of all amplitudes, each over its fitted value, which is
+    one. None for a single effect, and where a member has more than one amplitude.
     """
     ids = {term.effect.id for term in terms}
     if len(ids) < 2:

@@ -106,18 +106,7 @@ def ranked_curves(
 ) -> list[Curve]:
     """Best curve of every place and variable, that of the largest net decrease of χ² first.
 
-    Parameters
-    ----------
-    regression
-        Regression problem.
-    partial
-        Residual to which curves are fitted.
-    outputs
-        Outputs of which a curve must change one.
-    penalty_per_parameter
-        Penalty per parameter, ln n.
-    only
-        Places and variables of the curves; None for all.
+    ``penalty_per_parameter``: penalty per parameter, ln n. ``only``: None for all.
     """
     families = curves(regression, outputs, only)
     found = _fitted(regression, partial, families, penalty_per_parameter)

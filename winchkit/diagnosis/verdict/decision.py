@@ -55,20 +55,9 @@ def verdict_of(
 ) -> Verdict:
     """Verdict by the table of the errors.
 
-    Parameters
-    ----------
-    outputs
-        Errors by output, of the profile's file and of the final model.
-    steps
-        Number of steps of the final model.
-    noise_known
-        Whether the noise is that of repeats or of instruments, and not a lower bound.
-    deciding
-        Outputs that vary by more than their noise.
-    refuted
-        Outputs that the final model predicts worse than each run's own mean does.
-    predictable
-        Whether a free curve or an order predicts a tenth of what remains.
+    ``noise_known``: whether the noise is that of repeats or of instruments, and not a lower bound.
+    ``deciding``: outputs that vary by more than their noise. ``predictable``: whether a free curve
+    or an order predicts a tenth of what remains.
     """
     counted = {name: output for name, output in outputs.items() if name in deciding}
     at_noise = bool(counted) and all(map(is_at_noise, counted.values()))
@@ -155,17 +144,6 @@ def measured(
 ) -> Measured:
     """Outputs that decide on a model, and those that refute it.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    before, final
-        The profile's file and the final model.
-    noise
-        Noise variance.
-    outputs
-        Errors by output.
-
     Notes
     -----
     An output above its noise refutes the model where each run's own mean predicts it better, beyond
@@ -225,19 +203,7 @@ def output_fits(
 ) -> dict[str, OutputFit]:
     """Errors of every output before and after, in sample and held out, with its noise.
 
-    Parameters
-    ----------
-    engine
-        Data, candidates and folds of the search.
-    initial_model, final
-        Fit and noise of the initial and of the final model.
-    folds
-        Folds of the held-out errors; None for those that suit the final fit.
-
-    Returns
-    -------
-    dict
-        By output; rms in SI.
+    ``folds``: None for those that suit the final fit. Returns: by output; rms in SI.
     """
     regression, folds = engine.regression, folds or engine.folds(*final)
     assert isinstance(regression, TimeSeriesRegression)

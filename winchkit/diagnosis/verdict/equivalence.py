@@ -90,20 +90,6 @@ def equivalence_set(
 ) -> EquivalenceSet:
     """Equivalence set of one term of the final model.
 
-    Parameters
-    ----------
-    engine
-        Data, candidates and folds of the search.
-    final, noise
-        Final fit and its noise.
-    index
-        Of the term in the hypothesis.
-
-    Returns
-    -------
-    EquivalenceSet
-        Members with their fits.
-
     Notes
     -----
     All fits are compared under the larger of the noise and of the final model's residual, per band

@@ -32,20 +32,8 @@ def fit_statistics(
 ) -> FitStatistics | None:
     """Statistics of a fit; None without unknowns.
 
-    Parameters
-    ----------
-    regression
-        The data and the model.
-    initial
-        The profile's own effects, refitted.
-    fit
-        The reported model: the effects of ``initial``, then the named ones.
-    noise
-        Noise variance of the reported model.
-    spread
-        Uncertainty of its unknowns.
-    profile
-        Profile of the winch, for plausible ranges that are relative to one of its numbers.
+    ``fit``: the reported model: the effects of ``initial``, then the named ones. ``profile``:
+    profile of the winch, for plausible ranges that are relative to one of its numbers.
 
     Notes
     -----

@@ -33,22 +33,7 @@ def simplified(
     noise: Noise,
     settled: Callable[[Fit], Fit] = lambda fitted: fitted,
 ) -> tuple[Fit, Noise]:
-    """The model with the simplest laws, and without steps by which nothing is gained.
-
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    final, noise
-        Model with which the search ended.
-    settled
-        Fits further nuisance parameters of a model.
-
-    Returns
-    -------
-    tuple
-        Model and noise, the given ones where nothing changed.
-    """
+    """The model with the simplest laws, and without steps by which nothing is gained."""
     present = _with_simpler_laws(engine, final, noise, settled)
     while (without := _without_needless(engine, present, noise)) is not None:
         present = without

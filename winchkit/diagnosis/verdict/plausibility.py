@@ -26,14 +26,8 @@ def implausible(
 ) -> str | None:
     """Reason why the values of an effect are implausible; None where they are plausible.
 
-    Parameters
-    ----------
-    term
-        The effect.
-    values
-        Its fitted values.
-    profile
-        Profile of the winch, for ranges that are relative to one of its numbers; None for a robot.
+    ``profile``: profile of the winch, for ranges that are relative to one of its numbers; None for
+    a robot.
 
     Notes
     -----

@@ -37,21 +37,7 @@ def refitted_steps(
     outputs: Mapping[str, OutputFit],
     spread: Spread,
 ) -> Iterator[Step]:
-    """A step for every effect of the profile whose file values predict an output worse by 2 %.
-
-    Parameters
-    ----------
-    engine
-        Selection engine.
-    result
-        Result of the selection; all values of its final model are fitted.
-    file
-        Effects of the profile at their file values.
-    outputs
-        Errors of the file and of the final model.
-    spread
-        Uncertainty of the unknowns of the final model.
-    """
+    """A step for every effect of the profile whose file values predict an output worse by 2 %."""
     final, noise, regression = result.final, result.noise, engine.regression
     folds = engine.folds(final, noise)
     now = held_out_rms(regression, final, noise, folds)

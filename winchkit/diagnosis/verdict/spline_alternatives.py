@@ -133,14 +133,7 @@ def _ends(name: str, values: Sequence[Array]) -> tuple[float, float] | None:
 def linear_splines(values: Array, knots: Array) -> Array:
     """Linear B-splines over equidistant knots, which add up to one.
 
-    Parameters
-    ----------
-    values : (n,) array
-    knots : (k,) array
-
-    Returns
-    -------
-    (k, n) array
+    ``values`` (n,). ``knots`` (k,). Returns: (k, n).
     """
     at = np.clip((values - knots[0]) / (knots[1] - knots[0]), 0.0, len(knots) - 1.0)
     cell = np.minimum(at.astype(np.intp), len(knots) - 2)

@@ -34,18 +34,9 @@ class Consistency:
     def take(self, sound: bool, order: bool | None) -> bool | None:
         """Evaluate the next reading.
 
-        Parameters
-        ----------
-        sound : bool
-            Whether the value agrees with the status.
-        order : bool, optional
-            True where only this word order gives a possible value, False where the other one gives
-            a smaller value, None where both are alike.
-
-        Returns
-        -------
-        bool or None
-            True: the value is accepted; False: it is flagged; None: not decided yet, no reading.
+        ``order``: True where only this word order gives a possible value, False where the other one
+        gives a smaller value, None where both are alike. Returns: True: the value is accepted;
+        False: it is flagged; None: not decided yet, no reading.
         """
         self.order_known |= sound and order is True
         if order is False and not self.order_known:

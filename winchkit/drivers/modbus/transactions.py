@@ -35,12 +35,7 @@ class Transactions:
     def note(self, block: bytes, data: bytes) -> None:
         """Keep what the newest answer holds.
 
-        Parameters
-        ----------
-        block : bytes
-            What was asked for; its answer before is forgotten.
-        data : bytes
-            The answer behind unit and function.
+        ``data``: the answer behind unit and function.
         """
         for first in self._begin.get(block, b""):
             self._held[first] -= 1

@@ -51,22 +51,9 @@ def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSp
     V is the inverse of the Cholesky factor of Aᵀ A, so that the rows are NaN at poses where a force
     is missing or the cables do not hold all six degrees of freedom.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    pose : Pose
-        The p poses.
-    tension : (p, n) array
-        Measured cable forces, N.
-    platform : PlatformSpec
-        Mass and centre of mass.
-
-    Returns
-    -------
-    Constraint
-        ``by_robot`` has ``payload``: by mass and centre of mass, (p, 6, 4), and ``tension``: by
-        cable forces, (p, 6, n).
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): measured cable
+    forces, N. Returns: ``by_robot`` has ``payload``: by mass and centre of mass, (p, 6, 4), and
+    ``tension``: by cable forces, (p, 6, n).
     """
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     spread = structure @ np.swapaxes(structure, 1, 2)
@@ -83,19 +70,8 @@ def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSp
 def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:
     """Wrench Aᵀ f + w that cable forces and weight leave over, (p, 6), N and N m.
 
-    Parameters
-    ----------
-    structure : (p, 6, n) array
-        Structure matrices Aᵀ.
-    tension : (p, n) array
-        Cable forces f, N.
-    weight : (p, 6) array
-        Wrench w of the weight, N and N m.
-
-    Returns
-    -------
-    (p, 6) array
-        N and N m.
+    ``structure`` (p, 6, n): structure matrices Aᵀ. ``tension`` (p, n): cable forces f, N.
+    ``weight`` (p, 6): wrench w of the weight, N and N m. Returns (p, 6): N and N m.
     """
     return np.asarray((structure @ tension[..., None])[..., 0] + weight)
 
@@ -103,19 +79,11 @@ def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:
 def force_basis(structure: Array) -> tuple[Array, Array]:
     """Matrices from a wrench to whitened forces, and from these to cable forces.
 
-    Parameters
-    ----------
-    structure : (p, 6, n) array
-        Structure matrices Aᵀ = U S Wᵀ (singular value decomposition).
-
-    Returns
-    -------
-    to_forces : (p, k, 6) array
-        V = S⁻¹ Uᵀ with k = min(6, n): a whitening as in :func:`balance`, from which it differs
-        by an orthogonal matrix. A row is NaN where the cables cannot carry its wrench, so that
-        robots of fewer than six cables keep the rows that they do carry.
-    to_cables : (p, n, k) array
-        W: the least change of cable forces that carries each of these forces.
+    ``structure`` (p, 6, n): structure matrices Aᵀ = U S Wᵀ (singular value decomposition). Returns:
+    ``to_forces`` (p, k, 6): V = S⁻¹ Uᵀ with k = min(6, n): a whitening as in :func:`balance`, from
+    which it differs by an orthogonal matrix. A row is NaN where the cables cannot carry its wrench,
+    so that robots of fewer than six cables keep the rows that they do carry. ``to_cables``
+    (p, n, k): W: the least change of cable forces that carries each of these forces.
     """
     good = np.all(np.isfinite(structure), axis=(1, 2))
     left, size, right = np.linalg.svd(
@@ -136,18 +104,8 @@ def hanging_residual(
 ) -> Array:
     """Residuals of :func:`hanging_balance` without their derivatives, (p, 6), N.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    pose : Pose
-        The p poses.
-    tension : (p, n) array
-        Cable forces, N; NaN where missing.
-    platform : PlatformSpec
-        Mass and centre of mass.
-    inertial : (p, 6) array or float
-        Wrench of inertial forces, N and N m; zero at rest.
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): cable forces, N;
+    NaN where missing. ``inertial`` (p, 6): wrench of inertial forces, N and N m; zero at rest.
     """
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     weight = gravity_wrench(platform, pose.rotation) + inertial
@@ -169,24 +127,10 @@ def hanging_balance(
 ) -> Constraint:
     """Wrench of measured cable forces and weight, (p, 6), N.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    pose : Pose
-        The p poses.
-    tension : (p, n) array
-        Measured cable forces, N; NaN where missing.
-    platform : PlatformSpec
-        Mass and centre of mass.
-    inertial : (p, 6) array or float
-        Wrench of inertial forces, N and N m; zero at rest.
-
-    Returns
-    -------
-    Constraint
-        ``by_robot`` has ``payload``, (p, 6, 4), ``tension``, (p, 6, n), ``exit_point`` and
-        ``anchor_point``, (p, 6, 3 n), and ``swivel_radius``, (p, 6, n).
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): measured cable
+    forces, N; NaN where missing. ``inertial`` (p, 6): wrench of inertial forces, N and N m; zero at
+    rest. Returns: ``by_robot`` has ``payload``, (p, 6, 4), ``tension``, (p, 6, n), ``exit_point``
+    and ``anchor_point``, (p, 6, 3 n), and ``swivel_radius``, (p, 6, n).
     """
     scale = _scale(geometry)
 

@@ -103,12 +103,8 @@ class Winding:
     def wound(self, radius: Array, growth: Array | float) -> Array:
         """Cable wound in since home, (p, n), m.
 
-        Parameters
-        ----------
-        radius : (n,) array
-            Winding radii, m.
-        growth : float or (n,) array
-            Growth of the winding radius per turn, m.
+        ``radius`` (n,): winding radii, m. ``growth`` (n,): growth of the winding radius per turn,
+        m.
         """
         return np.hypot(radius, self.lead) * self.turned + growth * self.gain + self.rest
 
@@ -130,17 +126,8 @@ class Strain:
 def winding_of(winches: Sequence[WinchProfile], motor_angle: Array) -> Winding:
     """Separate the winding laws of a robot's drums into the terms of :class:`Winding`.
 
-    Parameters
-    ----------
-    winches : sequence of n WinchProfile
-        Winches of the lines.
-    motor_angle : (p, n) array
-        Motor angles, rad.
-
-    Returns
-    -------
-    Winding
-        Exact for any winding radius and growth of the same law.
+    ``motor_angle`` (p, n): motor angles, rad. Returns: exact for any winding radius and growth of
+    the same law.
     """
     turned, gain, rest = (np.zeros_like(motor_angle) for _ in range(3))
     lead = np.zeros(len(winches))
@@ -169,21 +156,9 @@ def closure_residual(
 ) -> Array:
     """Residuals of the closure equations.
 
-    Parameters
-    ----------
-    length : (p, n) array
-        Geometric lengths, m.
-    by_drum : (p, n) array
-        Unstrained lengths by the drums, m; strained ones where ``strain`` is left at zero.
-    strain : (p, n) array or float
-        Strains against home.
-    dead_length : (n,) array or float
-        Stressed cable between drum and exit point, m.
-
-    Returns
-    -------
-    (p, n) array
-        m.
+    ``length`` (p, n): geometric lengths, m. ``by_drum`` (p, n): unstrained lengths by the drums, m;
+    strained ones where ``strain`` is left at zero. ``strain`` (p, n). ``dead_length`` (n,):
+    stressed cable between drum and exit point, m. Returns (p, n): m.
     """
     return np.asarray(length - strain * (length + dead_length) - by_drum)
 
@@ -201,28 +176,11 @@ def closure(
 ) -> Constraint:
     """Closure equations with derivatives by pose, geometry and drums.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Of n lines.
-    pose, home : Pose
-        The p poses and the home pose.
-    by_drum : (p, n) array
-        Unstrained lengths by the drums with this geometry's lengths at home, m.
-    winding : Winding
-        Of the motor angles at the poses.
-    radius : (n,) array
-        Winding radii, m.
-    strain : Strain, optional
-        Strains of the cables; none of them are strained where it is left out.
-    dead_length : (n,) array or float
-        Stressed cable between drum and exit point, m.
-
-    Returns
-    -------
-    Constraint
-        ``by_line`` has ``exit_point``, ``anchor_point``, ``swivel_radius``, ``winding_radius`` and
-        ``home_length``; ``by_robot`` has ``layer_growth`` and what the strain depends on.
+    ``geometry``: of n lines. ``pose``, ``home``: the p poses and the home pose. ``by_drum`` (p, n):
+    unstrained lengths by the drums with this geometry's lengths at home, m. ``radius`` (n,):
+    winding radii, m. ``dead_length`` (n,): stressed cable between drum and exit point, m. Returns:
+    ``by_line`` has ``exit_point``, ``anchor_point``, ``swivel_radius``, ``winding_radius`` and
+    ``home_length``; ``by_robot`` has ``layer_growth`` and what the strain depends on.
     """
     length, by = linearised(geometry, pose.position, pose.rotation)
     at_home = sensitivities(geometry, home.position, home.rotation)
@@ -241,16 +199,8 @@ def closure_by_geometry(
 ) -> tuple[dict[str, Array], dict[str, Array]]:
     """Derivatives of the closure equations by the numbers of each line and by those of all lines.
 
-    Parameters
-    ----------
-    by, at_home : Sensitivities
-        Of the geometric lengths at the p poses and at the home pose.
-    winding : Winding
-        Of the motor angles at the poses.
-    radius : (n,) array
-        Winding radii, m.
-    slack : (p, n) array
-        One less the strains.
+    ``by``, ``at_home``: of the geometric lengths at the p poses and at the home pose. ``radius``
+    (n,): winding radii, m. ``slack`` (p, n).
     """
     by_line = {
         "exit_point": by.exit_point * slack[..., None] - at_home.exit_point,
@@ -265,17 +215,8 @@ def closure_by_geometry(
 def position(pose: Pose, measured: Array) -> Constraint:
     """Position of the platform less the measured one, (p, 3), m.
 
-    Parameters
-    ----------
-    pose : Pose
-        The p poses.
-    measured : (p, 3) array
-        Measured positions, m; NaN where missing.
-
-    Returns
-    -------
-    Constraint
-        With residuals (p, 3), m.
+    ``pose``: the p poses. ``measured`` (p, 3): measured positions, m; NaN where missing. Returns:
+    with residuals (p, 3), m.
     """
     by = np.zeros((len(measured), 3, 6))
     by[:, range(3), range(3)] = 1.0
@@ -285,12 +226,8 @@ def position(pose: Pose, measured: Array) -> Constraint:
 def rotation(pose: Pose, angles: Array) -> Constraint:
     """Rotation of the platform less the measured one, (p, 3), rad.
 
-    Parameters
-    ----------
-    pose : Pose
-        The p poses.
-    angles : (p, 3) array
-        Measured roll, pitch and yaw, rad; NaN where one was not measured.
+    ``pose``: the p poses. ``angles`` (p, 3): measured roll, pitch and yaw, rad; NaN where one was
+    not measured.
     """
     return Constraint(
         rotation_residual(pose.rotation, angles), rotation_by_pose(pose.rotation, angles)
@@ -300,17 +237,8 @@ def rotation(pose: Pose, angles: Array) -> Constraint:
 def rotation_residual(turned: Array, angles: Array) -> Array:
     """Rotation vector where all three angles were measured, else angle by angle; (p, 3), rad.
 
-    Parameters
-    ----------
-    turned : (p, 3, 3) array
-        Rotations R.
-    angles : (p, 3) array
-        Measured roll, pitch and yaw, rad; NaN where missing.
-
-    Returns
-    -------
-    (p, 3) array
-        rad.
+    ``turned`` (p, 3, 3): rotations R. ``angles`` (p, 3): measured roll, pitch and yaw, rad; NaN
+    where missing. Returns (p, 3): rad.
     """
     whole = np.all(np.isfinite(angles), axis=1)
     out = wrapped(angles_of(turned) - angles)
@@ -322,17 +250,8 @@ def rotation_residual(turned: Array, angles: Array) -> Array:
 def rotation_by_pose(turned: Array, angles: Array) -> Array:
     """Derivative of :func:`rotation_residual` by position and rotation vector, (p, 3, 6).
 
-    Parameters
-    ----------
-    turned : (p, 3, 3) array
-        Rotations R.
-    angles : (p, 3) array
-        Measured roll, pitch and yaw, rad; NaN where missing.
-
-    Returns
-    -------
-    (p, 3, 6) array
-        Derivatives.
+    ``turned`` (p, 3, 3): rotations R. ``angles`` (p, 3): measured roll, pitch and yaw, rad; NaN
+    where missing. Returns: (p, 3, 6).
     """
     out = np.zeros((len(turned), 3, 6))
     out[..., 3:] = angle_rates(turned)
@@ -345,21 +264,8 @@ def swivel_residual(
 ) -> Array:
     """Angles of the swivel pulleys plus their instruments' zeros less readings, (p, n), rad.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    pose : Pose
-        The p poses.
-    measured : (p, n) array
-        Readings, rad; NaN where missing.
-    zero : (n,) array or float
-        Zeros of the instruments, rad.
-
-    Returns
-    -------
-    (p, n) array
-        rad, within ±π.
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``measured`` (p, n): readings, rad;
+    NaN where missing. ``zero`` (n,): zeros of the instruments, rad. Returns (p, n): rad, within ±π.
     """
     return wrapped(swivel_angle(geometry, pose.position, pose.rotation) + zero - measured)
 
@@ -369,21 +275,9 @@ def swivel(
 ) -> Constraint:
     """:func:`swivel_residual` with derivatives by pose, geometry and ``swivel_zero``.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    pose : Pose
-        The p poses.
-    measured : (p, n) array
-        Readings, rad; NaN where missing.
-    zero : (n,) array or float
-        Zeros of the instruments, rad.
-
-    Returns
-    -------
-    Constraint
-        With residuals (p, n), rad.
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``measured`` (p, n): readings, rad;
+    NaN where missing. ``zero`` (n,): zeros of the instruments, rad. Returns: with residuals (p, n),
+    rad.
     """
     by = swivel_sensitivities(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "swivel_zero": np.ones_like(measured)}
@@ -397,21 +291,9 @@ def cable_length(
 
     ``by_line`` has the geometry and ``length_offset``.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    pose : Pose
-        The p poses.
-    measured : (p, n) array
-        Readings, m; NaN where missing.
-    offset : (n,) array or float
-        Offsets of the instruments, m.
-
-    Returns
-    -------
-    Constraint
-        With residuals (p, n), m.
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``measured`` (p, n): readings, m; NaN
+    where missing. ``offset`` (n,): offsets of the instruments, m. Returns: with residuals (p, n),
+    m.
     """
     length, by = linearised(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "length_offset": np.ones_like(measured)}
@@ -421,12 +303,8 @@ def cable_length(
 def mean_offset(residual: Array, *, angles: bool) -> Array:
     """Offset of each line's instrument that makes its mean residual zero, (n,).
 
-    Parameters
-    ----------
-    residual : (p, n) array
-        NaN where nothing was measured; a line without measurements gets zero.
-    angles : bool
-        Whether residuals are angles, rad, whose mean is the circular one.
+    ``residual`` (p, n): NaN where nothing was measured; a line without measurements gets zero.
+    ``angles``: whether residuals are angles, rad, whose mean is the circular one.
     """
     known = np.isfinite(residual)
     values = np.where(known, residual, 0.0)
@@ -438,15 +316,7 @@ def mean_offset(residual: Array, *, angles: bool) -> Array:
 def by_pose(by: Sensitivities) -> Array:
     """Derivatives by position and rotation vector beside each other, (p, n, 6).
 
-    Parameters
-    ----------
-    by : Sensitivities
-        Derivatives of a quantity per line.
-
-    Returns
-    -------
-    (p, n, 6) array
-        Position, then rotation vector.
+    ``by``: derivatives of a quantity per line. Returns: (p, n, 6).
     """
     return np.concatenate([by.position, by.rotation], axis=-1)
 
@@ -459,15 +329,8 @@ def wrapped(angle: Array) -> Array:
 def by_geometry(by: Sensitivities) -> dict[str, Array]:
     """Derivatives by each line's own points and swivel radius, by name.
 
-    Parameters
-    ----------
-    by : Sensitivities
-        Derivatives of a quantity per line.
-
-    Returns
-    -------
-    dict
-        Arrays by ``exit_point``, ``anchor_point`` and ``swivel_radius``.
+    ``by``: derivatives of a quantity per line. Returns: arrays by ``exit_point``, ``anchor_point``
+    and ``swivel_radius``.
     """
     return {
         "exit_point": by.exit_point,

@@ -116,17 +116,7 @@ def motion_of(time: Array, pose: Pose) -> PlatformMotion:
 def mass_matrix(platform: PlatformSpec, rotation: Array) -> Array:
     """Mass matrix M of the platform about its origin, base axes, (k, 6, 6).
 
-    Parameters
-    ----------
-    platform : PlatformSpec
-        Without a moment of inertia its mass is concentrated in its centre of mass.
-    rotation : (k, 3, 3) array
-        From platform to base axes.
-
-    Returns
-    -------
-    (k, 6, 6) array
-        kg, kg m and kg m².
+    ``rotation`` (k, 3, 3): from platform to base axes. Returns (k, 6, 6): kg, kg m and kg m².
     """
     lever = skew(rotation @ np.asarray(platform.center_of_mass, dtype=float))
     mass = platform.mass
@@ -164,26 +154,10 @@ def dynamic_wrench(platform: PlatformSpec, motion: PlatformMotion) -> Array:
 def accelerations(platform: PlatformSpec, rotation: Array, velocity: Array, wrench: Array) -> Array:
     """Forward dynamics: acceleration of the platform under a wrench beside its weight.
 
-    Parameters
-    ----------
-    platform : PlatformSpec
-        With mass and moment of inertia.
-    rotation : (k, 3, 3) array
-        From platform to base axes.
-    velocity : (k, 6) array
-        Of the origin, and angular, base axes, m/s and rad/s.
-    wrench : (k, 6) array
-        On the platform about its origin, N and N m: Aᵀ f of cable forces.
-
-    Returns
-    -------
-    (k, 6) array
-        m/s² and rad/s².
-
-    Raises
-    ------
-    UsageError
-        Without a mass or a moment of inertia.
+    ``rotation`` (k, 3, 3): from platform to base axes. ``velocity`` (k, 6): of the origin, and
+    angular, base axes, m/s and rad/s. ``wrench`` (k, 6): on the platform about its origin, N and N
+    m: Aᵀ f of cable forces. Returns (k, 6): m/s² and rad/s². Raises UsageError without a mass or a
+    moment of inertia.
     """
     if platform.mass <= 0 or platform.inertia is None or min(platform.inertia) <= 0:
         raise UsageError(
@@ -232,22 +206,9 @@ def inverse_dynamics(
 def sag(length: Array, span: Array, force: Array, mass_per_length: float) -> Array:
     """Difference of a sagging cable's length and its chord, m.
 
-    Parameters
-    ----------
-    length : array
-        Of the chord, m.
-    span : array
-        Its horizontal projection, m.
-    force : array
-        Along the chord, N.
-    mass_per_length : float
-        kg/m.
-
-    Returns
-    -------
-    array
-        (μ g h)² l / (24 f²), the parabola. For a level cable the next term of the catenary is
-        (μ g l / f)² / 80 of it.
+    ``length``: of the chord, m. ``span``: its horizontal projection, m. ``force``: along the chord,
+    N. ``mass_per_length``: kg/m. Returns: (μ g h)² l / (24 f²), the parabola. For a level cable the
+    next term of the catenary is (μ g l / f)² / 80 of it.
     """
     return np.asarray((mass_per_length * GRAVITY * span) ** 2 * length / (24 * force**2))
 

@@ -23,21 +23,10 @@ _LEAST_SLOPE = 0.1
 def strain_of(law: str, values: Array, tension: Array) -> tuple[Array, Array]:
     """Strain at tensions, and its derivatives by the law's parameters.
 
-    Parameters
-    ----------
-    law : str
-        ``cable-elongation-linear``, ``-quartic`` or ``-exponential``.
-    values : (m,) array
-        Linear: c, 1/N. Quartic: c, 1/N, b₂, b₃, b₄. Exponential: s, T₀, N.
-    tension : array
-        N, any shape; a slack cable (negative tension) has no strain.
-
-    Returns
-    -------
-    strain : array
-        Of the shape of ``tension``.
-    by_values : array
-        Of the same shape with a last axis of m.
+    ``law``: ``cable-elongation-linear``, ``-quartic`` or ``-exponential``. ``values`` (m,): linear:
+    c, 1/N. Quartic: c, 1/N, b₂, b₃, b₄. Exponential: s, T₀, N. ``tension``: N, any shape; a slack
+    cable (negative tension) has no strain. Returns: ``strain``: of the shape of ``tension``;
+    ``by_values``: of the same shape with a last axis of m.
     """
     force = np.maximum(tension, 0.0)
     if law == "cable-elongation-linear":

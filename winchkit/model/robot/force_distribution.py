@@ -288,15 +288,7 @@ def steepest_force(force: Array, distance: Array) -> float:
 def null_space(structure: Array) -> Array:
     """Orthonormal basis of the cable forces that balance each other.
 
-    Parameters
-    ----------
-    structure : (6, n) array
-        Structure matrix Aᵀ.
-
-    Returns
-    -------
-    (n, n − rank) array
-        Null space of Aᵀ.
+    ``structure`` (6, n): structure matrix Aᵀ. Returns (n, n − rank): null space of Aᵀ.
     """
     _, values, right = np.linalg.svd(structure)
     rank = int(np.sum(values > _RANK * values[0]))

@@ -63,25 +63,10 @@ def cable_forces(
 ) -> Array:
     """Forces of elastic cables, (p, n), N; zero where slack.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    cables : ElasticCables
-        Stiffness and damping.
-    pose : Pose
-        The p poses.
-    velocity : (p, 6) array
-        Of the platform's origin, and angular, m/s and rad/s.
-    unstrained : (n,) or (p, n) array
-        Lengths L0 without force, m.
-    rate : (n,) or (p, n) array
-        Their derivatives by time, m/s; zero for winches at rest.
-
-    Returns
-    -------
-    (p, n) array
-        N.
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``velocity`` (p, 6): of the platform's
+    origin, and angular, m/s and rad/s. ``unstrained`` (n,) or (p, n): lengths L0 without force, m.
+    ``rate`` (n,) or (p, n): their derivatives by time, m/s; zero for winches at rest. Returns
+    (p, n): N.
     """
     there = lengths(geometry, pose.position, pose.rotation)
     stiffness = cables.axial_stiffness / (unstrained + cables.dead_length)

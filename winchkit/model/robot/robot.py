@@ -301,21 +301,7 @@ def standing(
 ) -> At:
     """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default.
 
-    Parameters
-    ----------
-    line : Line
-        The line.
-    motor_angle : (n,) array
-        rad.
-    tension : (n,) array, optional
-        N.
-    temperature : (n,) array, optional
-        Degrees Celsius.
-
-    Returns
-    -------
-    At
-        Inputs of modifiers.
+    ``motor_angle`` (n,): rad. ``tension`` (n,): N. ``temperature`` (n,).
     """
     zero = np.zeros_like(motor_angle)
     pulled = zero if tension is None else tension

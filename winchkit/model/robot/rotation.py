@@ -69,15 +69,7 @@ def angles_of(rotation: ArrayLike) -> Array:
 def skew(vector: ArrayLike) -> Array:
     """[v]× with [v]× w = v × w, of vectors (..., 3); returns (..., 3, 3).
 
-    Parameters
-    ----------
-    vector : array_like, (..., 3)
-        Vectors v.
-
-    Returns
-    -------
-    (..., 3, 3) array
-        [v]×.
+    ``vector`` (..., 3): vectors v. Returns (..., 3, 3): [v]×.
     """
     v = np.asarray(vector, dtype=float)
     out = np.zeros((*v.shape, 3))
@@ -89,15 +81,7 @@ def skew(vector: ArrayLike) -> Array:
 def rotation_by(vector: ArrayLike) -> Array:
     """exp([ω]×) of rotation vectors (..., 3), rad (Rodrigues); returns (..., 3, 3).
 
-    Parameters
-    ----------
-    vector : array_like, (..., 3)
-        Rotation vectors ω, rad.
-
-    Returns
-    -------
-    (..., 3, 3) array
-        Rotations.
+    ``vector`` (..., 3): rotation vectors ω, rad. Returns: (..., 3, 3).
     """
     v = np.asarray(vector, dtype=float)
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
@@ -123,15 +107,7 @@ def mean_rotation(rotation: Array) -> Array:
 def rotation_vector(rotation: ArrayLike) -> Array:
     """The rotation vector of rotations (..., 3, 3), at most π long; returns (..., 3), rad.
 
-    Parameters
-    ----------
-    rotation : array_like, (..., 3, 3)
-        Rotations.
-
-    Returns
-    -------
-    (..., 3) array
-        rad, of length at most π.
+    ``rotation`` (..., 3, 3). Returns (..., 3): rad, of length at most π.
     """
     q = quaternion_of(rotation)
     sine = np.linalg.norm(q[..., 1:], axis=-1)
@@ -144,15 +120,8 @@ def rotation_vector(rotation: ArrayLike) -> Array:
 def rotation_rates(vector: Array, first: Array, second: Array) -> tuple[Array, Array]:
     """Angular velocity and acceleration of R = exp([φ]×) R0 with a changing rotation vector φ.
 
-    Parameters
-    ----------
-    vector, first, second : (..., 3) array
-        φ, rad, and its derivatives by any parameter.
-
-    Returns
-    -------
-    velocity, acceleration : (..., 3) array
-        ω with dR = [ω]× R, base axes, and its derivative.
+    ``vector``, ``first``, ``second`` (..., 3): φ, rad, and its derivatives by any parameter.
+    Returns (..., 3): ω with dR = [ω]× R, base axes, and its derivative.
 
     Notes
     -----
@@ -188,15 +157,7 @@ def rotation_rates(vector: Array, first: Array, second: Array) -> tuple[Array, A
 def rotation_from_quaternion(quaternion: ArrayLike) -> Array:
     """Rotations of quaternions (..., 4) as w, x, y, z, of any length but zero; (..., 3, 3).
 
-    Parameters
-    ----------
-    quaternion : array_like, (..., 4)
-        w, x, y, z, of any length except zero.
-
-    Returns
-    -------
-    (..., 3, 3) array
-        Rotations.
+    ``quaternion`` (..., 4): w, x, y, z, of any length except zero. Returns: (..., 3, 3).
     """
     q = np.asarray(quaternion, dtype=float)
     q = q / np.linalg.norm(q, axis=-1, keepdims=True)

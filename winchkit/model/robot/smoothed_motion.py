@@ -32,17 +32,7 @@ class SmoothedMotion(NamedTuple):
 def smoothed_motion(spline: SmoothingSpline, pose: Pose) -> SmoothedMotion:
     """Smooth sampled poses and differentiate them twice.
 
-    Parameters
-    ----------
-    spline : SmoothingSpline
-        Over the times of the poses.
-    pose : Pose
-        k poses.
-
-    Returns
-    -------
-    SmoothedMotion
-        Of k samples.
+    ``pose``: k poses. Returns: of k samples.
     """
     start = pose.rotation[0]
     raw = np.hstack([pose.position, rotation_vector(pose.rotation @ start.T)])

@@ -42,24 +42,7 @@ def require_png() -> None:
 def write_figures(figures: Iterable[Figure], folder: Path, prefix: str = "") -> list[Path]:
     """Write every figure as SVG, PNG and CSV.
 
-    Parameters
-    ----------
-    figures : iterable of Figure
-        The figures.
-    folder : Path
-        Created where its parent exists.
-    prefix : str
-        Start of every file name.
-
-    Returns
-    -------
-    list of Path
-        Written files.
-
-    Raises
-    ------
-    FileError
-        Where a file cannot be written.
+    Raises FileError where a file cannot be written.
     """
     written = []
     try:
@@ -84,18 +67,7 @@ def write_figures(figures: Iterable[Figure], folder: Path, prefix: str = "") -> 
 
 
 def png(figure: Figure) -> bytes:
-    """A figure as PNG at 192 dots per inch, in the light theme on white ground.
-
-    Parameters
-    ----------
-    figure : Figure
-        The figure.
-
-    Returns
-    -------
-    bytes
-        The file.
-    """
+    """A figure as PNG at 192 dots per inch, in the light theme on white ground."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as Canvas
 

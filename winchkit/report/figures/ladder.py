@@ -36,23 +36,7 @@ def error_ladder(
     changed: str = "with the effect",
     source: str = "",
 ) -> Figure | None:
-    """The ladder of one winch; the worst output first, None where no noise is known.
-
-    Parameters
-    ----------
-    outputs : mapping
-        Errors by output.
-    extended : bool
-        Whether the model was changed, so that there is an error after it.
-    changed : str
-        Name of the changed model.
-    source : str
-        Profile, runs and version, for files.
-
-    Returns
-    -------
-    Figure or None
-    """
+    """The ladder of one winch; the worst output first, None where no noise is known."""
     rows = [
         row
         for name in worst_outputs(outputs)

@@ -111,21 +111,7 @@ class _Build:
 
 
 def scene_of(figure: Figure, width: float = WIDE, *, source: bool = False) -> Scene:
-    """The layout of a figure.
-
-    Parameters
-    ----------
-    figure : Figure
-        The data.
-    width : float
-        Width, px.
-    source : bool
-        Whether the profile, the runs and the version are printed below, as in files.
-
-    Returns
-    -------
-    Scene
-    """
+    """The layout of a figure."""
     build = _Build(width)
     left, right = _left(figure), width - _MARGIN_RIGHT
     down = _head(build, figure)

@@ -29,19 +29,10 @@ _FEW = 5
 def decimated(series: Sequence[Array], intervals: int) -> NDArray[np.intp]:
     """Indices of the samples that a drawing keeps: the extremes of every interval.
 
-    Parameters
-    ----------
-    series : sequence of (n,) array
-        Signals over one variable; NaN where missing.
-    intervals : int
-        Number of intervals of equal counts.
-
-    Returns
-    -------
-    (m,) array of int
-        Sorted; the minimum and the maximum of every series in every interval, a missing sample of
-        an interval without any value, and the first and the last sample. All samples where these
-        are fewer.
+    ``series``, sequence of (n,) array: NaN where missing. ``intervals``: number of intervals of
+    equal counts. Returns (m,) of int: sorted; the minimum and the maximum of every series in every
+    interval, a missing sample of an interval without any value, and the first and the last sample.
+    All samples where these are fewer.
     """
     count = len(series[0])
     if count <= 2 * intervals * len(series):

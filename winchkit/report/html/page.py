@@ -26,21 +26,8 @@ _FILES = ("PNG", "SVG", "CSV")
 def page(title: str, figures: Sequence[Figure], *content: Markup, headed: bool = True) -> str:
     """A whole page: title, content, and the data of its figures.
 
-    Parameters
-    ----------
-    title : str
-        Title of the document.
-    figures : sequence of Figure
-        Figures that the content shows by :func:`figure_block`.
-    *content : Markup
-        Sections.
-    headed : bool
-        Whether the title is the heading; else the content has its own.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
+    ``figures``: figures that the content shows by :func:`figure_block`. ``headed``: else the
+    content has its own.
     """
     day = element("p", f"winchkit, {date.today()}", class_="quiet")
     head = [element("header", element("h1", title), day)] if headed else []

@@ -16,18 +16,7 @@ _LEFT_OUT = {"name", "description", "ledger", "effect", "rules"}
 
 
 def declared_rows(profile: Any) -> list[list[str]]:
-    """Parts of a profile with the values that differ from the defaults, a row each.
-
-    Parameters
-    ----------
-    profile : WinchProfile, AxisProfile or RobotProfile
-        The profile.
-
-    Returns
-    -------
-    list of list of str
-        Name of the part and its values in words.
-    """
+    """Parts of a profile with the values that differ from the defaults, a row each."""
     rows = []
     for field in dataclasses.fields(profile):
         if field.name in _LEFT_OUT or not field.init:

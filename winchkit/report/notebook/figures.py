@@ -46,19 +46,8 @@ def result_figure(
 ) -> Figure:
     """Measured and predicted over time with the residual and the noise band below.
 
-    Parameters
-    ----------
-    result : Comparison or Diagnosis
-        Of a winch; of a robot the errors at every pose are drawn.
-    output, run : str or sequence of str, optional
-        Those to draw; by default all, runs one after the other.
-    figsize : (float, float), optional
-        Width and height, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Two axes per output.
+    ``output``, ``run``: by default all, runs one after the other. ``figsize``: width and height,
+    inches. Returns: two axes per output.
     """
     traces = _chosen(result.traces, output, run)
     noise = {name: fit.noise_rms for name, fit in result.outputs.items()}
@@ -94,19 +83,8 @@ def run_figure(
 ) -> Figure:
     """Channels of a run over time.
 
-    Parameters
-    ----------
-    run : Run
-        The run.
-    channels : str or sequence of str, optional
-        Those to draw; by default the first eight with numbers.
-    figsize : (float, float), optional
-        Width and height, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One axis per channel.
+    ``channels``: by default the first eight with numbers. ``figsize``: width and height, inches.
+    Returns: one axis per channel.
     """
     there = [name for name in run if np.isfinite(run[name]).any()]
     names = there[:_CHANNELS] if channels is None else _known(channels, list(run), "channel")
@@ -129,17 +107,7 @@ def run_figure(
 def calibration_figure(found: Calibrated, *, figsize: Size = None) -> Figure:
     """Pose errors before and after a robot's calibration, of fitted and of held-out poses.
 
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-    figsize : (float, float), optional
-        Width and height, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        Position errors and, where rotations were measured, rotation errors.
+    ``figsize``: width and height, inches.
     """
     sides = [
         ("poses fitted", found.fit_before, found.fit_after),

@@ -25,17 +25,7 @@ _TURN = 2 * np.pi
 def winch_figure(profile: WinchProfile, *, figsize: Size = None) -> Figure:
     """Motor angle, and cable per drum angle, over the cable length.
 
-    Parameters
-    ----------
-    profile : WinchProfile
-        With its effects.
-    figsize : (float, float), optional
-        Width and height, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        From no free cable to that of the reference.
+    ``figsize``: width and height, inches.
     """
     longest = profile.reference.cable_length
     if isinstance(profile, AxisProfile) or not longest:
@@ -61,17 +51,7 @@ def winch_figure(profile: WinchProfile, *, figsize: Size = None) -> Figure:
 def robot_figure(profile: RobotProfile, *, figsize: Size = None) -> Figure:
     """Exit points, and the platform with its cables at the home pose.
 
-    Parameters
-    ----------
-    profile : RobotProfile
-        The robot.
-    figsize : (float, float), optional
-        Width and height, inches.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        One axis in three dimensions, m.
+    ``figsize``: width and height, inches. Returns: one axis in three dimensions, m.
     """
     robot = robot_of(profile)
     exits = robot.geometry.exit_point

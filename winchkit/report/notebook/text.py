@@ -30,20 +30,7 @@ _PROGRAMMES = 5
 
 
 def screen(text: str, more: str = "") -> str:
-    """Text of at most 24 lines; omitted lines are counted.
-
-    Parameters
-    ----------
-    text : str
-        Any number of lines.
-    more : str
-        Where the other lines are.
-
-    Returns
-    -------
-    str
-        The first lines.
-    """
+    """Text of at most 24 lines; omitted lines are counted."""
     lines = text.split("\n")
     if len(lines) <= _LINES:
         return text

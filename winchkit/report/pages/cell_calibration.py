@@ -34,22 +34,7 @@ _MARKS = {"up": "^", "down": "v"}
 
 
 def report_lines(fit: CellFit, points: Sequence[CalibrationPoint], unit: str = "N") -> list[str]:
-    """Coefficients, figures of merit, residuals drawn with characters, warnings.
-
-    Parameters
-    ----------
-    fit : CellFit
-        The fitted calibration.
-    points : sequence of CalibrationPoint
-        Loads and readings.
-    unit : str, optional
-        Of the readings.
-
-    Returns
-    -------
-    list of str
-        Lines of text.
-    """
+    """Coefficients, figures of merit, residuals drawn with characters, warnings."""
     lines = [f"calibration over {fit.span:.5g} N from {len(points)} points:"]
     lines += [
         f"  {name:20}{value:+.6g} ± {std:.2g}"
@@ -131,22 +116,7 @@ _TONES = {"up": "today", "down": "with"}
 def report_page(
     calibration: CellCalibration, fit: CellFit, needed: StaticDiagnosis | None = None
 ) -> str:
-    """Page with the load cell, the fit, the residuals and the points.
-
-    Parameters
-    ----------
-    calibration : CellCalibration
-        The calibration as filed.
-    fit : CellFit
-        The fit.
-    needed : StaticDiagnosis, optional
-        Effects of the cell that the points need.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """Page with the load cell, the fit, the residuals and the points."""
     coefficients = [
         (name, f"{value:.6g}", f"{std:.2g}")
         for name, value, std in zip(
@@ -215,20 +185,7 @@ def _points(points: Sequence[CalibrationPoint], fit: CellFit, unit: str) -> Mark
 
 
 def cell_figures(fit: CellFit, calibration: CellCalibration) -> list[Figure]:
-    """Readings and fit, and the residuals, over the load.
-
-    Parameters
-    ----------
-    fit : CellFit
-        The fit.
-    calibration : CellCalibration
-        The calibration as filed.
-
-    Returns
-    -------
-    list of Figure
-        One figure.
-    """
+    """Readings and fit, and the residuals, over the load."""
     points = calibration.point
     load = np.array([point.load for point in points], dtype=float)
     residual = np.asarray(fit.residuals, dtype=float)

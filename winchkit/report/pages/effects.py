@@ -29,20 +29,7 @@ _MOTION = (
 
 
 def effects_html(effects: Sequence[Effect], title: str) -> str:
-    """The page of one effect, or of a catalogue with its contents first.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-        The effects.
-    title : str
-        Title of the page.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page of one effect, or of a catalogue with its contents first."""
     contents = [_contents(effects)] if len(effects) > 1 else []
     drawn = [_drawing(effect) for effect in effects]
     figures = [figure for own, _ in drawn for figure in own]

@@ -49,19 +49,7 @@ def shared_effects_text(
 
     ``chances`` are those of :func:`winchkit.diagnosis.fleet.meta_analysis.alarms`.
 
-    Parameters
-    ----------
-    found : mapping
-        Diagnosis by winch.
-    shared : sequence of SharedEffect
-        Effects over all winches.
-    chances : mapping
-        Probability of a false alarm by winch.
-
-    Returns
-    -------
-    str
-        Text of 80 columns.
+    ``chances``: probability of a false alarm by winch. Returns: text of 80 columns.
     """
     lines = [f"all {len(found)} winches", *hanging(winch_rows(found, chances), words=2)]
     if shared:
@@ -73,17 +61,7 @@ def shared_effects_text(
 def shared_errors_text(found: Mapping[str, Comparison], shared: Mapping[str, SharedError]) -> str:
     """Comparisons of all winches, a line each, and the common attribution of their errors.
 
-    Parameters
-    ----------
-    found : mapping
-        Comparison by winch.
-    shared : mapping
-        Attribution by output.
-
-    Returns
-    -------
-    str
-        Text of 80 columns.
+    Returns: text of 80 columns.
     """
     lines = [f"all {len(found)} winches", *aligned(error_rows(found))]
     lines += ["", "share of the errors' variance explained by"]
@@ -225,23 +203,7 @@ def shared_effects_html(
 ) -> str:
     """The page over the diagnoses of all winches; ``pages`` are the files of the single ones.
 
-    Parameters
-    ----------
-    found : mapping
-        Diagnosis by winch.
-    shared : sequence of SharedEffect
-        Effects over all winches.
-    chances : mapping
-        Probability of a false alarm by winch.
-    title : str
-        Title of the page.
-    pages : mapping
-        File of each winch's page.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
+    ``chances``: probability of a false alarm by winch.
     """
     plain = winch_rows(found, chances)
     rows = [[_link(name, pages), verdict, unbroken(text)] for name, verdict, text in plain]
@@ -276,24 +238,7 @@ def shared_errors_html(
     title: str,
     pages: Mapping[str, str],
 ) -> str:
-    """The page over the comparisons of all winches, as :func:`shared_effects_html`.
-
-    Parameters
-    ----------
-    found : mapping
-        Comparison by winch.
-    shared : mapping
-        Attribution by output.
-    title : str
-        Title of the page.
-    pages : mapping
-        File of each winch's page.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page over the comparisons of all winches, as :func:`shared_effects_html`."""
     head, *rows = error_rows(found)
     linked = [[_link(name, pages), *cells] for name, *cells in rows]
     texts = [unbroken(text) for text in error_texts(shared)]

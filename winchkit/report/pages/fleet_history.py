@@ -29,19 +29,8 @@ _DAY = 86400.0
 def fleet_history_html(history: FleetHistory, title: str, swapped: Sequence[Swap] = ()) -> str:
     """The page: a row and a figure per change, limits, odd winches, exchanged profiles.
 
-    Parameters
-    ----------
-    history : FleetHistory
-        Changes and differences.
-    title : str
-        Title of the page.
-    swapped : sequence of Swap
-        Winches that have each other's profiles.
-
-    Returns
-    -------
-    str
-        HTML, self-contained; the most significant changes have figures, in the order of winches.
+    Returns: HTML, self-contained; the most significant changes have figures, in the order of
+    winches.
     """
     changed = history.changed
     drawn = sorted(changed[:_MOST_FIGURES], key=lambda pair: (pair[1].winch, pair[0].effect))

@@ -18,20 +18,7 @@ _ROOM = 1.05
 
 
 def ladder_html(name: str, rungs: Sequence[Rung]) -> str:
-    """The page; a step on other runs than the one before starts a new series.
-
-    Parameters
-    ----------
-    name : str
-        Name of the profile.
-    rungs : sequence of Rung
-        Steps of the ledger.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page; a step on other runs than the one before starts a new series."""
     title = f"{name}: history of its effects"
     if not rungs:
         return page(title, (), element("p", "No effect was added or removed."))
@@ -86,20 +73,7 @@ def _longest(rungs: Sequence[Rung], output: str) -> float:
 
 
 def ladder_text(name: str, rungs: Sequence[Rung]) -> str:
-    """Held-out error per step; a step on other runs than the one before starts a new series.
-
-    Parameters
-    ----------
-    name : str
-        Name of the profile.
-    rungs : sequence of Rung
-        Steps of the ledger.
-
-    Returns
-    -------
-    str
-        Text for a terminal.
-    """
+    """Held-out error per step; a step on other runs than the one before starts a new series."""
     if not rungs:
         return f"{name}: no effect was added or removed"
     shown = [o for o in LADDER_UNITS if any(o in rung.after for rung in rungs)]

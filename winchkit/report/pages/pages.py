@@ -32,28 +32,7 @@ def report_html(
     *,
     options: Sequence[str] = (),
 ) -> str:
-    """The page of a diagnosis.
-
-    Parameters
-    ----------
-    answer : WinchAnswer
-        The diagnosis.
-    title : str
-        Title of the page.
-    story : sequence of str, optional
-        Sentences on the procedure.
-    truth : mapping, optional
-        The hidden effect of a simulated bench, shown at the end.
-    profile : str, optional
-        The profile as the user named it, for the printed commands.
-    options : sequence of str, optional
-        Further options of the command.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page of a diagnosis."""
     command = Command(answer.engine.regression.dataset, profile, options)
     residuals = residuals_of(answer, command.source)
     drawn, cards = _cards(residuals, size_texts(answer.diagnosis.outputs))
@@ -139,24 +118,7 @@ def residuals_of_addition(fitted: FittedAddition, source: str = "") -> Residuals
 def comparison_html(
     compared: Compared, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
-    """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`.
-
-    Parameters
-    ----------
-    compared : Compared
-        The comparison, with its residuals.
-    title : str
-        Title of the page.
-    profile : str
-        The profile as the user named it.
-    options : sequence of str
-        Further options of the command.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`."""
     command = Command(compared.regression.dataset, profile, options)
     residuals = residuals_of_comparison(compared, command.source)
     own = residual_figures(residuals)
@@ -183,26 +145,7 @@ def addition_html(
     *,
     options: Sequence[str] = (),
 ) -> str:
-    """The page of an added effect; ``better`` is the written profile, the others as above.
-
-    Parameters
-    ----------
-    fitted : FittedAddition
-        The addition, with its residuals.
-    title : str
-        Title of the page.
-    profile : str
-        The profile as the user named it.
-    better : str
-        The written profile.
-    options : sequence of str
-        Further options of the command.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page of an added effect; ``better`` is the written profile, the others as above."""
     command = Command(fitted.regression.dataset, profile, options)
     outputs, residuals = fitted.addition.outputs, residuals_of_addition(fitted, command.source)
     drawn, cards = _cards(residuals, size_texts(outputs))

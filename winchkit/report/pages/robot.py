@@ -192,24 +192,7 @@ def _rms(values: Array) -> float:
 def robot_report_html(
     answer: RobotAnswer, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
-    """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them.
-
-    Parameters
-    ----------
-    answer : RobotAnswer
-        The diagnosis.
-    title : str
-        Title of the page.
-    profile : str
-        The profile as the user named it.
-    options : sequence of str
-        Further options of the command.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them."""
     selection, diagnosis = answer.selection, answer.diagnosis
     command = Command(selection.preparation.dataset, profile, options)
     drawn = _report_figures(answer, command.source)
@@ -270,24 +253,7 @@ def _report_figures(answer: RobotAnswer, source: str) -> dict[str, Figure]:
 def robot_comparison_html(
     compared: RobotCompared, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
-    """The page of a robot's comparison.
-
-    Parameters
-    ----------
-    compared : RobotCompared
-        The comparison, with its residuals.
-    title : str
-        Title of the page.
-    profile : str
-        The profile as the user named it.
-    options : sequence of str
-        Further options of the command.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page of a robot's comparison."""
     comparison = compared.comparison
     command = Command(compared.regression.dataset, profile, options)
     drawn = _comparison_figures(compared, command.source)
@@ -323,26 +289,7 @@ def robot_addition_html(
     *,
     options: Sequence[str] = (),
 ) -> str:
-    """The page of an effect added to a robot; ``better`` is the profile that was written.
-
-    Parameters
-    ----------
-    fitted : FittedRobotAddition
-        The addition, with its residuals.
-    title : str
-        Title of the page.
-    profile : str
-        The profile as the user named it.
-    better : str
-        The written profile.
-    options : sequence of str
-        Further options of the command.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
-    """
+    """The page of an effect added to a robot; ``better`` is the profile that was written."""
     command = Command(fitted.regression.dataset, profile, options)
     drawn = _addition_figures(fitted, command.source)
     sizes = size_texts(fitted.addition.outputs)

@@ -38,23 +38,7 @@ def calibration_html(
 ) -> str:
     """The page, self-contained.
 
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-    following : sequence of NextPose
-        Proposed poses.
-    title : str
-        Title of the page.
-    source : str
-        Profile and runs, for the files of the figures.
-    written : str
-        The written profile; empty where none was.
-
-    Returns
-    -------
-    str
-        HTML, self-contained.
+    ``written``: empty where none was.
     """
     chip, tone = _verdict(found)
     figures = calibration_figures(found, source)
@@ -92,18 +76,7 @@ def _compared(found: Calibrated) -> str:
 
 
 def headline(found: Calibrated) -> str:
-    """Return the result of a calibration in a sentence.
-
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-
-    Returns
-    -------
-    str
-        Pose error before and after, held out.
-    """
+    """Return the result of a calibration in a sentence."""
     from winchkit.calibration.robot.prediction import rms
 
     if found.refusal:
@@ -128,15 +101,7 @@ def _decides(following: Sequence[NextPose], blind: Sequence[str]) -> str:
 def largest_changes(found: Calibrated) -> list[list[str]]:
     """Return the largest changes in multiples of their standard deviation.
 
-    Parameters
-    ----------
-    found : Calibrated
-        The calibration.
-
-    Returns
-    -------
-    list of [str, str, str]
-        Parameter, value with standard deviation and unit, nominal value.
+    Returns: parameter, value with standard deviation and unit, nominal value.
     """
 
     def size(item: tuple[str, Estimated]) -> float:

@@ -32,15 +32,8 @@ def caveat_text(code: str) -> str:
 def finding_texts(findings: Sequence[Finding]) -> list[str]:
     """Findings as lines, equal ones of several runs in one, alike ones of many runs shortened.
 
-    Parameters
-    ----------
-    findings : sequence of Finding
-        In order of importance.
-
-    Returns
-    -------
-    list of str
-        One line per channel and text, with the runs that it applies to.
+    ``findings``: in order of importance. Returns: one line per channel and text, with the runs that
+    it applies to.
     """
     runs: dict[tuple[str, str], dict[str, list[str]]] = {}
     for finding in findings:

@@ -12,20 +12,7 @@ _WIDTH = 80
 
 
 def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
-    """Rows indented by two, the first ``words`` columns flush left and the others flush right.
-
-    Parameters
-    ----------
-    rows : sequence of Sequence[str]
-        Cells by row.
-    words : int
-        Number of left-aligned columns.
-
-    Returns
-    -------
-    list of str
-        Lines of text.
-    """
+    """Rows indented by two, the first ``words`` columns flush left and the others flush right."""
     if not rows:
         return []
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
@@ -42,17 +29,7 @@ def aligned(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
 def hanging(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
     """Rows as by :func:`aligned`, with the last cell of each wrapped in its column.
 
-    Parameters
-    ----------
-    rows : sequence of Sequence[str]
-        Cells by row.
-    words : int
-        Number of left-aligned columns.
-
-    Returns
-    -------
-    list of str
-        Lines of at most 80 characters.
+    Returns: lines of at most 80 characters.
     """
     heads = aligned([row[:-1] for row in rows], words)
     width = max((len(head) for head in heads), default=0) + 2
@@ -66,19 +43,7 @@ def hanging(rows: Sequence[Sequence[str]], words: int = 1) -> list[str]:
 def paragraph(text: str, first: str = "", then: str = "") -> list[str]:
     """Text in lines of at most 80 characters.
 
-    Parameters
-    ----------
-    text : str
-        The text.
-    first : str
-        Indentation of the first line.
-    then : str
-        Indentation of the others.
-
-    Returns
-    -------
-    list of str
-        Lines of at most 80 characters.
+    Returns: lines of at most 80 characters.
     """
     lines = wrap(
         unbroken(text),

@@ -76,19 +76,7 @@ def scale_for(sizes: float | Sequence[float], unit: str) -> Scale:
 def quantity(value: float, unit: str, digits: int = 3) -> str:
     """An SI value in its best unit: ``quantity(0.00163, "m") == "1.63 mm"``.
 
-    Parameters
-    ----------
-    value : float
-        SI value.
-    unit : str
-        SI unit.
-    digits : int
-        Significant digits.
-
-    Returns
-    -------
-    str
-        Number with unit.
+    ``value``: SI value. ``unit``: SI unit. Returns: number with unit.
     """
     return scale_for(value, unit).text(value, digits)
 
@@ -113,15 +101,7 @@ def with_std(value: float, std: float, unit: str, scale: Scale | None = None) ->
 def percent(share: float) -> str:
     """A share as per cent: ``0.934`` is ``93 %``; ``unknown`` where it is NaN.
 
-    Parameters
-    ----------
-    share : float
-        Share, 0 to 1.
-
-    Returns
-    -------
-    str
-        Number with ``%``.
+    ``share``: share, 0 to 1. Returns: number with ``%``.
     """
     if isnan(share):
         return "unknown"

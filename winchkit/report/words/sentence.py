@@ -34,18 +34,7 @@ _CONSTANT = ("winch", "pose")
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """The result in one line: ``The drum has runout``; without a full stop.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of a winch or a robot.
-
-    Returns
-    -------
-    str
-        Plain text.
-    """
+    """The result in one line: ``The drum has runout``; without a full stop."""
     worst = OUTPUT_NAMES.get(next(iter(worst_outputs(diagnosis.outputs)), ""), "model")
     verdict, steps = diagnosis.verdict, diagnosis.steps
     if diagnosis.interrupted:
@@ -64,35 +53,13 @@ def headline(diagnosis: Diagnosis) -> str:
 
 
 def sentence(diagnosis: Diagnosis) -> str:
-    """The verdict with its figures, in one to four short sentences.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of a winch or a robot.
-
-    Returns
-    -------
-    str
-        Plain text.
-    """
+    """The verdict with its figures, in one to four short sentences."""
     parts = [f"{headline(diagnosis)}.", error_text(diagnosis), remaining_text(diagnosis)]
     return " ".join(part for part in parts if part)
 
 
 def error_text(diagnosis: Diagnosis) -> str:
-    """Sentence on the held-out error that falls most with the steps, without any on the worst.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of a winch or a robot.
-
-    Returns
-    -------
-    str
-        Empty without outputs.
-    """
+    """Sentence on the held-out error that falls most with the steps, without any on the worst."""
     outputs = diagnosis.outputs
     if diagnosis.interrupted:
         return ""
@@ -110,18 +77,7 @@ def error_text(diagnosis: Diagnosis) -> str:
 
 
 def remaining_text(diagnosis: Diagnosis) -> str:
-    """What remains unexplained, and where; empty where nothing is missing any more.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of a winch or a robot.
-
-    Returns
-    -------
-    str
-        One or two sentences.
-    """
+    """What remains unexplained, and where; empty where nothing is missing any more."""
     if diagnosis.verdict == "adequate" or diagnosis.interrupted or _wrong_channels(diagnosis):
         return ""
     if diagnosis.verdict == "explained":
@@ -137,18 +93,7 @@ def remaining_text(diagnosis: Diagnosis) -> str:
 
 
 def changes_text(diagnosis: Diagnosis) -> str:
-    """What to record or to do so that the result is confirmed, refuted or decided.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-        Of a winch or a robot.
-
-    Returns
-    -------
-    str
-        One or two sentences.
-    """
+    """What to record or to do so that the result is confirmed, refuted or decided."""
     other, beyond = _CHANGES[diagnosis.data]
     if _wrong_channels(diagnosis):
         return "Correct the channel by an import, or confirm it with --as-recorded."

@@ -72,19 +72,8 @@ def step_text(
 ) -> str:
     """A step in one line: title, values, error of the output that it lowers most, and share.
 
-    Parameters
-    ----------
-    step : Step
-        The step.
-    outputs : mapping of str to OutputFit, optional
-        Errors of the file and of the final model.
-    without : mapping of str to float, optional
-        Held-out errors of the final model without the step, SI.
-
-    Returns
-    -------
-    str
-        ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
+    ``without``: held-out errors of the final model without the step, SI. Returns:
+    ``the cable is elastic: EA = 289.9 ± 6.0 kN; cable length 0.943 → 0.309 mm; explains 99 %``.
     """
     parts = [_titled_values(step)]
     if outputs and without and (name := lowered_most(outputs, without)):

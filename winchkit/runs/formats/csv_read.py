@@ -111,22 +111,7 @@ _LARGE = 16 << 20
 def read_csv(path: str | Path, *, is_part: bool = False) -> Run:
     """Read a run.
 
-    Parameters
-    ----------
-    path : str or Path
-        CSV file.
-    is_part : bool
-        Whether it is a part of a log, which may have no rows.
-
-    Returns
-    -------
-    Run
-        Channels in SI.
-
-    Raises
-    ------
-    RunError
-        With every fault of the file, each with its line.
+    Returns: channels in SI. Raises RunError with every fault of the file, each with its line.
 
     Notes
     -----

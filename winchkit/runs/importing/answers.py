@@ -41,18 +41,7 @@ The output of an amplifier (V) or converter (counts) needs a factor that only th
 
 
 def permitted(channel: str) -> tuple[str, ...]:
-    """Dimensions of the columns that a channel may have.
-
-    Parameters
-    ----------
-    channel : str
-        Channel, with or without a winch's name.
-
-    Returns
-    -------
-    tuple of str
-        Empty for a channel without a dimension.
-    """
+    """Dimensions of the columns that a channel may have."""
     base = channel.rpartition(".")[2]
     dimension = column_dimension(base)
     return _PERMITTED.get(base, () if dimension is None else (dimension,))
@@ -78,17 +67,8 @@ _COUNTED = re.compile(r"\s*(mV/V|counts?)\s*$")
 def read_constant(key: str, text: str) -> float:
     """A constant of :class:`Answers` in SI, ``"2.4 N m"`` or ``"2 mV/V"``.
 
-    Parameters
-    ----------
-    key : str
-        One of :data:`CONSTANTS`.
-    text : str
-        Number with unit.
-
-    Raises
-    ------
-    UsageError
-        For a wrong unit, or a number that is not above zero.
+    ``key``: one of :data:`CONSTANTS`. ``text``: number with unit. Raises UsageError for a wrong
+    unit, or a number that is not above zero.
     """
     dimension = CONSTANTS[key]
     option = f"--{key.replace('_', '-')}"
@@ -107,12 +87,7 @@ def as_ours(text: str, dimension: str) -> str:
 
     Raises UsageError where a comma may separate thousands.
 
-    Parameters
-    ----------
-    text : str
-        Number with unit.
-    dimension : str
-        Name of the dimension.
+    ``text``: number with unit.
     """
     plain = _with_point(text)
     number = re.match(r"\s*[\d.]+\s*", plain)
@@ -180,26 +155,9 @@ class Answers:
 def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answers:
     """Answers without the columns that are those of other files.
 
-    Parameters
-    ----------
-    table : Table
-        One of the files.
-    tables : sequence of Table
-        All of them.
-    answers : Answers
-        What the user has said of all.
-
-    Returns
-    -------
-    Answers
-        A column is that of the files that have its name; where none has, of those that have its
-        number; where none has that either, of all, so that each says so. An answer with the name
-        of a file is of that file only.
-
-    Raises
-    ------
-    UsageError
-        For the name of a file that is none of them.
+    Returns: a column is that of the files that have its name; where none has, of those that have
+    its number; where none has that either, of all, so that each says so. An answer with the name of
+    a file is of that file only. Raises UsageError for the name of a file that is none of them.
     """
     for item in answers.columns:
         if item.file and not any(_is_named(t, item.file) for t in tables):
@@ -242,13 +200,8 @@ def with_options(answers: Answers, options: Iterable[str]) -> Answers:
 
     Raises UsageError for another option.
 
-    Parameters
-    ----------
-    answers : Answers
-        Other answers.
-    options : iterable of str
-        ``--signed "speed 3" --signed "speed 5"``, ``--modulo "Position=65536"``,
-        ``--orientation vector``.
+    ``options``: ``--signed "speed 3" --signed "speed 5"``, ``--modulo "Position=65536"``,
+    ``--orientation vector``.
     """
     for text in options:
         try:
@@ -274,17 +227,10 @@ def read_column(text: str) -> ColumnAnswer:
 
     Raises UsageError for a text that is none of them.
 
-    Parameters
-    ----------
-    text : str
-        ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; the factor is a number or a
-        variable of the file; a minus before the column changes its sign; nothing after ``=`` for a
-        channel that the file does not have; ``FILE:`` before it for one of several files.
-
-    Returns
-    -------
-    ColumnAnswer
-        The factor is a multiplier of the unit.
+    ``text``: ``CHANNEL=COLUMN``, with ``*FACTOR`` or ``[UNIT]`` or both; the factor is a number or
+    a variable of the file; a minus before the column changes its sign; nothing after ``=`` for a
+    channel that the file does not have; ``FILE:`` before it for one of several files. Returns: the
+    factor is a multiplier of the unit.
     """
     found = _COLUMN.fullmatch(text)
     if found is None:

@@ -66,23 +66,9 @@ def choose(
 ) -> Choice:
     """Choose the columns of all channels.
 
-    Parameters
-    ----------
-    table : Table
-        Columns.
-    given : mapping of str to str
-        Channel by the unique name of a column, as the user gave it; empty for an unused one.
-    body : str, optional
-        Body of a tracker's export.
-    without : collection of str
-        Channels that the file does not have, as the user says.
-    orientation : str, optional
-        Convention of the orientation, as the user says.
-
-    Returns
-    -------
-    Choice
-        Every column is in ``chosen`` or in ``unused``.
+    ``given``: channel by the unique name of a column, as the user gave it; empty for an unused one.
+    ``without``: channels that the file does not have, as the user says. Returns: every column is in
+    ``chosen`` or in ``unused``.
     """
     choice = Choice()
     numbered = _numbered(table, given, orientation, choice)

@@ -44,17 +44,8 @@ class Ratio:
 def ratio_of(time: Array, angle: Array, velocity: Array) -> Ratio | None:
     """Ratio of the change of an angle to the integral of a velocity.
 
-    Parameters
-    ----------
-    time : (n,) array
-        Any unit.
-    angle, velocity : (n,) array
-        Any units; NaN where missing.
-
-    Returns
-    -------
-    Ratio, optional
-        None where the two are not proportional (correlation below 0.98) or constant.
+    ``time`` (n,): any unit. ``angle``, ``velocity`` (n,): any units; NaN where missing. Returns:
+    None where the two are not proportional (correlation below 0.98) or constant.
 
     Notes
     -----
@@ -81,16 +72,8 @@ def ratio_of(time: Array, angle: Array, velocity: Array) -> Ratio | None:
 def likely_counts(estimate: float) -> int | None:
     """Usual resolution of an encoder that an estimate of counts per turn stands for, or None.
 
-    Parameters
-    ----------
-    estimate : float
-        Counts per turn.
-
-    Returns
-    -------
-    int, optional
-        A power of two, or four times a usual number of lines, within 0.5 %; None where there is
-        none or more than one.
+    ``estimate``: counts per turn. Returns: a power of two, or four times a usual number of lines,
+    within 0.5 %; None where there is none or more than one.
     """
     near = [n for n in USUAL_COUNTS if abs(estimate / n - 1) < 0.005]
     return near[0] if len(near) == 1 else None

@@ -27,20 +27,7 @@ from winchkit.schema.mapping import DATE
 
 
 def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
-    """Guess what the columns of a table are.
-
-    Parameters
-    ----------
-    table : Table
-        A file's columns.
-    answers : Answers, optional
-        What the user knows.
-
-    Returns
-    -------
-    Guess
-        An assignment for every column, and what cannot be known.
-    """
+    """Guess what the columns of a table are."""
     answers = answers or Answers()
     if answers.axis:
         return _of_axes(table, answers, answers.axis)

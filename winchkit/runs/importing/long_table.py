@@ -24,23 +24,10 @@ Rows of one signal change more over several rows than over one: above 1 for a fl
 def axes_of(table: Table, by: str) -> dict[str, Table]:
     """The table of each axis, of a table in long form.
 
-    Parameters
-    ----------
-    table : Table
-        Each row is of one axis.
-    by : str
-        Name or number of the column that names the axis.
-
-    Returns
-    -------
-    dict
-        Tables without that column by the name of the axis, in the order of the file; columns keep
-        their names and numbers. Rows without an axis are left out.
-
-    Raises
-    ------
-    RunError
-        For a column that is not there, or with too few or too many values.
+    ``table``: each row is of one axis. ``by``: name or number of the column that names the axis.
+    Returns: tables without that column by the name of the axis, in the order of the file; columns
+    keep their names and numbers. Rows without an axis are left out. Raises RunError for a column
+    that is not there, or with too few or too many values.
     """
     key = table.column(by)
     if key is None:
@@ -64,16 +51,6 @@ def likely_axis(table: Table) -> Column | None:
 
     Its few values alternate, and another column changes far less from row to row of one axis than
     between neighbouring rows.
-
-    Parameters
-    ----------
-    table : Table
-        Any table.
-
-    Returns
-    -------
-    Column or None
-        The first one that fits.
     """
     for column in table.columns:
         # Most columns of text are stamps, which need not be sorted.

@@ -20,17 +20,8 @@ from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedL
 def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping:
     """Mapping of the logs that were imported.
 
-    Parameters
-    ----------
-    name : str
-        Name of the mapping.
-    guesses : sequence of (str, Guess)
-        Name and assignments of each file.
-
-    Returns
-    -------
-    ImportMapping
-        Files with the same columns are one log; a counter that wraps in one of them does in all.
+    Returns: files with the same columns are one log; a counter that wraps in one of them does in
+    all.
     """
     logs: list[MappedLog] = []
     wraps = {
@@ -60,30 +51,14 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
 def mapping_id(mapping: ImportMapping) -> str:
     """Identifier of a mapping's content, 12 hexadecimal digits.
 
-    Parameters
-    ----------
-    mapping : ImportMapping
-        The mapping.
-
-    Returns
-    -------
-    str
-        Equal for equal columns, units and factors.
+    Returns: equal for equal columns, units and factors.
     """
     content = json.dumps([asdict(log) for log in mapping.log], sort_keys=True)
     return hashlib.sha256(content.encode()).hexdigest()[:12]
 
 
 def write_mapping(mapping: ImportMapping, path: Path) -> None:
-    """Write a mapping file; raises FileError.
-
-    Parameters
-    ----------
-    mapping : ImportMapping
-        The mapping.
-    path : Path
-        The file.
-    """
+    """Write a mapping file; raises FileError."""
     import tomlkit
 
     document = tomlkit.document()
@@ -120,24 +95,9 @@ def write_mapping(mapping: ImportMapping, path: Path) -> None:
 def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     """Assignments of a table by a mapping.
 
-    Parameters
-    ----------
-    whole : Table
-        The file.
-    mapping : ImportMapping
-        Its first log whose columns the file has is used; of logs with the same columns the one
-        with the name of the file.
-
-    Returns
-    -------
-    Guess
-        Without questions.
-
-    Raises
-    ------
-    RunError
-        With the columns that the file lacks, where no log fits, and where several logs with the
-        same columns do.
+    ``mapping``: its first log whose columns the file has is used; of logs with the same columns the
+    one with the name of the file. Raises RunError with the columns that the file lacks, where no
+    log fits, and where several logs with the same columns do.
     """
     whole = with_derived(whole, [item.source for log in mapping.log for item in log.column])
     for log in _fitting(whole, mapping)[:1]:

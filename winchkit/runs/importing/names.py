@@ -227,15 +227,7 @@ _MATRIX = re.compile(r"^(?:.* )?(?:r|rot|m|matrix|t) ?([123]) ?([1234])$")
 def words_of(name: str) -> str:
     """A name in lower case: words, camel case and numbers separated, accents removed.
 
-    Parameters
-    ----------
-    name : str
-        Name of a column.
-
-    Returns
-    -------
-    str
-        ``MotorPos_ist2`` becomes ``motor pos ist 2``.
+    Returns: ``MotorPos_ist2`` becomes ``motor pos ist 2``.
     """
     text = _CAMEL.sub(" ", "".join(_GREEK.get(char, char) for char in name[:_LONGEST]))
     text = unicodedata.normalize("NFKD", text)
@@ -246,17 +238,8 @@ def words_of(name: str) -> str:
 def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
     """Channel that a name stands for; None for an unknown name.
 
-    Parameters
-    ----------
-    name : str
-        Name without unit; the name of a channel of winchkit stands for it.
-    labels : tuple of str
-        Texts of higher rows of the header.
-
-    Returns
-    -------
-    Meaning, optional
-        A column that is not used has the channel :data:`IGNORED`.
+    ``name``: name without unit; the name of a channel of winchkit stands for it. Returns: a column
+    that is not used has the channel :data:`IGNORED`.
     """
     if column_dimension(name) is not None or name == "time":
         return Meaning(name, 0, name)

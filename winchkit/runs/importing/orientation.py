@@ -79,10 +79,8 @@ def _turned(first: Array, second: Array) -> Array:
 def quaternion_order(first: Array, last: Array) -> str:
     """Order of a numbered quaternion whose platform turns by less than a right angle, else empty.
 
-    Parameters
-    ----------
-    first, last : (n,) array
-        First and last element: the real part of such a quaternion is above √½.
+    ``first``, ``last`` (n,): first and last element: the real part of such a quaternion is above
+    √½.
     """
     limit = math.sqrt(0.5)
     ends = [np.abs(values[np.isfinite(values)]) for values in (first, last)]

@@ -45,17 +45,9 @@ class Jump:
 def jumps_of(streams: Streams) -> tuple[Jump, ...]:
     """Jumps of every motor angle, in the order of time.
 
-    Parameters
-    ----------
-    streams : Streams
-        Channels in SI.
-
-    Returns
-    -------
-    tuple of Jump
-        Steps ten times as large as any other, beside a motion as large, which do not return
-        within three samples and which the velocity does not have; and gaps of a counter that wraps
-        in which it may have wrapped.
+    ``streams``: channels in SI. Returns: steps ten times as large as any other, beside a motion as
+    large, which do not return within three samples and which the velocity does not have; and gaps
+    of a counter that wraps in which it may have wrapped.
     """
     if not streams.has_time:
         return ()
@@ -125,17 +117,8 @@ def _outstanding(rates: Array, steps: Array) -> list[int]:
 def pieces_of(streams: Streams, jumps: tuple[Jump, ...]) -> tuple[Streams, ...]:
     """A file in pieces between its jumps; pieces with too few samples are left out.
 
-    Parameters
-    ----------
-    streams : Streams
-        Channels in SI.
-    jumps : tuple of Jump
-        Of :func:`jumps_of`.
-
-    Raises
-    ------
-    RunError
-        Where all pieces have too few samples.
+    ``streams``: channels in SI. ``jumps``: of :func:`jumps_of`. Raises RunError where all pieces
+    have too few samples.
     """
     if not jumps:
         return (streams,)

@@ -22,15 +22,7 @@ _MATRIX = tuple(f"platform_r{row}{column}" for row in "123" for column in "123")
 def body_of(column: Column) -> str:
     """Body or marker of a tracker that a column belongs to; empty without labels.
 
-    Parameters
-    ----------
-    column : Column
-        Column with the labels above its name.
-
-    Returns
-    -------
-    str
-        Labels without words such as ``Rigid Body`` and ``Position``.
+    Returns: labels without words such as ``Rigid Body`` and ``Position``.
     """
     own = [text for text in column.labels if not _NOT_A_BODY.match(words_of(text))]
     return " ".join(own) or column.group
@@ -41,19 +33,8 @@ def chosen_body(
 ) -> tuple[str | None, tuple[str, ...]]:
     """Body whose pose is imported.
 
-    Parameters
-    ----------
-    columns : sequence of Column
-        Columns of poses.
-    wanted : str, optional
-        Name that the user gives.
-
-    Returns
-    -------
-    body : str or None
-        None where there are several and none is chosen.
-    bodies : tuple of str
-        All of them. Where bodies with an orientation exist, single markers are not among them.
+    Returns: ``body``: None where there are several and none is chosen. ``bodies``: all of them.
+    Where bodies with an orientation exist, single markers are not among them.
     """
     bodies = tuple(dict.fromkeys(body_of(item) for item in columns))
     turned = tuple(
@@ -71,18 +52,7 @@ def chosen_body(
 
 
 def complete_sets(channels: Mapping[str, object]) -> tuple[str, ...]:
-    """Pose channels whose set is complete; the quaternion is preferred to matrix and angles.
-
-    Parameters
-    ----------
-    channels : mapping
-        Pose channels that have a column.
-
-    Returns
-    -------
-    tuple of str
-        Positions and one representation of the orientation.
-    """
+    """Pose channels whose set is complete; the quaternion is preferred to matrix and angles."""
     found: tuple[str, ...] = ()
     if all(name in channels for name in _POSITION):
         found += _POSITION
@@ -93,18 +63,7 @@ def complete_sets(channels: Mapping[str, object]) -> tuple[str, ...]:
 
 
 def vector_names(names: Sequence[str]) -> frozenset[str]:
-    """Names that differ in x, y and z only, as those of a six-axis cell: ``Fx``, ``Fy``, ``Fz``.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of all columns.
-
-    Returns
-    -------
-    frozenset of str
-        Names of which all three components are there.
-    """
+    """Names that differ in x, y and z only, as those of a six-axis cell: ``Fx``, ``Fy``, ``Fz``."""
     stems: dict[tuple[str, str], dict[str, str]] = {}
     for name in names:
         plain = words_of(name).replace(" ", "")
@@ -117,18 +76,8 @@ def vector_names(names: Sequence[str]) -> frozenset[str]:
 def quaternion_names(names: Sequence[str], order: str = "wxyz") -> dict[str, str]:
     """Channels of numbered quaternions: ``q0`` to ``q3`` beside positions.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of all columns.
-    order : str, optional
-        Of the elements.
-
-    Returns
-    -------
-    dict
-        Channel by name, from ``q0`` to ``q3``; empty where the four names are not there,
-        or no positions.
+    Returns: channel by name, from ``q0`` to ``q3``; empty where the four names are not there, or no
+    positions.
     """
     words = {words_of(name).replace(" ", ""): name for name in names}
     axes = all(any(key in words for key in (axis, f"pos{axis}", f"p{axis}")) for axis in "xyz")

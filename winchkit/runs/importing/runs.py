@@ -40,24 +40,9 @@ _DIGITS = 12
 def read_mapped(path: str | Path, mapping: str | Path | ImportMapping) -> Run:
     """Read a file of another program by a mapping.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file, in any format that ``winchkit import`` reads.
-    mapping : str, Path or ImportMapping
-        The mapping, or its file.
-
-    Returns
-    -------
-    Run
-        Channels in SI on one time base.
-
-    Raises
-    ------
-    RunError
-        With every fault of the file.
-    FileError
-        With every fault of the mapping.
+    ``path``: the file, in any format that ``winchkit import`` reads. Returns: channels in SI on one
+    time base. Raises RunError with every fault of the file; FileError with every fault of the
+    mapping.
     """
     read = mapping if isinstance(mapping, ImportMapping) else read_mapping(mapping)
     guess = guess_by(read_table(path), read)
@@ -77,17 +62,7 @@ def whole_run(streams: Streams, metadata: Mapping[str, str]) -> Run:
 def metadata_of(guess: Guess, more: Mapping[str, str]) -> dict[str, str]:
     """Metadata of an imported run: file, format, and what the file says above its header.
 
-    Parameters
-    ----------
-    guess : Guess
-        The file.
-    more : mapping
-        Further keys, which come first.
-
-    Returns
-    -------
-    dict
-        Keys of the file have the prefix ``source``.
+    Returns: keys of the file have the prefix ``source``.
     """
     table = guess.table
     own = {
@@ -115,16 +90,7 @@ def has_angle(streams: Streams) -> bool:
 def with_angle(streams: Streams) -> Streams:
     """Add the motor angle of a recording that has the motor velocity only.
 
-    Parameters
-    ----------
-    streams : Streams
-        Channels in SI, without a motor angle.
-
-    Returns
-    -------
-    Streams
-        The integral of each velocity over its own time stamps, with a note; unchanged without a
-        velocity or without times.
+    ``streams``: channels in SI, without a motor angle.
 
     Notes
     -----
@@ -158,22 +124,8 @@ def _integral(time: Array, velocity: Array) -> Array:
 def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     """Run of one file.
 
-    Parameters
-    ----------
-    streams : Streams
-        Channels in SI.
-    metadata : mapping
-        Keys and texts.
-
-    Returns
-    -------
-    Run
-        Time from the first row; ``start_time`` in the metadata where the clock has a date.
-
-    Raises
-    ------
-    RunError
-        With every fault of the file.
+    ``streams``: channels in SI. Returns: time from the first row; ``start_time`` in the metadata
+    where the clock has a date. Raises RunError with every fault of the file.
     """
     faults = list(streams.faults)
     if len(streams.streams) > 1:

@@ -83,18 +83,7 @@ class Streams:
 
 
 def streams_of(guess: Guess) -> Streams:
-    """Convert the used columns of a table to SI.
-
-    Parameters
-    ----------
-    guess : Guess
-        Assignments without open questions.
-
-    Returns
-    -------
-    Streams
-        With the faults of the table's rows and of the used columns' cells, each with its line.
-    """
+    """Convert the used columns of a table to SI."""
     if guess.axis:
         return _of_axes(guess)
     table = guess.table
@@ -364,19 +353,10 @@ def _is_spread(known: NDArray[np.bool_]) -> bool:
 def merged(parts: Sequence[Stream]) -> tuple[Array, dict[str, Array], NDArray[np.intp] | None]:
     """One time base for several streams of one clock.
 
-    Parameters
-    ----------
-    parts : sequence of Stream
-        Streams with increasing times.
-
-    Returns
-    -------
-    time : (n,) array
-        s: the samples of the slowest stream, of those with channels besides temperatures.
-    channels : dict
-        Other streams are interpolated there, and NaN without neighbours.
-    rows : (n,) array or None
-        Rows of the table; None where channels of several streams are in a row.
+    ``parts``: streams with increasing times. Returns: ``time`` (n,): s: the samples of the slowest
+    stream, of those with channels besides temperatures; ``channels``: other streams are
+    interpolated there, and NaN without neighbours; ``rows`` (n,): None where channels of several
+    streams are in a row.
     """
     if len(parts) == 1:
         return parts[0].time, parts[0].channels, parts[0].rows

@@ -84,16 +84,8 @@ class Table:
 def named_apart(columns: Sequence[Column]) -> tuple[Column, ...]:
     """Columns with numbers and unique names in ``source``.
 
-    Parameters
-    ----------
-    columns : sequence of Column
-        In the order of the file.
-
-    Returns
-    -------
-    tuple of Column
-        The name itself where it is unique; else with its labels before it, and with ``#2`` where
-        these are equal as well.
+    ``columns``: in the order of the file. Returns: else with its labels before it, and with ``#2``
+    where these are equal as well.
     """
     names = Counter(item.name for item in columns)
     full = [

@@ -154,15 +154,8 @@ _FOLDED = {key.casefold(): unit for key, unit in reversed(_KNOWN.items())}
 def read_unit(text: str) -> SpelledUnit | None:
     """The unit of a spelling, with or without brackets; None for another text.
 
-    Parameters
-    ----------
-    text : str
-        Spelling, e.g. ``1/min`` or ``(Nm)``.
-
-    Returns
-    -------
-    SpelledUnit, optional
-        The case counts where two units differ by it only (``mN``, ``MN``).
+    ``text``: spelling, e.g. ``1/min`` or ``(Nm)``. Returns: the case counts where two units differ
+    by it only (``mN``, ``MN``).
     """
     inner = _inner(text)
     # "V (Voltage)" and "A(rms)": a unit with a description.
@@ -187,16 +180,9 @@ def _inner(text: str) -> str:
 def split_unit(text: str) -> tuple[str, str]:
     """Name and unit of a header cell.
 
-    Parameters
-    ----------
-    text : str
-        ``Torque (Nm)``, ``speed/rpm``, ``pos_deg``, ``Kraft in N``, ``time [s]``, ``t, s``.
-
-    Returns
-    -------
-    (str, str)
-        The unit is empty where the cell has none that is known; a unit in brackets is one also
-        where it is not known.
+    ``text``: ``Torque (Nm)``, ``speed/rpm``, ``pos_deg``, ``Kraft in N``, ``time [s]``, ``t, s``.
+    Returns: the unit is empty where the cell has none that is known; a unit in brackets is one also
+    where it is not known.
     """
     bracketed = _in_brackets(text)
     if bracketed is not None:
@@ -297,17 +283,8 @@ def _is_safe(unit: str, mark: str, known: SpelledUnit) -> bool:
 def named_unit(name: str, dimensions: Collection[str]) -> SpelledUnit | None:
     """The unit that one word of a name is: ``rpm``, ``speed_rpm_left``, ``Nm 2``.
 
-    Parameters
-    ----------
-    name : str
-        Name of a column without a unit at its end or in brackets.
-    dimensions : collection of str
-        Of the channel for which the name stands.
-
-    Returns
-    -------
-    SpelledUnit, optional
-        None without such a word, and for several.
+    ``name``: name of a column without a unit at its end or in brackets. Returns: None without such
+    a word, and for several.
     """
     found = set()
     for word in re.split(r"[^A-Za-z°]+", name[:_LONGEST]):
@@ -321,15 +298,7 @@ def named_unit(name: str, dimensions: Collection[str]) -> SpelledUnit | None:
 def is_unit_row(cells: list[str]) -> bool:
     """Whether a row below or above the names has the units of the columns.
 
-    Parameters
-    ----------
-    cells : list of str
-        Cells of the row.
-
-    Returns
-    -------
-    bool
-        At least half of the cells with text are units, and one of them is.
+    Returns: at least half of the cells with text are units, and one of them is.
     """
     given = [cell.strip() for cell in cells if cell.strip()]
     units = [cell for cell in given if read_unit(cell)]

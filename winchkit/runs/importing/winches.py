@@ -25,14 +25,7 @@ def choose_channels(others: Sequence[Candidate], choice: Choice, without: Collec
 
     What the user says of a column of one winch holds for those of the others that are named alike.
 
-    Parameters
-    ----------
-    others : sequence of Candidate
-        Columns that may be of channels.
-    choice : Choice
-        With the columns that the user gives; the others are added.
-    without : collection of str
-        Channels that the file does not have, as the user says.
+    ``without``: channels that the file does not have, as the user says.
     """
     given = [item for item in choice.chosen if item.channel not in {"time", DATE}]
     # A channel without a winch's name that the user gives: the file is of one winch.
@@ -94,12 +87,7 @@ def choose_channels(others: Sequence[Candidate], choice: Choice, without: Collec
 def stem_of(column: Column, channel: str) -> tuple[str, ...]:
     """Words of a column's name, with ``*`` for the name of its winch.
 
-    Parameters
-    ----------
-    column : Column
-        Column of a channel.
-    channel : str
-        With the name of its winch, ``1.motor_angle``.
+    ``channel``: with the name of its winch, ``1.motor_angle``.
     """
     label = channel.rpartition(".")[0]
     words = words_of(" ".join((*column.labels, column.name))).split()

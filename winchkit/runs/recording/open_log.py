@@ -21,33 +21,9 @@ def open_log(
 ) -> LogWriter:
     """Start a log in the format of the file's suffix; its files are locked while they are written.
 
-    Parameters
-    ----------
-    path : Path
-        File, ``.mcap`` or ``.csv``.
-    layout : Layout
-        Sources and rule of rows.
-    metadata : mapping
-        Metadata of the run.
-    rotation : Rotation, optional
-        Size or duration of parts.
-    watch : callable
-        Called with the descriptor of every file.
-    replace : bool
-        Remove an earlier log of that name, its parts included.
-
-    Returns
-    -------
-    LogWriter
-        Open writer.
-
-    Raises
-    ------
-    FileError
-        Where the file cannot be written.
-    UsageError
-        For an unknown suffix, an existing log without ``replace``, and a file that is being
-        written.
+    ``path``: file, ``.mcap`` or ``.csv``. Raises FileError where the file cannot be written;
+    UsageError for an unknown suffix, an existing log without ``replace``, and a file that is being
+    written.
     """
     if path.suffix.lower() == ".mcap":
         from winchkit.runs.recording.channels import ChannelLog

@@ -51,18 +51,7 @@ def part_path(path: Path, number: int) -> Path:
 
 
 def parts_beside(path: Path) -> list[Path]:
-    """The parts ``lift.001.mcap``, ``lift.002.mcap`` … of ``lift.mcap``, in order.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the log without part number.
-
-    Returns
-    -------
-    list of Path
-        Existing parts.
-    """
+    """The parts ``lift.001.mcap``, ``lift.002.mcap`` … of ``lift.mcap``, in order."""
     pattern = re.compile(re.escape(path.stem) + r"\.(\d{3,})" + re.escape(path.suffix))
     found = [(pattern.fullmatch(item.name), item) for item in path.parent.glob(f"*{path.suffix}")]
     return [item for match, item in sorted((int(m[1]), p) for m, p in found if m)]

@@ -46,16 +46,8 @@ _MOVING = 0.02
 def ground_mask(run: Run) -> NDArray[np.bool_]:
     """Samples in which something else than the cable carries the load.
 
-    Parameters
-    ----------
-    run : Run
-        Run of one winch.
-
-    Returns
-    -------
-    (n,) array of bool
-        All false without a known mass on the cable. The samples from the end of the travel to the
-        motor angle at which the whole load hangs on the cable.
+    Returns (n,) of bool: all false without a known mass on the cable. The samples from the end of
+    the travel to the motor angle at which the whole load hangs on the cable.
     """
     none = np.zeros(len(run), dtype=bool)
     force = next((name for name in _FORCES if name in run), None)

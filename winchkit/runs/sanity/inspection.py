@@ -40,18 +40,7 @@ class Inspection:
 
 
 def inspect_run(run: Run) -> Inspection:
-    """Inspect a run, without a model of the winch.
-
-    Parameters
-    ----------
-    run : Run
-        The run, of one winch or of several.
-
-    Returns
-    -------
-    Inspection
-        Its findings, and the resolutions and outliers of its channels.
-    """
+    """Inspect a run, without a model of the winch."""
     steps = resolutions(run)
     masks = outlier_masks(run, steps)
     out = list(sampling(run))

@@ -27,17 +27,9 @@ _ROUNDING = 16.0
 def smallest_differences(values: Array) -> tuple[Array, float]:
     """Differences of the order in which the signal is smallest, and their noise gain.
 
-    Parameters
-    ----------
-    values : (n,) array
-        NaN where there is no value.
-
-    Returns
-    -------
-    differences : (m,) array
-        Of consecutive finite samples; rounding errors of floating point are zero.
-    gain : float
-        Standard deviation of the differences of white noise of unit variance.
+    ``values`` (n,): NaN where there is no value. Returns: ``differences`` (m,): of consecutive
+    finite samples; rounding errors of floating point are zero; ``gain``: standard deviation of the
+    differences of white noise of unit variance.
     """
     known = values[np.isfinite(values)]
     best, gain, least = np.zeros(0), 1.0, np.inf

@@ -35,14 +35,7 @@ _MAD = 0.6745
 def outlier_mask(values: Array) -> NDArray[np.bool_]:
     """Samples of one channel that are spikes.
 
-    Parameters
-    ----------
-    values : (n,) array
-        NaN where there is no value.
-
-    Returns
-    -------
-    (n,) array of bool
+    ``values`` (n,): NaN where there is no value. Returns: (n,) of bool.
 
     Notes
     -----
@@ -63,19 +56,10 @@ def outlier_mask(values: Array) -> NDArray[np.bool_]:
 def outlier_masks(run: Run, resolutions: Mapping[str, float]) -> dict[str, NDArray[np.bool_]]:
     """Spikes of every channel of a run that no other channel of the same winch shares.
 
-    Parameters
-    ----------
-    run : Run
-        The run.
-    resolutions : mapping of float
-        Resolution of every channel of the model (:func:`~.quantisation.resolutions`).
-
-    Returns
-    -------
-    dict of (n,) array of bool
-        Channels with at least one spike. A peak of the force that lasts one sample, as at a jerk,
-        appears in the angle, the tension, the load or the torque at the same time: it is none. A
-        first or last row of another moment differs in several channels.
+    ``resolutions``: resolution of every channel of the model (:func:`~.quantisation.resolutions`).
+    Returns: dict of (n,) array of bool: channels with at least one spike. A peak of the force that
+    lasts one sample, as at a jerk, appears in the angle, the tension, the load or the torque at the
+    same time: it is none. A first or last row of another moment differs in several channels.
 
     Notes
     -----

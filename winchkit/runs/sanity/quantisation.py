@@ -80,15 +80,8 @@ def quantisation_noise(step: float) -> float:
 def resolution(values: Array) -> float:
     """Step of a quantised channel.
 
-    Parameters
-    ----------
-    values : (n,) array
-        NaN where there is no value.
-
-    Returns
-    -------
-    float
-        In the unit of the values; 0 where no step is found, as for a step far below the noise.
+    ``values`` (n,): NaN where there is no value. Returns: in the unit of the values; 0 where no
+    step is found, as for a step far below the noise.
     """
     few = values[:_MOST]
     differences, _ = smallest_differences(few)

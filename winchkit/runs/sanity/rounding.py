@@ -34,22 +34,8 @@ _GRID = 401
 def mean_error(signal: Array, step: float, noise: float) -> tuple[Array, float]:
     """Mean rounding error as a function of the signal, whose zero is not known to a step.
 
-    Parameters
-    ----------
-    signal : (n,) array
-        Signal before noise and rounding, apart from an unknown offset.
-    step : float
-        Resolution, in the unit of the signal.
-    noise : float
-        Standard deviation of the noise before rounding.
-
-    Returns
-    -------
-    components : (2 × harmonics, n) array
-        Cosine and sine components of every harmonic. The sum of the squares of their transforms
-        bounds the square of the error's transform, harmonic by harmonic, whatever the offset is.
-    white : float
-        Variance of the rest of the error.
+    ``signal`` (n,): signal before noise and rounding, apart from an unknown offset. ``step``:
+    resolution, in the unit of the signal.
     """
     size = _sizes(noise / step) * step
     angle = 2 * np.pi / step * np.outer(np.arange(1, _HARMONICS + 1), signal)

@@ -52,16 +52,8 @@ def with_lost_samples(time: Array, values: Array) -> Array:
 
     Differences of the values are then those of consecutive samples.
 
-    Parameters
-    ----------
-    time : (n,) array
-        Stamps, s, increasing.
-    values : (n,) array
-
-    Returns
-    -------
-    (m,) array
-        One NaN for every gap, whatever its length.
+    ``time`` (n,): stamps, s, increasing. ``values`` (n,). Returns (m,): one NaN for every gap,
+    whatever its length.
     """
     if len(time) < _LEAST_SAMPLES:
         return values

@@ -38,20 +38,8 @@ class EdsText:
 def read_eds_text(path: str | Path) -> EdsText:
     """Read an EDS or DCF file.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    EdsText
-        Valid text, and a warning per repair.
-
-    Raises
-    ------
-    FileError
-        With every line that cannot be repaired.
+    Returns: valid text, and a warning per repair. Raises FileError with every line that cannot be
+    repaired.
     """
     findings = Findings(str(path))
     sections = _sections(_text(Path(path), findings), findings)

@@ -57,18 +57,7 @@ def spelled(key: Key) -> str:
 
 
 def open_source(path: str | Path) -> Source:
-    """Read a declaration of any kind; raises FileError for any other file.
-
-    Parameters
-    ----------
-    path : str or Path
-        TOML file.
-
-    Returns
-    -------
-    Source
-        Values with their lines.
-    """
+    """Read a declaration of any kind; raises FileError for any other file."""
     text = _text(path_of(path))
     if not text.strip():
         raise FileError(Fault("the file is empty; a declaration starts with schema = 1", str(path)))

@@ -41,33 +41,10 @@ class SimDrive:
     Frames enter by :meth:`receive`, time by :meth:`tick`; both take the time (s) of one steady
     clock and are called from one thread.
 
-    Parameters
-    ----------
-    send : callable
-        Sends a frame, given its identifier and data.
-    node : int
-        Node id.
-    servo : ServoSpec
-        The device file's declaration.
-    objects : ObjectDictionary
-        Object dictionary, owned by the drive from then on.
-    shaft : Shaft
-        The driven plant.
-    brake : bool
-        Whether a holding brake is fitted.
-    smoothing : float
-        Length of the set-point filter in CSV, CSP and IP, s.
-    tolerance : float
-        Time by which the motion may be behind at a tick, s.
-    longest_step : float
-        Time between two set-points of the motion, s.
-    now : float
-        Time at the start, s.
-
-    Raises
-    ------
-    FileError
-        Where the object dictionary lacks objects of the declared modes.
+    ``send``: sends a frame, given its identifier and data. ``smoothing``: length of the set-point
+    filter in CSV, CSP and IP, s. ``tolerance``: time by which the motion may be behind at a tick,
+    s. ``longest_step``: time between two set-points of the motion, s. ``now``: time at the start,
+    s. Raises FileError where the object dictionary lacks objects of the declared modes.
     """
 
     def __init__(

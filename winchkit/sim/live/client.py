@@ -49,22 +49,9 @@ def send(bench_file: str | Path, line: str) -> str:
 def answer(bench_file: str | Path, step: Step) -> bool:
     """Execute an operator request of a programme, where the bench is simulated.
 
-    Parameters
-    ----------
-    bench_file : str or Path
-        The bench.
-    step : Step
-        A step with ``ask``; its ``load_mass`` and ``temperature`` are set.
-
-    Returns
-    -------
-    bool
-        True where the request was executed, False for a real bench or another request.
-
-    Raises
-    ------
-    ConnectionLost, DeviceRefused
-        As of :func:`send`.
+    ``step``: a step with ``ask``; its ``load_mass`` and ``temperature`` are set. Returns: True
+    where the request was executed, False for a real bench or another request. Raises
+    ConnectionLost, DeviceRefused as of :func:`send`.
     """
     told = step.load_mass is not None or step.temperature is not None
     if not told or not is_simulated(bench_file):

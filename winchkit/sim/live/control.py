@@ -23,20 +23,7 @@ quit                end the simulation"""
 
 
 def obey(live: LiveBench, line: str) -> str:
-    """Execute a line and return the reply; raises UsageError, NotPermitted.
-
-    Parameters
-    ----------
-    live : LiveBench
-        The simulated bench.
-    line : str
-        Command with arguments.
-
-    Returns
-    -------
-    str
-        Reply.
-    """
+    """Execute a line and return the reply; raises UsageError, NotPermitted."""
     word, _, rest = line.strip().partition(" ")
     first, _, more = rest.strip().partition(" ")
     if word == "load":

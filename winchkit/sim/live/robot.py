@@ -17,21 +17,9 @@ from winchkit.sim.robot.tracker import SimTracker
 class LiveRobot:
     """Platform, cable ends and tracker of a simulated bench; not thread-safe.
 
-    Parameters
-    ----------
-    bench : SimBench
-        A bench with ``[robot]``.
-    truth : PlatformTruth
-        Its platform.
-    seed : int
-        Seed of the noise.
-    started : float
-        Time at which the winches start, s.
-    sends : bool
-        Whether the tracker sends datagrams to the address at which the bench file listens, as it
-        does in real time.
-    compiled : bool
-        Whether the mechanics are compiled, where numba is installed; it takes a second or two.
+    ``bench``: a bench with ``[robot]``. ``started``: time at which the winches start, s.
+    ``compiled``: whether the mechanics are compiled, where numba is installed; it takes a second or
+    two.
     """
 
     def __init__(

@@ -32,27 +32,8 @@ class WinchPlant:
     It starts at rest, loaded, with all effects with memory at their null. Formulas and signs are
     those of the line model; the code is independent of it.
 
-    Parameters
-    ----------
-    profile : WinchProfile
-        The declared profile.
-    truth : WinchTruth
-        Differences from it.
-    seed : int or str
-        Seed of the noise.
-    noise : NoiseSpec, optional
-        Noise of the instruments.
-    cable_length : float, optional
-        Initial cable length, m; by default that of the reference.
-    load : Load, optional
-        Load at the end of the cable in place of a hanging one, such as a robot's platform.
-    longest_step : float
-        Of the integration, s.
-
-    Raises
-    ------
-    FileError, UsageError
-        Where the truth does not match the profile.
+    ``cable_length``: initial cable length, m; by default that of the reference. ``longest_step``:
+    of the integration, s. Raises FileError, UsageError where the truth does not match the profile.
     """
 
     def __init__(

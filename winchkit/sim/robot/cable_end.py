@@ -18,16 +18,8 @@ class Coupling:
     Each winch integrates its own motor up to the instants of its frames and instruments. Beyond the
     platform's time, at most one tick, its cable continues with the last rate of its length.
 
-    Parameters
-    ----------
-    platform : CablePlatform
-        The platform at rest.
-    tension : (n,) array
-        Cable forces at the start, N.
-    axial_stiffness : float
-        EA of the cables, N.
-    dead_length : sequence of float
-        Cable between drums and exit points, (n,), m.
+    ``tension`` (n,): cable forces at the start, N. ``axial_stiffness``: EA of the cables, N.
+    ``dead_length``: cable between drums and exit points, (n,), m.
     """
 
     def __init__(

@@ -199,10 +199,7 @@ def solve(matrix: Any, right: Any) -> None:
 def compiled_step() -> Callable[..., None]:
     """:func:`step` compiled by numba, which takes seconds unless an earlier one is found on disk.
 
-    Raises
-    ------
-    ImportError
-        Where numba is not installed.
+    Raises ImportError where numba is not installed.
     """
     from numba import njit
     from numba.extending import register_jitable

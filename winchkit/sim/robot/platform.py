@@ -54,20 +54,9 @@ class Pulleys:
 class CablePlatform:
     """The platform; n cables pull it.
 
-    Parameters
-    ----------
-    body : Body
-        Mass, inertia and anchor points.
-    pulleys : Pulleys
-        Where the cables come from.
-    position : (3,) array
-        Of the platform's origin at the start, at rest, m.
-    attitude : (3, 3) array
-        Platform to base.
-    damping_time : float
-        Ratio of damping to stiffness, s.
-    compiled : bool
-        Compile the step by numba, which takes seconds; ImportError where it is not installed.
+    ``position`` (3,): of the platform's origin at the start, at rest, m. ``attitude`` (3, 3).
+    ``damping_time``: ratio of damping to stiffness, s. ``compiled``: compile the step by numba,
+    which takes seconds; ImportError where it is not installed.
     """
 
     def __init__(
@@ -186,14 +175,8 @@ class CablePlatform:
     ) -> None:
         """Integrate until ``to``.
 
-        Parameters
-        ----------
-        to : float
-            s.
-        start, end : sequence of float
-            Unstrained cable lengths now and then, between which they change linearly, (n,), m.
-        stiffness : sequence of float
-            Of the cables, (n,), N/m.
+        ``to``: s. ``start``, ``end``: unstrained cable lengths now and then, between which they
+        change linearly, (n,), m. ``stiffness``: of the cables, (n,), N/m.
         """
         duration = to - self.time
         if duration < _LEAST_STEP:

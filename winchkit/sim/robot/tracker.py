@@ -22,16 +22,7 @@ _LONGEST = 0.01
 class SimTracker:
     """Sends a datagram per pose; its clock starts with the simulation.
 
-    Parameters
-    ----------
-    platform : CablePlatform
-        The observed platform.
-    truth : TrackerTruth
-        Frame, noise, rate and delay.
-    seed : int or str
-        Seed of the noise.
-    send : callable
-        Takes the bytes of a datagram.
+    ``send``: takes the bytes of a datagram.
     """
 
     def __init__(
@@ -50,10 +41,7 @@ class SimTracker:
     def advance(self, now: float) -> None:
         """Measure where a period has passed, and send what its delay has passed.
 
-        Parameters
-        ----------
-        now : float
-            Since the start, s; the platform may be behind by a few ms, less than the delay.
+        ``now``: since the start, s; the platform may be behind by a few ms, less than the delay.
         """
         measured, truth = self._platform.time, self._truth
         while measured >= self._next - _ROUNDING:

@@ -24,24 +24,8 @@ from winchkit.schema.bench import BenchSpec
 def drive_objects(spec: BenchSpec, status: Mapping[str, Any], winch: str) -> dict[str, Any]:
     """What ``winchkit info`` shows of a drive, in groups.
 
-    Parameters
-    ----------
-    spec : BenchSpec
-        The bench.
-    status : mapping
-        Its newest status.
-    winch : str
-        Name of the winch.
-
-    Returns
-    -------
-    dict
-        ``groups``: name, and rows of object, meaning and value.
-
-    Raises
-    ------
-    UsageError
-        For an unknown winch, and where it is not disabled.
+    Returns: ``groups``: name, and rows of object, meaning and value. Raises UsageError for an
+    unknown winch, and where it is not disabled.
     """
     _require_disabled(spec, status, [winch])
     with drive_at(spec, winch) as node:
@@ -76,17 +60,7 @@ def _groups(node: int, info: DriveInfo) -> list[dict[str, Any]]:
 def drive_settings(spec: BenchSpec, winch: str) -> list[dict[str, Any]]:
     """Settings of a winch's drive that can be written, by its EDS; the drive is not asked.
 
-    Parameters
-    ----------
-    spec : BenchSpec
-        The bench.
-    winch : str
-        Name of the winch.
-
-    Returns
-    -------
-    list of dict
-        ``object``, ``name``, ``type``, ``low`` and ``high`` (None for text).
+    Returns: ``object``, ``name``, ``type``, ``low`` and ``high`` (None for text).
     """
     return [asdict(item) for item in described(declared_drive(spec, winch).dictionary)]
 
@@ -96,21 +70,8 @@ def read_setting(
 ) -> float | int | str | None:
     """Value of a setting; None where the drive has no such object.
 
-    Parameters
-    ----------
-    spec : BenchSpec
-        The bench.
-    status : mapping
-        Its newest status.
-    winch : str
-        Name of the winch.
-    name : str
-        Object, e.g. ``6081h`` or ``6091h:1``.
-
-    Raises
-    ------
-    UsageError
-        For an unknown winch or setting, and where the winch is not disabled.
+    ``name``: object, e.g. ``6081h`` or ``6091h:1``. Raises UsageError for an unknown winch or
+    setting, and where the winch is not disabled.
     """
     _require_disabled(spec, status, [winch])
     with drive_at(spec, winch) as node:
@@ -122,32 +83,10 @@ def write_setting(
 ) -> dict[str, Any]:
     """Write a setting of a drive, and read it back; every winch of the bench is disabled.
 
-    Parameters
-    ----------
-    spec : BenchSpec
-        The bench.
-    status : mapping
-        Its newest status.
-    winch : str
-        Name of the winch.
-    name : str
-        Object, e.g. ``6081h``.
-    text : str
-        Value; whole numbers also as ``0x1F``.
-
-    Returns
-    -------
-    dict
-        ``object``, ``value`` as read back, and ``before``.
-
-    Raises
-    ------
-    UsageError
-        For an unknown setting, a value that does not fit it, and where a winch is not disabled.
-    NotPermitted
-        Where another program owns the bench, or uses it.
-    DeviceRefused
-        For what the drive does not take.
+    ``name``: object, e.g. ``6081h``. ``text``: value; whole numbers also as ``0x1F``. Returns:
+    ``object``, ``value`` as read back, and ``before``. Raises UsageError for an unknown setting, a
+    value that does not fit it, and where a winch is not disabled; NotPermitted where another
+    program owns the bench, or uses it; DeviceRefused for what the drive does not take.
     """
     _require_disabled(spec, status, list(spec.winch))
     dictionary = declared_drive(spec, winch).dictionary

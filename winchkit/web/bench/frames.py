@@ -14,13 +14,7 @@ _LAST = 60
 
 
 class FrameWords:
-    """Says what frames mean, by the device files of the bench.
-
-    Parameters
-    ----------
-    spec : BenchSpec
-        The bench.
-    """
+    """Says what frames mean, by the device files of the bench."""
 
     def __init__(self, spec: BenchSpec) -> None:
         self._nodes: dict[str, dict[int, KnownNode]] = {}
@@ -33,16 +27,8 @@ class FrameWords:
     def table(self, frames: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
         """Rows for the newest frame of each identifier, and for the last frames.
 
-        Parameters
-        ----------
-        frames : mapping
-            As of a station's ``frames``.
-
-        Returns
-        -------
-        dict
-            ``newest`` and ``last``: bus, identifier, kind, words, bytes and time (s) of a frame;
-            the newest ones with ``count``, by identifier.
+        ``frames``: as of a station's ``frames``. Returns: ``newest`` and ``last``: bus, identifier,
+        kind, words, bytes and time (s) of a frame; the newest ones with ``count``, by identifier.
         """
         newest = [
             {"count": count, **self._row(bus, *frame)}

@@ -40,17 +40,7 @@ _DECIMALS = 6
 
 
 class LiveModel:
-    """The profiles of a bench's winches.
-
-    Parameters
-    ----------
-    spec : BenchSpec
-        The bench.
-    file : str
-        Its bench file, beside which profiles are looked for.
-    effects : sequence of str
-        Files with effects of the user's own.
-    """
+    """The profiles of a bench's winches."""
 
     def __init__(self, spec: BenchSpec, file: str, effects: Sequence[str]) -> None:
         self.spec = spec
@@ -61,13 +51,7 @@ class LiveModel:
         self._lines = {name: _line(profile, effects) for name, profile in self.profiles.items()}
 
     def declared(self, name: str) -> dict[str, Any]:
-        """Geometry and limits of a winch, for its picture.
-
-        Parameters
-        ----------
-        name : str
-            Winch.
-        """
+        """Geometry and limits of a winch, for its picture."""
         wiring, profile = self.spec.winch[name], self.profiles[name]
         limits, drum = wiring.limits, profile.drum
         full = capacity(profile).turns
@@ -97,16 +81,8 @@ class LiveModel:
     def drums(self, status: Mapping[str, Any]) -> dict[str, dict[str, float | None]]:
         """Turns and winding radius on each drum, and the place of its guide, at a status.
 
-        Parameters
-        ----------
-        status : mapping
-            Of the bench.
-
-        Returns
-        -------
-        dict
-            By winch: ``turns``, ``radius`` (m) and ``guide`` (travel from an empty drum, m); None
-            for what is not known.
+        Returns: by winch: ``turns``, ``radius`` (m) and ``guide`` (travel from an empty drum, m);
+        None for what is not known.
         """
         return {
             name: _drum(self.profiles[name], winch.get("cable_length"))
@@ -116,19 +92,9 @@ class LiveModel:
     def prediction(self, name: str, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any] | None:
         """Predict the outputs over the history of a winch from its angle and force.
 
-        Parameters
-        ----------
-        name : str
-            Winch.
-        rows : sequence of mapping
-            ``time`` and :data:`CHANNELS`, in SI.
-
-        Returns
-        -------
-        dict or None
-            ``time``, and by output ``predicted``, ``residual``, ``mean`` (of the residual over 1 s)
-            and ``noise``: the standard deviation of the readings' white noise. None where the
-            profile cannot be evaluated.
+        ``rows``: ``time`` and :data:`CHANNELS`, in SI. Returns: ``time``, and by output
+        ``predicted``, ``residual``, ``mean`` (of the residual over 1 s) and ``noise``: the standard
+        deviation of the readings' white noise. None where the profile cannot be evaluated.
         """
         line = self._lines[name]
         if line is None or len(rows) < _FEWEST:

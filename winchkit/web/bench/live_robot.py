@@ -18,13 +18,7 @@ _AGREE = 0.02
 
 
 class LiveRobot:
-    """The robot of a bench, and the pose that was found last, from which the next is computed.
-
-    Parameters
-    ----------
-    spec : BenchSpec
-        A bench with a robot.
-    """
+    """The robot of a bench, and the pose that was found last, from which the next is computed."""
 
     def __init__(self, spec: BenchSpec) -> None:
         robot = robot_of_bench(spec)
@@ -35,15 +29,7 @@ class LiveRobot:
     def picture(self, status: Mapping[str, Any]) -> dict[str, Any] | None:
         """Pose and cables at a status; None where a motor angle is not known or fits no pose.
 
-        Parameters
-        ----------
-        status : mapping
-            Of the bench.
-
-        Returns
-        -------
-        dict or None
-            As of ``winchkit.web.robot.pose_picture``, with ``row`` "live".
+        Returns: as of ``winchkit.web.robot.pose_picture``, with ``row`` "live".
         """
         winches = [status.get("winch", {}).get(name, {}) for name in self._robot.names]
         angles, tension = (

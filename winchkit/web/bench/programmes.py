@@ -26,17 +26,7 @@ _NO_NAME = re.compile(r"[^\w.-]+")
 
 
 class Programmes:
-    """The programmes that a bench can execute: shipped, beside the page's work, and uploaded.
-
-    Parameters
-    ----------
-    spec : BenchSpec
-        The bench.
-    folder : Path
-        Of the server's own, for programmes of the browser.
-    work : Path
-        Where the user's programmes lie, and where runs are written.
-    """
+    """The programmes that a bench can execute: shipped, beside the page's work, and uploaded."""
 
     def __init__(self, spec: BenchSpec, folder: Path, work: Path) -> None:
         self.spec, self.folder, self.work = spec, folder, work
@@ -54,10 +44,7 @@ class Programmes:
     def path(self, name: str) -> Path:
         """File of a programme.
 
-        Parameters
-        ----------
-        name : str
-            One of :meth:`paths`; raises UsageError for another.
+        ``name``: one of :meth:`paths`; raises UsageError for another.
         """
         known = self.paths()
         if name not in known:
@@ -65,15 +52,7 @@ class Programmes:
         return known[name]
 
     def keep(self, name: str, content: bytes) -> str:
-        """Keep a programme of the browser; raises FileError where it is none of this bench.
-
-        Parameters
-        ----------
-        name : str
-            Of its file.
-        content : bytes
-            What is in it.
-        """
+        """Keep a programme of the browser; raises FileError where it is none of this bench."""
         target = self.folder / (_NO_NAME.sub("-", Path(name).stem).lstrip(".-") + ".toml")
         target.write_bytes(content)
         try:
@@ -86,18 +65,9 @@ class Programmes:
     def preview(self, name: str, here: Mapping[str, float]) -> dict[str, Any]:
         """Preview of a programme; compares it with the limits.
 
-        Parameters
-        ----------
-        name : str
-            One of :meth:`paths`.
-        here : mapping of str to float
-            Present cable length by winch, m, where it is known.
-
-        Returns
-        -------
-        dict
-            ``name``, ``description``, ``repeats``, ``duration`` of a repeat (s), ``steps`` in
-            words, ``asks``: time and text, ``time`` (s) and ``curves`` by name in m.
+        ``name``: one of :meth:`paths`. ``here``: present cable length by winch, m, where it is
+        known. Returns: ``name``, ``description``, ``repeats``, ``duration`` of a repeat (s),
+        ``steps`` in words, ``asks``: time and text, ``time`` (s) and ``curves`` by name in m.
         """
         declared = load(self.path(name), self._kind).value
         if isinstance(declared, RobotProgramme):

@@ -30,17 +30,7 @@ the length instrument, and the speeds here are those of the drive."""
 def trip_run(found: Mapping[str, Any], bench: str) -> Run:
     """The cycles around a trip as a run; its time is 0 in the cycle of the trip.
 
-    Parameters
-    ----------
-    found : mapping
-        What :meth:`RemoteStation.trip_history` returns.
-    bench : str
-        Name of the bench.
-
-    Returns
-    -------
-    Run
-        Channels of every winch that have a value, the trips as metadata.
+    ``found``: what :meth:`RemoteStation.trip_history` returns.
     """
     channels = {
         f"{winch}.{name}": Channel(values, unit)
@@ -57,22 +47,7 @@ def trip_run(found: Mapping[str, Any], bench: str) -> Run:
 
 
 def trip_file(found: Mapping[str, Any], bench: str, folder: Path) -> tuple[str, str]:
-    """File name with the present time (UTC), and text of the run as CSV.
-
-    Parameters
-    ----------
-    found : mapping
-        As above.
-    bench : str
-        Name of the bench.
-    folder : Path
-        For the file until it is read.
-
-    Returns
-    -------
-    tuple of str
-        Name and text.
-    """
+    """File name with the present time (UTC), and text of the run as CSV."""
     name = f"trip-{datetime.now(UTC):%Y%m%d-%H%M%S}.csv"
     path = folder / name
     write_csv(trip_run(found, bench), path)

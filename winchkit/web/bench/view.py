@@ -85,19 +85,7 @@ class _Period:
 
 
 class BenchView:
-    """A bench as the page shows and commands it; a context manager.
-
-    Parameters
-    ----------
-    bench : str
-        Bench file.
-    effects : sequence of str
-        Files with effects of the user's own.
-    allow_motion : bool
-        Whether a browser may command.
-    folder : Path
-        Of the server's own, for programmes of a browser and files that it saves.
-    """
+    """A bench as the page shows and commands it; a context manager."""
 
     def __init__(
         self, bench: str, effects: Sequence[str] = (), *, allow_motion: bool, folder: Path

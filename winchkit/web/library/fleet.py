@@ -18,15 +18,7 @@ _DIGITS = 4
 
 
 class Fleet:
-    """One set of effects over all sessions of the library, fitted on request.
-
-    Parameters
-    ----------
-    library : Library
-        Its runs, which are indexed and diagnosed.
-    effects : sequence of str
-        Files with effects of the user's own.
-    """
+    """One set of effects over all sessions of the library, fitted on request."""
 
     def __init__(self, library: Library, effects: Sequence[str] = ()) -> None:
         self.library = library
@@ -39,14 +31,8 @@ class Fleet:
     ) -> None:
         """Fit every session; raises FileError and UsageError.
 
-        Parameters
-        ----------
-        profile : str
-            Profile of all winches, or a folder with ``WINCH.toml`` for each.
-        effects : sequence of str
-            Effects to follow; by default those that the library's diagnoses name.
-        progress : callable
-            Called with a text and the share of the work done.
+        ``profile``: profile of all winches, or a folder with ``WINCH.toml`` for each. ``effects``:
+        by default those that the library's diagnoses name.
         """
         found = library_history(
             self.library.folder,
@@ -88,12 +74,7 @@ class Fleet:
     def runs(self, winch: str, time: float) -> dict[str, Any]:
         """Names of the runs of a winch's session, and the profile that they were fitted with.
 
-        Parameters
-        ----------
-        winch : str
-            Name of the winch.
-        time : float
-            Start of the session, s since 1970 (UTC).
+        ``time``: start of the session, s since 1970 (UTC).
         """
         tables = self.library.tables
         for session in [] if tables is None else winch_sessions(tables):

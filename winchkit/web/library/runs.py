@@ -44,13 +44,7 @@ class LibraryRun:
 
 
 class Library:
-    """Runs below a folder; a file is read again where its size or date changed.
-
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    """
+    """Runs below a folder; a file is read again where its size or date changed."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder.resolve()
@@ -64,13 +58,7 @@ class Library:
         return tables if tables.files("runs") else None
 
     def rows(self, judged: Mapping[Path, Judgement] | None = None) -> dict[str, Any]:
-        """All runs with what is known of each, and files that are none with the reason.
-
-        Parameters
-        ----------
-        judged : mapping of Path to Judgement, optional
-            Diagnoses of the page, by run.
-        """
+        """All runs with what is known of each, and files that are none with the reason."""
         tables = self.tables
         indexed: dict[str, list[Row]] = {}
         known: dict[str, Judgement] = {}
@@ -105,13 +93,6 @@ class Library:
         """A channel of several runs from their starts, reduced for drawing; of two, the difference.
 
         The first run is interpolated at the instants of the second one as far as both last.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Rows of the library.
-        channel : str
-            Name of the channel.
         """
         curves: list[tuple[str, str, Array, Array]] = []
         for name in names:

@@ -105,13 +105,7 @@ class Setting:
 
 
 def described(dictionary: Any) -> list[Setting]:
-    """The settings of a dictionary with their types and limits.
-
-    Parameters
-    ----------
-    dictionary : object dictionary
-        Of the drive.
-    """
+    """The settings of a dictionary with their types and limits."""
     return [
         Setting(object_name(*key), _name(item), _type(item), *_range(item))
         for key, item in settings(dictionary).items()
@@ -119,15 +113,7 @@ def described(dictionary: Any) -> list[Setting]:
 
 
 def named_setting(dictionary: Any, name: str) -> ODVariable:
-    """A setting by its object, e.g. ``6081h`` or ``6091h:1``; raises UsageError for another.
-
-    Parameters
-    ----------
-    dictionary : object dictionary
-        Of the drive.
-    name : str
-        Object.
-    """
+    """A setting by its object, e.g. ``6081h`` or ``6091h:1``; raises UsageError for another."""
     for key, item in settings(dictionary).items():
         if object_name(*key) == name:
             return item
@@ -137,19 +123,8 @@ def named_setting(dictionary: Any, name: str) -> ODVariable:
 def one_setting(dictionary: Any, name: str, text: str) -> dict[Key, Value]:
     """A setting with its value, for a :class:`Config`.
 
-    Parameters
-    ----------
-    dictionary : object dictionary
-        Of the drive.
-    name : str
-        Object, e.g. ``6081h``.
-    text : str
-        Value; whole numbers also as ``0x1F``.
-
-    Raises
-    ------
-    UsageError
-        For an unknown setting, and for a value beyond its type or limits.
+    ``name``: object, e.g. ``6081h``. ``text``: value; whole numbers also as ``0x1F``. Raises
+    UsageError for an unknown setting, and for a value beyond its type or limits.
     """
     item = named_setting(dictionary, name)
     value = _parsed(item, text.strip())

@@ -192,22 +192,8 @@ def solve(
 ) -> Solution:
     """Fit poses and parameters by Levenberg and Marquardt's method with bounds.
 
-    Parameters
-    ----------
-    equations : Equations
-        With the parameters' priors and bounds.
-    state : State
-        Where the iteration starts.
-    weights : Weights
-        Standard deviations by kind and the loss.
-    progress : callable, optional
-        Called with the number of each step and the cost after it.
-
-    Returns
-    -------
-    Solution
-        The state after the last step that reduced the cost. ``converged`` is false after 60 steps
-        or where no step reduces the cost.
+    Returns: the state after the last step that reduced the cost. ``converged`` is false after 60
+    steps or where no step reduces the cost.
 
     Notes
     -----

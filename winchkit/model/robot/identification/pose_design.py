@@ -35,15 +35,7 @@ Box = tuple[Array, Array]
 def middle_and_half(values: Array) -> Box:
     """Middle and half width of each column of (p, k).
 
-    Parameters
-    ----------
-    values : (p, k) array
-        Coordinates of poses.
-
-    Returns
-    -------
-    Box
-        Middle and half width, (k,) each.
+    ``values`` (p, k). Returns: middle and half width, (k,) each.
     """
     low, high = values.min(axis=0), values.max(axis=0)
     return (low + high) / 2, (high - low) / 2
@@ -52,19 +44,7 @@ def middle_and_half(values: Array) -> Box:
 def in_box(box: Box, count: int, rng: np.random.Generator) -> Array:
     """Points evenly distributed in a box, (count, 3).
 
-    Parameters
-    ----------
-    box : Box
-        Middle and half width of each coordinate.
-    count : int
-        Number of points.
-    rng : np.random.Generator
-        Random generator.
-
-    Returns
-    -------
-    (count, 3) array
-        Points.
+    Returns: (count, 3).
     """
     middle, half = box
     return np.asarray(middle + half * rng.uniform(-1, 1, (count, 3)))
@@ -75,19 +55,8 @@ def random_poses(geometry: Geometry, position: Array, angles: Array) -> Pose:
 
     A pose has no lengths where an anchor point lies inside a swivel pulley.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    position : (c, 3) array
-        m.
-    angles : (c, 3) array
-        Roll, pitch and yaw, rad.
-
-    Returns
-    -------
-    Pose
-        At most c poses.
+    ``geometry``: geometry of n lines. ``position`` (c, 3): m. ``angles`` (c, 3): roll, pitch and
+    yaw, rad. Returns: at most c poses.
     """
     rotation = rotation_of(*angles.T)
     sound = np.all(np.isfinite(lengths(geometry, position, rotation)), axis=1)
@@ -99,19 +68,7 @@ def is_held(geometry: Geometry, platform: PlatformSpec, pose: Pose) -> NDArray[n
 
     True for robots of fewer than six cables, whose platform hangs.
 
-    Parameters
-    ----------
-    geometry : Geometry
-        Geometry of n lines.
-    platform : PlatformSpec
-        Mass and centre of mass.
-    pose : Pose
-        The p poses.
-
-    Returns
-    -------
-    (p,) array of bool
-        Whether each pose is held.
+    ``geometry``: geometry of n lines. ``pose``: the p poses. Returns: (p,) of bool.
     """
     if len(geometry.exit_point) < PLATFORM_DOF:
         return np.ones(len(pose.position), dtype=bool)
@@ -123,14 +80,8 @@ def is_held(geometry: Geometry, platform: PlatformSpec, pose: Pose) -> NDArray[n
 def pose_information(rows: Array, pose_of_row: NDArray[np.intp], count: int) -> Array:
     """Information matrices XᵀX of each pose, (count, k, k).
 
-    Parameters
-    ----------
-    rows : (r, k) array
-        Whitened rows of all poses.
-    pose_of_row : (r,) array
-        Index of the pose of each row; −1 is the last of ``count``.
-    count : int
-        Number of poses.
+    ``rows`` (r, k). ``pose_of_row`` (r,): index of the pose of each row; −1 is the last of
+    ``count``.
     """
     out = np.zeros((count, rows.shape[1], rows.shape[1]))
     for pose in np.unique(pose_of_row):
@@ -142,16 +93,8 @@ def pose_information(rows: Array, pose_of_row: NDArray[np.intp], count: int) -> 
 def determinant_gain(parts: Array, information: Array) -> Array:
     """Gain ln det(1 + X M⁻¹ Xᵀ) of each pose.
 
-    Parameters
-    ----------
-    parts : (c, r, q) array
-        Whitened rows X of each candidate.
-    information : (q, q) array
-        M, positive definite.
-
-    Returns
-    -------
-    (c,) array
+    ``parts`` (c, r, q): whitened rows X of each candidate. ``information`` (q, q): M, positive
+    definite. Returns: (c,).
     """
     inner = parts @ np.linalg.inv(information) @ np.swapaxes(parts, 1, 2)
     return np.asarray(np.linalg.slogdet(np.eye(inner.shape[1]) + inner)[1])
@@ -160,15 +103,8 @@ def determinant_gain(parts: Array, information: Array) -> Array:
 def noncentrality(information: Array) -> Array:
     """Noncentrality λ of the first column where all other columns may take any size.
 
-    Parameters
-    ----------
-    information : (..., k, k) array
-        Of whitened columns, the first that of interest.
-
-    Returns
-    -------
-    (...) array
-        Not below zero.
+    ``information`` (..., k, k): of whitened columns, the first that of interest. Returns (...): not
+    below zero.
     """
     rest = information[..., 1:, 1:] + _RIDGE * np.eye(information.shape[-1] - 1)
     across = information[..., 1:, :1]
@@ -181,16 +117,8 @@ def chosen_in_turn(
 ) -> None:
     """Choose poses one after another, each for the greatest gain beside those before.
 
-    Parameters
-    ----------
-    candidates : int
-        Number of candidate poses; each is tried once.
-    count : int
-        Number of poses to choose; fewer where candidates run out.
-    gains : callable
-        Gain of every candidate with the poses chosen so far, (candidates,).
-    add : callable
-        Adds a candidate, given its index and gain; returns False where it is refused.
+    ``gains``: gain of every candidate with the poses chosen so far, (candidates,). ``add``: adds a
+    candidate, given its index and gain; returns False where it is refused.
     """
     left = np.ones(candidates, dtype=bool)
     chosen = 0

@@ -40,20 +40,9 @@ def estimated_pose(
 ) -> Pose:
     """Poses with the least sum of squares of whitened residuals.
 
-    Parameters
-    ----------
-    whitened : callable
-        From p poses to residuals (p, r) in standard deviations and their derivatives (p, r, 6) by
-        position and rotation vector; both zero where nothing was measured.
-    start : Pose
-        Where the iteration starts.
-    iteration : Iteration
-        Damping and end.
-
-    Returns
-    -------
-    Pose
-        After the last step, whether or not the iteration has converged.
+    ``whitened``: from p poses to residuals (p, r) in standard deviations and their derivatives
+    (p, r, 6) by position and rotation vector; both zero where nothing was measured. Returns: after
+    the last step, whether or not the iteration has converged.
     """
     pose = start
     for _ in range(iteration.steps):
@@ -79,14 +68,9 @@ def moved_pose(pose: Pose, step: Array) -> Pose:
 def start_pose(position: Array, angles: Array, home: Pose) -> Pose:
     """Measured positions and rotations, completed by those of the home pose.
 
-    Parameters
-    ----------
-    position : (p, 3) array
-        m; NaN where a coordinate was not measured.
-    angles : (p, 3) array
-        Roll, pitch and yaw, rad; NaN where one was not measured.
-    home : Pose
-        The home pose, from which missing coordinates and angles are taken.
+    ``position`` (p, 3): m; NaN where a coordinate was not measured. ``angles`` (p, 3): roll, pitch
+    and yaw, rad; NaN where one was not measured. ``home``: the home pose, from which missing
+    coordinates and angles are taken.
     """
     place = np.where(np.isfinite(position), position, home.position)
     some = np.any(np.isfinite(angles), axis=1)

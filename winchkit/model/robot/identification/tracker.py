@@ -154,20 +154,9 @@ def pose_behind(tracker: Tracker, reading: Pose) -> Pose:
 def tracked_position(tracker: Tracker, pose: Pose, measured: Array) -> Constraint:
     """Position that the tracker should show less the measured one, (p, 3), m.
 
-    Parameters
-    ----------
-    tracker : Tracker
-        Its numbers.
-    pose : Pose
-        The p poses.
-    measured : (p, 3) array
-        Measured positions, m; NaN where missing.
-
-    Returns
-    -------
-    Constraint
-        ``by_robot`` has ``tracker_frame`` (shift and rotation vector), ``reflector`` and
-        ``tracker_scale``.
+    ``pose``: the p poses. ``measured`` (p, 3): measured positions, m; NaN where missing. Returns:
+    ``by_robot`` has ``tracker_frame`` (shift and rotation vector), ``reflector`` and
+    ``tracker_scale``.
     """
     turned = np.broadcast_to(rotation_by(tracker.turn), pose.rotation.shape)
     lever = pose.rotation @ tracker.offset
@@ -189,19 +178,8 @@ def tracked_position(tracker: Tracker, pose: Pose, measured: Array) -> Constrain
 def tracked_rotation(tracker: Tracker, pose: Pose, angles: Array) -> Constraint:
     """Rotation that the instrument should show less the measured one, (p, 3), rad.
 
-    Parameters
-    ----------
-    tracker : Tracker
-        Its numbers.
-    pose : Pose
-        The p poses.
-    angles : (p, 3) array
-        Measured roll, pitch and yaw, rad; NaN where one was not measured.
-
-    Returns
-    -------
-    Constraint
-        ``by_robot`` has ``tracker_frame`` and ``mounting``.
+    ``pose``: the p poses. ``angles`` (p, 3): measured roll, pitch and yaw, rad; NaN where one was
+    not measured. Returns: ``by_robot`` has ``tracker_frame`` and ``mounting``.
     """
     turned = np.broadcast_to(rotation_by(tracker.turn), pose.rotation.shape)
     shown = _shown_rotation(tracker, pose, turned)
@@ -224,21 +202,9 @@ def tracked_rotation(tracker: Tracker, pose: Pose, angles: Array) -> Constraint:
 def registration(seen: Array, point: Array) -> tuple[Array, Array, float]:
     """Similarity that carries points to their measured places, by Umeyama's closed form.
 
-    Parameters
-    ----------
-    seen : (p, 3) array
-        Measured places y, m.
-    point : (p, 3) array
-        Points x, m.
-
-    Returns
-    -------
-    rotation : (3, 3) array
-        Q of Σ |y − t − k Q x|² → min.
-    shift : (3,) array
-        t for k = 1.
-    scale : float
-        k; 1 where the points coincide.
+    ``seen`` (p, 3): measured places y, m. ``point`` (p, 3): points x, m. Returns: ``rotation``
+    (3, 3): Q of Σ |y − t − k Q x|² → min; ``shift`` (3,): t for k = 1; ``scale``: k; 1 where the
+    points coincide.
     """
     mean_seen, mean = seen.mean(axis=0), point.mean(axis=0)
     spread = point - mean
@@ -255,23 +221,10 @@ def registered(
 ) -> Tracker:
     """First estimate of a tracker's numbers from predicted poses.
 
-    Parameters
-    ----------
-    start : Tracker
-        Values of the numbers that are not free.
-    pose : Pose
-        Predicted poses, (p,); NaN where one is unknown.
-    seen : (p, 3) array
-        Measured positions, m; NaN where missing.
-    angles : (p, 3) array
-        Measured angles, rad; NaN where missing.
-    free : collection of str
-        Of ``frame``, ``reflector``, ``scale`` and ``mounting``.
-
-    Returns
-    -------
-    Tracker
-        ``start`` where fewer than four positions were measured whole.
+    ``start``: values of the numbers that are not free. ``pose``: predicted poses, (p,); NaN where
+    one is unknown. ``seen`` (p, 3): measured positions, m; NaN where missing. ``angles`` (p, 3):
+    measured angles, rad; NaN where missing. ``free``: of ``frame``, ``reflector``, ``scale`` and
+    ``mounting``. Returns: ``start`` where fewer than four positions were measured whole.
     """
     known = np.all(np.isfinite(seen), axis=1) & np.all(np.isfinite(pose.position), axis=1)
     if np.count_nonzero(known) >= 4:

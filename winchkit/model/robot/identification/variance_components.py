@@ -53,18 +53,9 @@ def re_estimated(
 ) -> Component:
     """One step of the iteration for one kind of measurement.
 
-    Parameters
-    ----------
-    sigma : float
-        Standard deviation by which the residuals were divided, SI.
-    residual : (m,) array
-        Whitened residuals of the kind.
-    leverage : (m,) array
-        Their leverages, 0 to 1.
-    least_redundancy : float
-        Degrees of freedom below which ``sigma`` is kept; it is also kept below 2 % of m.
-    least : float
-        Lower limit of the estimate, SI.
+    ``sigma``: standard deviation by which the residuals were divided, SI. ``residual`` (m,).
+    ``leverage`` (m,): their leverages, 0 to 1. ``least_redundancy``: degrees of freedom below which
+    ``sigma`` is kept; it is also kept below 2 % of m. ``least``: lower limit of the estimate, SI.
     """
     free = float(np.sum(1 - leverage))
     if free < max(least_redundancy, _LEAST_SHARE * len(residual)):

@@ -35,24 +35,8 @@ class Joint:
 def joined(parts: Sequence[Streams], lag: float | None = None) -> tuple[Streams, tuple[Joint, ...]]:
     """All channels of several files on the clock of the first one.
 
-    Parameters
-    ----------
-    parts : sequence of Streams
-        Files; the first one has the reference clock.
-    lag : float, optional
-        Known difference of the clocks, s: time of the first = time of the others + lag.
-
-    Returns
-    -------
-    Streams
-        Streams of all files; of a channel that several files have, that of the earlier one.
-    joints : tuple of Joint
-        One for each further file.
-
-    Raises
-    ------
-    RunError
-        Where the difference of the clocks cannot be determined.
+    ``lag``: known difference of the clocks, s: time of the first = time of the others + lag. Raises
+    RunError where the difference of the clocks cannot be determined.
     """
     first = parts[0]
     streams = list(first.streams)

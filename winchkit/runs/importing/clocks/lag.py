@@ -38,15 +38,7 @@ _PAIRS = (
 def agreement_of(first: Streams, second: Streams) -> Agreement | None:
     """Lag of two files by the channel pair with the largest correlation.
 
-    Parameters
-    ----------
-    first, second : Streams
-        Files with times.
-
-    Returns
-    -------
-    Agreement, optional
-        None without channels that follow each other.
+    Returns: None without channels that follow each other.
     """
     best = pose_agreement(first, second)
     has_pose = best is not None
@@ -74,21 +66,7 @@ def span_of(streams: Streams) -> tuple[float, float]:
 def shifted(streams: Streams, lag: float, drift: float = 0.0, reference: float = 0.0) -> Streams:
     """Streams on another clock: t + lag + drift (t − reference).
 
-    Parameters
-    ----------
-    streams : Streams
-        A file.
-    lag : float
-        s.
-    drift : float
-        Relative difference of the rates.
-    reference : float
-        Time at which the lag is valid, s.
-
-    Returns
-    -------
-    Streams
-        The same samples.
+    ``lag``: s. ``reference``: time at which the lag is valid, s. Returns: the same samples.
     """
     moved = tuple(
         replace(item, time=item.time + lag + drift * (item.time - reference))

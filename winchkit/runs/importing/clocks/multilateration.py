@@ -46,15 +46,7 @@ _RIDGE = 1e-9
 def pose_agreement(first: Streams, second: Streams) -> Agreement | None:
     """Lag of two files of which one has the motor angles of a robot and the other its positions.
 
-    Parameters
-    ----------
-    first, second : Streams
-        Files with times.
-
-    Returns
-    -------
-    Agreement, optional
-        None without three lines in one file and a position in the other.
+    Returns: None without three lines in one file and a position in the other.
     """
     for lines, tracker in ((first, second), (second, first)):
         angles = signals_by_base(lines).get("motor_angle", [])

@@ -26,18 +26,9 @@ def is_expression(source: str) -> bool:
 def with_derived(table: Table, sources: Iterable[str]) -> Table:
     """The table with a further column for every source that is an expression of its columns.
 
-    Parameters
-    ----------
-    table : Table
-        Columns.
-    sources : iterable of str
-        Names, numbers of columns, and expressions; only the last are added.
-
-    Returns
-    -------
-    Table
-        The unit of a sum is that of its columns, which is the same for all or convertible; a
-        product of columns has none. A name with an operator is that column.
+    ``sources``: names, numbers of columns, and expressions; only the last are added. Returns: the
+    unit of a sum is that of its columns, which is the same for all or convertible; a product of
+    columns has none. A name with an operator is that column.
     """
     added: list[Column] = []
     for source in dict.fromkeys(sources):

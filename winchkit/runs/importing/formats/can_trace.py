@@ -39,15 +39,8 @@ _LONGEST = 64
 def is_can_trace(lines: Sequence[str]) -> bool:
     """Whether lines of text are frames of a CAN bus.
 
-    Parameters
-    ----------
-    lines : sequence of str
-        The first lines of a file.
-
-    Returns
-    -------
-    bool
-        True where at least 70 % of the lines from the first frame on are frames.
+    ``lines``: the first lines of a file. Returns: True where at least 70 % of the lines from the
+    first frame on are frames.
     """
     filled = [line for line in islice(lines, _SAMPLED) if line.strip()]
     frames = [_frame_of(line) for line in filled]

@@ -28,12 +28,7 @@ _FEWEST = 5
 def has_unit(cell: str, decimal: str) -> bool:
     """Whether a cell is a number with its unit.
 
-    Parameters
-    ----------
-    cell : str
-        Cell.
-    decimal : str
-        Decimal sign.
+    ``decimal``: decimal sign.
     """
     return _read(cell, decimal) is not None
 
@@ -41,15 +36,7 @@ def has_unit(cell: str, decimal: str) -> bool:
 def with_cell_units(column: Column) -> Column:
     """A column of text whose cells have units as one of numbers; another one unchanged.
 
-    Parameters
-    ----------
-    column : Column
-        Any column.
-
-    Returns
-    -------
-    Column
-        In the most frequent unit of the cells. Cells with another text are in ``wrong``.
+    Returns: in the most frequent unit of the cells. Cells with another text are in ``wrong``.
     """
     if column.texts is None:
         return column

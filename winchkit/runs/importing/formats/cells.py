@@ -37,17 +37,7 @@ def is_missing(cell: str) -> bool:
 def number(cell: str, decimal: str) -> float | None:
     """Value of a cell; NaN for a missing value, None for another text.
 
-    Parameters
-    ----------
-    cell : str
-        Cell.
-    decimal : str
-        ``.`` or ``,``.
-
-    Returns
-    -------
-    float, optional
-        Infinite values are as in the file.
+    ``decimal``: ``.`` or ``,``.
     """
     text = _ODD.sub("", cell.strip().strip('"').strip()).replace("−", "-")
     if (_COMMA if decimal == "," else _POINT).fullmatch(text):
@@ -64,19 +54,7 @@ def number(cell: str, decimal: str) -> float | None:
 def numbers(cells: Sequence[str], decimal: str) -> tuple[Array, list[int]]:
     """Values of a column, and the rows that have another text.
 
-    Parameters
-    ----------
-    cells : sequence of str
-        Cells of a column.
-    decimal : str
-        ``.`` or ``,``.
-
-    Returns
-    -------
-    values : (n,) array
-        NaN for a missing value and for a text.
-    wrong : list of int
-        Rows with a text.
+    ``decimal``: ``.`` or ``,``. Returns: ``values`` (n,): NaN for a missing value and for a text.
     """
     try:
         plain = [cell.replace(",", ".") for cell in cells] if decimal == "," else cells

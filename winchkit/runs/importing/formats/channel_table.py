@@ -45,16 +45,8 @@ class _Parts:
 def by_channel(table: Table) -> Table:
     """A table with one column for each channel, where each row is one value of one channel.
 
-    Parameters
-    ----------
-    table : Table
-        Any table.
-
-    Returns
-    -------
-    Table
-        Values and stamps of each channel in a group of its own, in the order of the file; the
-        table itself where it has another form.
+    Returns: values and stamps of each channel in a group of its own, in the order of the file; the
+    table itself where it has another form.
     """
     parts = _parts(table)
     if parts is None:

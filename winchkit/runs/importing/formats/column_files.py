@@ -22,17 +22,7 @@ _OBJECTS = (
 def read_numpy(path: str, data: bytes) -> Table:
     """Read NPY or NPZ; raises RunError, also for arrays of Python objects, which may hold code.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        An array of an NPY file is called ``array``; the fields of a structured one have names.
+    Returns: an array of an NPY file is called ``array``; the fields of a structured one have names.
     """
     try:
         if data.startswith(b"PK"):
@@ -60,24 +50,8 @@ def read_numpy(path: str, data: bytes) -> Table:
 def read_parquet(path: str, data: bytes) -> Table:
     """Read Parquet; units are in the columns' names or metadata (``unit``).
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        A column per column of numbers or dates.
-
-    Raises
-    ------
-    UsageError
-        Without pyarrow.
-    RunError
-        For an invalid file.
+    Returns: a column per column of numbers or dates. Raises UsageError without pyarrow; RunError
+    for an invalid file.
     """
     try:
         import pyarrow as pa

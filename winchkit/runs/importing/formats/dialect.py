@@ -50,19 +50,7 @@ class Dialect:
 def decode(data: bytes, path: str) -> tuple[list[str], str]:
     """Lines of a text file and its encoding; raises RunError for a binary file.
 
-    Parameters
-    ----------
-    data : bytes
-        Content.
-    path : str
-        File, for the message.
-
-    Returns
-    -------
-    lines : list of str
-        Without line ends.
-    encoding : str
-        Name of the encoding; empty for UTF-8.
+    Returns: ``encoding``: empty for UTF-8.
     """
     for encoding, called in _encodings(data):
         try:
@@ -91,17 +79,7 @@ def _encodings(data: bytes) -> list[tuple[str, str]]:
 def whole_lines(lines: list[str]) -> tuple[list[str], list[int] | None]:
     """Lines joined where a quoted cell has a line end, as spreadsheets write it.
 
-    Parameters
-    ----------
-    lines : list of str
-        Lines of the file.
-
-    Returns
-    -------
-    lines : list of str
-        A line end within a cell is a blank.
-    numbers : list of int or None
-        Line of the file of each; None where no line was joined.
+    Returns: ``numbers``: None where no line was joined.
     """
     odd = [n for n, line in enumerate(lines) if line.count('"') % 2]
     # A quotation mark within a cell is one of inches.
@@ -124,17 +102,7 @@ def whole_lines(lines: list[str]) -> tuple[list[str], list[int] | None]:
 def split_line(line: str, delimiter: str) -> list[str]:
     """Cells of a line; quoted cells may have delimiters.
 
-    Parameters
-    ----------
-    line : str
-        Line without its end.
-    delimiter : str
-        One character; a blank stands for any number of blanks.
-
-    Returns
-    -------
-    list of str
-        Cells without blanks at their ends.
+    ``delimiter``: one character; a blank stands for any number of blanks.
     """
     if '"' not in line:
         return line.split() if delimiter == BLANKS else _cells(line, delimiter)
@@ -154,16 +122,8 @@ def _cells(line: str, delimiter: str) -> list[str]:
 def find_dialect(lines: Sequence[str]) -> Dialect | None:
     """Delimiter and decimal sign that read the most rows of numbers; None without such rows.
 
-    Parameters
-    ----------
-    lines : sequence of str
-        Lines of the file.
-
-    Returns
-    -------
-    Dialect, optional
-        Of equal candidates the one with more cells in a row. Rows with fewer numbers than texts
-        count where no rows have more.
+    Returns: of equal candidates the one with more cells in a row. Rows with fewer numbers than
+    texts count where no rows have more.
     """
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(("#", "%"))]
     sample = _blocks(filled)
@@ -221,12 +181,7 @@ def _rated(
 def has_cell_units(rows: Sequence[Sequence[str]], decimal: str) -> bool:
     """Whether at least half of the rows have a cell that is a number with its unit.
 
-    Parameters
-    ----------
-    rows : sequence of sequence of str
-        Cells of each row.
-    decimal : str
-        Decimal sign.
+    ``decimal``: decimal sign.
     """
     return 2 * sum(any(has_unit(c, decimal) for c in cells) for cells in rows) >= max(len(rows), 1)
 

@@ -19,15 +19,8 @@ _DEEPEST = 6
 def numbers_of(value: Any) -> Iterator[tuple[str, float]]:
     """Paths and values of the numbers of a message, without its header.
 
-    Parameters
-    ----------
-    value : object
-        Mappings, sequences, objects with ``__slots__``, numbers.
-
-    Yields
-    ------
-    (str, float)
-        Path such as ``pose.x`` or ``joint1.position``; ``data`` for a single number.
+    ``value``: mappings, sequences, objects with ``__slots__``, numbers. Yields: path such as
+    ``pose.x`` or ``joint1.position``; ``data`` for a single number.
     """
     for name, item in fields_of(value):
         if not isinstance(item, str) and not _HEADER.match(name):
@@ -37,15 +30,7 @@ def numbers_of(value: Any) -> Iterator[tuple[str, float]]:
 def stamp_of(value: Any) -> int | None:
     """Stamp of the header of a message, or of the header of a part of it; None without one.
 
-    Parameters
-    ----------
-    value : object
-        As for :func:`numbers_of`.
-
-    Returns
-    -------
-    int, optional
-        ns.
+    ``value``: as for :func:`numbers_of`.
     """
     header = _field(value, "header")
     for part in () if header is not None else map(str, _keys(value)):
@@ -74,10 +59,7 @@ def _field(value: Any, name: str) -> Any:
 def fields_of(value: Any) -> Iterator[tuple[str, float | str]]:
     """Paths and values of the numbers and texts of a message or a record.
 
-    Parameters
-    ----------
-    value : object
-        As for :func:`numbers_of`.
+    ``value``: as for :func:`numbers_of`.
     """
     yield from _leaves("", value, 0)
 

@@ -66,21 +66,7 @@ class Header:
 def read_header(rows: Sequence[Row], width: int, decimal: str, *, is_blank: bool) -> Header:
     """Read what is above the numbers.
 
-    Parameters
-    ----------
-    rows : sequence of (int, list of str)
-        All rows above the first one of numbers; blank ones have no cells.
-    width : int
-        Cells of a row of numbers.
-    decimal : str
-        Decimal sign.
-    is_blank : bool
-        Whether blanks separate the cells: a sentence above the names has cells as well.
-
-    Returns
-    -------
-    Header
-        Names are empty where the file has none.
+    ``decimal``: decimal sign. Returns: names are empty where the file has none.
     """
     header = _of_oscilloscope(rows, width, decimal)
     if header is not None:
@@ -198,18 +184,7 @@ def _padded(cells: Sequence[str], width: int) -> list[str]:
 
 
 def keyed_width(rows: Sequence[Row]) -> int:
-    """Cells of the row of names of a TwinCAT Scope export; 0 in another file.
-
-    Parameters
-    ----------
-    rows : sequence of (int, list of str)
-        The first rows of the file.
-
-    Returns
-    -------
-    int
-        Rows of numbers have fewer cells once the slower channels have ended.
-    """
+    """Cells of the row of names of a TwinCAT Scope export; 0 in another file."""
     for (_, cells), (_, below) in pairwise([row for row in rows if any(row[1])]):
         starts = [n for n, cell in enumerate(cells) if cell == _NAME]
         if starts[:1] == [0] and len(cells) > len(starts) and below[0] in KEYS - {_NAME}:

@@ -27,13 +27,7 @@ _FEWEST = 2
 
 
 def is_json(data: bytes) -> bool:
-    """Whether a file is JSON by its first character that is no blank.
-
-    Parameters
-    ----------
-    data : bytes
-        Content.
-    """
+    """Whether a file is JSON by its first character that is no blank."""
     start = data[:4000].removeprefix(b"\xef\xbb\xbf").lstrip()
     return start.startswith(b"{") or (start[:1] == b"[" and start[1:].lstrip()[:1] in b"[{")
 
@@ -41,22 +35,8 @@ def is_json(data: bytes) -> bool:
 def read_json(path: str, data: bytes) -> Table | None:
     """Read JSON, or JSON Lines (a value on every line).
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table, optional
-        None for a text that is no JSON.
-
-    Raises
-    ------
-    RunError
-        For JSON without a list of numbers, and for a file that ends within a value.
+    Returns: None for a text that is no JSON. Raises RunError for JSON without a list of numbers,
+    and for a file that ends within a value.
     """
     value, notes = _loaded(path, data)
     if value is None:

@@ -29,22 +29,7 @@ _CLASSES = "save its arrays, e.g. t = seconds(T.Time); x = T.x; save('file.mat',
 def read_mat(path: str, data: bytes) -> Table:
     """Read a MAT file of version 4 to 7.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        Vectors and columns of matrices; scalars are constants.
-
-    Raises
-    ------
-    RunError
-        For an invalid file.
+    Raises RunError for an invalid file.
     """
     from scipy.io import loadmat, whosmat
 
@@ -124,25 +109,8 @@ def _flat(name: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
 def read_hdf5(path: str, data: bytes) -> Table:
     """Read an HDF5 file, or a MAT file of version 7.3.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        Every dataset of numbers by its path; attributes ``unit`` or ``units`` are units. Links to
-        other files are not followed.
-
-    Raises
-    ------
-    UsageError
-        Without h5py.
-    RunError
-        For an invalid file.
+    Returns: every dataset of numbers by its path; attributes ``unit`` or ``units`` are units. Links
+    to other files are not followed. Raises UsageError without h5py; RunError for an invalid file.
     """
     try:
         import h5py

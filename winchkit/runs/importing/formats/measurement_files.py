@@ -26,25 +26,9 @@ _TIMES = "mM"
 def read_mdf(path: str, data: bytes) -> Table:
     """Read an MDF file of version 3 or 4, in physical units.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        A column per channel of numbers; channels of one channel group have one time. Samples that
-        the file marks as invalid are NaN. Lines ``key: value`` of its comment are metadata.
-
-    Raises
-    ------
-    UsageError
-        Without asammdf.
-    RunError
-        For an invalid file, or one without channels of numbers.
+    Returns: a column per channel of numbers; channels of one channel group have one time. Samples
+    that the file marks as invalid are NaN. Lines ``key: value`` of its comment are metadata. Raises
+    UsageError without asammdf; RunError for an invalid file, or one without channels of numbers.
     """
     try:
         from asammdf import MDF
@@ -116,25 +100,9 @@ def _channels(file: Any, notes: list[str]) -> Iterator[Column]:
 def read_tdms(path: str, data: bytes) -> Table:
     """Read a TDMS file of LabVIEW, with scaled values.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        A column per channel of numbers or time stamps. Channels that are waveforms have the time
-        of their increment; those of one group with one time are sampled together.
-
-    Raises
-    ------
-    UsageError
-        Without npTDMS.
-    RunError
-        For an invalid file, or one without channels of numbers.
+    Returns: a column per channel of numbers or time stamps. Channels that are waveforms have the
+    time of their increment; those of one group with one time are sampled together. Raises
+    UsageError without npTDMS; RunError for an invalid file, or one without channels of numbers.
     """
     try:
         from nptdms import TdmsFile

@@ -32,25 +32,9 @@ class _Message:
 def read_messages(path: str, data: bytes) -> Table:
     """Read an MCAP file.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        Columns by topic, in the order of the file, with the log time and the stamp of the header,
-        in ns since 1970 or on a clock of their own.
-
-    Raises
-    ------
-    UsageError
-        For ROS 2 messages without the decoder.
-    RunError
-        For an invalid file, and one without numbers in a known encoding.
+    Returns: columns by topic, in the order of the file, with the log time and the stamp of the
+    header, in ns since 1970 or on a clock of their own. Raises UsageError for ROS 2 messages
+    without the decoder; RunError for an invalid file, and one without numbers in a known encoding.
     """
     from mcap.reader import NonSeekingReader
 

@@ -51,20 +51,7 @@ class _Layout:
 
 
 def read_capture(path: str, data: bytes) -> Table | None:
-    """Read a text export of motion capture; None for another file.
-
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table, optional
-        Columns with the name of their marker or body as label.
-    """
+    """Read a text export of motion capture; None for another file."""
     if not data.lstrip(b"\xef\xbb\xbf").startswith((_QUALISYS, _TRC)):
         return None
     lines, _ = decode(data, path)

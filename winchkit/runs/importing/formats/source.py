@@ -20,22 +20,10 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 def read_table(path: str | Path) -> Table:
     """Read a file.
 
-    Parameters
-    ----------
-    path : str or Path
-        Text, JSON, XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF or TDMS.
-
-    Returns
-    -------
-    Table
-        Columns in the units of the file.
-
-    Raises
-    ------
-    RunError
-        For a file that cannot be read, an unknown format, and one without numbers.
-    UsageError
-        Without the library of the format, with the name of the extra that installs it.
+    ``path``: text, JSON, XLSX, MAT, HDF5, Parquet, NPY, NPZ, MCAP, MDF or TDMS. Returns: columns in
+    the units of the file. Raises RunError for a file that cannot be read, an unknown format, and
+    one without numbers; UsageError without the library of the format, with the name of the extra
+    that installs it.
     """
     table = _read(path)
     units = replace(table, columns=tuple(with_cell_units(item) for item in table.columns))

@@ -18,24 +18,8 @@ from winchkit.runs.importing.table import Table, named_apart, refuse_size
 def read_workbook(path: str, data: bytes) -> Table:
     """Read a workbook.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        Cached values of formulas; dates as text in ISO 8601.
-
-    Raises
-    ------
-    UsageError
-        Without openpyxl.
-    RunError
-        For an invalid workbook, and one without rows of numbers.
+    Returns: cached values of formulas; dates as text in ISO 8601. Raises UsageError without
+    openpyxl; RunError for an invalid workbook, and one without rows of numbers.
     """
     try:
         import openpyxl

@@ -43,22 +43,7 @@ _TEXT_SHARE = 0.2
 def read_text_table(path: str, data: bytes) -> Table:
     """Read a text file.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    data : bytes
-        Its content.
-
-    Returns
-    -------
-    Table
-        With the faults of rows; those of cells are in the columns.
-
-    Raises
-    ------
-    RunError
-        For a binary file, and for one without rows of numbers.
+    Raises RunError for a binary file, and for one without rows of numbers.
     """
     lines, encoding = decode(data, path)
     lines, numbers = whole_lines(lines)
@@ -183,21 +168,7 @@ class _Rows:
 def table_of_rows(path: str, rows: Sequence[Row], dialect: Dialect, *, is_ended: bool) -> Table:
     """Table of split lines.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    rows : sequence of (int, list of str)
-        Line numbers and cells.
-    dialect : Dialect
-        Decimal sign and width.
-    is_ended : bool
-        Whether the last line has a line end.
-
-    Returns
-    -------
-    Table
-        Columns without a name and without values are left out.
+    ``dialect``: decimal sign and width.
     """
     head = [rows[n] for n in range(min(len(rows), _HEAD))]
     is_padded = bool(keyed := keyed_width(head))

@@ -26,30 +26,8 @@ def table_of_arrays(
 ) -> Table:
     """Table of arrays: vectors and columns of matrices, scalars as constants, texts as metadata.
 
-    Parameters
-    ----------
-    path : str
-        File, for messages.
-    layout : str
-        Description of the format.
-    arrays : mapping of str to array
-        Variables; matrices have a row or a column per sample, the longer side is time.
-    units : mapping, optional
-        Units by name.
-    metadata : mapping, optional
-        Keys and texts.
-    notes : sequence of str
-        Notes of the reader.
-
-    Returns
-    -------
-    Table
-        Arrays of different lengths are groups.
-
-    Raises
-    ------
-    RunError
-        Without any array of numbers.
+    ``arrays``: variables; matrices have a row or a column per sample, the longer side is time.
+    Raises RunError without any array of numbers.
     """
     columns: list[Column] = []
     constants: dict[str, float] = {}
@@ -95,14 +73,8 @@ def table_of_arrays(
 def column_of(name: str, array: Any, unit: str) -> Column:
     """Column of a vector of numbers, or of dates as nanoseconds since 1970.
 
-    Parameters
-    ----------
-    name : str
-        Its name.
-    array : (n,) array
-        Numbers, dates or durations (``datetime64``, ``timedelta64``).
-    unit : str
-        Unit of numbers as spelled in the file; empty where the name may have it, ``Load [N]``.
+    ``array`` (n,): numbers, dates or durations (``datetime64``, ``timedelta64``). ``unit``: empty
+    where the name may have it, ``Load [N]``.
     """
     if array.dtype.kind in "mM":
         missing = np.isnat(array)

@@ -41,13 +41,8 @@ class Wrap:
 def restored(values: Array, stored: str) -> Array:
     """Numbers with their sign and without wraps.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Numbers of the file; NaN where missing.
-    stored : str
-        ``modulo 360``, ``two's complement 65536``, ``sign and magnitude 2048``; empty for numbers
-        that are stored as they are.
+    ``values`` (n,): NaN where missing. ``stored``: ``modulo 360``, ``two's complement 65536``,
+    ``sign and magnitude 2048``; empty for numbers that are stored as they are.
     """
     if stored in {"", VECTOR}:
         return values
@@ -83,20 +78,9 @@ def _unwrapped(values: Array, modulus: float) -> Array:
 def wrap_of(values: Array, usual: Collection[float], rare: Collection[float] = ()) -> Wrap | None:
     """Modulus of numbers that wrap, by their steps.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Numbers of the file; NaN where missing.
-    usual : collection of float
-        Moduli of which one step is enough: a turn in the unit of the column, ranges of counters.
-    rare : collection of float
-        Moduli of which several steps are needed: resolutions of encoders.
-
-    Returns
-    -------
-    Wrap, optional
-        None where no steps are near a modulus. The modulus is an estimate where it is neither
-        usual nor rare.
+    ``values`` (n,): NaN where missing. ``usual``: moduli of which one step is enough: a turn in the
+    unit of the column, ranges of counters. Returns: None where no steps are near a modulus. The
+    modulus is an estimate where it is neither usual nor rare.
 
     Notes
     -----

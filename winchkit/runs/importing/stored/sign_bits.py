@@ -53,13 +53,8 @@ class LostSign:
 def lost_sign(values: Array, *, is_small: bool = False) -> LostSign | None:
     """How a column is stored whose sign seems to be lost; None for another one.
 
-    Parameters
-    ----------
-    values : (n,) array
-        Numbers as in the file; NaN where missing.
-    is_small : bool, optional
-        Whether the numbers are small for certain, as per cent of a rated torque are, so that all
-        may be negative.
+    ``values`` (n,): NaN where missing. ``is_small``: whether the numbers are small for certain, as
+    per cent of a rated torque are, so that all may be negative.
     """
     known = np.unique(values[np.isfinite(values)])
     if len(known) < 2 or known[0] < 0:
