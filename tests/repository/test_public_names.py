@@ -96,6 +96,18 @@ def undescribed_fields(public: type) -> Iterator[str]:
                 yield field.target.id
 
 
+def test_only_public_faces_list_their_names() -> None:
+    """``__all__`` is that of a package that re-exports, or of a module that is promised."""
+    promised = runpy.run_path(str(ROOT / "docs/make_signatures.py"))["PACKAGES"]
+    root = Path(winchkit.__file__).parent
+    listed = {
+        ".".join(("winchkit", *file.relative_to(root).with_suffix("").parts))
+        for file in root.rglob("*.py")
+        if file.name != "__init__.py" and "\n__all__" in file.read_text(encoding="utf-8")
+    }
+    assert listed <= set(promised)
+
+
 def test_every_package_describes_itself_and_names_its_folders() -> None:
     lacking = []
     for file in sorted(Path(winchkit.__file__).parent.rglob("__init__.py")):
