@@ -21,7 +21,8 @@ from winchkit.diagnosis.selection.acceptance import RELEVANT_RATIO
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.starting_values import shape_at_bound
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
-from winchkit.diagnosis.verdict.plausibility import implausible_value
+from winchkit.diagnosis.verdict.plausibility import implausible_value, plausible_range
+from winchkit.effects.effect import Parameter
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
@@ -70,15 +71,21 @@ def _rise(engine: SelectionEngine, smaller: Fit, present: Fit, noise: Noise) -> 
 def reduced_law(term: Term, values: Mapping[str, Estimate], profile: WinchProfile | None) -> bool:
     """Whether the shape of a law is at a bound, implausible, or not determined.
 
-    A single shape is not determined where its standard deviation exceeds its value; a series of
-    coefficients where those of all do.
+    A shape is determined where the interval of one standard deviation about its value is above zero
+    and ends before its largest plausible value; a series of coefficients where one of them is.
     """
     shapes = [p for p in Coordinates(term.effect).shapes if p.name in values]
     if not shapes:
         return False
     if shape_at_bound(term) or any(implausible_value(p, values[p.name], profile) for p in shapes):
         return True
-    return all(not values[p.name].std < abs(values[p.name].value) for p in shapes)
+    return not any(_is_determined(p, values[p.name], profile) for p in shapes)
+
+
+def _is_determined(parameter: Parameter, estimate: Estimate, profile: WinchProfile | None) -> bool:
+    known = plausible_range(parameter, profile)
+    size, high = abs(estimate.value), parameter.high if known is None else known[1]
+    return estimate.std < min(size, high - size)
 
 
 def _replaced(engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> Fit:

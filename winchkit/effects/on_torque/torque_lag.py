@@ -22,7 +22,9 @@ EFFECT = Effect(
             typical=0.02,
             low=0.0,
             high=10.0,
-            plausible=Plausible(0.0, 1.0, "current loops and filters settle within a second"),
+            plausible=Plausible(
+                0.0, 0.2, "a filter, a bus and a logger delay by a tenth of a second"
+            ),
         ),
     ),
     apply=apply,

@@ -22,7 +22,7 @@ EFFECT = Effect(
             typical=5e-3,
             low=0.0,
             high=2.0,
-            plausible=Plausible(0.0, 0.5, "a drive follows its command within half a second"),
+            plausible=Plausible(0.0, 0.2, "a drive follows its command within a tenth of a second"),
         ),
     ),
     apply=apply,
