@@ -30,10 +30,10 @@ from winchkit.diagnosis.results import (
     OutputError,
     RunOffset,
 )
+from winchkit.quantity_text import percent
 from winchkit.report.detectability import untestable, useful_candidates, visible
 from winchkit.report.figures.waterfall import errors_without
 from winchkit.report.text import addition_text, compare_text, report_text
-from winchkit.report.words.numbers import percent
 from winchkit.report.words.sentence import changes_text, headline
 from winchkit.report.words.steps import lowered_most, step_text
 from winchkit.schema.read import read_profile

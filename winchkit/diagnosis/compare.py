@@ -23,8 +23,8 @@ from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
-from winchkit.runs.sanity.text import size
 from winchkit.schema.profiles.winch import WinchProfile
 
 
@@ -177,9 +177,9 @@ def _rms_within_runs(regression: TimeSeriesRegression, residual: Array, output: 
 def _offset_note(output: str, error: OutputError, spread: float) -> str:
     return (
         f"{output.replace('_', ' ')}: the mean error differs between the runs by "
-        f"{size(spread, error.unit)} (standard deviation): another zero of the instrument in every "
-        "run, or an effect of what differs between them; with an offset per run the error is "
-        f"{size(error.rms_with_run_offsets or 0.0, error.unit)} rms"
+        f"{quantity(spread, error.unit)} (standard deviation): another zero of the "
+        "instrument in every run, or an effect of what differs between them; with an offset per run the error is "
+        f"{quantity(error.rms_with_run_offsets or 0.0, error.unit)} rms"
     )
 
 

@@ -14,7 +14,7 @@ from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.model.stages import OUTPUT_UNITS
-from winchkit.runs.sanity.text import size
+from winchkit.quantity_text import quantity
 
 _LARGEST_RATIO = 2.0
 """Range of an effect's change over that of the output itself, from which other effects must cancel
@@ -39,8 +39,8 @@ def oversized(regression: Regression, fit: Fit, index: int) -> str | None:
         if own > _LARGEST_RATIO * whole:
             unit, name = OUTPUT_UNITS[output], output.replace("_", " ")
             return (
-                f"it changes the {name} by {size(own, unit)}, which varies by {size(whole, unit)}: "
-                "other effects cancel it"
+                f"it changes the {name} by {quantity(own, unit)}, which varies by "
+                f"{quantity(whole, unit)}: other effects cancel it"
             )
     return None
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from winchkit.diagnosis.results import Comparison, OutputError
+from winchkit.quantity_text import percent, quantity, scale_for
 from winchkit.report.figures.maps import map_text
-from winchkit.report.words.numbers import percent, quantity, scale_for
 from winchkit.report.words.sentence import CLEAR_ORDER, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
 

@@ -10,7 +10,7 @@ from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import CandidateScore, Detectable, Diagnosis
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.effect import Effect, Parameter
-from winchkit.report.words.numbers import quantity
+from winchkit.quantity_text import quantity
 from winchkit.report.words.vocabulary import parameter_name, parameter_unit
 
 _FEW = 4

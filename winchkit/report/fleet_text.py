@@ -9,7 +9,7 @@ from math import isfinite
 
 from winchkit.diagnosis.fleet.history import FleetHistory, FleetParameter, WinchHistory
 from winchkit.diagnosis.fleet.swapped_profiles import Swap
-from winchkit.report.words.numbers import quantity
+from winchkit.quantity_text import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
 
 _DO = {

@@ -9,11 +9,7 @@ from math import degrees, isfinite
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import CandidateScore, Diagnosis, Estimate, OutputFit
 from winchkit.effects.effect import Effect
-from winchkit.report.detectability import untestable, useful_candidates, visible
-from winchkit.report.figures.waterfall import Waterfall
-from winchkit.report.html.markup import Markup, details, element, formula, join, table
-from winchkit.report.words.headline import noise_text, worst_outputs
-from winchkit.report.words.numbers import (
+from winchkit.quantity_text import (
     Scale,
     grouped,
     quantity,
@@ -21,6 +17,10 @@ from winchkit.report.words.numbers import (
     significant,
     unbroken,
 )
+from winchkit.report.detectability import untestable, useful_candidates, visible
+from winchkit.report.figures.waterfall import Waterfall
+from winchkit.report.html.markup import Markup, details, element, formula, join, table
+from winchkit.report.words.headline import noise_text, worst_outputs
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.steps import alike, doubt_texts, step_text
 from winchkit.report.words.vocabulary import (

@@ -16,6 +16,7 @@ from winchkit.diagnosis.robot.excitation import missing_pose_excitation
 from winchkit.effects.card import sparkline
 from winchkit.effects.placement import HOME
 from winchkit.profile_edit.history import LADDER_UNITS
+from winchkit.quantity_text import grouped, percent, scale_for, significant, with_std
 from winchkit.report.comparison_rows import (
     HEAD,
     followed,
@@ -29,7 +30,6 @@ from winchkit.report.figures.waterfall import errors_without, waterfall_of
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.columns import aligned, hanging, paragraph
 from winchkit.report.words.headline import noise_text
-from winchkit.report.words.numbers import grouped, percent, scale_for, significant, with_std
 from winchkit.report.words.sentence import (
     changes_text,
     error_text,

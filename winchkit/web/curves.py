@@ -27,9 +27,9 @@ from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.model.stages import OUTPUT_UNITS
 from winchkit.model.variables import ANGLES
 from winchkit.plain_json import significant
+from winchkit.quantity_text import Scale, scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.reduction import bin_edges, bin_means, decimated
-from winchkit.report.words.numbers import Scale, scale_for
 from winchkit.report.words.sentence import CLEAR_ORDER, capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 from winchkit.runs.run import Run

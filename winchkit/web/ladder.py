@@ -10,8 +10,8 @@ from typing import Any
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.results import Diagnosis, Estimate
 from winchkit.effects.effect import Effect
+from winchkit.quantity_text import Scale, between, scale_for, significant, with_std
 from winchkit.report.detectability import effects_of, useful_candidates
-from winchkit.report.words.numbers import Scale, between, scale_for, significant, with_std
 from winchkit.report.words.sentence import (
     capital,
     changes_text,

@@ -13,7 +13,7 @@ from winchkit.diagnosis.results import OutputFit
 from winchkit.diagnosis.write import write_addition
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import UsageError
-from winchkit.report.words.numbers import quantity
+from winchkit.quantity_text import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 from winchkit.web.curves import curves_of
 from winchkit.web.ladder import Rung

@@ -16,12 +16,12 @@ from winchkit.catalog import find
 from winchkit.diagnosis.compare import Compared, compared
 from winchkit.diagnosis.residuals.attribution import attributions
 from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
+from winchkit.quantity_text import Scale
 from winchkit.report.figures.axes import Range, range_of, reading
 from winchkit.report.figures.figure import Axis
 from winchkit.report.figures.maps import map_text
 from winchkit.report.pages.pages import comparison_html
 from winchkit.report.text import compare_text
-from winchkit.report.words.numbers import Scale
 from winchkit.schema.read import read_profile
 
 PROFILE = read_profile(find("profiles", "bench-spiral"))

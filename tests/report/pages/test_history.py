@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from report_parsed import HOSTILE, Page
 from winchkit.diagnosis.results import Estimate
 from winchkit.profile_edit.history import Rung
+from winchkit.quantity_text import between, plain
 from winchkit.report.pages.history import ladder_html
-from winchkit.report.words.numbers import between, plain
 from winchkit.report.words.vocabulary import interval_text
 
 RUNS = ("a.csv", "b.csv")

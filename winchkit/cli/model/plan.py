@@ -82,8 +82,8 @@ def _poses_text(plan: PosePlan) -> str:
     from math import degrees
 
     from winchkit.diagnosis.robot.pose_design import reach
+    from winchkit.quantity_text import percent
     from winchkit.report.words.columns import hanging
-    from winchkit.report.words.numbers import percent
 
     if not plan.offers:
         return (
@@ -289,8 +289,8 @@ def _silent(found: Plan, *, widened: bool) -> list[str]:
 
 def _text(found: Sequence[Offer], pairs: Sequence[tuple[Term, Term]]) -> str:
     """A line a kind, the best first; pairs of effects by letters."""
+    from winchkit.quantity_text import percent
     from winchkit.report.words.columns import aligned, hanging, paragraph
-    from winchkit.report.words.numbers import percent
 
     if not pairs:
         rows = [["programme", "minutes", "shows besides"]]

@@ -116,7 +116,7 @@ class _Story:
 
 
 def _add_findings(story: _Story, comparison: Comparison, findings: Findings) -> None:
-    from winchkit.report.words.numbers import percent, quantity
+    from winchkit.quantity_text import percent, quantity
     from winchkit.report.words.sentence import sentence
     from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 

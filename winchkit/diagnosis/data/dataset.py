@@ -38,11 +38,11 @@ from winchkit.errors import Fault, RunError, UsageError
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS, At, Signals
+from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
 from winchkit.runs.sanity.quantisation import quantisation_noise
-from winchkit.runs.sanity.text import size
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -272,8 +272,8 @@ def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Fin
         if rms < least:
             unit = OUTPUT_UNITS[output]
             text = (
-                f"repeats agree to {size(rms, unit)} rms, less than the {size(least, unit)} of its "
-                "resolution: they are rounded alike, and the noise of the resolution is used"
+                f"repeats agree to {quantity(rms, unit)} rms, less than the {quantity(least, unit)} of "
+                "its resolution: they are rounded alike, and the noise of the resolution is used"
             )
             out.append(Finding(ROUNDED_ALIKE, "", output, rms, text))
     return out
@@ -330,9 +330,9 @@ def _outlying(dataset: Dataset) -> tuple[int, Finding] | None:
                 continue
             run, unit = group.runs[found.index], OUTPUT_UNITS[output]
             text = (
-                f"differs by {size(found.rms, unit)} rms from its repeats, these by "
-                f"{size(found.usual, unit)} from each other: another zero, load or setting that is "
-                "not recorded; left out"
+                f"differs by {quantity(found.rms, unit)} rms from its repeats, these by "
+                f"{quantity(found.usual, unit)} from each other: another zero, load or setting "
+                "that is not recorded; left out"
             )
             name = dataset.recordings[run].name
             return run, Finding(OUTLYING, name, output, found.rms, text)

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.transients import white_noise
 from winchkit.model.line import Motion
+from winchkit.quantity_text import quantity
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import size
 
 STANDSTILL = "standstill"
 _LEAST_SAMPLES = 5
@@ -130,8 +130,8 @@ def standstill_findings(runs: Iterable[tuple[str, Array, Array, Motion]]) -> lis
         spread = float(np.sqrt(within))
         share = sum(i.stop - i.start for i in intervals) / len(measured)
         text = (
-            f"changes by {size(spread, 'N m')} rms while the motor stands still: static friction "
-            f"holds any torque below its limit; these {share:.0%} of the samples are not "
+            f"changes by {quantity(spread, 'N m')} rms while the motor stands still: static "
+            f"friction holds any torque below its limit; these {share:.0%} of the samples are not "
             "compared"
         )
         found.append(Finding(STANDSTILL, name, "motor_torque", spread, text))

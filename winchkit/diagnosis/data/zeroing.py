@@ -25,9 +25,9 @@ from scipy.special import fdtrc
 
 from winchkit.arrays import Array
 from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import size
 
 BLOCKS = 8
 """Blocks of time over which the difference of two repeats, or the residual of a run, is averaged;
@@ -99,8 +99,8 @@ def zeroed_finding(output: str, spread: float, p_value: float, between: str) -> 
         else "; without repeats an unknown effect of what differs between the runs is the same"
     )
     text = (
-        f"the offset differs between {between} by {size(spread, OUTPUT_UNITS[output])} (standard "
-        f"deviation, F test p = {p_value:.1g}): the instrument was zeroed anew before each run, "
+        f"the offset differs between {between} by {quantity(spread, OUTPUT_UNITS[output])} "
+        f"(standard deviation, F test p = {p_value:.1g}): the instrument was zeroed anew before each run, "
         f"and an offset per run is fitted{limit}"
     )
     return Finding("zeroed-anew", "", output, spread, text)
@@ -120,7 +120,7 @@ def is_setting(values: Sequence[Array]) -> bool:
 
 def as_noise(finding: Finding) -> Finding:
     """The finding on an offset of a force or torque where the speed is a setting of the runs."""
-    spread = size(finding.value, OUTPUT_UNITS[finding.channel])
+    spread = quantity(finding.value, OUTPUT_UNITS[finding.channel])
     text = (
         f"the offset differs between repeats by {spread} (standard deviation): the runs differ in "
         "speed or direction, on which friction depends, so that no offset per run is fitted; it "

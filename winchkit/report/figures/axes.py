@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.model.variables import ANGLES, VARIABLE_UNITS
+from winchkit.quantity_text import plain
 from winchkit.report.figures.figure import Axis
-from winchkit.report.words.numbers import plain
 from winchkit.report.words.vocabulary import VARIABLE_NAMES
 
 _STEPS = (1.0, 2.0, 2.5, 5.0, 10.0)

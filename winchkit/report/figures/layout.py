@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.quantity_text import plain
 from winchkit.report.figures.axes import Range, range_of
 from winchkit.report.figures.figure import Axis, Cells, Figure, Panel, Series
 from winchkit.report.figures.tokens import STYLES
-from winchkit.report.words.numbers import plain
 
 WIDE, NARROW = 700, 340
 """Widths of the two layouts of a page, px."""

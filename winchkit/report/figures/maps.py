@@ -8,11 +8,11 @@ import numpy as np
 
 from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
 from winchkit.model.variables import ANGLES
+from winchkit.quantity_text import Scale, percent
 from winchkit.report.figures.axes import Reading, reading
 from winchkit.report.figures.figure import Cells, Figure, Panel
 from winchkit.report.figures.layout import signed_levels
 from winchkit.report.figures.residuals import Residuals
-from winchkit.report.words.numbers import Scale, percent
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 

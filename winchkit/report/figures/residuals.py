@@ -16,6 +16,7 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, variables_of
 from winchkit.diagnosis.residuals.traces import Trace, traces_of
 from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.quantity_text import Scale, percent, plain, scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import (
     Axis,
@@ -27,7 +28,6 @@ from winchkit.report.figures.figure import (
 )
 from winchkit.report.figures.layout import density_levels
 from winchkit.report.figures.reduction import bin_edges, bin_means, decimated, strongest
-from winchkit.report.words.numbers import Scale, percent, plain, scale_for
 from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 from winchkit.units import GRAVITY

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
-from winchkit.report.words.numbers import plain, quantity
+from winchkit.quantity_text import plain, quantity
 from winchkit.schema.profiles.winch import EffectTable
 from winchkit.schema.quantity import Quantity
 from winchkit.units import UNITS

@@ -12,9 +12,9 @@ from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.residuals.traces import PoseTrace, Trace
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.errors import UsageError, suggest
+from winchkit.quantity_text import Scale, scale_for
 from winchkit.report.figures.reduction import decimated
 from winchkit.report.notebook.style import BLACK, BLUE, GREY, ORANGE, WIDTH, Size, new_figure
-from winchkit.report.words.numbers import Scale, scale_for
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 from winchkit.runs.run import Run

@@ -11,12 +11,12 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
+from winchkit.quantity_text import unbroken
 from winchkit.report import tables
 from winchkit.report.comparison_rows import HEAD, followed, size_rows
 from winchkit.report.html.markup import Markup, details, element, table
 from winchkit.report.notebook.declarations import declared_rows
 from winchkit.report.notebook.text import plan_screen, run_head, run_rows
-from winchkit.report.words.numbers import unbroken
 from winchkit.report.words.sentence import capital, sentence
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VERDICT_NAMES, meaning, values_text
 from winchkit.runs.run import Run

@@ -9,10 +9,10 @@ import numpy as np
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
+from winchkit.quantity_text import grouped, percent, significant
 from winchkit.report.notebook.declarations import declared_rows
 from winchkit.report.text import addition_text, compare_text, error_lines, head_lines, step_lines
 from winchkit.report.words.columns import aligned, hanging, paragraph
-from winchkit.report.words.numbers import grouped, percent, significant
 from winchkit.report.words.sentence import changes_text, remaining_text
 from winchkit.runs.run import Run
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.add import Addition
 from winchkit.diagnosis.results import Estimate, OutputFit
+from winchkit.quantity_text import scale_for, significant
 from winchkit.report import tables
 from winchkit.report.figures.figure import Figure
 from winchkit.report.html.markup import Markup, element, folded, join, table
@@ -13,7 +14,6 @@ from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, lead
 from winchkit.report.reproducibility import Command, repeat
 from winchkit.report.words.headline import worst_outputs
-from winchkit.report.words.numbers import scale_for, significant
 from winchkit.report.words.sentence import (
     capital,
     gain_text,

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from winchkit.quantity_text import scale_for
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.html.markup import Markup, element, folded, join, section, table
 from winchkit.report.html.page import figure_block, page
-from winchkit.report.words.numbers import scale_for
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.fit import CellFit

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, OutputError
+from winchkit.quantity_text import percent, quantity, scale_for, significant, unbroken
 from winchkit.report.comparison_rows import HEAD, followed, offset_text, size_rows
 from winchkit.report.figures.figure import Figure
 from winchkit.report.html.markup import Markup, element, folded, join, table
@@ -13,7 +14,6 @@ from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
 from winchkit.report.reproducibility import Command, repeat
 from winchkit.report.words.headline import at_noise, comparison_headline, worst_outputs
-from winchkit.report.words.numbers import percent, quantity, scale_for, significant, unbroken
 from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 

@@ -8,6 +8,7 @@ from math import isnan
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.profile_edit.naming import extended_name
+from winchkit.quantity_text import percent
 from winchkit.report import tables
 from winchkit.report.as_json import report_json
 from winchkit.report.detectability import effects_of, smallest_shown
@@ -17,7 +18,6 @@ from winchkit.report.html.markup import Markup, element, folded, join, table
 from winchkit.report.html.page import figure_block
 from winchkit.report.pages.parts import bullets, code_block, compared_text, data, lead
 from winchkit.report.reproducibility import Command, repeat
-from winchkit.report.words.numbers import percent
 from winchkit.report.words.sentence import (
     changes_text,
     error_text,

@@ -10,11 +10,11 @@ import numpy as np
 from winchkit.effects.card import Signature, in_control, parameter_kind, signature
 from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS
+from winchkit.quantity_text import plain, scale_for
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.reduction import decimated
 from winchkit.report.html.markup import Markup, element, formula, section, table
 from winchkit.report.html.page import figure_block, page
-from winchkit.report.words.numbers import plain, scale_for
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed, meaning, parameter_name
 

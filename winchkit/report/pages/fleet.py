@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.fleet.anova import SharedAttribution, SharedError
 from winchkit.diagnosis.fleet.meta_analysis import Pooled, SharedEffect
 from winchkit.diagnosis.results import Comparison, Diagnosis, Estimate, OutputError, Place, Step
+from winchkit.quantity_text import Scale, percent, quantity, scale_for, significant, unbroken
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.ladder import fleet_ladders
 from winchkit.report.html.markup import Markup, compact, element, folded, section, table
@@ -14,7 +15,6 @@ from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
 from winchkit.report.words.columns import aligned, hanging, paragraph
 from winchkit.report.words.headline import at_noise
-from winchkit.report.words.numbers import Scale, percent, quantity, scale_for, significant, unbroken
 from winchkit.report.words.sentence import capital, main_patterns, where_text
 from winchkit.report.words.steps import has_other_law
 from winchkit.report.words.vocabulary import (

@@ -9,12 +9,12 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.diagnosis.fleet.history import FleetHistory, FleetParameter, WinchHistory
 from winchkit.diagnosis.fleet.swapped_profiles import Swap
+from winchkit.quantity_text import unbroken
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.fleet_text import beyond_text, change_text, day_text, odd_texts, swap_text
 from winchkit.report.html.markup import Markup, element, section, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
-from winchkit.report.words.numbers import unbroken
 
 _MOST_FIGURES = 24
 """Parameters that are drawn, most significant first; a longer page is not read."""

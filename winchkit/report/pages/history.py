@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from winchkit.profile_edit.history import LADDER_UNITS, Rung
+from winchkit.quantity_text import scale_for
 from winchkit.report.html.markup import Markup, element, join, section, table
 from winchkit.report.html.page import page
 from winchkit.report.tables import bar
 from winchkit.report.words.columns import aligned
-from winchkit.report.words.numbers import scale_for
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, meaning
 
 _SIGN = {"add": "+", "remove": "−"}

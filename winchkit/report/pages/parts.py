@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.diagnosis.robot.dataset import RobotDataset
+from winchkit.quantity_text import unbroken
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.residuals import OutputFigures, run_names
 from winchkit.report.html.markup import Markup, details, element
 from winchkit.report.html.page import figure_block
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
-from winchkit.report.words.numbers import unbroken
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed
 

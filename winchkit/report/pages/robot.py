@@ -17,6 +17,7 @@ from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.diagnosis.robot.errors import UNITS, Errors
 from winchkit.diagnosis.robot.regression import PoseRegression
 from winchkit.profile_edit.naming import extended_name
+from winchkit.quantity_text import scale_for
 from winchkit.report.figures.axes import Reading, reading
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.ladder import error_ladder, present
@@ -31,7 +32,6 @@ from winchkit.report.pages.parts import output_card
 from winchkit.report.reproducibility import Command
 from winchkit.report.tables import bar
 from winchkit.report.words.headline import size_texts, worst_outputs
-from winchkit.report.words.numbers import scale_for
 from winchkit.report.words.sentence import capital, where_text
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 

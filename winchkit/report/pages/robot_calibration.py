@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from winchkit.calibration.robot.results import candidate_lines, in_words, noise_words
+from winchkit.quantity_text import quantity
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.html.markup import Markup, element, folded, table
 from winchkit.report.html.page import figure_block, page
 from winchkit.report.pages.parts import bullets, lead
-from winchkit.report.words.numbers import quantity
 from winchkit.report.words.sentence import capital
 
 if TYPE_CHECKING:

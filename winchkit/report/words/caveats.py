@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from winchkit.report.words.numbers import percent
+from winchkit.quantity_text import percent
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 from winchkit.runs.sanity.finding import Finding
 

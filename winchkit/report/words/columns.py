@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from textwrap import wrap
 
-from winchkit.report.words.numbers import unbroken
+from winchkit.quantity_text import unbroken
 
 _WIDTH = 80
 """Characters of a terminal."""

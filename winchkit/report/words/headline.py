@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from winchkit.diagnosis.results import Comparison, OutputError, OutputFit
-from winchkit.report.words.numbers import quantity, scale_for, significant
+from winchkit.quantity_text import quantity, scale_for, significant
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 
 AT_NOISE = 1.15

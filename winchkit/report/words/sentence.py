@@ -8,9 +8,9 @@ from math import isnan
 from winchkit.diagnosis.data.sanity import ALARMING
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, OutputFit
+from winchkit.quantity_text import percent, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
-from winchkit.report.words.numbers import percent, scale_for, significant
 from winchkit.report.words.steps import cause
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
 

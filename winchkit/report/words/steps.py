@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from math import degrees, isfinite
 
 from winchkit.diagnosis.results import OutputFit, Step
-from winchkit.report.words.numbers import percent, scale_for, significant, with_std
+from winchkit.quantity_text import percent, scale_for, significant, with_std
 from winchkit.report.words.vocabulary import (
     OUTPUT_NAMES,
     clause,

@@ -7,7 +7,7 @@ from math import isfinite
 
 from winchkit.diagnosis.results import Combination, Estimate, series_orders
 from winchkit.effects.series import fundamentals
-from winchkit.report.words.numbers import between, with_std
+from winchkit.quantity_text import between, with_std
 
 VERDICT_NAMES = {
     "adequate": "Adequate",

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.quantity_text import quantity
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.local_noise import sorted_quantile
 from winchkit.runs.sanity.quantisation import quantisation_noise, resolution
-from winchkit.runs.sanity.text import size
 
 _LIMIT = 12.0
 """Local standard deviations: beyond 8 in none of 10¹⁵ Gaussian samples, and room for tails."""
@@ -101,7 +101,7 @@ def outliers(run: Run, masks: Mapping[str, NDArray[np.bool_]]) -> Iterator[Findi
             name,
             largest,
             f"{np.count_nonzero(spikes)} of {len(values)} samples are spikes of up to "
-            f"{size(largest, run.channels[name].unit)}; they are not compared",
+            f"{quantity(largest, run.channels[name].unit)}; they are not compared",
         )
 
 

@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.quantity_text import quantity
 from winchkit.runs.run import CHANNEL_DIMENSIONS, Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.local_noise import local_noise, smallest_differences, sorted_quantile
 from winchkit.runs.sanity.sampling import with_lost_samples
-from winchkit.runs.sanity.text import size
 
 _BINS = 8192
 """Bins of the histogram of the differences: with `_BINS_PER_STEP` it shows steps down to 1/512 of
@@ -120,8 +120,8 @@ def quantised(run: Run, name: str, step: float) -> Iterator[Finding]:
             run.name,
             name,
             step,
-            f"resolution {size(step, channel.unit)}: errors below "
-            f"{size(floor, channel.unit)} (resolution/√12) are not judged",
+            f"resolution {quantity(step, channel.unit)}: errors below "
+            f"{quantity(floor, channel.unit)} (resolution/√12) are not judged",
         )
 
 

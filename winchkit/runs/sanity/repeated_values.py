@@ -10,9 +10,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import share, size
+from winchkit.runs.sanity.text import share
 
 _LEAST_SHARE = 0.2
 """Share of repeated values that is reported; fewer hardly change a spectrum. Rule of thumb."""
@@ -29,7 +30,7 @@ def constant(run: Run, name: str) -> Iterator[Finding]:
     values = run[name]
     values = values[np.isfinite(values)]
     if len(values) > 1 and np.ptp(values) == 0:
-        text = f"constant at {size(float(values[0]), run.channels[name].unit)} in all samples"
+        text = f"constant at {quantity(float(values[0]), run.channels[name].unit)} in all samples"
         yield Finding("constant", run.name, name, float(values[0]), text)
 
 

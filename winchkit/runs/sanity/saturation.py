@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import share, size
+from winchkit.runs.sanity.text import share
 
 _LEAST_SAMPLES = 5
 """Fewer equal samples at an end are an extremum that the resolution flattens. Rule of thumb."""
@@ -58,7 +59,7 @@ def saturated(run: Run, name: str, step: float) -> Iterator[Finding]:
             continue
         if np.ptp(values) < _LEAST_LEVELS * step:
             return
-        limit = size(sign * level, run.channels[name].unit)
+        limit = quantity(sign * level, run.channels[name].unit)
         text = (
             f"{share(count / len(values))} of the samples are at the {word} value, {limit}: the "
             "instrument or the logger saturates; larger errors there are no effect of the winch"

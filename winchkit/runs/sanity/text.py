@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 
-def size(value: float, unit: str) -> str:
-    """A value with three digits and its unit: ``0.0238 N m``."""
-    return f"{value:.3g}" + ("" if unit in {"", "1"} else f" {unit}")
-
-
 def share(part: float) -> str:
     """A share in per cent with two digits, never in scientific notation."""
     percent = 100 * part

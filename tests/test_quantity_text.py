@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit.report.words.numbers import (
+from winchkit.quantity_text import (
     between,
     percent,
     quantity,
