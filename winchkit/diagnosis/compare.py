@@ -178,7 +178,8 @@ def _offset_note(output: str, error: OutputError, spread: float) -> str:
     return (
         f"{output.replace('_', ' ')}: the mean error differs between the runs by "
         f"{quantity(spread, error.unit)} (standard deviation): another zero of the "
-        "instrument in every run, or an effect of what differs between them; with an offset per run the error is "
+        "instrument in every run, or an effect of what differs between them; with an offset per "
+        "run the error is "
         f"{quantity(error.rms_with_run_offsets or 0.0, error.unit)} rms"
     )
 
