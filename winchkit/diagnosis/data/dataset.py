@@ -273,7 +273,8 @@ def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Fin
             unit = OUTPUT_UNITS[output]
             text = (
                 f"repeats agree to {quantity(rms, unit)} rms, less than the "
-                f"{quantity(least, unit)} of its resolution: they are rounded alike, and the noise of the resolution is used"
+                f"{quantity(least, unit)} of its resolution: they are rounded alike, "
+                "and the noise of the resolution is used"
             )
             out.append(Finding(ROUNDED_ALIKE, "", output, rms, text))
     return out

@@ -100,8 +100,8 @@ def zeroed_finding(output: str, spread: float, p_value: float, between: str) -> 
     )
     text = (
         f"the offset differs between {between} by {quantity(spread, OUTPUT_UNITS[output])} "
-        f"(standard deviation, F test p = {p_value:.1g}): the instrument was zeroed anew before each "
-        f"run, and an offset per run is fitted{limit}"
+        f"(standard deviation, F test p = {p_value:.1g}): the instrument was zeroed anew before "
+        f"each run, and an offset per run is fitted{limit}"
     )
     return Finding("zeroed-anew", "", output, spread, text)
 
