@@ -105,7 +105,7 @@ def lifted(masses: tuple[float, ...]) -> list[Run]:
 WAVES = {"motor-cogging", "torque-ripple"}
 
 
-def test_waves_of_a_direct_drive_are_one_set_with_one_load_and_two_tell_them_apart(
+def test_waves_of_a_direct_drive_are_one_set_with_one_load_and_two_separate_them(
     tmp_path: Path,
 ) -> None:
     one = found(tmp_path, WINCH, lifted((20.0,)))

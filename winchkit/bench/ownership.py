@@ -1,6 +1,6 @@
 """One process owns a bench: a lock that dies with its holder, and where to find the owner.
 
-A stop leaves a mark, since an owner that still opens the bench is found by nobody.
+A stop leaves a mark, since an owner that still opens the bench cannot be found.
 """
 
 from __future__ import annotations

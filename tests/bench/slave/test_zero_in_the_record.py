@@ -44,7 +44,7 @@ def power_cycle(rig: Rig) -> None:
 
 
 def homed(bench: Bench, rig: Rig) -> None:
-    """Told to be at 4 m, nothing moves; then 0.1 m wound in, by the shaft."""
+    """Homed at 4 m, where nothing moves; then 0.1 m wound in, by the shaft."""
     slave, winch = rig.slaves[0], bench.winch["A"]
     begun = slave.motor.angle
     winch.home(at=4.0)

@@ -86,7 +86,7 @@ def test_the_highest_order_at_the_highest_speed_bounds_the_cut_off() -> None:
     assert cut_off([weak], 1000.0, 0.1) == 20.0
 
 
-def test_what_the_low_pass_removes_is_told_with_its_size_and_its_order() -> None:
+def test_what_the_low_pass_removes_is_reported_with_its_size_and_its_order() -> None:
     """Rms of a sine of 3 mN m and of white noise above 20 of 250 Hz."""
     runs = [fast_motor(1, 3e-3), fast_motor(2, 3e-3)]
     found = removed_by_low_pass([compared(run) for run in runs], "motor_torque", 20.0)

@@ -164,7 +164,7 @@ def _waves_of_one_load(engine: SelectionEngine, own: Effect, rival: Effect) -> b
 
     A cogging is constant, a ripple of the torque constant and a transmission error are in
     proportion to the torque. What friction and inertia make of that under one load depends on the
-    side on which they act, which nobody knows.
+    side on which they act, which is unknown.
     """
     known, waves = set(engine.regression.outputs), (own, rival)
     if not all(has_orders(e.single or e) and {*e.outputs} & known == _TORQUE for e in waves):

@@ -1,7 +1,7 @@
 """friction-of-load: friction in proportion to the torque of the load.
 
-The load is weight, springs and a cable. The inertia is none: which part of it the gear transmits,
-and which is the rotor's, no recording of the motor tells.
+The load is weight, springs and a cable. The inertia is none: no recording of the motor shows which
+part of it the gear transmits, and which is the rotor's.
 """
 
 import numpy as np
