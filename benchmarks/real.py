@@ -27,8 +27,9 @@ from numpy.typing import NDArray
 from campaign.rivals import SELECTIONS, Regression, all_columns, in_time
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.signatures import Signatures
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.effects.catalogue import load_catalogue

@@ -8,7 +8,8 @@ import pytest
 from diagnosis_runs import term
 from winchkit.diagnosis.credibility import oversized, short_travel
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.search import selection_engine
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.axis import AxisProfile

@@ -19,8 +19,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from winchkit.diagnosis.add import Addition, add
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import WinchAnswer, diagnose, selection_engine
+from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
 from winchkit.diagnosis.results import Diagnosis
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.write import write_addition
 from winchkit.effects.bind import line_of
 from winchkit.effects.catalogue import load_catalogue

@@ -8,7 +8,6 @@ from typing import Any
 
 from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.diagnose import selection_engine, with_offsets_where_better
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
@@ -16,6 +15,7 @@ from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import variables_of
 from winchkit.diagnosis.results import Estimate, OutputFit
+from winchkit.diagnosis.search import selection_engine, with_offsets_where_better
 from winchkit.diagnosis.selection.orders import has_orders
 from winchkit.diagnosis.selection.scores import Score, score
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection

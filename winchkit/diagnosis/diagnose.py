@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
-import numpy as np
-
-from winchkit.diagnosis.compare import initial_hypothesis
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
-from winchkit.diagnosis.regression.exclusion import without_impacts
-from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
-from winchkit.diagnosis.regression.noise import Noise
-from winchkit.diagnosis.regression.run_offsets import run_offsets, with_run_offsets
+from winchkit.diagnosis.regression.run_offsets import run_offsets
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import (
     MOST_PLACES,
@@ -29,16 +22,20 @@ from winchkit.diagnosis.residuals.attribution import (
 )
 from winchkit.diagnosis.residuals.traces import Trace, trace_columns, traces_of
 from winchkit.diagnosis.results import Diagnosis, NextRun, OutputFit, Step
-from winchkit.diagnosis.selection.acceptance import predicts_better
+from winchkit.diagnosis.search import (
+    ProgressCallback,
+    no_progress,
+    search,
+    selection_engine,
+)
 from winchkit.diagnosis.selection.contribution import ordered_by_contribution
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import (
     SelectionResult,
     initial_result,
-    stepwise_selection,
 )
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.selection.transitions import scanned_transitions, with_fitted_transitions
+from winchkit.diagnosis.selection.transitions import with_fitted_transitions
 from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.diagnosis.steps import (
     Standing,
@@ -58,14 +55,11 @@ from winchkit.diagnosis.verdict.decision import (
 )
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
-from winchkit.diagnosis.verdict.laws import simplified, with_first_members
+from winchkit.diagnosis.verdict.laws import with_first_members
 from winchkit.diagnosis.verdict.open_law import better_curve, predictable_share
 from winchkit.diagnosis.verdict.profile_values import file_model, refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
-from winchkit.effects.effect import Effect
-from winchkit.effects.location import located
 from winchkit.effects.term import Term
-from winchkit.effects.transition import with_transitions
 from winchkit.rendering import Plotted
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile
@@ -74,20 +68,6 @@ from winchkit.tabular import Columns, Tabular
 _PREDICTED = 0.1
 """Share of a residual that a curve or an order must predict for it to be a missing effect."""
 _REPEAT = "record the same motion again: without repeats the noise is not known"
-
-
-Found = TypeVar("Found")
-ProgressCallback = Callable[[str, float], None]
-"""Called with the present step and the share of the work done, 0 to 1."""
-
-_USUAL_TRIALS = 7.0
-"""Candidates after whose fits the progress bar has covered 63 % of a step; measured: a search of
-the timing benchmark fits 7, 7, 7 and 8 candidates (four hidden effects)."""
-_SEARCH = (0.4, 0.8)
-"""Part of the progress bar for the search; measured: the search of these four begins at 36 to 40 %
-of the processor time and ends at 79 to 86 %."""
-_NAMING = (0.8, 1.0)
-"""The same for the equivalence sets; measured: the rest."""
 
 
 class Answer(Plotted, Tabular):
@@ -155,10 +135,6 @@ class WinchAnswer(Answer):
         pairs: Sequence[tuple[Term, Term]] = (),
     ) -> None:
         super().__init__(engine, result, diagnosis, sets, pairs)
-
-
-def no_progress(what: str, share: float) -> None:
-    """Progress callback that does nothing."""
 
 
 def diagnose(
@@ -231,129 +207,12 @@ def diagnose_prepared(
     file = engine.initial_model
     known: list[SelectionResult] = []
     try:
-        result, rounded = _searched(engine, catalogue, _Trials(progress, "fitting"), known.append)
-        engine, catalogue = rounded or (engine, catalogue)
-
-        def searched(offset: Dataset) -> tuple[TimeSeriesSelection, SelectionResult]:
-            other = selection_engine(offset, catalogue)
-            other.on_trial = _Trials(progress, "with an offset per run, fitting")
-            return other, stepwise_selection(other)
-
-        dataset, (engine, result) = with_offsets_where_better(
-            dataset,
-            (engine, result),
-            searched,
-            lambda found: (found[0], found[1].final, found[1].noise),
-        )
-        reduced = without_impacts(dataset, result.final.hypothesis)
-        if reduced is not None:
-            engine = selection_engine(reduced, catalogue)
-            engine.on_trial = _Trials(progress, "without impacts, fitting")
-            result = stepwise_selection(engine)
-        engine.on_trial = _Trials(progress, "naming, compared with", _NAMING)
-        return _answer(*_with_plain_laws(engine, result, catalogue), file)
+        engine, result = search(engine, catalogue, progress, known.append)
+        return _answer(engine, result, file)
     except KeyboardInterrupt:
         if interrupted is not None and known:
             interrupted(_known_at_interrupt(engine, known[0]))
         raise
-
-
-def _searched(
-    engine: TimeSeriesSelection,
-    catalogue: Catalogue,
-    trials: Callable[[str], None],
-    known: Callable[[SelectionResult], None],
-) -> tuple[SelectionResult, tuple[TimeSeriesSelection, Catalogue] | None]:
-    """Result of the search, and engine and catalogue where reversals of friction are rounded.
-
-    As soon as a friction that was found fits better with a transition, the search begins again with
-    it in every law of friction.
-    """
-    transitions: dict[str, float] = {}
-
-    def is_rounded(present: Fit, noise: Noise) -> bool:
-        transitions.update(scanned_transitions(engine, present, noise))
-        return bool(transitions)
-
-    engine.on_trial, engine.on_step = trials, is_rounded
-    result = stepwise_selection(engine, known)
-    if not transitions:
-        return result, None
-    rounded = Catalogue(with_transitions(effect, transitions) for effect in catalogue)
-    again = selection_engine(engine.regression.dataset, rounded)
-    again.on_trial = trials
-    return stepwise_selection(again), (again, rounded)
-
-
-def _with_plain_laws(
-    engine: TimeSeriesSelection, result: SelectionResult, catalogue: Catalogue
-) -> tuple[TimeSeriesSelection, SelectionResult]:
-    """The result with its simplest laws and fitted transitions.
-
-    A law with a degenerate shape may have imitated another effect (presliding over a whole turn is
-    a spring). Where its replacement loses by 2 %, the search is repeated without such laws.
-    """
-    plain = _simplified(engine, result)
-    before = (engine, result.final, result.noise)
-    left = {term.effect.id for term in plain.final.hypothesis.terms}
-    degenerate = {
-        term.effect.id
-        for term in result.final.hypothesis.terms[engine.n_initial_terms :]
-        if term.effect.reduces_to and term.effect.id not in left
-    }
-    if not degenerate or not predicts_better(before, (engine, plain.final, plain.noise)):
-        return engine, plain
-    others = [effect for effect in catalogue if effect.id not in degenerate]
-    again = selection_engine(engine.regression.dataset, catalogue, others)
-    again.on_trial = engine.on_trial
-    found = _simplified(again, stepwise_selection(again))
-    now, was = (again, found.final, found.noise), (engine, plain.final, plain.noise)
-    return (again, found) if predicts_better(now, was) else (engine, plain)
-
-
-def _simplified(engine: TimeSeriesSelection, result: SelectionResult) -> SelectionResult:
-    """The result with its simplest laws, the transitions of friction fitted before and after."""
-
-    def settled(fitted: Fit) -> Fit:
-        return with_fitted_transitions(engine, fitted, result.noise)
-
-    final, noise = simplified(engine, settled(result.final), result.noise, settled)
-    return replace(result, final=with_fitted_transitions(engine, final, noise), noise=noise)
-
-
-def with_offsets_where_better(
-    dataset: Dataset,
-    found: Found,
-    again: Callable[[Dataset], Found],
-    final: Callable[[Found], tuple[TimeSeriesSelection, Fit, Noise]],
-) -> tuple[Dataset, Found]:
-    """Result with an offset per run, where one is found that predicts held-out blocks better.
-
-    Returns: data set and result, the given ones where offsets are not needed.
-    """
-    engine, fitted, noise = final(found)
-    offset = with_run_offsets(dataset, engine.regression, fitted)
-    if offset is None:
-        return dataset, found
-    other = again(offset)
-    better = predicts_better(final(other), (engine, fitted, noise))
-    return (offset, other) if better else (dataset, found)
-
-
-class _Trials:
-    """Reports the progress of a step by the number of candidates that were fitted."""
-
-    def __init__(
-        self, progress: ProgressCallback, what: str, ends: tuple[float, float] = _SEARCH
-    ) -> None:
-        self._progress, self._what, self._ends, self._count = progress, what, ends, 0
-        progress(what.partition(",")[0], ends[0])
-
-    def __call__(self, effect: str) -> None:
-        low, high = self._ends
-        self._count += 1
-        left = np.exp(-self._count / _USUAL_TRIALS)
-        self._progress(f"{self._what} {effect}", float(high - (high - low) * left))
 
 
 def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> WinchAnswer:
@@ -524,20 +383,6 @@ def _traces(
 def _spread(engine: SelectionEngine, result: SelectionResult) -> Spread:
     """Uncertainty of the unknowns of the final model."""
     return spread_of(engine.regression, result.final, result.noise, engine.regression.blocks)
-
-
-def selection_engine(
-    dataset: Dataset, catalogue: Catalogue, candidates: Iterable[Effect] | None = None
-) -> TimeSeriesSelection:
-    """Selection engine whose initial model is the profile's own effects.
-
-    Candidates are all effects of the catalogue, or those that are given.
-    """
-    regression = TimeSeriesRegression(dataset)
-    initial_model = initial_hypothesis(dataset.profile, catalogue, regression)
-    chosen = catalogue if candidates is None else candidates
-    absent = [located(effect, dataset.motions) for effect in chosen]
-    return TimeSeriesSelection(regression, initial_model, absent)
 
 
 def _where(regression: TimeSeriesRegression, result: SelectionResult) -> tuple[Attribution, ...]:

@@ -17,10 +17,10 @@ from winchkit.diagnosis.design.discrimination import information_of, next_runs, 
 from winchkit.diagnosis.design.plan import inseparable
 from winchkit.diagnosis.design.plan import offers as plan_offers
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, range_of_runs
-from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.plan import Plan
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Detectable, NextRun
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.scores import null_maxima
 
 RIDE = Ride(samples=400)

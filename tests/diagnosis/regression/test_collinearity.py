@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.conditioning import collinearity
+from winchkit.diagnosis.search import selection_engine
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.term import Term
 from winchkit.runs.run import Channel, Run

@@ -10,9 +10,10 @@ import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term, with_channel
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.data.dataset import Dataset, prepare
-from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
+from winchkit.diagnosis.search import selection_engine
 
 RIDE = Ride(samples=600, stroke=400.0, period=6.0)
 PLAY = term("gear-backlash", gap=0.02, held=0.0)

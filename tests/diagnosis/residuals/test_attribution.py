@@ -10,8 +10,8 @@ import pytest
 from diagnosis_runs import recorded
 from winchkit.catalog import find
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.residuals.attribution import attributions, ranked
+from winchkit.diagnosis.search import selection_engine
 from winchkit.effects import load_catalogue
 from winchkit.schema.read import read_profile
 

@@ -8,8 +8,9 @@ import pytest
 from diagnosis_runs import CATALOGUE, GROOVED, NOISE, Ride, made, term
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.spectrum import to_frequency, to_time
-from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.noise import noise_saturated
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.candidates import with_grid_points
 from winchkit.diagnosis.selection.onset import best_onset, onset_of
 from winchkit.runs.run import Run

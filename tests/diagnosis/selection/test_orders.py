@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.prediction_cache import masked
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.orders import periodogram
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.series import orders_of

@@ -13,9 +13,10 @@ import pytest
 from scipy import stats
 
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.regression.noise import satterthwaite_dof
 from winchkit.diagnosis.results import Diagnosis
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.scores import score_by_chance
 from winchkit.diagnosis.selection.stepwise import initial_result
 from winchkit.effects.catalogue import load_catalogue

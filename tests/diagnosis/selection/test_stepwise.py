@@ -6,7 +6,8 @@ import numpy as np
 
 from diagnosis_runs import CATALOGUE, GROOVED, Ride, made, term
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import diagnose, selection_engine
+from winchkit.diagnosis.diagnose import diagnose
+from winchkit.diagnosis.search import selection_engine
 from winchkit.effects.catalogue import Catalogue
 
 RIDE = Ride(samples=400)

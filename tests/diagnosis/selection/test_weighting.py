@@ -9,9 +9,9 @@ from diagnosis_runs import CATALOGUE as EVERY
 from diagnosis_runs import GROOVED, Array, Ride, made, term, with_channel
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.effects.catalogue import Catalogue

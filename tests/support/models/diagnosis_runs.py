@@ -12,8 +12,8 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.catalog import find
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.diagnose import selection_engine
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
+from winchkit.diagnosis.search import selection_engine
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.term import Term, modifiers_of

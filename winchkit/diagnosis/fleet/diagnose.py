@@ -8,7 +8,8 @@ from concurrent.futures import Future
 from threading import Thread
 
 from winchkit.arguments import require_each, require_type
-from winchkit.diagnosis.diagnose import ProgressCallback, WinchAnswer, diagnose, no_progress
+from winchkit.diagnosis.diagnose import WinchAnswer, diagnose
+from winchkit.diagnosis.search import ProgressCallback, no_progress
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.winch import WinchProfile

@@ -13,11 +13,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
-from winchkit.diagnosis.diagnose import (
-    Answer,
-    ProgressCallback,
-    no_progress,
-)
+from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.residuals.attribution import MOST_PLACES, Attribution
@@ -58,6 +54,7 @@ from winchkit.diagnosis.robot.preparation import (
 )
 from winchkit.diagnosis.robot.registration import datum_notes
 from winchkit.diagnosis.robot.regression import PoseRegression
+from winchkit.diagnosis.search import ProgressCallback, no_progress
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.steps import (
     Standing,
