@@ -93,7 +93,7 @@ def as_ours(text: str, dimension: str) -> str:
     number = re.match(r"\s*[\d.]+\s*", plain)
     unit = read_unit(plain[number.end() :]) if number else None
     is_ours = unit is not None and unit.text in UNITS[dimension]
-    return f"{number[0]} {unit.text}" if number and unit and is_ours else plain
+    return f"{number[0].strip()} {unit.text}" if number and unit and is_ours else plain
 
 
 def _with_point(text: str) -> str:
