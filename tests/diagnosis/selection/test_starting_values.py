@@ -10,7 +10,6 @@ from winchkit.diagnosis.selection.starting_values import (
     shape_at_bound,
     truncated_series,
 )
-from winchkit.effects.reference_motion import standard_motion
 
 
 def test_a_series_is_truncated_from_its_last_coefficient() -> None:
@@ -40,15 +39,6 @@ def test_a_shape_at_its_bound_is_rejected() -> None:
     inside = term("motor-stribeck", torque=0.02, stribeck_speed=ends.typical)
     assert not shape_at_bound(inside)
     assert shape_at_bound(term("motor-stribeck", torque=0.02, stribeck_speed=ends.high))
-
-
-def test_a_stribeck_speed_is_visible_where_a_run_passes_it() -> None:
-    motion = standard_motion().at
-    for effect, rate in (("motor-stribeck", motion.motor_rate), ("pulley-stribeck", motion.speed)):
-        visible = CATALOGUE[effect].visible
-        assert visible is not None
-        for share, range_of_runs in ((0.5, True), (0.8, False)):
-            assert visible(motion, {"stribeck_speed": share * abs(rate).max()}) is range_of_runs
 
 
 def test_times_and_orders_have_other_minima_and_time_constants_do_not() -> None:
