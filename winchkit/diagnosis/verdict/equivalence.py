@@ -128,9 +128,20 @@ def equivalence_set(
         worse = fits_worse(engine.regression, fitted, own_fit, dispersed) and _predicts_worse(
             engine, fitted, losses, dispersed
         )
-        if not worse or _waves_of_one_load(engine, own.effect, rival.candidate.effect):
-            members.append(_Member(fitted.hypothesis.terms[-1], fitted, fitted))
-    members = [m for m in members if not any(_adds_nothing(m, other) for other in members)]
+        member = _Member(fitted.hypothesis.terms[-1], fitted, fitted)
+        if _is_listed(own.effect, member.term.effect):
+            joins = not worse
+        else:
+            joins = not worse and not _adds_nothing(member, members[0])
+        if joins or _waves_of_one_load(engine, own.effect, rival.candidate.effect):
+            members.append(member)
+    members = [
+        m
+        for m in members
+        if not any(
+            o.term.effect.id in m.term.effect.reduces_to and _adds_nothing(m, o) for o in members
+        )
+    ]
     members = _ordered(engine, members, dispersed)
     projected = engine.projected(base, dispersed)
     angles = {
@@ -175,16 +186,21 @@ def _waves_of_one_load(engine: SelectionEngine, own: Effect, rival: Effect) -> b
     return bool(high - low < _ONE_LOAD * middle)
 
 
+def _is_listed(own: Effect, rival: Effect) -> bool:
+    """Whether the catalogue lists two effects as confusable, neither being a case of the other."""
+    listed = rival.id in own.confused_with or own.id in rival.confused_with
+    return listed and not own.nested_with(rival)
+
+
 def _adds_nothing(rich: _Member, simple: _Member) -> bool:
-    """Whether a law reduces to another, which fits as well by a likelihood-ratio test at 5 %."""
-    if simple.term.effect.id not in rich.term.effect.reduces_to:
-        return False
+    """Whether a law with more parameters is not preferred by a likelihood-ratio test at 5 %."""
     counts = [
         Coordinates(m.term.effect).n_parameters + sum(map(len, m.compared.hypothesis.starts))
         for m in (rich, simple)
     ]
     gain = max(0.0, simple.compared.chi_square - rich.compared.chi_square)
-    return bool(chdtrc(max(1, counts[0] - counts[1]), gain) > _LEVEL)
+    more = counts[0] - counts[1]
+    return more > 0 and bool(chdtrc(more, gain) > _LEVEL)
 
 
 def _ordered(engine: SelectionEngine, members: Sequence[_Member], noise: Noise) -> list[_Member]:
