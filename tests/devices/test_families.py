@@ -57,6 +57,9 @@ def test_its_simulated_drive_is_commissioned_and_jogged(live: LiveBench, clock: 
         winch = bench.winch["A"]
         start, plant = winch.cable_length, live.winches["A"].plant
         turned, wound = plant.motor_angle, plant.cable_length
+        if not winch.snapshot.length_known:
+            winch.home(at=wound)
+            start = winch.cable_length
         winch.jog(wind_in=0.2, duration=0.5)
         assert winch.snapshot.phase is Phase.DISABLED
         gone = start - winch.cable_length

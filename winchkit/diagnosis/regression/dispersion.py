@@ -16,7 +16,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.special import fdtrc, ndtri, stdtrit
+from scipy.special import chdtrc, fdtrc, ndtri, stdtrit
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Regression
@@ -59,6 +59,25 @@ def overdispersed(regression: Regression, fit: Fit, noise: Noise) -> Noise:
         power=np.where(residual_taken, np.maximum(own, regression.power_floor), noise.power),
         dof=np.where(residual_taken, dof, noise.dof),
     )
+
+
+def excess_p_value(regression: Regression, fit: Fit, noise: Noise) -> float:
+    """P-value of a residual that does not exceed the noise (Fisher's combination over bands).
+
+    Notes
+    -----
+    F test of the residual's mean square against the noise in every band; -2 Σ ln p is χ² with two
+    degrees of freedom per band. Noise of the saturated model shares its residual with the fit, so
+    that the test is conservative without repeats.
+
+    References
+    ----------
+    Fisher, R. A. (1932). Statistical Methods for Research Workers, 4th ed., sec. 21.1. Oliver and
+    Boyd.
+    """
+    own, dof = _of_residual(regression, fit, noise)
+    p = np.maximum(fdtrc(dof, noise.dof, own / noise.power), np.finfo(float).tiny)
+    return float(chdtrc(2 * len(p), -2 * np.sum(np.log(p))))
 
 
 def _of_residual(regression: Regression, fit: Fit, noise: Noise) -> tuple[Array, Array]:

@@ -23,7 +23,12 @@ from scipy.special import chdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.cross_validation import held_out
-from winchkit.diagnosis.regression.dispersion import fits_worse, largest_loss, overdispersed
+from winchkit.diagnosis.regression.dispersion import (
+    excess_p_value,
+    fits_worse,
+    largest_loss,
+    overdispersed,
+)
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.selection.engine import SelectionEngine
@@ -46,6 +51,8 @@ _ONE_LOAD = 0.2
 wave by less than the tenth that establishes a law."""
 _SIGN_FLIPS = 2000
 """Random signs of the block differences; computing cost."""
+_INCOMPLETE = 0.25
+"""Level of the preliminary test that the residual of the final model does not exceed the noise."""
 _LEVEL = 0.05
 """Level of the likelihood-ratio test and of a difference held out; convention."""
 
@@ -119,7 +126,7 @@ def equivalence_set(
     goal = own_fit.chi_square + largest_loss(np.inf)
     aim = own_fit.chi_square + largest_loss(float(dispersed.dof.min()))
     losses = held_out(engine.regression, own_fit, dispersed, engine.regression.blocks)
-    members = [_Member(own, final, own_fit)]
+    members, left_out = [_Member(own, final, own_fit)], list[Fit]()
     for rival in rivals:
         trial = exchange.trial(rival, goal, least, aim)
         fitted = trial.fit
@@ -135,6 +142,8 @@ def equivalence_set(
             joins = not worse and not _adds_nothing(member, members[0])
         if joins or _waves_of_one_load(engine, own.effect, rival.candidate.effect):
             members.append(member)
+        else:
+            left_out.append(fitted)
     members = [
         m
         for m in members
@@ -143,6 +152,15 @@ def equivalence_set(
         )
     ]
     members = _ordered(engine, members, dispersed)
+    if not noise.from_repeats and excess_p_value(engine.regression, final, noise) < _INCOMPLETE:
+        # Another effect may be missing: gravity beside friction that is an offset in one direction.
+        alone = [m.term.effect for m in members]
+        beside = [_beside_another(engine, fitted, alone, dispersed) for fitted in left_out]
+        members += [
+            m
+            for m in beside
+            if m is not None and not _predicts_worse(engine, m.compared, losses, dispersed)
+        ]
     projected = engine.projected(base, dispersed)
     angles = {
         member.term.effect.id: _angle(projected, own.effect.id, member.term.effect.id)
@@ -184,6 +202,33 @@ def _waves_of_one_load(engine: SelectionEngine, own: Effect, rival: Effect) -> b
     forces = np.concatenate([at.tension for at in engine.regression.motions])
     low, middle, high = np.quantile(np.abs(forces), [0.05, 0.5, 0.95])
     return bool(high - low < _ONE_LOAD * middle)
+
+
+def _beside_another(
+    engine: SelectionEngine, rival: Fit, members: Sequence[Effect], noise: Noise
+) -> _Member | None:
+    """A rival with the further effect that explains most of what it leaves; None without one.
+
+    The further effect is no member of the set and contains none: that would explain the same
+    without the rival.
+    """
+    own = rival.hypothesis.terms[-1]
+    for item in engine.scores(rival, noise):
+        effect = item.candidate.effect
+        if item.net_gain <= 0.0:
+            return None
+        if {effect.id, *effect.contains} & {member.id for member in (own.effect, *members)}:
+            continue
+        trial = engine.trial(rival, item, noise)
+        labels = [term.effect.id for term in trial.fit.hypothesis.terms]
+        if not np.isfinite(trial.criterion) or labels.count(own.effect.id) != 1:
+            return None
+        place = labels.index(own.effect.id)
+        others = trial.fit.hypothesis.without(place)
+        term = trial.fit.hypothesis.terms[place]
+        both = engine.refit(others.with_term(term, engine.regression.n_runs), noise)
+        return _Member(both.hypothesis.terms[-1], both, both)
+    return None
 
 
 def _is_listed(own: Effect, rival: Effect) -> bool:
