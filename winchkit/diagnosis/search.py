@@ -1,4 +1,4 @@
-"""Search of a diagnosis: stepwise selection, begun again where it shows another data set or law.
+"""Search of a diagnosis: stepwise selection, started again where it shows another data set or law.
 
 The selection is repeated with rounded reversals of friction, with an offset per run, and without
 the samples of impacts, each where it predicts held-out data better; then with the simplest laws.
