@@ -30,9 +30,9 @@ from campaign.truth import Situation, show
 from campaign.winch import Winch, turns_for, write_profile
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import diagnose
-from winchkit.diagnosis.fleet.diagnose import diagnose_each
 from winchkit.diagnosis.results import Diagnosis
 from winchkit.effects import load_catalogue
+from winchkit.fleet.diagnosis.diagnose import diagnose_each
 from winchkit.runs import read_run
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.read import read_profile

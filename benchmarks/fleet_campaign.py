@@ -32,10 +32,10 @@ import numpy as np
 
 from summaries import print_summary
 from winchkit.catalog import find
-from winchkit.diagnosis.fleet.history import FleetHistory, fleet_history
-from winchkit.diagnosis.fleet.sessions import SessionEstimate, fit_session, null_term
-from winchkit.diagnosis.fleet.swapped_profiles import swapped_by_radius
 from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.fleet.diagnosis.history import FleetHistory, fleet_history
+from winchkit.fleet.diagnosis.sessions import SessionEstimate, fit_session, null_term
+from winchkit.fleet.diagnosis.swapped_profiles import swapped_by_radius
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_programme, read_simbench

@@ -17,7 +17,7 @@ from collections.abc import Callable
 import numpy as np
 
 from winchkit.catalog import find
-from winchkit.model.robot import (
+from winchkit.robot import (
     ForceLimits,
     Forces,
     Pose,

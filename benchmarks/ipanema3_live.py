@@ -29,7 +29,8 @@ import numpy as np
 
 from winchkit.catalog import find
 from winchkit.estimation.elongation import ElongationCorrection
-from winchkit.model.robot import (
+from winchkit.model.trajectory import plan
+from winchkit.robot import (
     PLAIN,
     DynamicsCycle,
     Pose,
@@ -39,9 +40,8 @@ from winchkit.model.robot import (
     flat_pose,
     robot_of,
 )
-from winchkit.model.trajectory import plan
+from winchkit.robot.sim.platform import Body, CablePlatform, Pulleys
 from winchkit.schema.read import read_robot
-from winchkit.sim.robot.platform import Body, CablePlatform, Pulleys
 
 GOAL = np.array([-0.55, 0.55, 0.70])
 """Pose 6 of the paper's Table 2, m."""

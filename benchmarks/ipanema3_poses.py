@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.catalog import find
-from winchkit.model.robot import Pose, approximate_forces, forward, robot_of
+from winchkit.robot import Pose, approximate_forces, forward, robot_of
 from winchkit.schema.read import read_robot
 
 MIDDLE_FORCE = 500.0

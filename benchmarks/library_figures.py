@@ -36,11 +36,11 @@ import pyarrow.parquet as pq
 from summaries import print_summary
 from winchkit import diagnose_library, index_library, query_library, write_run
 from winchkit.catalog import find
-from winchkit.library import cluster
-from winchkit.library.partitions import Partitions
-from winchkit.library.sessions import winch_sessions
-from winchkit.library.tables import arrow_schema
-from winchkit.library.tasks import Outcome, Task, outcome_of, task_of
+from winchkit.fleet.library import cluster
+from winchkit.fleet.library.partitions import Partitions
+from winchkit.fleet.library.sessions import winch_sessions
+from winchkit.fleet.library.tables import arrow_schema
+from winchkit.fleet.library.tasks import Outcome, Task, outcome_of, task_of
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.read import read_programme, read_simbench
 from winchkit.sim.bench import hiding, profiles_of, programme_path

@@ -25,12 +25,12 @@ import numpy as np
 
 from robot_poses.nested import ITERATIONS, NestedProblem, nominal
 from robot_poses.truth import Noise, Truth, csv, poses
-from winchkit.calibration.robot.calibrate import Calibrated, calibrate
-from winchkit.calibration.robot.prediction import rms
 from winchkit.catalog import find
-from winchkit.model.robot import Robot, robot_of
+from winchkit.robot import Robot, robot_of
+from winchkit.robot.calibration.calibrate import Calibrated, calibrate
+from winchkit.robot.calibration.prediction import rms
+from winchkit.robot.files.poses import Measured, read_poses
 from winchkit.runs import read_run
-from winchkit.runs.poses import Measured, read_poses
 from winchkit.schema.read import read_robot
 
 AIMS = {"speed_up": 1e4, "seconds": 0.1, "held_out_mm": 0.02, "seconds_1000": 0.5}

@@ -32,9 +32,9 @@ from fault_cases.kinds import KINDS
 from fault_cases.world import World
 from winchkit import find, open_bench, read_simbench
 from winchkit.arrays import Array
-from winchkit.bench.robot.path import Waypoint
-from winchkit.bench.robot.trajectory import PlatformTrajectory
 from winchkit.errors import MotionError, NotPermitted, WinchkitError
+from winchkit.robot.bench.path import Waypoint
+from winchkit.robot.bench.trajectory import PlatformTrajectory
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 

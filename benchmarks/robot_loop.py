@@ -27,18 +27,18 @@ from click.testing import CliRunner
 
 from winchkit import open_bench, read_robot, robot_of
 from winchkit.bench.bench import Bench
-from winchkit.bench.robot.path import Waypoint
-from winchkit.bench.robot.planner import coordinates_of, moved
-from winchkit.bench.robot.tracker import Tracker
 from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.errors import NotPermitted
-from winchkit.model.robot import lengths
+from winchkit.robot import lengths
+from winchkit.robot.bench.path import Waypoint
+from winchkit.robot.bench.planner import coordinates_of, moved
+from winchkit.robot.bench.tracker import Tracker
+from winchkit.robot.sim.build import build_robot
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import HiddenSpec, SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
-from winchkit.sim.robot.build import build_robot
 
 ROBOT = "cabtive-robot"
 KINDS = ("drum radius", "cell gain", "soft cable", "exit point", "none")

@@ -25,11 +25,11 @@ from scipy.spatial.transform import Rotation
 
 from winchkit import find
 from winchkit.arrays import Array
-from winchkit.model.robot.integration import ElasticCables, integrate
-from winchkit.model.robot.kinematics import Geometry, Pose, geometry_of, home_of, lengths
+from winchkit.robot.dynamics.integration import ElasticCables, integrate
+from winchkit.robot.geometry.kinematics import Geometry, Pose, geometry_of, home_of, lengths
+from winchkit.robot.sim.platform import Body, CablePlatform, Pulleys
 from winchkit.schema.profiles.robot import PlatformSpec
 from winchkit.schema.read import read_robot
-from winchkit.sim.robot.platform import Body, CablePlatform, Pulleys
 
 DURATION = 4.0
 CYCLE = 2e-3

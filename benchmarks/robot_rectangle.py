@@ -29,11 +29,11 @@ from winchkit import open_bench
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import BenchSnapshot
-from winchkit.bench.robot.planner import moved
 from winchkit.catalog import find
 from winchkit.estimation import DahlEstimator, PulleyGroup
 from winchkit.estimation.dahl_identification import Record, identify_dahl
 from winchkit.model.pulleys import Bearings, over_pulleys
+from winchkit.robot.bench.planner import moved
 from winchkit.schema.read import read_profile, read_simbench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench

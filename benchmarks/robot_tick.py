@@ -23,7 +23,8 @@ import numpy as np
 
 from winchkit.catalog import find
 from winchkit.estimation.elongation import ElongationCorrection
-from winchkit.model.robot import (
+from winchkit.model.rotation import rotation_by
+from winchkit.robot import (
     PLAIN,
     DynamicsCycle,
     Linear,
@@ -37,7 +38,6 @@ from winchkit.model.robot import (
     forward,
     robot_of,
 )
-from winchkit.model.robot.rotation import rotation_by
 from winchkit.schema.read import read_robot
 
 LIMITS = {

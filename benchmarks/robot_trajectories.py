@@ -25,10 +25,10 @@ from winchkit import find, open_bench, read_simbench
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.snapshot import BenchSnapshot
-from winchkit.bench.robot.path import Waypoint
-from winchkit.bench.robot.trajectory import PlatformTrajectory, motion_at
 from winchkit.errors import NotPermitted
-from winchkit.model.robot import dynamic_wrench, wrench_feasibility
+from winchkit.robot import dynamic_wrench, wrench_feasibility
+from winchkit.robot.bench.path import Waypoint
+from winchkit.robot.bench.trajectory import PlatformTrajectory, motion_at
 from winchkit.schema.simbench import SimBench
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench

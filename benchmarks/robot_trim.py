@@ -21,8 +21,8 @@ import numpy as np
 from winchkit import find, open_bench, read_simbench
 from winchkit.arrays import Array
 from winchkit.bench.bench import Bench
-from winchkit.model.robot import quadratic
-from winchkit.model.robot.force_distribution import null_space
+from winchkit.robot import quadratic
+from winchkit.robot.forces.force_distribution import null_space
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench import LiveBench
 

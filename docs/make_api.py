@@ -71,7 +71,7 @@ from winchkit import diagnose, read_profile, read_run
 ```
 
 For effects of your own there are `winchkit.effects` and `winchkit.model.stages` besides, for
-control loops `winchkit.model.robot` and `winchkit.estimation`, for tests `winchkit.testing`. Paths
+control loops `winchkit.robot` and `winchkit.estimation`, for tests `winchkit.testing`. Paths
 of other modules may change with any version; [stability.md](stability.md) says what is promised,
 and which call each command is. `import winchkit` loads no other package: a name is
 imported when it is first used. `winchkit.__version__` is the version.

@@ -22,7 +22,7 @@ FILE = Path(__file__).with_name("public_names.txt")
 PACKAGES = (
     "winchkit.effects",
     "winchkit.estimation",
-    "winchkit.model.robot",
+    "winchkit.robot",
     "winchkit.model.stages",
     "winchkit.testing.plugin",
 )
@@ -30,8 +30,8 @@ PACKAGES = (
 RESULTS = {
     "winchkit.bench.remote.client": ("RemoteStation",),
     "winchkit.bench.winch": ("Winch",),
-    "winchkit.calibration.robot.calibrate": ("Calibrated", "Options"),
-    "winchkit.calibration.robot.parameters": ("Estimated",),
+    "winchkit.robot.calibration.calibrate": ("Calibrated", "Options"),
+    "winchkit.robot.calibration.parameters": ("Estimated",),
     "winchkit.diagnosis.add": ("Addition", "Removal"),
     "winchkit.diagnosis.diagnose": ("WinchAnswer",),
     "winchkit.diagnosis.plan": ("Plan",),
@@ -41,7 +41,7 @@ RESULTS = {
         *("CandidateScore", "Combination", "Comparison", "Detectable", "Diagnosis", "Doubt"),
         *("Estimate", "NextRun", "OutputError", "OutputFit", "RobotDiagnosis", "Step"),
     ),
-    "winchkit.diagnosis.robot.diagnose": ("RobotAnswer",),
+    "winchkit.robot.diagnosis.diagnose": ("RobotAnswer",),
     "winchkit.fit_statistics": ("Correlation", "FitStatistics", "FittedParameter"),
     "winchkit.runs.run": ("Channel",),
     "winchkit.schema.profiles.axis": ("AxisProfile",),

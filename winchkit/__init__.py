@@ -44,27 +44,16 @@ if TYPE_CHECKING:
     from winchkit.bench.programme import run_programme
     from winchkit.bench.recording.replay import open_replay
     from winchkit.bench.remote.session import attach
-    from winchkit.bench.robot.computation import ComputationProcess
-    from winchkit.bench.robot.self_calibration import PoseVolume, SelfCalibration, self_calibrated
-    from winchkit.bench.robot.tracker import Tracker
     from winchkit.calibration.cell.files import read_points
     from winchkit.calibration.cell.fit import fit_cell
     from winchkit.calibration.cell.static_effects import static_effects
-    from winchkit.calibration.robot.calibrate import calibrate
-    from winchkit.calibration.robot.pose_design import next_poses
-    from winchkit.calibration.robot.profile import write_calibrated
     from winchkit.catalog import find
     from winchkit.cli.files.check import check
     from winchkit.diagnosis.add import add, remove
     from winchkit.diagnosis.compare import compare
     from winchkit.diagnosis.diagnose import diagnose
-    from winchkit.diagnosis.fleet.diagnose import diagnose_each
     from winchkit.diagnosis.new_effect import new_effect
     from winchkit.diagnosis.plan import plan
-    from winchkit.diagnosis.robot.add import add_to_robot, remove_from_robot
-    from winchkit.diagnosis.robot.compare import compare_robot
-    from winchkit.diagnosis.robot.diagnose import diagnose_robot
-    from winchkit.diagnosis.robot.plan import plan_poses
     from winchkit.diagnosis.write import write_addition, write_removal
     from winchkit.effects.catalogue import load_catalogue
     from winchkit.effects.effect import Effect, Parameter
@@ -85,21 +74,32 @@ if TYPE_CHECKING:
     from winchkit.estimation.dahl import DahlEstimator
     from winchkit.estimation.dahl_identification import identify_dahl
     from winchkit.estimation.elongation import ElongationCorrection
-    from winchkit.library.diagnose import diagnose_library
-    from winchkit.library.history import LibraryHistory, library_history
-    from winchkit.library.index import index_library
-    from winchkit.library.query import library_estimates, library_runs, query_library
-    from winchkit.model.robot.cycle import RobotCycle
-    from winchkit.model.robot.force_distribution import ForceLimits
-    from winchkit.model.robot.kinematics import Pose
-    from winchkit.model.robot.robot import Robot, robot_of
+    from winchkit.fleet.diagnosis.diagnose import diagnose_each
+    from winchkit.fleet.library.diagnose import diagnose_library
+    from winchkit.fleet.library.history import LibraryHistory, library_history
+    from winchkit.fleet.library.index import index_library
+    from winchkit.fleet.library.query import library_estimates, library_runs, query_library
     from winchkit.model.sizing.sizing import sized
     from winchkit.profile_edit.history import ladder
     from winchkit.profile_edit.ledger import undo
     from winchkit.profile_edit.naming import extended_name
+    from winchkit.robot.bench.computation import ComputationProcess
+    from winchkit.robot.bench.self_calibration import PoseVolume, SelfCalibration, self_calibrated
+    from winchkit.robot.bench.tracker import Tracker
+    from winchkit.robot.calibration.calibrate import calibrate
+    from winchkit.robot.calibration.pose_design import next_poses
+    from winchkit.robot.calibration.profile import write_calibrated
+    from winchkit.robot.diagnosis.add import add_to_robot, remove_from_robot
+    from winchkit.robot.diagnosis.compare import compare_robot
+    from winchkit.robot.diagnosis.diagnose import diagnose_robot
+    from winchkit.robot.diagnosis.plan import plan_poses
+    from winchkit.robot.dynamics.cycle import RobotCycle
+    from winchkit.robot.files.poses import read_poses
+    from winchkit.robot.forces.force_distribution import ForceLimits
+    from winchkit.robot.geometry.kinematics import Pose
+    from winchkit.robot.geometry.robot import Robot, robot_of
     from winchkit.runs.export import export
     from winchkit.runs.info import info_of
-    from winchkit.runs.poses import read_poses
     from winchkit.runs.read import read_log, read_run
     from winchkit.runs.recover import recover
     from winchkit.runs.run import Run
@@ -246,9 +246,9 @@ _NAMES = {
         "cell_zero",
     ),
     "winchkit.bench.commissioning.calls": ("commission",),
-    "winchkit.bench.robot.computation": ("ComputationProcess",),
-    "winchkit.bench.robot.self_calibration": ("PoseVolume", "SelfCalibration", "self_calibrated"),
-    "winchkit.bench.robot.tracker": ("Tracker",),
+    "winchkit.robot.bench.computation": ("ComputationProcess",),
+    "winchkit.robot.bench.self_calibration": ("PoseVolume", "SelfCalibration", "self_calibrated"),
+    "winchkit.robot.bench.tracker": ("Tracker",),
     "winchkit.bench.control.snapshot": ("BenchSnapshot",),
     "winchkit.bench.drives.calls": (
         "bus_load",
@@ -272,9 +272,9 @@ _NAMES = {
     "winchkit.calibration.cell.files": ("read_points",),
     "winchkit.calibration.cell.fit": ("fit_cell",),
     "winchkit.calibration.cell.static_effects": ("static_effects",),
-    "winchkit.calibration.robot.calibrate": ("calibrate",),
-    "winchkit.calibration.robot.pose_design": ("next_poses",),
-    "winchkit.calibration.robot.profile": ("write_calibrated",),
+    "winchkit.robot.calibration.calibrate": ("calibrate",),
+    "winchkit.robot.calibration.pose_design": ("next_poses",),
+    "winchkit.robot.calibration.profile": ("write_calibrated",),
     "winchkit.catalog": ("find",),
     "winchkit.cli.files.check": ("check",),
     "winchkit.diagnosis.add": (
@@ -283,16 +283,16 @@ _NAMES = {
     ),
     "winchkit.diagnosis.compare": ("compare",),
     "winchkit.diagnosis.diagnose": ("diagnose",),
-    "winchkit.diagnosis.fleet.diagnose": ("diagnose_each",),
+    "winchkit.fleet.diagnosis.diagnose": ("diagnose_each",),
     "winchkit.diagnosis.new_effect": ("new_effect",),
     "winchkit.diagnosis.plan": ("plan",),
-    "winchkit.diagnosis.robot.add": (
+    "winchkit.robot.diagnosis.add": (
         "add_to_robot",
         "remove_from_robot",
     ),
-    "winchkit.diagnosis.robot.compare": ("compare_robot",),
-    "winchkit.diagnosis.robot.diagnose": ("diagnose_robot",),
-    "winchkit.diagnosis.robot.plan": ("plan_poses",),
+    "winchkit.robot.diagnosis.compare": ("compare_robot",),
+    "winchkit.robot.diagnosis.diagnose": ("diagnose_robot",),
+    "winchkit.robot.diagnosis.plan": ("plan_poses",),
     "winchkit.diagnosis.write": (
         "write_addition",
         "write_removal",
@@ -319,18 +319,18 @@ _NAMES = {
     "winchkit.estimation.dahl": ("DahlEstimator",),
     "winchkit.estimation.dahl_identification": ("identify_dahl",),
     "winchkit.estimation.elongation": ("ElongationCorrection",),
-    "winchkit.library.history": ("LibraryHistory", "library_history"),
-    "winchkit.library.diagnose": ("diagnose_library",),
-    "winchkit.library.index": ("index_library",),
-    "winchkit.library.query": (
+    "winchkit.fleet.library.history": ("LibraryHistory", "library_history"),
+    "winchkit.fleet.library.diagnose": ("diagnose_library",),
+    "winchkit.fleet.library.index": ("index_library",),
+    "winchkit.fleet.library.query": (
         "library_estimates",
         "library_runs",
         "query_library",
     ),
-    "winchkit.model.robot.cycle": ("RobotCycle",),
-    "winchkit.model.robot.force_distribution": ("ForceLimits",),
-    "winchkit.model.robot.kinematics": ("Pose",),
-    "winchkit.model.robot.robot": (
+    "winchkit.robot.dynamics.cycle": ("RobotCycle",),
+    "winchkit.robot.forces.force_distribution": ("ForceLimits",),
+    "winchkit.robot.geometry.kinematics": ("Pose",),
+    "winchkit.robot.geometry.robot": (
         "Robot",
         "robot_of",
     ),
@@ -340,7 +340,7 @@ _NAMES = {
     "winchkit.profile_edit.naming": ("extended_name",),
     "winchkit.runs.export": ("export",),
     "winchkit.runs.info": ("info_of",),
-    "winchkit.runs.poses": ("read_poses",),
+    "winchkit.robot.files.poses": ("read_poses",),
     "winchkit.runs.read": (
         "read_log",
         "read_run",

@@ -99,9 +99,9 @@ class SeveralScore:
 
 def answer_several(case: Several) -> SeveralScore:
     """Diagnose every winch of a case from its files."""
-    from winchkit.diagnosis.fleet.diagnose import diagnose_each
-    from winchkit.diagnosis.fleet.meta_analysis import shared_effects
     from winchkit.effects import load_catalogue
+    from winchkit.fleet.diagnosis.diagnose import diagnose_each
+    from winchkit.fleet.diagnosis.meta_analysis import shared_effects
     from winchkit.runs.read import read_run
     from winchkit.schema.read import read_profile
 

@@ -22,7 +22,7 @@ from winchkit import (
     robot_of,
     run_of,
 )
-from winchkit.model.robot import rotation_of
+from winchkit.robot import rotation_of
 
 drawings = read_robot(find("profiles", "cabtive"))
 drawings

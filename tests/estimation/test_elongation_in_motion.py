@@ -6,7 +6,7 @@ import numpy as np
 
 import ipanema3_live
 from winchkit.catalog import find
-from winchkit.model.robot import PLAIN, robot_of
+from winchkit.robot import PLAIN, robot_of
 from winchkit.schema.read import read_robot
 
 

@@ -19,7 +19,6 @@ from scipy.fft import dct
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of
-from winchkit.diagnosis.fleet.meta_analysis import pooled
 from winchkit.diagnosis.regression.cross_validation import signed_rank_p_value
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.lack_of_fit import lack_of_fit_test
@@ -29,6 +28,7 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.scores import Projected, null_maxima, score
 from winchkit.diagnosis.selection.signatures import signatures
 from winchkit.effects import load_catalogue
+from winchkit.fleet.diagnosis.meta_analysis import pooled
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
 

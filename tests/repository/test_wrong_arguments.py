@@ -17,7 +17,7 @@ import pytest
 import winchkit
 from snippets import ROOT
 from winchkit.errors import WinchkitError
-from winchkit.runs.poses import read_poses
+from winchkit.robot.files.poses import read_poses
 
 FILES = r"str \| Path|PathLike|Path|Wiring"
 OURS = r"Run|WinchProfile|RobotProfile|Robot|Measured|Log|CalibrationPoint|Calibrated|WinchAnswer"

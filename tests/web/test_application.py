@@ -25,14 +25,14 @@ from winchkit import index_library
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.write import write_addition
-from winchkit.library.partitions import Partitions
+from winchkit.fleet.library.partitions import Partitions
+from winchkit.fleet.web.runs import Library
+from winchkit.robot.web.robot import RobotWork
 from winchkit.runs.read import read_run
 from winchkit.runs.writer import write_run
 from winchkit.schema.read import read_profile
 from winchkit.web.application import application
 from winchkit.web.examples import example_runs
-from winchkit.web.library.runs import Library
-from winchkit.web.robot import RobotWork
 from winchkit.web.state import Judgement
 from winchkit.web.workspace import Workspace
 

@@ -16,10 +16,10 @@ pytest.importorskip("httpx2")
 from starlette.testclient import TestClient
 
 from robot_poses.truth import Truth, csv, poses
+from winchkit.fleet.web.runs import Library
+from winchkit.robot.web.robot import RobotWork
 from winchkit.schema.read import read_robot
 from winchkit.web.application import application
-from winchkit.web.library.runs import Library
-from winchkit.web.robot import RobotWork
 from winchkit.web.workspace import Workspace
 
 TOKEN = "t0ken"

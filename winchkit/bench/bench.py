@@ -27,7 +27,6 @@ from winchkit.bench.remote.commander import Commanders, NotCommander, NotRelease
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.life_sign import LifeSigns
-from winchkit.bench.robot.wiring import no_robot
 from winchkit.bench.winch import Winch
 from winchkit.drivers.clock import Clock
 from winchkit.errors import (
@@ -37,10 +36,11 @@ from winchkit.errors import (
     MotionError,
     NotPermitted,
 )
+from winchkit.robot.bench.wiring import no_robot
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
-    from winchkit.bench.robot.platform import Platform
+    from winchkit.robot.bench.platform import Platform
 
 
 class Stations(Protocol):
@@ -152,7 +152,7 @@ class Bench(BenchConnection):
         robot, wiring = self._wired.robot, self.spec.robot
         if robot is None or wiring is None:
             return None
-        from winchkit.bench.robot.platform import Platform
+        from winchkit.robot.bench.platform import Platform
 
         return Platform(self, wiring, robot, self.winch)
 

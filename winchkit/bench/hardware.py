@@ -26,7 +26,6 @@ from winchkit.bench.control.winch_state import WinchParts
 from winchkit.bench.drives.set_up_progress import SetUpProgress, Tell, to_stderr
 from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
-from winchkit.bench.robot.wiring import line_profiles, robot_of_bench
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
@@ -36,6 +35,7 @@ from winchkit.drivers.instrument_process.process import InstrumentProcess
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import ConnectionLost, Fault, FileError
+from winchkit.robot.bench.wiring import line_profiles, robot_of_bench
 from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
 from winchkit.schema.bench_warnings import bench_warnings
 from winchkit.schema.profiles.winch import WinchProfile
@@ -43,7 +43,7 @@ from winchkit.units import GRAVITY
 from winchkit.version import __version__
 
 if TYPE_CHECKING:
-    from winchkit.model.robot import Robot
+    from winchkit.robot.geometry.robot import Robot
 
 _STALE_BEATS = 2
 """Feedback may be this many heartbeats old: the bench file says how soon silence must count."""

@@ -45,14 +45,14 @@ SECTIONS: dict[str, dict[str, At]] = {
             "winchkit.cli.web.serve",
             "Serve the page in the browser: all of this, with figures.",
         ),
-        "fleet": At("winchkit.cli.library.fleet", "Many winches: diagnose a library of runs."),
+        "fleet": At("winchkit.fleet.cli.fleet", "Many winches: diagnose a library of runs."),
         "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
         "effects": At("winchkit.cli.model.effects", "List the physical effects, or describe one."),
         "size": At(
             "winchkit.cli.model.size", "Size a winch: compare each requirement with its limit."
         ),
         "calibrate": At(
-            "winchkit.cli.model.calibrate", "Calibrate a cable robot from measured poses."
+            "winchkit.robot.cli.calibrate", "Calibrate a cable robot from measured poses."
         ),
     },
     "Bench": {
@@ -97,7 +97,7 @@ SECTIONS: dict[str, dict[str, At]] = {
         ),
         "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
         "library": At(
-            "winchkit.cli.library.group", "Tables of the runs of a folder: index, list, query."
+            "winchkit.fleet.cli.group", "Tables of the runs of a folder: index, list, query."
         ),
         "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
         "completion": At(

@@ -6,10 +6,10 @@ a profile, ``parametrization`` gives the coordinates in which a fit changes thei
 """
 
 from winchkit.effects.bind import check_profile, line_of, terms_of
-from winchkit.effects.bind_robot import robot_terms, robot_with_effects
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter, Values
 from winchkit.effects.term import Term, modifiers_of, robot_with_terms
+from winchkit.robot.effects.bind import robot_terms, robot_with_effects
 
 __all__ = [
     "Catalogue",

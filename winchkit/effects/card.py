@@ -13,9 +13,9 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.effects.effect import NEED_WORDS, Effect, Parameter, Values
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
-from winchkit.effects.reference_robot import robot_changes
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
+from winchkit.robot.effects.reference import robot_changes
 
 _PLACES = {"all": "all lines equally", "one": "one line", "platform": "the platform"}
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}

@@ -17,7 +17,13 @@ from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.stages import OUTPUTS
 from winchkit.units import UNITS, dimension_of
 
-_ROOMS = ("on_length", "on_tension", "on_torque", "on_axis", "on_robot")
+_ROOMS = (
+    "winchkit.effects.on_length",
+    "winchkit.effects.on_tension",
+    "winchkit.effects.on_torque",
+    "winchkit.effects.on_axis",
+    "winchkit.robot.effects.on_robot",
+)
 
 
 class Catalogue:
@@ -87,7 +93,7 @@ def _installed() -> tuple[Effect, ...]:
     """Effects of the package and of entry points; these are searched in every distribution."""
     found: list[Effect] = []
     for room in _ROOMS:
-        package = import_module(f"winchkit.effects.{room}")
+        package = import_module(room)
         for module in iter_modules(package.__path__):
             found.append(import_module(f"{package.__name__}.{module.name}").EFFECT)
     for point in entry_points(group="winchkit.effects"):

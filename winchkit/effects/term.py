@@ -13,8 +13,8 @@ import numpy as np
 from winchkit.effects.effect import Effect, Values
 from winchkit.effects.placement import HOME, line_of_effect
 from winchkit.errors import Fault, FileError, WinchkitError
-from winchkit.model.robot import Robot, robot_of
 from winchkit.model.stages import At, Modifier, Stage
+from winchkit.robot.geometry.robot import Robot, robot_of
 from winchkit.schema.profiles.robot import RobotProfile
 
 _ORDERS_IN_LABEL = 6

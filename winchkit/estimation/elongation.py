@@ -22,17 +22,12 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
-from winchkit.model.robot import (
-    PLAIN,
-    ElongationLaw,
-    Linear,
-    Pose,
-    Robot,
-    RobotKernels,
-    approximate_forces,
-    cables_of,
-    flat_pose,
-)
+from winchkit.model.elastic import ElongationLaw, Linear
+from winchkit.robot.dynamics.cycle import flat_pose
+from winchkit.robot.dynamics.kernels import PLAIN, RobotKernels
+from winchkit.robot.forces.force_distribution import approximate_forces
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.robot import Robot, cables_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +99,7 @@ class ElongationCorrection:
         if count < 6:
             raise UsageError(
                 f"{count} lines: Eq. 8 needs at least six; the forces of a hanging platform come "
-                "from winchkit.model.robot.forward"
+                "from winchkit.robot.geometry.forward"
             )
         for name, found in (("laws", len(laws)), ("initial forces", len(initial))):
             if found != count:
@@ -179,7 +174,7 @@ class ElongationCorrection:
             Position, m, and rotation matrix by rows.
         wrench : (6,) sequence of float, optional
             On the platform, N and N m: that of a moving platform, with its inertial forces, as of
-            :meth:`winchkit.model.robot.DynamicsCycle.wrench`; None for the constant one.
+            :meth:`winchkit.robot.DynamicsCycle.wrench`; None for the constant one.
 
         Returns
         -------

@@ -67,7 +67,7 @@ class Stage(IntEnum):
     PAYLOAD = 16
     """Value: the :class:`~winchkit.schema.profiles.robot.PlatformSpec` of a robot."""
     TRACKER = 17
-    """Value: :class:`~winchkit.model.robot.identification.tracker.Tracker` of a robot's poses."""
+    """Value: :class:`~winchkit.robot.geometry.tracker.Tracker` of a robot's poses."""
 
 
 ROBOT_STAGES = frozenset({Stage.LINE_PLACE, Stage.HOME_LENGTH, Stage.PAYLOAD, Stage.TRACKER})

@@ -9,12 +9,12 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.maps import residual_maps
-from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.report.detectability import untestable
-from winchkit.report.figures.pose_traces import traces
 from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.figures.waterfall import Waterfall, waterfall_of
 from winchkit.report.words.sentence import changes_text, sentence
+from winchkit.robot.diagnosis.diagnose import RobotAnswer
+from winchkit.robot.report.pose_traces import traces
 
 
 def report_json(answer: Answer) -> dict[str, Any]:

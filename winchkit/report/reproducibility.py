@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from winchkit.diagnosis.data.dataset import Dataset
-from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.report.html.markup import Markup, compact, details, element, folded, table
+from winchkit.robot.diagnosis.data.dataset import RobotDataset
 
 _FEW = 3
 """Runs that a command names; more are written with a wildcard."""

@@ -11,8 +11,6 @@ from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset
-from winchkit.diagnosis.robot.diagnose import RobotAnswer
-from winchkit.diagnosis.robot.excitation import missing_pose_excitation
 from winchkit.effects.card import sparkline
 from winchkit.effects.placement import HOME
 from winchkit.profile_edit.history import LADDER_UNITS
@@ -49,6 +47,8 @@ from winchkit.report.words.vocabulary import (
     parameter_name,
     values_text,
 )
+from winchkit.robot.diagnosis.diagnose import RobotAnswer
+from winchkit.robot.diagnosis.excitation import missing_pose_excitation
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal

@@ -26,7 +26,7 @@ def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
     from winchkit.schema.read import read_winch
 
     if bench.platform is not None:
-        from winchkit.sim.robot.build import build_robot
+        from winchkit.robot.sim.build import build_robot
 
         return build_robot(bench, bench.platform).profiles
     return {

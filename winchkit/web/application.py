@@ -20,12 +20,12 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from winchkit.catalog import names
 from winchkit.errors import UsageError, WinchkitError
+from winchkit.fleet.web.fleet import Fleet
+from winchkit.fleet.web.runs import Library
+from winchkit.robot.web.robot import RobotWork, is_robot
 from winchkit.version import __version__
 from winchkit.web.foreign import is_run, preview
 from winchkit.web.guard import Guard
-from winchkit.web.library.fleet import Fleet
-from winchkit.web.library.runs import Library
-from winchkit.web.robot import RobotWork, is_robot
 from winchkit.web.workspace import Workspace
 
 if TYPE_CHECKING:

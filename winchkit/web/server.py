@@ -77,8 +77,8 @@ def serve(
         raise UsageError(
             f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
         ) from None
-    from winchkit.web.library.runs import Library
-    from winchkit.web.robot import RobotWork, is_robot
+    from winchkit.fleet.web.runs import Library
+    from winchkit.robot.web.robot import RobotWork, is_robot
     from winchkit.web.workspace import Workspace
 
     token = secrets.token_urlsafe(24)

@@ -22,6 +22,7 @@ from winchkit.diagnosis.diagnose import WinchAnswer, diagnose_prepared
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.errors import FileError, UsageError, WinchkitError
+from winchkit.fleet.web.runs import LibraryRun
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
@@ -31,7 +32,6 @@ from winchkit.web.candidate import candidate_card
 from winchkit.web.curves import OutputCurves, curves_of, recorded_curves
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
 from winchkit.web.foreign import imported
-from winchkit.web.library.runs import LibraryRun
 from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, State, Version
 

@@ -10,8 +10,8 @@ import pytest
 
 from report_answers import AT_NOISE, ELASTIC, FRICTIONAL, NOISY, diagnosis_of
 from report_parsed import HOSTILE, Page
+from winchkit.fleet.report.comparison import shared_effects_html
 from winchkit.report.figures.ladder import error_ladder, fleet_ladders
-from winchkit.report.pages.fleet import shared_effects_html
 from winchkit.report.words.headline import worst_outputs
 from winchkit.report.words.sentence import headline
 

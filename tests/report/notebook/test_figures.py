@@ -12,13 +12,13 @@ import pytest
 from calibration_cases import held, measured, robot, rows
 from report_answers import answer_of, recorded
 from robot_poses.truth import csv
-from winchkit.calibration.robot.calibrate import Calibrated, calibrate
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import compare
 from winchkit.diagnosis.diagnose import WinchAnswer
 from winchkit.diagnosis.residuals.traces import PoseTrace
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.errors import UsageError
+from winchkit.robot.calibration.calibrate import Calibrated, calibrate
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.read import read_profile, read_robot
 

@@ -13,11 +13,11 @@ import pytest
 from calibration_cases import held, measured, robot, rows
 from report_answers import answer_of, recorded
 from robot_poses.truth import csv
-from winchkit.calibration.robot.calibrate import calibrate
 from winchkit.catalog import find
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.compare import compare
 from winchkit.rendering import Renderers, Shown
+from winchkit.robot.calibration.calibrate import calibrate
 from winchkit.schema.read import read_profile, read_robot
 
 PROFILE = read_profile(find("profiles", "bench-spiral"))

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from winchkit.arrays import Array
-from winchkit.model.robot.rotation import rotation_from_quaternion, rotation_of
+from winchkit.model.rotation import rotation_from_quaternion, rotation_of
 from winchkit.runs.importing.answers import Answers
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.formats.source import read_table

@@ -19,7 +19,7 @@ from tracker_exports import (
 )
 from winchkit.arrays import Array
 from winchkit.errors import RunError
-from winchkit.model.robot.rotation import rotation_from_quaternion, rotation_of
+from winchkit.model.rotation import rotation_from_quaternion, rotation_of
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.assignment import Guess
 from winchkit.runs.importing.clocks.joint import joined

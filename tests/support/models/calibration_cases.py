@@ -14,9 +14,9 @@ import numpy as np
 
 from robot_poses.truth import Noise, Row, Truth, csv, poses
 from winchkit.catalog import find
-from winchkit.model.robot import Robot, robot_of
+from winchkit.robot import Robot, robot_of
+from winchkit.robot.files.poses import Measured, read_poses
 from winchkit.runs import read_run
-from winchkit.runs.poses import Measured, read_poses
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.read import read_robot
 

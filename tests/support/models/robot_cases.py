@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 
 from winchkit.catalog import find
-from winchkit.model.robot import Geometry, Pose, Robot, robot_of
-from winchkit.model.robot.rotation import rotation_by
+from winchkit.model.rotation import rotation_by
+from winchkit.robot import Geometry, Pose, Robot, robot_of
 from winchkit.schema.read import read_robot
 
 Array = np.ndarray

@@ -33,7 +33,7 @@ from winchkit.runs.recording.rotation import Rotation
 from winchkit.runs.recording.sync import Syncer
 
 if TYPE_CHECKING:
-    from winchkit.bench.robot.tracker import Tracker
+    from winchkit.robot.bench.tracker import Tracker
 
 _LOGGER = logging.getLogger(__name__)
 _PERIOD = {".csv": 0.05}

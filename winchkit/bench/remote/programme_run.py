@@ -142,7 +142,7 @@ class ProgrammeRun:
                 check=self._require_going,
                 replace=self._replace,
             )
-        from winchkit.bench.robot.programme import run_robot_programme
+        from winchkit.robot.bench.programme import run_robot_programme
 
         return run_robot_programme(
             self._bench,

@@ -87,7 +87,7 @@ def command(
 
     path = programme_path(programme)
     if isinstance(poses := load(path).value, RobotProgramme):
-        from winchkit.cli.bench.run_robot import run_robot
+        from winchkit.robot.cli.run import run_robot
 
         run_robot(
             poses,

@@ -164,7 +164,7 @@ def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
     """The bench with simulated drives, in simulated time; frames of the host are collected."""
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
-    from winchkit.bench.robot.wiring import line_profiles, robot_of_bench
+    from winchkit.robot.bench.wiring import line_profiles, robot_of_bench
     from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live.bench import LiveBench
 

@@ -167,7 +167,7 @@ def _declaration(file: str, effects: Sequence[str]) -> Verdict:
     from winchkit.cli.files.check_drums import stroke_of, warnings_of_drums
     from winchkit.cli.files.check_effects import bench_of
     from winchkit.cli.files.check_effects import faults_and_warnings as of_effects
-    from winchkit.cli.files.check_robots import faults_and_warnings as of_robots
+    from winchkit.robot.cli.check import faults_and_warnings as of_robots
     from winchkit.schema.read import load
 
     declaration = load(file)

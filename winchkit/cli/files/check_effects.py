@@ -41,7 +41,7 @@ def faults_and_warnings(
     if not (effects or robot or any(profile.effect for profile in profiles)):
         return [], warnings
     from winchkit.effects import check_profile, load_catalogue
-    from winchkit.effects.bind_robot import check_robot
+    from winchkit.robot.effects.bind import check_robot
 
     catalogue = load_catalogue(effects)
     if unread:

@@ -112,8 +112,8 @@ def _to_robot(
     figures: str | None,
 ) -> None:
     """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
-    from winchkit.diagnosis.robot.add import fitted_robot_addition
     from winchkit.diagnosis.write import write_addition
+    from winchkit.robot.diagnosis.add import fitted_robot_addition
 
     name, _, place = effect.partition("/")
     line = asked.winch or place or None
@@ -124,15 +124,15 @@ def _to_robot(
     write_addition(asked.source, fitted.addition, [Path(r).name for r in runs], Path(output))
     _tell(fitted.addition, output, as_json)
     if html:
-        from winchkit.report.pages.robot import robot_addition_html
+        from winchkit.robot.report.diagnosis import robot_addition_html
 
         title = page_title(declared.name, runs, effect)
         options = asked.options
         page = robot_addition_html(fitted, title, asked.profile, output, options=options)
         write_page(html, page)
     if figures:
-        from winchkit.report.pages.robot import robot_addition_figures
         from winchkit.report.reproducibility import Command
+        from winchkit.robot.report.diagnosis import robot_addition_figures
 
         source = Command(fitted.regression.dataset, asked.profile).source
         write_figures(figures, robot_addition_figures(fitted, source))

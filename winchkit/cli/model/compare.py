@@ -92,8 +92,8 @@ def _tell_each(
 ) -> None:
     """Every winch of the runs by itself, and what their errors follow alike or not."""
     from winchkit.diagnosis.compare import compared
-    from winchkit.diagnosis.fleet.anova import errors_of, shared_errors
-    from winchkit.report.pages.fleet import shared_errors_text
+    from winchkit.fleet.diagnosis.anova import errors_of, shared_errors
+    from winchkit.fleet.report.comparison import shared_errors_text
     from winchkit.report.pages.pages import comparison_figures, comparison_html
     from winchkit.report.reproducibility import Command
     from winchkit.report.text import compare_text
@@ -124,7 +124,7 @@ def _tell_each(
         texts = {name: compare_text(one) for name, one in found.items()}
         echo_each(texts, shared_errors_text(found, shared))
     if html:
-        from winchkit.report.pages.fleet import shared_errors_html
+        from winchkit.fleet.report.comparison import shared_errors_html
 
         write_page(html, shared_errors_html(found, shared, title, pages))
     if figures:
@@ -141,7 +141,7 @@ def _tell_robot(
     figures: str | None,
 ) -> None:
     """Poses with a robot's profile."""
-    from winchkit.diagnosis.robot.compare import compared_robot
+    from winchkit.robot.diagnosis.compare import compared_robot
 
     with progress_bar() as progress:
         measured = read_all(runs)
@@ -149,13 +149,13 @@ def _tell_robot(
         answer = compared_robot(measured, declared, asked.catalogue)
     _tell(answer.comparison, as_json)
     if html:
-        from winchkit.report.pages.robot import robot_comparison_html
+        from winchkit.robot.report.diagnosis import robot_comparison_html
 
         title = page_title(declared.name, runs)
         write_page(html, robot_comparison_html(answer, title, asked.profile, options=asked.options))
     if figures:
-        from winchkit.report.pages.robot import robot_comparison_figures
         from winchkit.report.reproducibility import Command
+        from winchkit.robot.report.diagnosis import robot_comparison_figures
 
         source = Command(answer.regression.dataset, asked.profile).source
         write_figures(figures, robot_comparison_figures(answer, source))

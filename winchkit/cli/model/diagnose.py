@@ -145,9 +145,9 @@ def _tell_each(
     figures: str | None,
 ) -> None:
     """Diagnosis of every winch of the runs by itself, and their common effects."""
-    from winchkit.diagnosis.fleet.diagnose import diagnose_each
-    from winchkit.diagnosis.fleet.meta_analysis import alarms, shared_effects
-    from winchkit.report.pages.fleet import shared_effects_text
+    from winchkit.fleet.diagnosis.diagnose import diagnose_each
+    from winchkit.fleet.diagnosis.meta_analysis import alarms, shared_effects
+    from winchkit.fleet.report.comparison import shared_effects_text
 
     said: dict[str, Any] = {}
     found: dict[str, Diagnosis] = {}
@@ -175,7 +175,7 @@ def _tell_each(
     else:
         echo_each(said, shared_effects_text(found, shared, chances))
     if html:
-        from winchkit.report.pages.fleet import shared_effects_html
+        from winchkit.fleet.report.comparison import shared_effects_html
 
         write_page(html, shared_effects_html(found, shared, chances, title, pages))
     if figures:
@@ -191,19 +191,19 @@ def _tell_robot(
     figures: str | None,
 ) -> None:
     """Diagnosis of a robot from poses."""
-    from winchkit.diagnosis.robot.diagnose import diagnose_robot
+    from winchkit.robot.diagnosis.diagnose import diagnose_robot
 
     with progress_bar() as progress:
         answer = diagnose_robot(read_all(runs), declared, asked.catalogue, progress)
     (echo_json if as_json else click.echo)(_said(answer, as_json))
     if html:
-        from winchkit.report.pages.robot import robot_report_html
+        from winchkit.robot.report.diagnosis import robot_report_html
 
         title = page_title(declared.name, runs)
         write_page(html, robot_report_html(answer, title, asked.profile, options=asked.options))
     if figures:
-        from winchkit.report.pages.robot import robot_report_figures
         from winchkit.report.reproducibility import Command
+        from winchkit.robot.report.diagnosis import robot_report_figures
 
         source = Command(answer.selection.preparation.dataset, asked.profile).source
         write_figures(figures, robot_report_figures(answer, source))

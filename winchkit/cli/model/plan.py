@@ -30,8 +30,8 @@ from winchkit.errors import UsageError, suggest
 if TYPE_CHECKING:
     from winchkit.diagnosis.design.plan import Offer
     from winchkit.diagnosis.plan import Plan
-    from winchkit.diagnosis.robot.plan import PosePlan
     from winchkit.effects.term import Term
+    from winchkit.robot.diagnosis.plan import PosePlan
     from winchkit.schema.bench import LimitSpec
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
@@ -46,8 +46,8 @@ def tell_poses(
     as_json: bool,
 ) -> None:
     """Diagnose, then propose poses; raises UsageError for options that mean nothing here."""
-    from winchkit.diagnosis.robot.diagnose import diagnose_robot
-    from winchkit.diagnosis.robot.plan import plan_poses
+    from winchkit.robot.diagnosis.diagnose import diagnose_robot
+    from winchkit.robot.diagnosis.plan import plan_poses
 
     refuse_options(asked.band, asked.winch)
     if bench is not None:
@@ -81,9 +81,9 @@ def _poses_text(plan: PosePlan) -> str:
     """A line a kind, the best first, then its poses."""
     from math import degrees
 
-    from winchkit.diagnosis.robot.pose_design import reach
     from winchkit.quantity_text import percent
     from winchkit.report.words.columns import hanging
+    from winchkit.robot.diagnosis.pose_design import reach
 
     if not plan.offers:
         return (
@@ -131,7 +131,7 @@ def _listed(plan: PosePlan) -> list[str]:
     """The poses of the best offer."""
     from math import degrees
 
-    from winchkit.model.robot import angles_of
+    from winchkit.model.rotation import angles_of
     from winchkit.report.words.columns import aligned
 
     offer = plan.best

@@ -60,7 +60,7 @@ def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json
     with progress_bar() as progress:
         progress("fitting", None)
         if isinstance(declared, RobotProfile):
-            from winchkit.diagnosis.robot.add import remove_from_robot
+            from winchkit.robot.diagnosis.add import remove_from_robot
 
             refuse_options(asked.band)
             effect = f"{effect}/{asked.winch}" if asked.winch else effect

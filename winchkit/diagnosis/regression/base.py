@@ -4,7 +4,7 @@ A regression has rows (observations), each with a noise band, and predicts them 
 effects with values, nuisance parameters and initial states. What the rows are - spectral
 coefficients of a winch's runs or equations of a robot's poses - is known to its implementations
 only: :class:`~winchkit.diagnosis.regression.time_series.TimeSeriesRegression` and
-:class:`~winchkit.diagnosis.robot.regression.PoseRegression`.
+:class:`~winchkit.robot.diagnosis.regression.PoseRegression`.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 The engine fits, scores and compares hypotheses of any regression. How the noise is estimated,
 how lack of fit is tested and which folds are held out depends on the data: the implementations
 are :class:`~winchkit.diagnosis.selection.time_series.TimeSeriesSelection` for a winch's runs and
-:class:`~winchkit.diagnosis.robot.engine.PoseSelection` for a robot's poses.
+:class:`~winchkit.robot.diagnosis.engine.PoseSelection` for a robot's poses.
 """
 
 from __future__ import annotations

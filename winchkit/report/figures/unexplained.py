@@ -6,17 +6,17 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Step
-from winchkit.diagnosis.robot.diagnose import RobotAnswer
 from winchkit.effects.empirical import empirical_id
 from winchkit.profile_edit.history import LADDER_UNITS
 from winchkit.quantity_text import scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
-from winchkit.report.figures.pose_traces import trace_over
 from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.words.sentence import capital, main_patterns, where_text
 from winchkit.report.words.steps import has_other_law
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, variable_name
+from winchkit.robot.diagnosis.diagnose import RobotAnswer
+from winchkit.robot.report.pose_traces import trace_over
 
 
 def unexplained_curve(answer: Answer, where: Attribution) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from winchkit.calibration.robot.calibrate import Calibrated
+    from winchkit.robot.calibration.calibrate import Calibrated
 
 _OUTPUT_HEIGHT, _CHANNEL_HEIGHT, _POSE_HEIGHT = 2.5, 1.15, 2.0
 """Inches per output, channel and pose trace."""

@@ -22,9 +22,9 @@ from winchkit.report.words.vocabulary import OUTPUT_NAMES, VERDICT_NAMES, meanin
 from winchkit.runs.run import Run
 
 if TYPE_CHECKING:
-    from winchkit.calibration.robot.calibrate import Calibrated
     from winchkit.diagnosis.add import Addition, Removal
     from winchkit.diagnosis.plan import Plan
+    from winchkit.robot.calibration.calibrate import Calibrated
 
 _TONES = {
     "adequate": "#2b7a4b",
@@ -114,8 +114,8 @@ def plan_cell(plan: Plan) -> str:
 
 def calibration_cell(found: Calibrated) -> str:
     """A robot's calibration: errors before and after, and its parameters."""
-    from winchkit.calibration.robot.prediction import rms
-    from winchkit.calibration.robot.results import in_words
+    from winchkit.robot.calibration.prediction import rms
+    from winchkit.robot.calibration.results import in_words
 
     pairs = {
         "fitted": (found.fit_before, found.fit_after),

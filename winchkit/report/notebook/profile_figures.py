@@ -8,8 +8,8 @@ import numpy as np
 
 from winchkit.effects.bind import line_of
 from winchkit.errors import UsageError
-from winchkit.model.robot import robot_of
 from winchkit.report.notebook.style import BLACK, BLUE, GREY, ORANGE, WIDTH, Size, new_figure
+from winchkit.robot.geometry.robot import robot_of
 from winchkit.schema.profiles.axis import AxisProfile
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from winchkit.calibration.robot.calibrate import Calibrated
 from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.diagnose import Answer
 from winchkit.diagnosis.plan import Plan
@@ -11,6 +10,7 @@ from winchkit.fit_statistics import FitStatistics
 from winchkit.rendering import Renderer, renderers
 from winchkit.report.notebook import figures, html, text
 from winchkit.report.notebook.profile_figures import robot_figure, winch_figure
+from winchkit.robot.calibration.calibrate import Calibrated
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile

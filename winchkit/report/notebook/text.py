@@ -17,9 +17,9 @@ from winchkit.report.words.sentence import changes_text, remaining_text
 from winchkit.runs.run import Run
 
 if TYPE_CHECKING:
-    from winchkit.calibration.robot.calibrate import Calibrated
     from winchkit.diagnosis.add import Addition, Removal
     from winchkit.diagnosis.plan import Plan
+    from winchkit.robot.calibration.calibrate import Calibrated
 
 _LINES = 24
 """Lines of a terminal window."""
@@ -124,7 +124,7 @@ def plan_screen(plan: Plan) -> str:
 
 def calibration_screen(found: Calibrated) -> str:
     """A robot's calibration: errors before and after, and the first parameters."""
-    from winchkit.calibration.robot.results import calibration_text
+    from winchkit.robot.calibration.results import calibration_text
 
     lines = paragraph(found.refusal) if found.refusal else []
     return screen("\n".join([*lines, calibration_text(found, ())]), "; fit_report() has all")

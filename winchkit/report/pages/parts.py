@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.results import Comparison, Diagnosis
-from winchkit.diagnosis.robot.dataset import RobotDataset
 from winchkit.quantity_text import unbroken
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.residuals import OutputFigures, run_names
@@ -15,6 +14,7 @@ from winchkit.report.html.page import figure_block
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed
+from winchkit.robot.diagnosis.data.dataset import RobotDataset
 
 _ICONS = {
     "adequate": '<circle cx="8" cy="8" r="6"/><path d="M5.2 8.2l2 2 3.6-4.2"/>',

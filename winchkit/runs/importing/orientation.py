@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.robot.rotation import rotation_by, rotation_of, rotation_vector
+from winchkit.model.rotation import rotation_by, rotation_of, rotation_vector
 from winchkit.runs.importing.assignment import Question
 from winchkit.runs.importing.chosen import ChosenColumn, Work
 from winchkit.runs.importing.names import words_of

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault
-from winchkit.model.robot.rotation import quaternion_of, rotation_by
+from winchkit.model.rotation import quaternion_of, rotation_by
 from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps

@@ -13,6 +13,7 @@ from time import monotonic
 from types import TracebackType
 
 from winchkit.errors import NotPermitted, UsageError, suggest
+from winchkit.robot.sim.live import LiveRobot
 from winchkit.schema.bench import BenchSpec, BusSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import ALL, Step
@@ -24,7 +25,6 @@ from winchkit.sim.live.bench_file import write_bench
 from winchkit.sim.live.buses import CanPort, Interface, Wire, wired
 from winchkit.sim.live.lines import Line, Placed, open_line
 from winchkit.sim.live.real_time import TICK, serve
-from winchkit.sim.live.robot import LiveRobot
 from winchkit.sim.live.winch import LiveWinch
 from winchkit.sim.plant.hanging_load import Load
 

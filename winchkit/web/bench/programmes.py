@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from winchkit.bench.programme_plan import plan_programme
-from winchkit.bench.robot.planner import Planner
-from winchkit.bench.robot.programme import planned_motions
 from winchkit.catalog import folder as shipped
 from winchkit.errors import UsageError
 from winchkit.plain_json import significant
+from winchkit.robot.bench.planner import Planner
+from winchkit.robot.bench.programme import planned_motions
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.programme import Programme
 from winchkit.schema.read import load

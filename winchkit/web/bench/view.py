@@ -30,6 +30,7 @@ from winchkit.bench.remote.session import attach
 from winchkit.catalog import find
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, UsageError, WinchkitError
+from winchkit.robot.web.live_robot import LiveRobot
 from winchkit.schema.read import read_bench
 from winchkit.web.bench import messages
 from winchkit.web.bench.browser import BEGINS_NOTHING, Browser, counting, received
@@ -41,7 +42,6 @@ from winchkit.web.bench.drive_objects import (
 )
 from winchkit.web.bench.frames import FrameWords
 from winchkit.web.bench.live_model import CHANNELS, LiveModel
-from winchkit.web.bench.live_robot import LiveRobot
 from winchkit.web.bench.messages import Message
 from winchkit.web.bench.programmes import Programmes
 from winchkit.web.bench.trip_file import trip_file

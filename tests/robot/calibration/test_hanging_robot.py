@@ -1,0 +1,291 @@
+"""A hanging robot of four cables: poses of lowest potential energy, from another program."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from math import pi
+
+import numpy as np
+import pytest
+from scipy.linalg import null_space
+from scipy.optimize import brentq, minimize
+
+from calibration_cases import robot
+from robot_poses.truth import GRAVITY, HOME, Truth, turn
+from winchkit.arrays import Array
+from winchkit.errors import UsageError
+from winchkit.robot import Pose, Robot, lengths, robot_of, rotation_of
+from winchkit.robot.calibration import pose_design as robot_next
+from winchkit.robot.calibration.calibrate import calibrate, split
+from winchkit.robot.calibration.options import Options
+from winchkit.robot.calibration.prediction import rms
+from winchkit.robot.files.poses import Measured
+from winchkit.robot.forces.balance import hanging_balance
+from winchkit.robot.geometry.pose_estimation import moved_pose
+from winchkit.schema.profiles.robot import PriorSpec
+from winchkit.schema.profiles.winch import WinchProfile
+
+CENTRE = np.array([0.0, 0.0, -0.05])
+ROPES, COUNT = 4, 60
+TRACKER, ENCODER, ANGLE = 2e-5, 1e-4, 1e-3
+
+
+def truth() -> Truth:
+    """The upper cables of the paper's robot, led to points above its platform."""
+    whole = Truth()
+    anchor = tuple((x, y, 0.0635 + 0.002 * i) for i, (x, y, _) in enumerate(whole.anchor[:ROPES]))
+    return replace(whole, exit=whole.exit[:ROPES], anchor=anchor)
+
+
+def ropes(pose: Array) -> Array:
+    x, y, z, *angles = pose.tolist()
+    return np.array([truth().length(i, (x, y, z), turn(*angles)) for i in range(ROPES)])
+
+
+def height(pose: Array) -> float:
+    """Of the centre of mass."""
+    return float(pose[2] + (np.array(turn(*pose[3:].tolist())) @ CENTRE)[2])
+
+
+def rest(given: Array, start: Array) -> Array:
+    """The pose of the lowest weight with cables of these lengths."""
+    found = minimize(
+        height,
+        start,
+        method="SLSQP",
+        constraints={"type": "eq", "fun": lambda pose: ropes(pose) - given},
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    assert np.max(np.abs(ropes(found.x) - given)) < 1e-9
+    return np.asarray(found.x)
+
+
+def wound_in(line: int, shorter: float) -> float:
+    """Drum angle since home at which the cable is that much shorter."""
+    begin = 2 * pi * truth().turns
+    at_home = truth().wound(line, begin)
+    return float(brentq(lambda a: truth().wound(line, begin + a) - at_home - shorter, -20, 20))
+
+
+@lru_cache(maxsize=1)
+def hanging() -> tuple[Robot, Measured]:
+    """The nominal robot, and measurements of the true one."""
+    rng = np.random.default_rng(3)
+    home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
+    poses = []
+    for _ in range(COUNT):
+        about = home + np.concatenate([rng.uniform(-0.1, 0.1, 3), np.zeros(3)])
+        poses.append(rest(ropes(about) + rng.uniform(-0.012, 0.012, ROPES), about))
+    shorter = ropes(home) - np.array([ropes(pose) for pose in poses])
+    motor = np.array([[wound_in(i, s) for i, s in enumerate(row)] for row in shorter.tolist()])
+    seen = np.array(poses)
+    nothing = np.full((COUNT, ROPES), np.nan)
+    measured = Measured(
+        motor_angle=motor + rng.normal(0, ENCODER, motor.shape),
+        position=seen[:, :3] + rng.normal(0, TRACKER, (COUNT, 3)),
+        angles=seen[:, 3:] + rng.normal(0, ANGLE, (COUNT, 3)),
+        swivel=nothing,
+        cable_length=nothing,
+        tension=nothing,
+        temperature=nothing,
+        run=np.zeros(COUNT, dtype=np.intp),
+        place=np.array([f"row {n + 1}" for n in range(COUNT)]),
+    )
+    return believed(home), measured
+
+
+def believed(home: Array) -> Robot:
+    """The profile's own points, the anchors a few millimetres off, and the pose measured first."""
+    profile = robot().profile
+    lines = tuple(
+        replace(line, anchor_point=(line.anchor_point[0], line.anchor_point[1], 0.066))
+        for line in profile.line[:ROPES]
+    )
+    place, angles = (tuple(part.tolist()) for part in (home[:3], home[3:]))
+    return robot_of(
+        replace(
+            profile,
+            line=lines,
+            home=replace(profile.home, position=place, rotation=angles),
+            platform=replace(profile.platform, center_of_mass=tuple(CENTRE.tolist())),
+        )
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rotations", [pytest.param(True, marks=pytest.mark.campaign), False])
+def test_a_robot_that_hangs_is_calibrated_and_predicted(rotations: bool) -> None:
+    believed, measured = hanging()
+    if not rotations:
+        measured = replace(measured, angles=np.full_like(measured.angles, np.nan))
+    fit, held = split(measured)
+    found = calibrate(believed, fit, held)
+    assert found.solution.converged
+    assert found.observed.free == 33
+    assert found.validation_after.unfound == 0
+    before, after = rms(found.validation_before.distance), rms(found.validation_after.distance)
+    assert before > 2e-3
+    assert after < before / (10 if rotations else 3)
+
+
+def test_proposed_poses_are_such_that_it_rests_there() -> None:
+    """No motion that keeps the cables' lengths moves the centre of mass up or down."""
+    believed, measured = hanging()
+    fit, held = split(measured)
+    found = calibrate(believed, fit, held)
+    geometry = found.equations.geometry(found.values)
+    proposed = robot_next.next_poses(found, 3)
+    assert len(proposed) == 3
+    for pose in proposed:
+        at = np.array([*pose.position, *pose.angles])
+
+        def given(x: Array) -> Array:
+            return lengths(geometry, x[None, :3], rotation_of(*x[3:, None]))[0]
+
+        steps = np.eye(6) * 1e-6
+        slope = np.array([(given(at + d) - given(at - d)) / 2e-6 for d in steps])
+        rise = np.array([(height(at + d) - height(at - d)) / 2e-6 for d in steps])
+        free = null_space(slope.T)
+        assert free.shape == (6, 2)
+        np.testing.assert_allclose(free.T @ rise, 0.0, atol=1e-6)
+
+
+MASS = 3.0
+
+
+def forces(pose: Array) -> Array:
+    """Cable forces at rest by virtual work: a cable that gets longer pulls back with its force."""
+    ends = [(pose + step, pose - step) for step in np.eye(6) * 1e-6]
+    slope = np.array([(ropes(a) - ropes(b)) / 2e-6 for a, b in ends])
+    rise = np.array([(height(a) - height(b)) / 2e-6 for a, b in ends])
+    found, _, _, _ = np.linalg.lstsq(slope, -MASS * GRAVITY * rise, rcond=None)
+    assert np.max(np.abs(slope @ found + MASS * GRAVITY * rise)) < 1e-4
+    return np.asarray(found)
+
+
+def without_tracker(count: int, seed: int, ratio: tuple[float, ...]) -> tuple[Robot, Measured]:
+    """The true robot, and swivels, cells and roll and pitch of an IMU at poses at rest."""
+    rng = np.random.default_rng(seed)
+    home = rest(ropes(np.array([*HOME, 0, 0, 0])), np.array([*HOME, 0, 0, 0]))
+    poses = []
+    for _ in range(count):
+        about = home + np.concatenate([rng.uniform(-0.12, 0.12, 3), np.zeros(3)])
+        poses.append(rest(ropes(about) + rng.uniform(-0.012, 0.012, ROPES), about))
+    shorter = (ropes(home) - np.array([ropes(pose) for pose in poses])).tolist()
+    motor = np.array([[wound_in(i, s) * ratio[i] for i, s in enumerate(row)] for row in shorter])
+    swivel = np.array([[swivel_of(pose, i) + 0.3 * i - 1 for i in range(ROPES)] for pose in poses])
+    pull = np.array([forces(pose) for pose in poses])
+    angles = np.array(poses)[:, 3:] + rng.normal(0, 5e-4, (count, 3))
+    angles[:, 2] = np.nan
+    nothing = np.full((count, ROPES), np.nan)
+    measured = Measured(
+        motor_angle=motor + rng.normal(0, ENCODER, motor.shape),
+        position=np.full((count, 3), np.nan),
+        angles=angles,
+        swivel=swivel + rng.normal(0, ANGLE, swivel.shape),
+        cable_length=nothing,
+        tension=pull + rng.normal(0, 0.05, pull.shape),
+        temperature=nothing,
+        run=np.zeros(count, dtype=np.intp),
+        place=np.array([f"row {n + 1}" for n in range(count)]),
+    )
+    profile, own = believed(home).profile, truth()
+    lines = tuple(
+        replace(line, exit_point=own.exit[i], anchor_point=own.anchor[i])
+        for i, line in enumerate(profile.line)
+    )
+    drums = []
+    for i, line in enumerate(lines):
+        assert isinstance(line.winch, WinchProfile)
+        drum = replace(line.winch.drum, winding_radius=own.winding[i], layer_growth=own.growth)
+        drums.append(
+            replace(line, swivel_radius=own.swivel[i], winch=replace(line.winch, drum=drum))
+        )
+    platform = replace(profile.platform, mass=MASS)
+    return robot_of(replace(profile, line=tuple(drums), platform=platform, prior={})), measured
+
+
+def swivel_of(pose: Array, line: int) -> float:
+    x, y, z, *angles = pose.tolist()
+    arm = np.array(turn(*angles)) @ np.array(truth().anchor[line])
+    seen = np.array([x, y, z]) + arm - np.array(truth().exit[line])
+    return float(np.arctan2(seen[1], seen[0]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("wrong", [2, pytest.param(0, marks=pytest.mark.campaign)])
+def test_a_ratio_is_named_on_its_winch_without_a_tracker(wrong: int) -> None:
+    """Statics of the hanging platform take part: without tensions the ratio is not determined."""
+    ratio = tuple(1.01 if i == wrong else 1.0 for i in range(ROPES))
+    nominal, measured = without_tracker(50, 5, ratio)
+    found = calibrate(nominal, *split(measured))
+    assert found.solution.converged
+    assert "balance" in found.weights.sigma
+    (told,) = (text for text in found.warnings if "the cable per motor turn differs" in text)
+    assert told.startswith(f"line {wrong + 1}: the cable per motor turn differs by -")
+    share = float(told.split("differs by ")[1].split()[0])
+    assert share == pytest.approx(-100 * 0.01 / 1.01, abs=0.25)
+
+
+@pytest.mark.slow
+def test_no_ratio_is_named_where_all_are_right() -> None:
+    nominal, measured = without_tracker(50, 6, (1.0,) * ROPES)
+    found = calibrate(nominal, *split(measured))
+    assert not any("the cable per motor turn differs" in text for text in found.warnings)
+    assert not found.unexplained
+
+
+def test_the_equilibrium_has_the_derivatives_of_its_residual() -> None:
+    nominal, measured = without_tracker(3, 7, (1.0,) * ROPES)
+    rng = np.random.default_rng(1)
+    pose = Pose(HOME + rng.normal(0, 0.05, (3, 3)), rotation_of(*rng.normal(0, 0.05, (3, 3))))
+    platform = nominal.platform
+    found = hanging_balance(nominal.geometry, pose, measured.tension, platform)
+    step = 1e-4 * rng.normal(size=(3, 6))
+    there = hanging_balance(nominal.geometry, moved_pose(pose, step), measured.tension, platform)
+    back = hanging_balance(nominal.geometry, moved_pose(pose, -step), measured.tension, platform)
+    change = (there.residual - back.residual) / 2
+    np.testing.assert_allclose((found.by_pose @ step[..., None])[..., 0], change, atol=1e-6)
+
+
+def test_motor_angles_alone_are_not_enough_for_four_cables() -> None:
+    believed, measured = hanging()
+    blind = replace(
+        measured,
+        position=np.full_like(measured.position, np.nan),
+        angles=np.full_like(measured.angles, np.nan),
+    )
+    with pytest.raises(UsageError, match="measure more at each"):
+        calibrate(believed, blind, blind)
+
+
+@pytest.mark.slow
+def test_inverted_swivel_encoders_are_refused() -> None:
+    """As the directions of the pulleys of a real robot were: a noise of 20 degrees was fitted."""
+    nominal, measured = without_tracker(14, 7, (1.0,) * ROPES)
+    found = calibrate(nominal, *split(replace(measured, swivel=-measured.swivel)))
+    assert "not calibrated: the swivel angles do not follow the geometry" in found.refusal
+    assert "swivel_axis" in found.refusal
+
+
+@pytest.mark.slow
+def test_an_unknown_home_pose_is_estimated_by_the_lengths_there() -> None:
+    """A robot that is switched on anywhere: its home is declared 50 mm beside the true one."""
+    nominal, measured = without_tracker(30, 8, (1.0,) * ROPES)
+    profile, away = nominal.profile, np.array([0.03, -0.03, 0.03])
+    declared = np.array(profile.home.position) + away
+    x, y, z = declared.tolist()
+    unknown = replace(
+        profile,
+        home=replace(profile.home, position=(x, y, z)),
+        prior={"home_length": PriorSpec(0.1), "exit_point": PriorSpec(1e-3)},
+    )
+    found = calibrate(robot_of(unknown), *split(measured), Options(effects=("home-length",)))
+    home = np.array([*profile.home.position, *profile.home.rotation])
+    moved = ropes(home) - ropes(np.array([x, y, z, *profile.home.rotation]))
+    lengths_there = [found.estimates[f"{line}.home_length"] for line in nominal.names]
+    assert np.max(np.abs(moved)) > 0.02
+    assert [item.value for item in lengths_there] == pytest.approx(moved.tolist(), abs=3e-3)
+    before, after = found.validation_lengths
+    assert after < 0.2 * before

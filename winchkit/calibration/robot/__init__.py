@@ -1,8 +1,0 @@
-"""Calibration of cable robots: geometry and winches from poses of which anything was measured.
-
-``calibrate`` fits ``parameters`` in ``equations`` (the constraints of
-:mod:`winchkit.model.robot.constraints`) by
-:mod:`winchkit.model.robot.identification.bundle_adjustment`, alternating with
-``variance_components``. ``identifiability``, ``outliers``, ``candidate_effects`` and ``prediction``
-judge the fit; ``pose_design`` proposes poses; ``results`` and ``profile`` write it.
-"""

@@ -1,0 +1,1 @@
+"""Many winches at many dates."""

@@ -1,0 +1,85 @@
+"""``winchkit fleet diagnose``: every winch and session of a library."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+
+from winchkit.cli.core.command import Command, Example
+from winchkit.cli.core.completion import complete_file
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import json_option
+
+
+@click.command(
+    "diagnose",
+    cls=Command,
+    examples=(
+        Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
+        Example(
+            "winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786",
+            "needs a Dask scheduler",
+        ),
+    ),
+)
+@click.argument("folder", metavar="DIR")
+@click.option(
+    "-p", "--profile", required=True, metavar="P", help="Profile, or folder of WINCH.toml."
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    multiple=True,
+    metavar="FILE",
+    shell_complete=complete_file,
+    help="Your own effects.",
+)
+@click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Processes; 1 needs no Dask.  [default: by cores and memory]",
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Workers of this Dask scheduler instead.")
+@json_option
+def command(
+    *,
+    folder: str,
+    profile: str,
+    effect_files: Sequence[str],
+    band: float | None,
+    jobs: int | None,
+    scheduler: str | None,
+    as_json: bool,
+) -> int:
+    """Diagnose the runs of every winch and session below DIR that have no diagnosis yet.
+
+    Runs of one winch that started on one UTC day, or have the same metadata session, belong
+    together. Results are the tables diagnoses and estimates of the library. Ctrl-C keeps what is
+    done, and the next call goes on. Exit code 1: a session has no diagnosis.
+    """
+    from winchkit.fleet.library.diagnose import diagnose_library
+
+    with progress_bar() as progress:
+        report = diagnose_library(
+            folder,
+            profile,
+            effects=effect_files,
+            band=band,
+            jobs=jobs,
+            scheduler=scheduler,
+            progress=progress,
+        )
+    for session, reason in report.failures.items():
+        note(f"{session}: {reason}")
+    if as_json:
+        echo_json(report.to_json())
+    else:
+        counts = f"{report.diagnosed} diagnosed, {report.unchanged} unchanged"
+        click.echo(f"{counts}, {len(report.failures)} failed")
+        suggest_next("library", "list", folder)
+    return 1 if report.failures else 0

@@ -1,0 +1,28 @@
+"""``winchkit fleet``: many winches and sessions."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.core.command import Example
+from winchkit.cli.core.lazy import At, LazyGroup
+
+COMMANDS = {
+    "diagnose": At("winchkit.fleet.cli.diagnose", "Diagnose every winch and session."),
+    "trend": At("winchkit.fleet.cli.trend", "What changed, since when, at what cost."),
+}
+
+
+@click.group(
+    cls=LazyGroup,
+    table=COMMANDS,
+    examples=(
+        Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
+        Example(
+            "winchkit fleet diagnose . -p bench-spiral --scheduler tcp://host:8786",
+            "needs a Dask scheduler",
+        ),
+    ),
+)
+def command() -> None:
+    """Many winches and sessions: the runs of an indexed folder."""

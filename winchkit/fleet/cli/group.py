@@ -1,0 +1,25 @@
+"""``winchkit library``: tables of the runs of a folder."""
+
+from __future__ import annotations
+
+import click
+
+from winchkit.cli.core.lazy import At, LazyGroup
+
+COMMANDS = {
+    "index": At("winchkit.fleet.cli.index", "Bring the tables to the state of the files."),
+    "list": At("winchkit.fleet.cli.list", "List runs by winch, programme, load, date, verdict."),
+    "query": At("winchkit.fleet.cli.query", "Answer a SELECT over the tables (DuckDB)."),
+}
+
+
+@click.group(
+    cls=LazyGroup,
+    table=COMMANDS,
+    examples=(
+        "winchkit library index .",
+        "winchkit library list . --winch A",
+    ),
+)
+def command() -> None:
+    """Tables of the runs of a folder, kept beside them; the files stay the truth."""

@@ -1,0 +1,82 @@
+"""``winchkit library list``: runs of a library by filters."""
+
+from __future__ import annotations
+
+from datetime import date, datetime
+
+import click
+
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.model.options import json_option
+
+
+@click.command(
+    "list",
+    cls=Command,
+    examples=(
+        "winchkit library list . --winch A --since 2026-03-01",
+        "winchkit library list . --load '10 kg' --json",
+    ),
+)
+@click.argument("folder", metavar="DIR")
+@click.option("--winch", metavar="NAME", help="Winch, as the list names it.")
+@click.option("--programme", metavar="NAME", help="Motion programme.")
+@click.option(
+    "--load",
+    metavar="MASS",
+    type=Quantity("mass", example="10 kg"),
+    help="Known mass on the cable, such as '10 kg'.",
+)
+@click.option("--since", metavar="DATE", help="First UTC day, YYYY-MM-DD.")
+@click.option("--until", metavar="DATE", help="Last UTC day, YYYY-MM-DD.")
+@click.option(
+    "--verdict",
+    type=click.Choice(["adequate", "explained", "partly", "unknown"]),
+    help="Verdict of the session's diagnosis.",
+)
+@json_option
+def command(
+    *,
+    folder: str,
+    winch: str | None,
+    programme: str | None,
+    load: str | None,
+    since: str | None,
+    until: str | None,
+    verdict: str | None,
+    as_json: bool,
+) -> None:
+    """List the runs of an indexed folder, in the order of winch and time."""
+    from winchkit.cli.core.quantities import quantity
+    from winchkit.fleet.library.query import library_runs
+
+    rows = library_runs(
+        folder,
+        winch=winch,
+        programme=programme,
+        load=None if load is None else quantity(load, "mass"),
+        since=_day("--since", since),
+        until=_day("--until", until),
+        verdict=verdict,
+    ).to_pylist()
+    if as_json:
+        echo_json({"schema": 1, "runs": rows})
+        return
+    width = max((len(row["winch"]) for row in rows), default=0)
+    for row in rows:
+        mass = "" if row["load_mass"] is None else f"{row['load_mass']:g} kg"
+        facts = (row["programme"], mass, row["fault"], "" if row["complete"] else "no end")
+        known = "  ".join(fact for fact in facts if fact)
+        moment: datetime = row["time"]
+        click.echo(f"{row['winch']:<{width}}  {moment:%Y-%m-%d %H:%M}  {row['path']}  {known}")
+
+
+def _day(option: str, text: str | None) -> date | None:
+    if text is None:
+        return None
+    try:
+        return date.fromisoformat(text)
+    except ValueError:
+        raise click.UsageError(f"{option} {text}: no date; write YYYY-MM-DD") from None

@@ -1,0 +1,138 @@
+"""``winchkit fleet trend``: changes in the runs of a library, with their dates and costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import click
+
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.completion import complete_effect, complete_file
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import html_option, json_option, write_page
+from winchkit.errors import UsageError, suggest
+
+
+@click.command(
+    "trend",
+    cls=Command,
+    examples=(
+        "winchkit fleet trend . -p bench-spiral --effect cell-gain",
+        "winchkit fleet trend . -p bench-spiral --effect cell-gain --limit cell-gain.gain_error=2%",
+    ),
+)
+@click.argument("folder", metavar="DIR")
+@click.option(
+    "-p", "--profile", required=True, metavar="P", help="Profile, or folder of WINCH.toml."
+)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME",
+    shell_complete=complete_effect,
+    help="Follow this effect.  [default: named by 'fleet diagnose', and of the profiles]",
+)
+@click.option(
+    "--limit",
+    "limits",
+    multiple=True,
+    metavar="EFFECT.PARAMETER=VALUE",
+    help="Value that must not be reached; a trend towards it has a date.",
+)
+@click.option(
+    "--effects",
+    "effect_files",
+    multiple=True,
+    metavar="FILE",
+    shell_complete=complete_file,
+    help="Your own effects.",
+)
+@html_option
+@json_option
+def command(
+    *,
+    folder: str,
+    profile: str,
+    effects: Sequence[str],
+    limits: Sequence[str],
+    effect_files: Sequence[str],
+    html: str | None,
+    as_json: bool,
+) -> int:
+    """Fit one set of effects to every session below DIR, and report what changed and since when.
+
+    The same effects are fitted to all winches and dates, so that names do not change from session
+    to session. Every series is tested for a step or a trend, and every winch against the others,
+    at a false discovery rate of 1 % over all of them. The report says date, size, cost and what to
+    do. Exit code 1: something changed, a winch differs from the others or is beyond a limit, or
+    profiles were exchanged.
+    """
+    from winchkit.fleet.library.history import library_history
+    from winchkit.fleet.report.text import history_text
+
+    known = dict(_limit(text, effect_files) for text in limits)
+    with progress_bar() as progress:
+        found = library_history(
+            folder,
+            profile,
+            effects=effects,
+            effect_files=effect_files,
+            limits=known,
+            progress=progress,
+        )
+    for session, reason in found.failures.items():
+        note(f"{session}: {reason}")
+    history = found.history
+    if as_json:
+        told: dict[str, Any] = history.to_json()
+        told |= {
+            "effects": list(found.effects),
+            "sessions": found.sessions,
+            "failures": dict(found.failures),
+            "swapped": [vars(swap) for swap in found.swapped],
+        }
+        echo_json(told)
+    else:
+        sessions = f"{found.sessions} session{'' if found.sessions == 1 else 's'}"
+        click.echo(f"{sessions}, effects {', '.join(found.effects)}\n")
+        click.echo(history_text(history, found.swapped))
+    if html:
+        from winchkit.fleet.report.history import fleet_history_html
+
+        title = "Maintenance report of a fleet"
+        write_page(html, fleet_history_html(found.history, title, found.swapped))
+    is_clear = not (history.changed or history.odd or history.beyond_limit or found.swapped)
+    return 0 if is_clear else 1
+
+
+def _limit(text: str, effect_files: Sequence[str]) -> tuple[tuple[str, str], float]:
+    """``cell-gain.gain_error=2 %`` as effect, parameter and SI value; raises UsageError."""
+    from winchkit.cli.core.quantities import check_typed, quantity
+    from winchkit.effects.catalogue import load_catalogue
+    from winchkit.units import dimension_of
+
+    left, equals, value = text.partition("=")
+    name, dot, parameter = left.strip().partition(".")
+    if not (equals and dot):
+        raise UsageError(f"--limit '{text}': write EFFECT.PARAMETER=VALUE")
+    catalogue = load_catalogue(effect_files)
+    if name not in catalogue:
+        known = [effect.id for effect in catalogue]
+        raise UsageError(f"--limit '{text}': there is no effect '{name}'{suggest(name, known)}")
+    names = [p.name for p in catalogue[name].parameters]
+    if parameter not in names:
+        raise UsageError(f"--limit '{text}': {name} has {', '.join(names)}")
+    declared = catalogue[name].parameter(parameter)
+    dimension = dimension_of(declared.unit) or "ratio"
+    check_typed(f"--limit {name}.{parameter}", value, dimension)
+    limit = quantity(value, dimension)
+    if limit == 0 or (declared.reciprocal and limit < 0):
+        where = "above 0" if declared.reciprocal else "above or below 0, which is no effect"
+        raise UsageError(f"--limit '{text}': it is {where}")
+    if declared.reciprocal:
+        return (name, f"1/{parameter}"), 1 / limit
+    return (name, parameter), limit

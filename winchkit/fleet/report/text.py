@@ -1,0 +1,172 @@
+"""Maintenance report of a fleet: changes, their dates, their costs, and the actions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from math import isfinite
+
+from winchkit.fleet.diagnosis.history import FleetHistory, FleetParameter, WinchHistory
+from winchkit.fleet.diagnosis.swapped_profiles import Swap
+from winchkit.quantity_text import quantity
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
+
+_DO = {
+    "cell": "calibrate the load cell with known weights, look for damage and moisture of its cable",
+    "cable": "measure the cable with a known length and load, look for broken wires; shorten or "
+    "replace it",
+    "drum": "measure the drum, and look how the cable lies on it",
+    "layer": "measure the drum, and look how the cable lies on it",
+    "pulley": "turn the pulleys by hand, clean and lubricate or replace their bearings",
+    "motor": "look at lubricant, temperature and brake of motor and gearbox",
+    "gear": "measure the backlash at the drum, look at oil and teeth",
+    "torque": "compare the drive's torque with a known load; check its settings",
+    "length": "compare the length instrument with a known length",
+    "payload": "weigh the load",
+}
+"""What to do, by the first word of an effect."""
+_US = "%Y-%m-%d"
+_UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
+
+
+@dataclass(frozen=True)
+class ChangeText:
+    """Words of one change."""
+
+    cause: str
+    size: str
+    since: str
+    now: str
+    cost: str
+    """Empty where the change causes no error in the runs."""
+    limit: str
+    """Empty without a limit."""
+    advice: str
+
+
+def history_text(history: FleetHistory, swapped: Sequence[Swap] = ()) -> str:
+    """Report of a fleet's history for a terminal."""
+    lines = [line for pair in history.changed for line in _changed(*pair)]
+    lines += [beyond_text(*pair) for pair in history.beyond_limit if not pair[1].changed]
+    lines += [line for pair in history.odd for line in odd_texts(*pair)]
+    lines += [swap_text(swap) for swap in swapped]
+    if not lines:
+        lines = ["No change over time, and no winch that differs from the others."]
+    tested = sum(len(parameter.winches) for parameter in history.parameters)
+    lines += ["", f"{tested} series of estimates; false discovery rate 1 % ({history.procedure})."]
+    if history.undetermined:
+        lines.append(f"{history.undetermined} estimates left out: their runs leave the value open.")
+    return "\n".join(lines)
+
+
+def change_text(parameter: FleetParameter, winch: WinchHistory) -> ChangeText:
+    """Words of a change that was tested."""
+    change = winch.change
+    assert change is not None, "a change that was tested is there"
+    since = "over the sessions"
+    if change.date is not None and winch.kind != "trend":
+        date = change.date
+        ends = f"95 %: {day_text(date.earliest)} to {day_text(date.latest)}"
+        since = f"since {day_text(date.date)} ({ends})"
+    costs = [
+        f"{quantity(size, _UNITS.get(output, ''))} in the {OUTPUT_NAMES.get(output, output)}"
+        for output, size in winch.cost.items()
+        if size > 0
+    ]
+    return ChangeText(
+        clause(parameter.effect),
+        _value(change.size, change.size_std, parameter.unit),
+        since,
+        _value(winch.value, winch.std, parameter.unit),
+        ", ".join(costs),
+        _limit(winch, parameter.unit),
+        _do(parameter.effect),
+    )
+
+
+def _changed(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
+    text = change_text(parameter, winch)
+    name = f"{parameter.effect} {parameter.parameter}"
+    yield f"winch {winch.winch}: {text.cause}: {name} changed by {text.size} {text.since}"
+    yield (
+        f"  {winch.kind}; q = {winch.change_q_value:.1g}; now {text.now}, all winches "
+        f"{_value(parameter.common, parameter.common_std, parameter.unit)}"
+    )
+    if text.cost:
+        yield f"  costs {text.cost} (rms over the runs)"
+    if text.limit:
+        yield f"  {text.limit}"
+    yield f"  do: {text.advice}"
+
+
+def odd_texts(parameter: FleetParameter, winch: WinchHistory) -> Iterator[str]:
+    """Two lines of a winch that differs from the others."""
+    own = _value(winch.value, winch.std, parameter.unit)
+    others = _value(parameter.common, parameter.common_std, parameter.unit)
+    name = f"{parameter.effect} {parameter.parameter}"
+    yield f"winch {winch.winch} differs from the others: {name} {own}, the others {others}"
+    yield (
+        f"  q = {winch.odd_q_value:.1g}; pooled "
+        f"{_value(winch.pooled, winch.pooled_std, parameter.unit)}; do: "
+        f"{_do(parameter.effect)}; or is it another winch's profile?"
+    )
+
+
+def beyond_text(parameter: FleetParameter, winch: WinchHistory) -> str:
+    """Sentence on a winch beyond a limit."""
+    own = _value(winch.value, winch.std, parameter.unit)
+    name = f"{parameter.effect} {parameter.parameter}"
+    return f"winch {winch.winch}: {name} {own}, {_limit(winch, parameter.unit)}"
+
+
+def swap_text(swap: Swap) -> str:
+    """Sentence on exchanged profiles."""
+    names, p_value = swap.winches, f"p = {swap.p_value:.1g}"
+    following = (*names[1:], names[0])
+    pairs = [f"{own} fits that of {other}" for own, other in zip(names, following, strict=True)]
+    return (
+        f"winches {', '.join(names[:-1])} and {names[-1]} have exchanged profiles: "
+        f"{', '.join(pairs)} ({p_value}); do: compare drums and files, and exchange the profiles"
+    )
+
+
+def _limit(winch: WinchHistory, unit: str) -> str:
+    """Sentence on the limit of a winch; empty where there is nothing to say."""
+    value, limit = winch.limit_value, winch.limit
+    if value is None or (limit is None and not winch.is_beyond_limit):
+        return ""
+    known = f"limit of {_plain(value, unit)}"
+    if limit is None:
+        return f"beyond the {known}"
+    verb = "passed" if limit.date <= winch.series.times[-1] else "reaches"
+    ends = f"95 %: {day_text(limit.earliest)} to {day_text(limit.latest)}"
+    return f"{verb} the {known} on {day_text(limit.date)} ({ends})"
+
+
+def _plain(value: float, unit: str) -> str:
+    return f"{100 * value:.4g} %" if unit == "1" else quantity(value, unit)
+
+
+def _value(value: float, std: float, unit: str) -> str:
+    if unit == "1":
+        return f"{100 * value:.4g} ± {100 * std:.2g} %"
+    return f"{value:.4g} ± {std:.2g} {unit}"
+
+
+def day_text(time: float) -> str:
+    """Date of a time in s since 1970; in words where there is none.
+
+    ``time``: UTC, s. Returns: ``2026-03-01``.
+    """
+    if not isfinite(time):
+        return "no earlier bound" if time < 0 else "no later bound"
+    try:
+        return datetime.fromtimestamp(time, UTC).strftime(_US)
+    except (OverflowError, ValueError, OSError):
+        return "beyond the calendar"
+
+
+def _do(effect: str) -> str:
+    first = effect.partition("-")[0]
+    return _DO.get(first, "measure it again on the winch")

@@ -1,0 +1,190 @@
+"""Cable robots: many winches that move one platform.
+
+``geometry``, ``forces`` and ``dynamics`` have the model, ``identification`` what ``calibration``
+and ``diagnosis`` share; ``bench`` moves the platform, ``sim`` simulates it; ``effects``, ``files``,
+``report``, ``web`` and ``cli`` are the robot's parts of the packages of these names.
+
+    robot = robot_of(read_robot("cabtive"))
+    angles = robot.motor_angles(Pose(position, rotation))
+    found = robot.poses_at(angles)
+
+Each name is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from winchkit.model.elastic import ElongationLaw, Exponential, Linear, Quartic
+    from winchkit.model.rotation import angles_of, rotation_of
+    from winchkit.robot.dynamics.cycle import RobotCycle, flat_pose
+    from winchkit.robot.dynamics.dynamics import (
+        InverseDynamics,
+        PlatformMotion,
+        dynamic_wrench,
+        inverse_dynamics,
+        motion_of,
+    )
+    from winchkit.robot.dynamics.dynamics_cycle import DynamicsCycle, DynamicTarget
+    from winchkit.robot.dynamics.kernels import PLAIN, RobotKernels, compiled, fastest
+    from winchkit.robot.forces.force_distribution import (
+        Feasibility,
+        ForceLimits,
+        Forces,
+        approximate_forces,
+        closed_form,
+        distributed_forces,
+        improved_closed_form,
+        quadratic,
+        steepest_force,
+        wrench_feasibility,
+    )
+    from winchkit.robot.geometry.forward import Found, forward
+    from winchkit.robot.geometry.kinematics import (
+        Geometry,
+        Pose,
+        Sensitivities,
+        geometry_of,
+        home_of,
+        lengths,
+        sensitivities,
+        structure_matrix,
+        swivel_angle,
+        swivel_sensitivities,
+        wrap_angle,
+    )
+    from winchkit.robot.geometry.robot import Robot, cables_of, robot_of
+    from winchkit.robot.geometry.wrench import gravity_wrench
+
+__all__ = [
+    "PLAIN",
+    "DynamicTarget",
+    "DynamicsCycle",
+    "ElongationLaw",
+    "Exponential",
+    "Feasibility",
+    "ForceLimits",
+    "Forces",
+    "Found",
+    "Geometry",
+    "InverseDynamics",
+    "Linear",
+    "PlatformMotion",
+    "Pose",
+    "Quartic",
+    "Robot",
+    "RobotCycle",
+    "RobotKernels",
+    "Sensitivities",
+    "angles_of",
+    "approximate_forces",
+    "cables_of",
+    "closed_form",
+    "compiled",
+    "distributed_forces",
+    "dynamic_wrench",
+    "fastest",
+    "flat_pose",
+    "forward",
+    "geometry_of",
+    "gravity_wrench",
+    "home_of",
+    "improved_closed_form",
+    "inverse_dynamics",
+    "lengths",
+    "motion_of",
+    "quadratic",
+    "robot_of",
+    "rotation_of",
+    "sensitivities",
+    "steepest_force",
+    "structure_matrix",
+    "swivel_angle",
+    "swivel_sensitivities",
+    "wrap_angle",
+    "wrench_feasibility",
+]
+
+_NAMES = {
+    "winchkit.model.elastic": (
+        "ElongationLaw",
+        "Exponential",
+        "Linear",
+        "Quartic",
+    ),
+    "winchkit.model.rotation": (
+        "angles_of",
+        "rotation_of",
+    ),
+    "winchkit.robot.dynamics.cycle": (
+        "RobotCycle",
+        "flat_pose",
+    ),
+    "winchkit.robot.dynamics.dynamics": (
+        "InverseDynamics",
+        "PlatformMotion",
+        "dynamic_wrench",
+        "inverse_dynamics",
+        "motion_of",
+    ),
+    "winchkit.robot.dynamics.dynamics_cycle": (
+        "DynamicTarget",
+        "DynamicsCycle",
+    ),
+    "winchkit.robot.dynamics.kernels": (
+        "PLAIN",
+        "RobotKernels",
+        "compiled",
+        "fastest",
+    ),
+    "winchkit.robot.forces.force_distribution": (
+        "Feasibility",
+        "ForceLimits",
+        "Forces",
+        "approximate_forces",
+        "closed_form",
+        "distributed_forces",
+        "improved_closed_form",
+        "quadratic",
+        "steepest_force",
+        "wrench_feasibility",
+    ),
+    "winchkit.robot.geometry.forward": (
+        "Found",
+        "forward",
+    ),
+    "winchkit.robot.geometry.kinematics": (
+        "Geometry",
+        "Pose",
+        "Sensitivities",
+        "geometry_of",
+        "home_of",
+        "lengths",
+        "sensitivities",
+        "structure_matrix",
+        "swivel_angle",
+        "swivel_sensitivities",
+        "wrap_angle",
+    ),
+    "winchkit.robot.geometry.robot": (
+        "Robot",
+        "cables_of",
+        "robot_of",
+    ),
+    "winchkit.robot.geometry.wrench": ("gravity_wrench",),
+}
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'winchkit.robot' has no attribute '{name}'")
+    value = globals()[name] = getattr(import_module(_HOME[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,117 @@
+"""Plans motions of a platform within the limits of a bench file; needs no open bench."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from winchkit.arguments import number, positive
+from winchkit.arrays import Array
+from winchkit.errors import NotPermitted, UsageError
+from winchkit.model.rotation import angles_of, rotation_of
+from winchkit.robot.bench.checks import require_within_limits
+from winchkit.robot.bench.path import Waypoint, paths_through
+from winchkit.robot.bench.trajectory import PlatformTrajectory, plan_along
+from winchkit.robot.bench.wiring import no_robot, robot_of_bench
+from winchkit.robot.forces.force_distribution import ForceLimits
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.robot import Robot
+from winchkit.schema.bench import BenchSpec, LimitSpec
+from winchkit.schema.robot_bench import RobotWiring
+
+_COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True)
+class Planner:
+    """A robot with the limits of its platform and of its winches."""
+
+    robot: Robot
+    wiring: RobotWiring
+    limits: Mapping[str, LimitSpec]
+    """By line."""
+
+    @classmethod
+    def of(cls, spec: BenchSpec) -> Planner:
+        """The robot of a bench file; raises UsageError where it declares none."""
+        robot = robot_of_bench(spec)
+        if robot is None or spec.robot is None:
+            raise no_robot(spec)
+        return cls(robot, spec.robot, {name: spec.winch[name].limits for name in robot.names})
+
+    @property
+    def tension(self) -> ForceLimits:
+        """Limits of the force distribution, N."""
+        return ForceLimits(*self.wiring.tension)
+
+    def plan(
+        self,
+        waypoints: Sequence[Waypoint],
+        start: Pose,
+        speed: float | None = None,
+        acceleration: float | None = None,
+    ) -> list[PlatformTrajectory]:
+        """Plan motions through waypoints and compare them with all limits.
+
+        ``waypoints``: poses to go to; the platform stops at each that is not blended. ``speed``,
+        ``acceleration``: of the platform, m/s and m/s²; by default the limits of ``[robot]``.
+        Raises UsageError for what is no pose, or no number; NotPermitted for a limit that would be
+        exceeded on the way, or by a stop.
+        """
+        for waypoint in waypoints:
+            if not all(np.isfinite(part).all() for part in (waypoint.position, waypoint.rotation)):
+                raise UsageError("move: a pose with numbers that are not finite is no goal")
+        if len(self.robot.names) < 6:
+            raise NotPermitted(
+                f"robot '{self.robot.profile.name}' has {len(self.robot.names)} cables, which do "
+                "not determine the rotation of its platform; moves along a path need at least 6"
+            )
+        wiring = self.wiring
+        fast = _within("speed", speed, wiring.speed, "m/s")
+        ramp = _within("acceleration", acceleration, wiring.acceleration, "m/s^2")
+        scale = wiring.speed / wiring.rotation_speed
+        # Rotation counts as ρ times its angle: its acceleration is limited with that of the path.
+        turning = wiring.rotation_acceleration * scale
+        out = []
+        for path in paths_through(start, waypoints, scale):
+            one = plan_along(self.robot, path, self.tension, fast, min(ramp, turning))
+            require_within_limits(self.robot, one, self.limits, self.tension, wiring.acceleration)
+            out.append(one)
+        return out
+
+
+def moved(pose: Pose, change: Mapping[str, float], *, relative: bool) -> Pose:
+    """A pose with some of its coordinates replaced or changed.
+
+    ``change``: ``x``, ``y``, ``z`` in m, ``roll``, ``pitch``, ``yaw`` in rad.
+    """
+    new = _six(pose)
+    for name, value in change.items():
+        if name not in _COORDINATES:
+            raise UsageError(f"'{name}' is no coordinate of a pose: {', '.join(_COORDINATES)}")
+        index = _COORDINATES.index(name)
+        new[index] = number("move", name, value) + (new[index] if relative else 0.0)
+    return Pose(new[None, :3], rotation_of(*new[3:])[None])
+
+
+def coordinates_of(pose: Pose) -> dict[str, float]:
+    """One pose as x, y, z (m), roll, pitch and yaw (rad)."""
+    return {name: float(value) for name, value in zip(_COORDINATES, _six(pose), strict=True)}
+
+
+def _six(pose: Pose) -> Array:
+    return np.concatenate([pose.position[0], angles_of(pose.rotation)[0]])
+
+
+def _within(name: str, asked: float | None, limit: float, unit: str) -> float:
+    """The asked value, or the limit; raises NotPermitted beyond it."""
+    if asked is None:
+        return limit
+    if positive("move", name, asked) > limit:
+        raise NotPermitted(
+            f"{name} {asked:g} {unit} of the platform is not within the limit {limit:g} {unit} of "
+            "[robot]"
+        )
+    return asked

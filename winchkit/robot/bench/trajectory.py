@@ -1,0 +1,101 @@
+"""Planned motion of the platform in time, with cable lengths, forces and motor angles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, sqrt
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.bench.control.motion import JERK_TIME
+from winchkit.model.trajectory import Trajectory, plan
+from winchkit.robot.bench.path import Path
+from winchkit.robot.dynamics.dynamics import PlatformMotion, dynamic_wrench
+from winchkit.robot.forces.force_distribution import ForceLimits, distributed_forces
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.robot import Robot
+
+_STEP = 0.02
+"""Of the samples between which motor angles are interpolated, s."""
+_MOST = 20_000
+"""Samples: 400 s at `_STEP`; longer motions have longer steps."""
+_FEWEST = 16
+"""Samples: a motion of less than 0.3 s has them in place of a few steps of 20 ms."""
+
+
+@dataclass(frozen=True)
+class PlatformTrajectory:
+    """Samples of a motion from rest to rest along a path; k of them, n cables."""
+
+    path: Path
+    profile: Trajectory
+    """Distance along the path by time."""
+    time: Array
+    """(k,), s."""
+    distance: Array
+    """Along the path, (k,), m."""
+    speed: Array
+    """Along the path, (k,), m/s."""
+    motion: PlatformMotion
+    """Poses with velocities and accelerations, (k, 6)."""
+    length: Array
+    """Of the cables, (k, n), m."""
+    force: Array
+    """Cable forces nearest to the middle of the limits, (k, n), N; NaN where there are none."""
+    motor_angle: Array
+    """(k, n), rad."""
+
+    @property
+    def pose(self) -> Pose:
+        """Poses, k."""
+        return self.motion.pose
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return float(self.time[-1])
+
+
+def plan_along(
+    robot: Robot,
+    path: Path,
+    limits: ForceLimits,
+    speed: float,
+    acceleration: float,
+) -> PlatformTrajectory:
+    """Plan an S-curve along a path, and the cables with it.
+
+    ``speed``, ``acceleration``: along the path, m/s and m/s^2; rotation counts as ρ times its
+    angle.
+
+    Notes
+    -----
+    On a curved path tangential and centripetal acceleration each get acceleration/√2.
+    """
+    curved = path.curvature * path.length > 1e-6
+    tangential = acceleration / sqrt(2) if curved else acceleration
+    fastest = min(speed, sqrt(tangential / path.curvature)) if curved else speed
+    profile = plan(path.length, fastest, tangential, tangential / JERK_TIME)
+    count = min(_MOST, max(_FEWEST, ceil(profile.duration / _STEP) + 1))
+    time = np.linspace(0.0, profile.duration, count)
+    distance, rate, change = profile.at(time)
+    motion = motion_at(path, distance, rate, change)
+    structure = robot.structure(motion.pose)
+    force = distributed_forces(structure, dynamic_wrench(robot.platform, motion), limits)
+    tension = np.where(np.isfinite(force), force, 0.0)
+    angle = robot.motor_angles(motion.pose, tension=tension)
+    length = robot.lengths(motion.pose)
+    return PlatformTrajectory(path, profile, time, distance, rate, motion, length, force, angle)
+
+
+def motion_at(path: Path, distance: Array, rate: Array, change: Array) -> PlatformMotion:
+    """Motion of the platform at places of a path.
+
+    ``distance``, ``rate``, ``change`` (k,): along it, with first and second derivative by time, m,
+    m/s and m/s². Returns: k samples.
+    """
+    first, second = path.derivatives(distance)
+    velocity = first * rate[:, None]
+    acceleration = second * rate[:, None] ** 2 + first * change[:, None]
+    return PlatformMotion(path.pose(distance), velocity, acceleration)

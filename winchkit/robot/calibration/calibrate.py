@@ -1,0 +1,428 @@
+"""Calibration of a cable robot: geometry and winches from poses with any kind of measurement.
+
+    result = calibrate(robot, read_poses(runs, robot.profile))
+    result.estimates["1.exit_point.x"].value
+
+The estimate is the maximum of the posterior over all poses and parameters at once, with the
+constraint equations of :mod:`winchkit.robot.geometry.constraints`. The CABTIVE paper (Lessanibahri
+et al., Eq. 5 and 6) solves the forward kinematics of every pose inside each evaluation of its cost;
+here the pose is an unknown beside the parameters, so that all cable equations count.
+
+The cost is ½ Σ ρ(r/σ) + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
+deviations σ by kind of measurement are variance components
+(:mod:`winchkit.robot.identification.variance_components`): fit and estimate alternate until σ
+changes by less than 3 %, at most eight times. A robust loss ρ is used after the first fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from time import perf_counter
+
+import numpy as np
+
+from winchkit.arguments import require_type
+from winchkit.arrays import Array
+from winchkit.errors import UsageError
+from winchkit.fit_statistics import FitStatistics
+from winchkit.rendering import Plotted
+from winchkit.robot.calibration.cable_forces import CableForces
+from winchkit.robot.calibration.candidate_effects import Candidate, candidates
+from winchkit.robot.calibration.equations import Equations
+from winchkit.robot.calibration.identifiability import (
+    Observability,
+    observability,
+    outside_bounds,
+    refuse_unfit,
+)
+from winchkit.robot.calibration.instruments import declared_instruments
+from winchkit.robot.calibration.options import Options, ProgressCallback
+from winchkit.robot.calibration.outliers import gross_errors, unexplained
+from winchkit.robot.calibration.parameters import (
+    EFFECTS,
+    Estimated,
+    Parameters,
+    own_effects,
+    parameters_of,
+)
+from winchkit.robot.calibration.prediction import PoseErrors, cable_errors, errors_at, rms
+from winchkit.robot.calibration.ratios import Ratios, ratios_of
+from winchkit.robot.calibration.selection import Fitted, fitted_with_instruments
+from winchkit.robot.calibration.statistics import calibration_statistics
+from winchkit.robot.files.poses import Measured
+from winchkit.robot.geometry.robot import Robot
+from winchkit.robot.identification.bundle_adjustment import Solution, Weights
+from winchkit.tabular import Columns, Tabular
+
+_HELD_OUT_EVERY = 10
+"""Every tenth pose: the fit loses 5 % of its accuracy, and 100 poses leave ten for the held-out
+error."""
+_NAMES = {"closure": "lengths by the drums", "position": "positions"}
+_LARGEST_ERROR = 0.05
+"""Held-out position error as a share of the largest distance of two exit points, above which a
+robot is not called calibrated (rule of thumb: far above any camera, far below a wrong pose)."""
+_WORSE_ROTATION = 1.5
+"""Ratio of the held-out rotation errors after and before above which a warning is due."""
+_COARSE_RATIO = 5.0
+"""Standard deviation of positions, in that of the exit points' prior, above which a warning is due
+(rule of thumb: a camera may be coarser than a drawing)."""
+
+
+@dataclass(frozen=True, repr=False)
+class Calibrated(Plotted, Tabular):
+    """Result of a calibration."""
+
+    equations: Equations
+    solution: Solution
+    weights: Weights
+    estimates: Mapping[str, Estimated]
+    fit_before: PoseErrors
+    fit_after: PoseErrors
+    validation_before: PoseErrors
+    validation_after: PoseErrors
+    observed: Observability
+    candidates: tuple[Candidate, ...]
+    """Effects that would explain a large part of the remaining cost."""
+    seconds: float
+    warnings: tuple[str, ...]
+    validation_lengths: tuple[float, float] = (float("nan"), float("nan"))
+    """Rms of cable lengths by drums against geometry at held-out poses, before and after, m."""
+    ratios: Ratios = field(default_factory=lambda: Ratios(()))
+    """Cable per motor turn of each line."""
+    found_instruments: frozenset[str] = frozenset()
+    """Numbers of instruments that the poses require and that the file does not declare unknown."""
+    unexplained: tuple[str, ...] = ()
+    """Instruments at the lines whose readings do not follow the geometry, in words."""
+
+    @property
+    def refusal(self) -> str:
+        """Reason why the robot is not calibrated, in words; empty where it is."""
+        if self.unexplained:
+            return f"not calibrated: {'; '.join(self.unexplained)}; nothing was written"
+        before, after = rms(self.validation_before.distance), rms(self.validation_after.distance)
+        if after > before:
+            return (
+                f"not calibrated: the held-out position error is {after * 1e3:.4g} mm rms after "
+                f"the fit, larger than {before * 1e3:.4g} mm with the starting profile; nothing "
+                "was written. Check that the poses are of this robot, record more of them, or fit "
+                "a missing effect beside the geometry (--effect)"
+            )
+        first, last = self.validation_lengths
+        if not isfinite(after) and last > first:
+            return (
+                f"not calibrated: the held-out error of the cable lengths is {last * 1e3:.4g} mm "
+                f"rms after the fit, larger than {first * 1e3:.4g} mm with the starting profile; "
+                "nothing was written. Check that the poses are of this robot, record more of them, "
+                "or fit a missing effect beside the geometry (--effect)"
+            )
+        size = self.equations.robot.geometry.size
+        if after > _LARGEST_ERROR * size:
+            return (
+                f"not calibrated: the held-out position error is {after * 1e3:.4g} mm rms, in a "
+                f"robot of {size:.3g} m (limit: {_LARGEST_ERROR:.0%} of it); nothing was written. "
+                "Check units and signs of the positions, the lines' order and gearbox.direction"
+            )
+        count = len(self.validation_after.distance)
+        if self.validation_after.unfound > count / 2:
+            return (
+                f"not calibrated: {self.validation_after.unfound} of {count} held-out poses were "
+                "not found from their motor angles; nothing was written. Check the lines' order, "
+                "gearbox.direction, [home] and the motor angles there"
+            )
+        return ""
+
+    @property
+    def values(self) -> Array:
+        """Parameters in fitted units, (q,)."""
+        return self.solution.state.values
+
+    @property
+    def statistics(self) -> FitStatistics:
+        """χ² with its degrees of freedom, values and correlations."""
+        return calibration_statistics(self.equations, self.solution, self.weights, self.estimates)
+
+    def fit_report(self) -> str:
+        """Return the report of the fit, in the layout of lmfit's.
+
+        Returns
+        -------
+        str
+            Data, degrees of freedom, χ², AIC and BIC; per parameter its standard deviation,
+            nominal value, 95 % interval and bounds; correlations above 0.5.
+        """
+        return self.statistics.text()
+
+    def _columns(self) -> Columns:
+        return self.statistics._columns()
+
+
+def split(measured: Measured) -> tuple[Measured, Measured]:
+    """Split poses into those to fit and every tenth to hold out (none of fewer than ten)."""
+    held = np.arange(len(measured)) % _HELD_OUT_EVERY == _HELD_OUT_EVERY - 1
+    return measured[~held], measured[held]
+
+
+def calibrate(
+    robot: Robot,
+    fit: Measured,
+    validation: Measured | None = None,
+    options: Options | None = None,
+    progress: ProgressCallback = lambda text: None,
+) -> Calibrated:
+    """Fit a robot's geometry, winches and named effects to poses.
+
+    Parameters
+    ----------
+    robot : Robot
+        With the nominal values, which are the means of the priors.
+    fit : Measured
+        Poses to fit, p of n lines.
+    validation : Measured, optional
+        Poses for the held-out error; by default every tenth of ``fit``, which is then not fitted.
+    options : Options, optional
+        Effects, loss and known standard deviations.
+    progress : callable, optional
+        Called with a line of progress.
+
+    Returns
+    -------
+    Calibrated
+        Estimates, prediction errors before and after, identifiability and warnings.
+
+    Raises
+    ------
+    UsageError
+        Where the poses have no redundancy, or a measurement is missing that an effect needs.
+    """
+    require_type(robot, Robot, "robot")
+    require_type(fit, Measured, "fit")
+    if validation is not None:
+        require_type(validation, Measured, "validation")
+    options = options or Options()
+    if validation is None:
+        fit, validation = split(fit)
+    effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
+    begin = perf_counter()
+    equations = equations_of(robot, fit, options)
+    refuse_unfit(equations)
+    declared, chosen = fitted_with_instruments(equations, options, progress)
+    equations, solution, weights = chosen.equations, chosen.solution, chosen.weights
+    observed = observability(equations, solution, weights)
+    ratios = ratios_of(equations, solution)
+    seconds = perf_counter() - begin
+
+    def held_out(own: Equations) -> Equations:
+        return replace(own, measured=validation, forces=_forces(validation, options))
+
+    start = declared
+    nominal, values = start.parameters.nominal, solution.state.values
+    before = errors_at(held_out(start), nominal)
+    after = errors_at(held_out(equations), values)
+    lengths = (float("nan"), float("nan"))
+    if "position" not in equations.kinds and len(validation):
+        own, first = held_out(equations), equations.parameters.nominal
+        lengths = rms(cable_errors(own, first, weights)), rms(cable_errors(own, values, weights))
+    return Calibrated(
+        equations=equations,
+        solution=solution,
+        weights=weights,
+        estimates=_estimates(equations.parameters, solution, observed),
+        fit_before=errors_at(start, nominal),
+        fit_after=errors_at(equations, values),
+        validation_before=before,
+        validation_after=after,
+        observed=observed,
+        candidates=candidates(
+            equations, solution, weights, tuple(dict.fromkeys((*effects, *equations.effects)))
+        ),
+        seconds=seconds,
+        warnings=(
+            *_instrument_notes(declared, chosen),
+            *_warnings(equations, solution, weights, observed, after.unfound),
+            *_worse_rotation(before, after),
+            *ratios.words,
+        ),
+        validation_lengths=lengths,
+        ratios=ratios,
+        unexplained=tuple(unexplained(equations, solution)),
+        found_instruments=chosen.free
+        - (declared.instruments.free if declared.instruments else frozenset()),
+    )
+
+
+def equations_of(robot: Robot, measured: Measured, options: Options) -> Equations:
+    """Constraint equations of measured poses with the parameters of an option's effects.
+
+    Raises UsageError where a measurement is missing that an effect needs.
+    """
+    instruments = declared_instruments(robot, measured)
+    parameters = parameters_of(
+        robot,
+        options.effects,
+        swivel=bool(np.any(np.isfinite(measured.swivel)))
+        and isinstance(robot.profile.instrument.swivels.zero, str),
+        length_offset=bool(np.any(np.isfinite(measured.cable_length)))
+        and not measured.length_zeroed,
+        instruments=instruments,
+    )
+    tension = bool(np.any(np.isfinite(measured.tension)))
+    needing = [e for e in options.effects if e.startswith(("cable-elongation", "payload"))]
+    if needing and not tension and options.middle_force is None:
+        raise UsageError(
+            f"{needing[0]} needs cable forces: record 'LINE.tension [N]', or give the forces that "
+            "the robot keeps near, e.g. --middle-force '60 N'"
+        )
+    if options.middle_force is not None and not options.middle_force > 0:
+        raise UsageError(
+            f"--middle-force is {options.middle_force:g} N; cables only pull, so that it is above 0"
+        )
+    payload = [e for e in options.effects if e.startswith("payload")]
+    if payload and len(robot.names) < 6:
+        raise UsageError(
+            f"{payload[0]} needs cables that hold all six degrees of freedom; the robot has "
+            f"{len(robot.names)} lines"
+        )
+    if payload and not tension and parameters.law is None:
+        raise UsageError(
+            f"{payload[0]} shows in tensions, or in elongation by computed forces: record "
+            "'LINE.tension [N]', or add an elongation effect"
+        )
+    return Equations(
+        robot,
+        parameters,
+        measured,
+        _forces(measured, options),
+        None if instruments.is_trivial else instruments,
+        tuple(options.effects),
+    )
+
+
+def _forces(measured: Measured, options: Options) -> CableForces:
+    return CableForces(measured.tension, options.middle_force)
+
+
+def _estimates(
+    parameters: Parameters, solution: Solution, observed: Observability
+) -> dict[str, Estimated]:
+    out = {}
+    values = solution.state.values
+    for i, parameter in enumerate(parameters):
+        if parameter.std > 0:
+            nominal, _ = parameter.shown(parameter.nominal, 0.0)
+            value, std = parameter.shown(float(values[i]), float(observed.std[i]))
+            bound = {-1: "low", 0: "", 1: "high"}[int(solution.held[i])]
+            out[parameter.name] = Estimated(parameter, nominal, value, std, bound)
+    return out
+
+
+def _left_out(equations: Equations) -> list[str]:
+    """Effects of the profiles that this model leaves out."""
+    robot = equations.robot
+    tables = [*robot.profile.effect, *(table for winch in robot.winches for table in winch.effect)]
+    own = {table.id for table in robot.profile.effect if table.id in EFFECTS}
+    names = {table.id for table in tables} - own
+    if equations.parameters.law is None and any(w.cable.axial_stiffness for w in robot.winches):
+        names.add("cable-elongation-linear (cable.axial_stiffness)")
+    return [f"effects of the profile left out here: {', '.join(sorted(names))}"] if names else []
+
+
+_OF_TRACKER = {
+    "frame": "the tracker's frame",
+    "reflector": "the reflector's offset on the platform",
+    "scale": "the tracker's scale",
+    "mounting": "the axes of the target, or of the IMU, on the platform",
+    "cell_gain": "the gains of the load cells",
+    "length_scale": "the scales of the length counters",
+}
+
+
+def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
+    """Numbers of instruments that were fitted, and the datum, in words."""
+    before = declared.instruments.free if declared.instruments else frozenset()
+    out = []
+    if found := [text for name, text in _OF_TRACKER.items() if name in chosen.free - before]:
+        out.append(
+            f"the poses require {' and '.join(found)} to be other than the robot's file has: "
+            "fitted beside the geometry. Declare it as unknown in [instrument]"
+        )
+    if "frame" in chosen.free:
+        own = chosen.equations.robot.profile.instrument.tracker.datum
+        kept = {
+            "robot": "the robot's base frame, by the home pose and the priors of the exit points",
+            "tracker": "the tracker's frame; exit points and home pose are written in it",
+        }
+        out.append(f"datum: {kept[own]}")
+    if "reflector" in chosen.free:
+        out.append(
+            "datum of the platform: its anchor points at the home pose; a common shift of all "
+            "anchor points and of the home pose is the same as another reflector offset"
+        )
+    if "cell_gain" in chosen.free:
+        out.append(
+            "datum of the forces: the platform's mass; a common gain of all cells is the same as "
+            "another mass"
+        )
+    if "mounting" in chosen.free and "position" not in chosen.equations.kinds:
+        out.append(
+            "a bias of roll and pitch is the same as the IMU's mounting: reported as the mounting"
+        )
+    return out
+
+
+def _worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:
+    first, last = rms(before.angle), rms(after.angle)
+    if not last > _WORSE_ROTATION * first:
+        return []
+    return [
+        f"the held-out rotation error grew from {np.degrees(first):.3g} to {np.degrees(last):.3g} "
+        "deg: the fit traded rotations for positions; check the tracker's frame"
+    ]
+
+
+def _disagreements(equations: Equations, weights: Weights) -> list[str]:
+    """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
+    prior_std, sigma = float(equations.parameters.std[0]), weights.sigma
+    checks = {
+        "closure": "gearbox.direction, the lines' order, [home] and the motor angles there",
+        "position": "that the poses are of this robot, in its base frame",
+    }
+    # A camera may well be coarser than a drawing.
+    most = {"closure": prior_std, "position": _COARSE_RATIO * prior_std}
+    return [
+        f"{_NAMES[kind]} and geometry disagree by {sigma[kind] * 1e3:.3g} mm, more than the "
+        f"standard deviation of the exit points' prior: check {cause}"
+        for kind, cause in checks.items()
+        if sigma.get(kind, 0.0) > most[kind]
+    ]
+
+
+def _warnings(
+    equations: Equations,
+    solution: Solution,
+    weights: Weights,
+    observed: Observability,
+    unfound: int,
+) -> tuple[str, ...]:
+    out = [*equations.measured.notes, *_left_out(equations)]
+    out += outside_bounds(equations.parameters)
+    # A robust fit has already done what would be advised.
+    out += gross_errors(equations, solution) if weights.loss == "least-squares" else []
+    if unfound:
+        out.append(
+            f"{unfound} held-out poses were not found from their motor angles: a tension is "
+            "missing that an effect needs, or the cables contradict each other"
+        )
+    out += _disagreements(equations, weights)
+    if not solution.converged:
+        out.append(f"the fit did not converge within {solution.steps} steps")
+    held = [p.name for p, at in zip(equations.parameters, solution.held, strict=True) if at != 0]
+    if held:
+        out.append(f"stopped at a bound: {', '.join(held)}; is the bound right, or the model?")
+    if observed.weak:
+        out.append(
+            f"{observed.weak} of {observed.free} directions of the parameters have more "
+            "information from the prior than from the data"
+        )
+    return tuple(out)

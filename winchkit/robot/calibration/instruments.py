@@ -1,0 +1,175 @@
+"""Instruments of a robot's calibration: which of their numbers are unknown, and their parameters.
+
+Load cells have a gain per line and length counters a scale per line beside their offset.
+
+A tracker that was set up anew has another frame, a reflector sits elsewhere on the platform, a
+scale is off by some ppm, a target or an IMU is mounted at an angle. These numbers are parameters
+beside those of the robot (:mod:`winchkit.robot.geometry.tracker`), one frame per
+session. Each starts from the closed-form registration of the measured poses on those that the
+starting values predict from the motor angles alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.robot.files.poses import Measured
+from winchkit.robot.geometry.constraints import rotation_residual
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.robot import Robot
+from winchkit.robot.geometry.tracker import (
+    Tracker,
+    declared_tracker,
+    reading_of,
+    registered,
+)
+
+LARGEST_SCALE = 0.01
+"""Largest relative error of a tracker's scale that is fitted: a hundred times that of a camera
+system in good order; beyond it units are wrong."""
+NUMBERS = ("frame", "reflector", "scale", "mounting")
+"""Numbers of a tracker that may be unknown."""
+OF_LINES = ("cell_gain", "length_scale")
+"""Numbers of each line's load cell and length counter that may be unknown."""
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """Numbers of instruments: those that are estimated, and the values of the tracker's.
+
+    Attributes
+    ----------
+    free : frozenset of str
+        Of :data:`NUMBERS` and :data:`OF_LINES`; the latter start at zero.
+    sessions : tuple of str
+        Names of sessions, each with a frame of its own.
+    trackers : tuple of Tracker
+        One per session; they differ in the frame alone.
+    """
+
+    free: frozenset[str]
+    sessions: tuple[str, ...]
+    trackers: tuple[Tracker, ...]
+
+    @property
+    def is_trivial(self) -> bool:
+        """Whether the tracker shows the platform's pose in the base frame and nothing is free."""
+        if self.free:
+            return False
+        return all(tracker.is_trivial for tracker in self.trackers)
+
+    def session_of(self, measured: Measured) -> NDArray[np.intp]:
+        """Index of the session of each pose, (p,); −1 where it is another session."""
+        index = {name: n for n, name in enumerate(self.sessions)}
+        of_run = [index.get(name, -1) for name in measured.sessions]
+        if len(of_run) == 1:
+            return np.full(len(measured), of_run[0], dtype=np.intp)
+        return np.array(of_run, dtype=np.intp)[measured.run]
+
+    def at(self, measured: Measured) -> Tracker:
+        """The tracker with a frame per pose; that of the first session for other sessions."""
+        which = np.maximum(self.session_of(measured), 0)
+        shift = np.stack([t.shift for t in self.trackers])[which]
+        turn = np.stack([t.turn for t in self.trackers])[which]
+        return replace(self.trackers[0], shift=shift, turn=turn)
+
+
+def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
+    """Instruments as the robot's file declares them.
+
+    ``measured``: poses, whose sessions get a frame each. Returns: numbers of what was not measured
+    are not free.
+    """
+    spec = robot.profile.instrument
+    tracker = robot.tracker or declared_tracker(robot.profile)
+    free = {
+        name
+        for name, value in (
+            ("frame", spec.tracker.frame),
+            ("reflector", spec.tracker.reflector),
+            ("scale", spec.tracker.scale),
+            ("mounting", spec.imu.mounting if spec.imu else spec.tracker.mounting),
+            ("cell_gain", spec.cells.gain),
+            ("length_scale", spec.length_counters.scale),
+        )
+        if isinstance(value, str)
+    }
+    for values, names in (
+        (measured.position, {"frame", "reflector", "scale"}),
+        (measured.angles, {"mounting"}),
+        (measured.tension, {"cell_gain"}),
+        (measured.cable_length, {"length_scale"}),
+    ):
+        if not np.any(np.isfinite(values)):
+            free -= names
+    sessions = tuple(dict.fromkeys(measured.sessions))
+    return Instruments(frozenset(free), sessions, (tracker,) * len(sessions))
+
+
+def registered_instruments(
+    instruments: Instruments,
+    free: Collection[str],
+    predicted: Pose,
+    measured: Measured,
+    *,
+    imu: bool,
+) -> Instruments:
+    """Instruments with these numbers free, at the values of the closed-form registration.
+
+    ``instruments``: values of the numbers that are not free. ``free``: of :data:`NUMBERS`.
+    ``predicted``: poses by the motor angles alone, (p,); NaN where one was not found. ``imu``:
+    whether rotations are declared to be those of an IMU. Otherwise they are in the tracker's frame
+    if the registration fits them better so. Returns: with ``free``.
+    """
+    variants = [False] if imu or "frame" not in free else [True, False]
+    found = [
+        _registered(instruments, frozenset(free), predicted, measured, turns) for turns in variants
+    ]
+    if not np.any(np.isfinite(measured.angles)):
+        return found[0]
+    return min(found, key=lambda own: _misfit_of_rotation(own, predicted, measured))
+
+
+def _registered(
+    instruments: Instruments,
+    free: frozenset[str],
+    predicted: Pose,
+    measured: Measured,
+    turns: bool,
+) -> Instruments:
+    """Common numbers from all sessions at once, then a frame per session."""
+    first = replace(
+        instruments.trackers[0],
+        turns_rotation=turns if "frame" in free else instruments.trackers[0].turns_rotation,
+    )
+    which = instruments.session_of(measured)
+    common = free - {"frame"} if len(instruments.sessions) > 1 else free
+    largest = int(np.argmax(np.bincount(which[which >= 0], minlength=len(instruments.sessions))))
+    rows = which == largest
+    whole = registered(
+        first,
+        Pose(predicted.position[rows], predicted.rotation[rows]),
+        measured.position[rows],
+        measured.angles[rows],
+        free,
+    )
+    if common == free:
+        return Instruments(free, instruments.sessions, (whole,) * len(instruments.sessions))
+    trackers = []
+    for number in range(len(instruments.sessions)):
+        rows = which == number
+        own = Pose(predicted.position[rows], predicted.rotation[rows])
+        trackers.append(
+            registered(whole, own, measured.position[rows], measured.angles[rows], free & {"frame"})
+        )
+    return Instruments(free, instruments.sessions, tuple(trackers))
+
+
+def _misfit_of_rotation(instruments: Instruments, predicted: Pose, measured: Measured) -> float:
+    shown = reading_of(instruments.at(measured), predicted)
+    difference = rotation_residual(shown.rotation, measured.angles)
+    return float(np.nanmean(difference**2))

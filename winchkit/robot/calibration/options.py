@@ -1,0 +1,24 @@
+"""Options of a robot's calibration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from winchkit.robot.identification.bundle_adjustment import Loss
+
+ProgressCallback = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a calibration."""
+
+    effects: tuple[str, ...] = ()
+    """Effects of the catalogue that are fitted beside the geometry."""
+    loss: Loss = "least-squares"
+    sigma: Mapping[str, float] | None = None
+    """Standard deviations by kind of equation, SI; those that are not given are estimated."""
+    middle_force: float | None = None
+    """Force, N, to which cable forces are nearest where an effect needs them and no tension was
+    measured."""

@@ -1,0 +1,392 @@
+"""Parameters of a robot's calibration: names, units, priors and bounds, in one vector."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.errors import Fault, FileError, UsageError, suggest
+from winchkit.model.drum import drum_of
+from winchkit.robot.calibration.elongation import LAWS, LawParameter
+from winchkit.robot.calibration.instruments import LARGEST_SCALE, Instruments
+from winchkit.robot.geometry.constraints import ZERO_STD
+from winchkit.robot.geometry.robot import Robot
+from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotProfile
+from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
+from winchkit.units import dimension_of, parse
+
+_HOME = "home-length"
+
+
+def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
+    """Values of a profile's effects that a calibration fits.
+
+    Returns: by effect the parameters of a law of elongation, or home lengths by line, SI. Raises
+    FileError for a value that cannot be read.
+    """
+    out: dict[str, dict[str, float]] = {}
+    faults: list[Fault] = []
+    for table in profile.effect:
+        if table.id in LAWS and "line" not in table.values:
+            units = {p.name: p.unit for p in LAWS[table.id]}
+            given: Mapping[str, Any] = table.values
+        elif table.id == _HOME:
+            units = {line.name: "m" for line in profile.line}
+            lengths = table.values.get("length")
+            if not isinstance(lengths, Mapping):
+                lengths = {str(table.values.get("line")): lengths}
+            given = {**dict.fromkeys(units, "0 m"), **lengths}
+        else:
+            continue
+        try:
+            found = _values(given, units)
+            if before := out.get(table.id):
+                found = {name: value + before[name] for name, value in found.items()}
+            out[table.id] = found
+        except UsageError as error:
+            faults.append(_fault(table, str(error)))
+    if faults:
+        raise FileError(faults)
+    return out
+
+
+def _values(given: Mapping[str, Any], units: Mapping[str, str]) -> dict[str, float]:
+    out = {}
+    for name, unit in units.items():
+        if name in given:
+            try:
+                out[name] = parse(given[name], dimension_of(unit) or "ratio")
+            except UsageError as error:
+                raise UsageError(f"{name}: {error}") from error
+    return out
+
+
+def _fault(table: EffectTable, message: str) -> Fault:
+    return Fault(message, table.path, table.line, f"effect {table.id}")
+
+
+Indices = NDArray[np.intp]
+
+GEOMETRY = ("exit-point", "anchor-point", "swivel-radius")
+"""Effects of the catalogue that every calibration fits."""
+EFFECTS = (*LAWS, "home-length", "gear-ratio", "payload-mass", "payload-centre")
+"""Effects that are fitted where they are named; ``gear-ratio/LINE`` on one line."""
+
+_MASS_SHARE, _MASS_LEAST = 0.2, 0.1
+"""Standard deviation of the prior: a fifth of the mass, at least 0.1 kg for a tool or cable carrier
+that is in no drawing (rule of thumb)."""
+_CENTRE = 20e-3
+"""Standard deviation of the prior, m: a centre of mass is known from a drawing to some centimetres
+(rule of thumb; the data decide where it can be identified)."""
+_TRACKER_STD = {"m": 1.0, "rad": 1.0, "1": 0.01}
+"""Standard deviations of the priors of a tracker's numbers about their registration, by unit: far
+above what the registration leaves, so that the data decide."""
+_RATIO_SHARE = 0.1
+"""Standard deviation of the prior of a gear ratio that is fitted, as a share: rounded ratios and
+wrong counts per turn are per cent off."""
+_OF_LINES_STD = {"cell_gain": 0.2, "length_scale": 0.02}
+"""Standard deviations of the priors of a cell's gain and a length counter's scale: wider than those
+of instruments in use, so that the data decide."""
+_REFLECTOR_STD = 0.1
+"""Of a reflector's offset, m: the size of a platform."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter in the unit that is fitted."""
+
+    name: str
+    """``LINE.exit_point.x``, ``layer_growth``, ``cable-elongation-linear.axial_stiffness`` …"""
+    unit: str
+    """Unit of the value in files."""
+    nominal: float
+    std: float
+    """Of the prior; zero for a parameter that is held."""
+    low: float = -np.inf
+    high: float = np.inf
+    reciprocal: bool = False
+    """Files have 1/value."""
+    zero: bool = False
+    """Whether it is the zero of an instrument and no part of the robot."""
+
+    def shown(self, value: float, std: float) -> tuple[float, float]:
+        """Value and standard deviation in the unit of files; NaN for an infinite stiffness's."""
+        if not self.reciprocal:
+            return value, std
+        return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """Estimate of one parameter, in the unit of files."""
+
+    parameter: Parameter
+    nominal: float
+    value: float
+    std: float
+    """Posterior standard deviation."""
+    bound: str
+    """``low`` or ``high`` where the fit stopped at a bound, else empty."""
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """All parameters, and the indices of each block."""
+
+    all: tuple[Parameter, ...]
+    block: dict[str, Indices]
+    """Indices by block; (n, 3) for points, (n,) for what a line has one of."""
+    law: str | None
+    """Law of elongation that is fitted."""
+
+    def __iter__(self) -> Iterator[Parameter]:
+        return iter(self.all)
+
+    def __len__(self) -> int:
+        return len(self.all)
+
+    @property
+    def nominal(self) -> Array:
+        """(q,)."""
+        return np.array([p.nominal for p in self.all])
+
+    @property
+    def std(self) -> Array:
+        """Of the priors, (q,)."""
+        return np.array([p.std for p in self.all])
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """(q,) each."""
+        return np.array([p.low for p in self.all]), np.array([p.high for p in self.all])
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """Mask of parameters that are fitted, (q,)."""
+        return np.array([p.std > 0 for p in self.all])
+
+    @property
+    def lasting(self) -> NDArray[np.bool_]:
+        """Mask of parameters that are fitted and belong to the robot, (q,)."""
+        return np.array([p.std > 0 and not p.zero for p in self.all])
+
+    def starting(self, block: str, values: Array) -> Parameters:
+        """The same parameters with other nominal values of a block."""
+        everything = list(self.all)
+        for at, value in zip(self.block[block].ravel(), values.ravel(), strict=True):
+            everything[at] = replace(everything[at], nominal=float(value))
+        return replace(self, all=tuple(everything))
+
+
+class _Builder:
+    """Appends blocks of parameters."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot = robot
+        self.all: list[Parameter] = []
+        self.block: dict[str, Indices] = {}
+
+    def add(self, block: str, parameters: Sequence[Parameter], *shape: int) -> None:
+        """Append a block; its indices get ``shape``."""
+        start = len(self.all)
+        self.all += parameters
+        self.block[block] = np.arange(start, len(self.all)).reshape(shape or (-1,))
+
+    def prior(self, name: PriorName) -> PriorSpec:
+        """Prior of the robot's file, else of the paper."""
+        return self.robot.profile.prior.get(name, PriorSpec(PRIORS[name]))
+
+    def points(self, name: PriorName, values: Array) -> None:
+        """Three coordinates a line."""
+        std = self.prior(name).std
+        found = [
+            Parameter(f"{line}.{name}.{axis}", "m", float(value), std)
+            for line, point in zip(self.robot.names, values, strict=True)
+            for axis, value in zip("xyz", point, strict=True)
+        ]
+        self.add(name, found, -1, 3)
+
+    def lengths(self, name: PriorName, values: Sequence[float], fitted: Sequence[bool]) -> None:
+        """One length a line; those that are not fitted have a prior of zero width."""
+        prior = self.prior(name)
+        low, high = prior.bounds or (0.0, np.inf)
+        found = [
+            Parameter(f"{line}.{name}", "m", value, prior.std * free, low, high)
+            for line, value, free in zip(self.robot.names, values, fitted, strict=True)
+        ]
+        self.add(name, found)
+
+    def ratios(self, effects: Sequence[str]) -> None:
+        """Gear ratios; those that no effect frees have a prior of zero width."""
+        if not any(effect.partition("/")[0] == "gear-ratio" for effect in effects):
+            return
+        found = [
+            Parameter(
+                f"{line}.gear_ratio",
+                "1",
+                winch.gearbox.ratio,
+                _RATIO_SHARE
+                * winch.gearbox.ratio
+                * bool({"gear-ratio", f"gear-ratio/{line}"} & set(effects)),
+                low=1e-3,
+            )
+            for line, winch in zip(self.robot.names, self.robot.winches, strict=True)
+        ]
+        self.add("gear_ratio", found)
+
+    def zeros(self, name: str, unit: str, std: float, *, zero: bool) -> None:
+        """One number a line that starts at zero."""
+        found = [
+            Parameter(f"{line}.{name}", unit, 0.0, std, zero=zero) for line in self.robot.names
+        ]
+        self.add(name, found)
+
+
+def parameters_of(
+    robot: Robot,
+    effects: Sequence[str] = (),
+    *,
+    swivel: bool = False,
+    length_offset: bool = False,
+    instruments: Instruments | None = None,
+) -> Parameters:
+    """Parameters of geometry, winches, named effects and instruments.
+
+    ``robot``: of n lines; its numbers are the nominal values. ``effects``: beside those of the
+    robot's profile. A law of elongation adds home lengths, since the tension at home is unknown.
+    ``swivel``, ``length_offset``: whether the zeros of swivel angles and the offsets
+    of length instruments are unknown. ``instruments``: numbers of instruments that are unknown,
+    with their starting values. Raises UsageError for an effect that a calibration cannot fit, or
+    two laws of elongation.
+    """
+    own = own_effects(robot.profile)
+    effects = tuple(dict.fromkeys((*effects, *own)))
+    _known(effects)
+    law = next((effect for effect in effects if effect in LAWS), None)
+    build = _Builder(robot)
+    build.points("exit_point", robot.geometry.exit_point)
+    build.points("anchor_point", robot.geometry.anchor_point)
+    winches = robot.winches
+    radii = [winch.drum.winding_radius for winch in winches]
+    build.lengths("winding_radius", radii, [True] * len(winches))
+    swivels = robot.geometry.swivel_radius.tolist()
+    build.lengths("swivel_radius", swivels, [radius > 0 for radius in swivels])
+    _growth(build, winches)
+    build.ratios(effects)
+    if law or "home-length" in effects:
+        build.zeros("home_length", "m", build.prior("home_length").std, zero=False)
+    if law:
+        build.add("law", [_of_law(law, p, own.get(law, {})) for p in LAWS[law]])
+    _payload(build, effects)
+    if swivel:
+        build.zeros("swivel_zero", "rad", ZERO_STD["swivel"], zero=True)
+    if length_offset:
+        build.zeros("length_offset", "m", ZERO_STD["cable_length"], zero=True)
+    if instruments is not None:
+        _tracker(build, instruments)
+        for name, std in _OF_LINES_STD.items():
+            if name in instruments.free:
+                build.zeros(name, "1", std, zero=True)
+    found = Parameters(tuple(build.all), build.block, law)
+    if offsets := own.get("home-length"):
+        found = found.starting("home_length", np.array([offsets[n] for n in robot.names]))
+    return found
+
+
+def _of_law(law: str, spec: LawParameter, own: Mapping[str, float]) -> Parameter:
+    """Parameter of a law that starts at the value of the robot's file."""
+    start = spec.start
+    if spec.name in own:
+        start = 1 / own[spec.name] if spec.reciprocal else own[spec.name]
+    return Parameter(
+        f"{law}.{spec.name}", spec.unit, start, spec.std, spec.low, spec.high, spec.reciprocal
+    )
+
+
+def _known(effects: Sequence[str]) -> None:
+    for effect in effects:
+        if effect.partition("/")[0] not in (*GEOMETRY, *EFFECTS) or (
+            "/" in effect and not effect.startswith("gear-ratio/")
+        ):
+            raise UsageError(
+                f"effect '{effect}' cannot join a robot's calibration; use one of "
+                f"{', '.join(EFFECTS)} ({', '.join(GEOMETRY)} are always in it)"
+                f"{suggest(effect, [*EFFECTS, *GEOMETRY])}"
+            )
+    laws = [effect for effect in effects if effect in LAWS]
+    if len(set(laws)) > 1:
+        raise UsageError(f"{' and '.join(laws)} are laws of the same cable; name one of them")
+
+
+def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
+    """One growth for all layered drums, which wind the same cable."""
+    growths = {
+        getattr(drum_of(winch), "growth", 0.0) for winch in winches if winch.drum.kind in LAYERED
+    }
+    if len(growths) > 1:
+        listed = ", ".join(f"{growth * 1e3:g} mm" for growth in sorted(growths))
+        raise UsageError(
+            f"the winches of '{build.robot.profile.name}' have the layer growths {listed}; the "
+            "lines of "
+            "one robot are calibrated with one, so give them the same cable"
+        )
+    prior = build.prior("layer_growth")
+    low, high = prior.bounds or (0.0, np.inf)
+    value = growths.pop() if growths else 0.0
+    std = prior.std if any(winch.drum.kind in LAYERED for winch in winches) else 0.0
+    build.add("layer_growth", [Parameter("layer_growth", "m", value, std, low, high)])
+
+
+def _payload(build: _Builder, effects: Sequence[str]) -> None:
+    platform = build.robot.profile.platform
+    std = max(_MASS_SHARE * platform.mass, _MASS_LEAST) * ("payload-mass" in effects)
+    build.add("payload_mass", [Parameter("payload-mass.mass", "kg", platform.mass, std, 0.0)])
+    std = _CENTRE * ("payload-centre" in effects)
+    found = [
+        Parameter(f"payload-centre.{axis}", "m", value, std)
+        for axis, value in zip("xyz", platform.center_of_mass, strict=True)
+    ]
+    build.add("payload_centre", found)
+
+
+def _tracker(build: _Builder, instruments: Instruments) -> None:
+    """Numbers of a tracker that are free; a frame per session."""
+
+    def add(block: str, names: Sequence[str], units: Sequence[str], values: Array) -> None:
+        found = [
+            Parameter(
+                name,
+                unit,
+                float(value),
+                _REFLECTOR_STD if block == "reflector" else _TRACKER_STD[unit],
+                low=-LARGEST_SCALE if unit == "1" else -np.inf,
+                high=LARGEST_SCALE if unit == "1" else np.inf,
+                zero=True,
+            )
+            for name, unit, value in zip(names, units, values.ravel(), strict=True)
+        ]
+        shape = (-1, 6) if block == "tracker_frame" else ()
+        build.add(block, found, *shape)
+
+    first = instruments.trackers[0]
+    if "frame" in instruments.free:
+        several = len(instruments.sessions) > 1
+        names = [
+            f"tracker_frame{f'[{session}]' if several else ''}.{axis}"
+            for session in instruments.sessions
+            for axis in ("x", "y", "z", "rx", "ry", "rz")
+        ]
+        values = np.array([[*t.shift, *t.turn] for t in instruments.trackers])
+        add("tracker_frame", names, ["m", "m", "m", "rad", "rad", "rad"] * len(values), values)
+    if "reflector" in instruments.free:
+        add("reflector", [f"reflector.{axis}" for axis in "xyz"], ["m"] * 3, first.offset)
+    if "scale" in instruments.free:
+        add("tracker_scale", ["tracker_scale"], ["1"], np.array([first.scale]))
+    if "mounting" in instruments.free:
+        mounting = np.zeros(3) if first.mounting is None else first.mounting
+        add("mounting", [f"mounting.r{axis}" for axis in "xyz"], ["rad"] * 3, mounting)

@@ -1,0 +1,157 @@
+"""Prediction errors of a robot's model: poses by motor angles alone against measured ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from winchkit.arrays import Array
+from winchkit.model.rotation import rotation_of, rotation_vector
+from winchkit.robot.calibration.equations import Equations
+from winchkit.robot.geometry.forward import forward
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.pose_estimation import start_pose
+from winchkit.robot.geometry.tracker import pose_behind, reading_of, registered
+from winchkit.robot.identification.bundle_adjustment import State, Weights, place
+
+_ROUNDS = 4
+"""Each multiplies the error of the lengths by the strain, at most some per cent: four reach 1e-6 of
+the elongation."""
+
+
+@dataclass(frozen=True)
+class PoseErrors:
+    """Predicted against measured poses."""
+
+    distance: Array
+    """(p,), m; NaN where no position was measured or no pose was found."""
+    angle: Array
+    """(p,), rad; NaN where the rotation was not measured whole."""
+    vector: Array
+    """Predicted minus measured position, (p, 3), m; NaN as above."""
+    measured: Array
+    """Positions as indicated by the tracker, (p, 3), m."""
+    place: NDArray[np.str_]
+    """Run and row of each pose, (p,)."""
+    unfound: int
+    """Number of poses for which the forward kinematics did not converge."""
+
+
+def errors_at(equations: Equations, values: Array, predicted: Pose | None = None) -> PoseErrors:
+    """Predict every pose from its motor angles, and compare it with the measured one.
+
+    ``equations``: of the p poses to predict. ``values`` (q,): parameters in fitted units.
+    ``predicted``: (p,), by the machine's numbers among `values`, where it is known already.
+    """
+    found = predicted_poses(equations, values) if predicted is None else predicted
+    unfound = int(np.count_nonzero(_known(equations) & ~np.isfinite(found.position[:, 0])))
+    measured = equations.measured
+    pose = _reading(equations, values, found)
+    vector = pose.position - measured.position
+    distance = np.linalg.norm(vector, axis=1)
+    angle = np.full(len(distance), np.nan)
+    whole = np.all(np.isfinite(measured.angles), axis=1) & np.isfinite(pose.rotation[:, 0, 0])
+    seen = np.swapaxes(rotation_of(*measured.angles[whole].T), 1, 2)
+    angle[whole] = np.linalg.norm(rotation_vector(pose.rotation[whole] @ seen), axis=1)
+    return PoseErrors(distance, angle, vector, measured.position, measured.place, unfound)
+
+
+def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array:
+    """Cable lengths by drums against geometry, at the poses that all instruments determine.
+
+    The held-out error of a robot whose positions are not measured.
+
+    ``equations``: of the p poses. ``values`` (q,): parameters in fitted units. Returns (p, n): m;
+    NaN where a motor angle is missing.
+    """
+    # Kinds that were not fitted have unknown zeros and take no part.
+    sigma = {kind: weights.sigma.get(kind, np.inf) for kind in equations.kinds}
+    state = place(equations, State(values, start_of(equations, values)), Weights(sigma))
+    return next(c.residual for kind, c in equations.constraints(state) if kind == "closure")
+
+
+def predicted_poses(equations: Equations, values: Array, start: Pose | None = None) -> Pose:
+    """Forward kinematics of the motor angles, with strains by fixed-point iteration.
+
+    ``equations``: of the p poses to predict. ``values`` (q,): parameters in fitted units.
+    ``start``: by default at the measured poses. Returns: (p,); NaN where no pose was found. A
+    search that fails starts again from home.
+    """
+    geometry, slack = equations.geometry(values), equations.by_drum(values)
+    dead = equations.robot.dead_length
+    start = start_of(equations, values) if start is None else start
+    given, platform = slack, equations.platform(values)
+    strained = equations.parameters.law is not None and equations.forces.middle is not None
+    for _ in range(_ROUNDS if strained else 1):
+        if (strain := equations.strain(values, start)) is not None:
+            given = (slack + strain.value * dead) / (1 - strain.value)
+        found = forward(geometry, given, start, platform)
+        # A search that did not converge starts again from home.
+        start = _where(found.converged.astype(bool), found.pose, equations)
+    return found.pose
+
+
+def _reading(equations: Equations, values: Array, pose: Pose) -> Pose:
+    """Indications of the tracker at poses.
+
+    A session that was not fitted has an unknown frame, which is registered on its own poses.
+    """
+    own = equations.instruments_at(values)
+    if own is None:
+        return pose
+    measured, tracker = equations.measured, own.at(equations.measured)
+    which = own.session_of(measured)
+    if "frame" in own.free and np.any(which < 0):
+        shift, turn = np.array(tracker.shift), np.array(tracker.turn)
+        for run in np.unique(measured.run[which < 0]):
+            rows = (which < 0) & (measured.run == run)
+            part = Pose(pose.position[rows], pose.rotation[rows])
+            seen, angles = measured.position[rows], measured.angles[rows]
+            frame = registered(own.trackers[0], part, seen, angles, {"frame"})
+            shift[rows], turn[rows] = frame.shift, frame.turn
+        tracker = replace(tracker, shift=shift, turn=turn)
+    return reading_of(tracker, pose)
+
+
+def _known(equations: Equations) -> NDArray[np.bool_]:
+    return np.asarray(np.all(np.isfinite(equations.measured.motor_angle), axis=1))
+
+
+def rms(values: Sequence[float] | Array) -> float:
+    """Root of the mean square of finite values; NaN without any.
+
+    ``values``: NaN is ignored. Returns: in the unit of the values.
+    """
+    known = np.asarray(values)[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
+    home = equations.robot.home
+    return Pose(
+        np.where(good[:, None], pose.position, home.position),
+        np.where(good[:, None, None], pose.rotation, home.rotation),
+    )
+
+
+def start_of(equations: Equations, values: Array | None = None) -> Pose:
+    """Measured poses in the base frame; those of the home pose where one was not measured whole.
+
+    ``values`` (q,): by default the nominal ones.
+    """
+    measured, home = equations.measured, equations.robot.home
+    whole = np.all(np.isfinite(measured.angles), axis=1, keepdims=True)
+    angles = np.where(whole, measured.angles, np.nan)
+    tracker = equations.tracker(equations.parameters.nominal if values is None else values)
+    if tracker is None:
+        return start_pose(measured.position, angles, home)
+    # Without a measured rotation the platform is taken to stand as at home.
+    turned = reading_of(tracker, Pose(np.zeros_like(measured.position), home.rotation)).rotation
+    seen = np.where(whole[..., None], rotation_of(*np.nan_to_num(angles).T), turned)
+    behind = pose_behind(tracker, Pose(measured.position, seen))
+    return Pose(
+        np.where(np.isfinite(behind.position), behind.position, home.position), behind.rotation
+    )

@@ -1,0 +1,435 @@
+"""Fit of a robot's calibration, with the numbers of the tracker that the poses require.
+
+The model with the numbers that the file declares unknown is fitted first. Where a tracker whose
+frame, reflector or scale are free predicts the poses much better, it is fitted in its place:
+otherwise exit points and home lengths would absorb a tracker that was set up anew. Models are
+compared by the Bayesian information criterion
+
+    χ² + 2 Σ n_k ln σ_k + q ln N
+
+with n_k equations of the kind k and its standard deviation σ_k, q numbers of instruments and gear
+ratios and N equations in all. Gains of cells, scales of length counters and the axes of an IMU of a
+robot without a tracker are then freed one after another, as long as a score test and the criterion
+ask for them, and the gear ratios of lines whose winding radius left its prior. The prior's part of
+χ² takes part between models of equally many parts alone: a common shift of all anchor points is the
+same as a reflector's offset, and with the prior it would be cheaper as an offset whether or not
+there is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain, combinations
+from math import log
+
+import numpy as np
+
+from winchkit.robot.calibration.equations import Equations
+from winchkit.robot.calibration.instruments import (
+    LARGEST_SCALE,
+    OF_LINES,
+    Instruments,
+    declared_instruments,
+    registered_instruments,
+)
+from winchkit.robot.calibration.options import Options, ProgressCallback
+from winchkit.robot.calibration.parameters import parameters_of
+from winchkit.robot.calibration.prediction import (
+    PoseErrors,
+    errors_at,
+    predicted_poses,
+    rms,
+    start_of,
+)
+from winchkit.robot.calibration.ratios import ratios_of
+from winchkit.robot.calibration.variance_components import NOISE, re_estimated_weights
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.tracker import Tracker
+from winchkit.robot.identification.bundle_adjustment import (
+    Solution,
+    State,
+    Weights,
+    linearise,
+    place,
+    solve,
+)
+
+_NOISE_ROUNDS = 8
+"""Rule of thumb: the components converge linearly; where two of them exchange variance they do not
+settle in any number of rounds."""
+_SETTLED_CHANGE = 0.03
+"""Relative change of a standard deviation at which variance components have settled."""
+_LEAST_FALL = 0.7
+"""Ratio of the prediction errors with and without free numbers of the tracker above which they are
+not fitted (rule of thumb: half of the variance, so that a tracker is not blamed for cables)."""
+_CLEARLY_WORSE = 5.0
+"""Ratio of two registrations' errors above which the worse one is not fitted (rule of thumb)."""
+_COUNTED = (
+    "tracker_frame",
+    "reflector",
+    "tracker_scale",
+    "mounting",
+    "gear_ratio",
+    *OF_LINES,
+)
+_COUNTED_AS = {"reflector": 6}
+"""Numbers of a reflector's offset in the criterion: as many as of a frame. With a platform that
+hardly turns the two are the same shift, which is then said to be the frame's."""
+_DELTA_CHI_SQUARE = 9.0
+"""Difference of criteria below which two explanations count as equal: the true one is worse by this
+much with probability at most 1/740."""
+_BEYOND_PRIOR = 3.0
+"""Standard deviations of its prior beyond which a winding radius imitates another gear ratio."""
+_LEVEL = 1e-6
+"""Level of the score test for free numbers of the tracker (rule of thumb)."""
+_PLAINLY = 3.0
+"""Ratio of two errors of rotations above which the worse assumption is not fitted (rule of thumb).
+"""
+_LEAST_MISFIT = 10e-3
+"""Error of a registration below which it is always fitted, m: two standard deviations of the exit
+points' prior."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """End of a fit."""
+
+    equations: Equations
+    solution: Solution
+    weights: Weights
+
+    @property
+    def free(self) -> frozenset[str]:
+        """Numbers of the tracker that were fitted."""
+        return self.equations.instruments.free if self.equations.instruments else frozenset()
+
+    @property
+    def criterion(self) -> float:
+        """Bayesian information criterion, up to a constant."""
+        known = self.solution.linear.stack.known
+        kinds = self.solution.linear.stack.kinds
+        linear = self.solution.linear
+        likelihood = (
+            2 * linear.cost
+            - float(linear.prior @ linear.prior)
+            + sum(
+                2 * np.count_nonzero(known[:, part]) * log(self.weights.sigma[kind])
+                for kind, part in kinds.items()
+            )
+        )
+        block = self.equations.parameters.block
+        std = self.equations.parameters.std
+        numbers = sum(
+            _COUNTED_AS.get(name, int(np.count_nonzero(std[block[name]])))
+            for name in _COUNTED
+            if name in block
+        )
+        return likelihood + numbers * log(max(int(np.count_nonzero(known)), 2))
+
+    @property
+    def with_prior(self) -> float:
+        """The criterion with the prior's part of χ²."""
+        prior = self.solution.linear.prior
+        return self.criterion + float(prior @ prior)
+
+    @property
+    def at_bound(self) -> bool:
+        """Whether a number of an instrument stopped at a bound."""
+        held, block = self.solution.held, self.equations.parameters.block
+        return any(bool(np.any(held[block[name]])) for name in _COUNTED if name in block)
+
+    @property
+    def is_plausible(self) -> bool:
+        """Whether cables and geometry agree to within the prior of the exit points, with a
+        plausible scale of the tracker."""
+        own = self.equations.instruments_at(self.solution.state.values)
+        scale = own.trackers[0].scale if own is not None else 0.0
+        closure = self.weights.sigma.get("closure", 0.0)
+        return abs(scale) < LARGEST_SCALE and closure < float(self.equations.parameters.std[0])
+
+    @cached_property
+    def errors(self) -> PoseErrors:
+        """Prediction errors of the fitted poses."""
+        return errors_at(self.equations, self.solution.state.values)
+
+    @property
+    def error(self) -> float:
+        """Rms prediction error of the fitted positions, m."""
+        return rms(self.errors.distance)
+
+
+def fitted_with_instruments(
+    equations: Equations, options: Options, progress: ProgressCallback
+) -> tuple[Equations, Fitted]:
+    """Fit the declared model, or the one with the instruments and ratios that the poses require.
+
+    ``progress``: called with a line of progress. Returns: ``declared``: declared model at the
+    values from which its fit starts: what the file has, and the registration of what it declares
+    unknown.
+    """
+    declared, best = _fitted_with_tracker(equations, options, progress)
+    best = _with_more(best, options, progress)
+    return declared, _with_ratios(best, options, progress)
+
+
+def _fitted_with_tracker(
+    equations: Equations, options: Options, progress: ProgressCallback
+) -> tuple[Equations, Fitted]:
+    """Fit the declared model, or the one with the tracker that the poses require."""
+    own = _instruments(equations)
+    predicted = predicted_poses(equations, equations.parameters.nominal, equations.robot.home)
+    declared = _registered(equations, own, own.free, predicted) if own.free else equations
+    if "position" not in equations.kinds:
+        return declared, _fitted(declared, options, progress)
+    wider = [
+        [
+            trial
+            for more in combinations(_left(own.free), count + 1)
+            for trial in _variants(equations, own, own.free | set(more), predicted)
+        ]
+        for count in range(len(_left(own.free)))
+    ]
+    errors = [_nominal_error(trial, predicted) for trial in (declared, *chain(*wider))]
+    least = np.nanmin(errors) if np.any(np.isfinite(errors)) else 0.0
+    limit = max(_CLEARLY_WORSE * float(least), _LEAST_MISFIT)
+
+    def is_near(trial: Equations) -> bool:
+        return not _nominal_error(trial, predicted) > limit
+
+    first = _fitted(declared, options, progress) if is_near(declared) else None
+    best = first
+    for trials in wider:
+        if best is not None and not any(_shows_more(best, trial) for trial in trials):
+            break
+        fits = [_fitted(trial, options, progress) for trial in trials if is_near(trial)]
+        fits = [fit for fit in fits if fit.is_plausible]
+        if first is not None:
+            fits = [fit for fit in fits if fit.error < _LEAST_FALL * first.error]
+        chosen = None
+        for fit in fits:
+            # Of equal explanations the one that stands first is kept: a frame before a reflector.
+            if chosen is None or fit.with_prior < chosen.with_prior - _DELTA_CHI_SQUARE:
+                chosen = fit
+        if chosen is None and best is None:
+            continue
+        if chosen is None or (best is not None and not chosen.criterion < best.criterion):
+            break
+        best = chosen
+    if best is None:
+        return declared, _fitted(declared, options, progress)
+    return declared, best if best is first else _mounted(best, predicted, options, progress)
+
+
+def _with_more(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:
+    """The fit with more numbers of instruments free, while the poses require one of them."""
+    while True:
+        own = _instruments(best.equations)
+        trials = [
+            with_instruments(best.equations, replace(own, free=own.free | {name}))
+            for name in _undeclared(best.equations, own)
+        ]
+        fits = [_fitted(t, options, progress, best) for t in trials if _shows_more(best, t)]
+        fits = [fit for fit in fits if fit.criterion < best.criterion and not fit.at_bound]
+        if not fits:
+            return best
+        best = min(fits, key=lambda fit: fit.criterion)
+
+
+def _undeclared(equations: Equations, own: Instruments) -> list[str]:
+    """Numbers of instruments other than a tracker that may be free beside those that are."""
+    kinds = equations.kinds
+    possible = {
+        "mounting": "rotation" in kinds and "position" not in kinds,
+        "cell_gain": equations.hangs,
+        "length_scale": "cable_length" in kinds,
+    }
+    return [name for name, may in possible.items() if may and name not in own.free]
+
+
+def _with_ratios(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:
+    """The fit with the gear ratios of the lines whose winding radius left its prior.
+
+    A drum with layers distinguishes its ratio from its radius, so that the radius alone would be a
+    wrong model; on other drums the wider prior of the ratio takes the change.
+    """
+    radius = best.equations.parameters.block["winding_radius"]
+    prior, held = best.solution.linear.prior[radius], best.solution.held[radius]
+    beyond = (np.abs(prior) > _BEYOND_PRIOR) | (held != 0)
+    if not np.any(beyond):
+        return best
+    odd = ratios_of(best.equations, best.solution).named
+    if not odd or "gear-ratio" in best.equations.effects:
+        return best
+    effects = (*best.equations.effects, *(f"gear-ratio/{line}" for line in odd))
+    trial = with_instruments(replace(best.equations, effects=effects), _instruments(best.equations))
+    found = _fitted(trial, options, progress, best)
+    return found if found.with_prior < best.with_prior else best
+
+
+def _instruments(equations: Equations) -> Instruments:
+    if equations.instruments is not None:
+        return equations.instruments
+    return declared_instruments(equations.robot, equations.measured)
+
+
+def _left(free: frozenset[str]) -> list[str]:
+    """Parts of a tracker that may be free beside those that are."""
+    return [name for name in ("frame", "reflector", "scale") if name not in free]
+
+
+def _variants(
+    equations: Equations, own: Instruments, free: frozenset[str], predicted: Pose
+) -> list[Equations]:
+    """Rotations in the tracker's frame, and in that of an IMU, unless it is plain which."""
+    found = _registered(equations, own, free, predicted)
+    used = found.instruments
+    if "frame" not in free or "rotation" not in equations.kinds or used is None:
+        return [found]
+    if equations.robot.profile.instrument.imu is not None:
+        return [found]
+    other = [replace(t, turns_rotation=not t.turns_rotation) for t in used.trackers]
+    both = [found, with_instruments(equations, replace(used, trackers=tuple(other)))]
+    both.sort(key=lambda trial: not _first_tracker(trial).turns_rotation)
+    plain = [rms(errors_at(trial, trial.parameters.nominal, predicted).angle) for trial in both]
+    least = min(plain)
+    return [trial for trial, error in zip(both, plain, strict=True) if error <= _PLAINLY * least]
+
+
+def _first_tracker(equations: Equations) -> Tracker:
+    assert equations.instruments is not None
+    return equations.instruments.trackers[0]
+
+
+def _registered(
+    equations: Equations, own: Instruments, free: frozenset[str], predicted: Pose
+) -> Equations:
+    """Equations with these numbers free, at the values of the registration."""
+    imu = equations.robot.profile.instrument.imu is not None
+    instruments = registered_instruments(own, free, predicted, equations.measured, imu=imu)
+    return with_instruments(equations, instruments)
+
+
+def with_instruments(equations: Equations, instruments: Instruments) -> Equations:
+    """The equations with other instruments; the other parameters start as they do."""
+    block = equations.parameters.block
+    wider = parameters_of(
+        equations.robot,
+        equations.effects,
+        swivel="swivel_zero" in block,
+        length_offset="length_offset" in block,
+        instruments=instruments,
+    )
+    return replace(equations, parameters=wider, instruments=instruments)
+
+
+def _nominal_error(equations: Equations, predicted: Pose) -> float:
+    return rms(errors_at(equations, equations.parameters.nominal, predicted).distance)
+
+
+def _shows_more(first: Fitted, wider: Equations) -> bool:
+    """Score test: whether one more free part of the tracker explains a significant part of χ².
+
+    The equations are linearised at the end of the fit with these numbers beside the parameters. The
+    step −(H + 1)⁻¹ g changes 2 cost by −gᵀ (H + 1)⁻¹ g; the prior's part of that is left out.
+    """
+    from scipy.special import chdtri
+
+    own = first.equations.instruments or declared_instruments(
+        first.equations.robot, first.equations.measured
+    )
+    assert wider.instruments is not None
+    free = wider.instruments.free
+    if not (own.free < free and len(free) == len(own.free) + 1):
+        return False
+    trial = with_instruments(first.equations, replace(own, free=free))
+    values, held = trial.parameters.nominal, np.zeros(len(trial.parameters), dtype=bool)
+    for name, indices in first.equations.parameters.block.items():
+        target = trial.parameters.block[name]
+        values[target] = first.solution.state.values[indices]
+        held[target] = first.solution.held[indices] != 0
+    linear = linearise(trial, State(values, first.solution.state.pose), first.weights)
+    gradient, prior = linear.gradient[~held], linear.prior[~held]
+    matrix = linear.information[np.ix_(~held, ~held)] + np.eye(len(gradient))
+    step = -np.linalg.solve(matrix, gradient)
+    fall = -float(gradient @ step) + float(np.sum((prior + step) ** 2 - prior**2))
+    more = len(trial.parameters) - len(first.equations.parameters)
+    return not fall < chdtri(more, _LEVEL)
+
+
+def _mounted(best: Fitted, predicted: Pose, options: Options, progress: ProgressCallback) -> Fitted:
+    """The fit with the target's axes free, where the measured rotations require it."""
+    own = best.equations.instruments
+    if own is None or "rotation" not in best.equations.kinds or "mounting" in own.free:
+        return best
+    trial = _registered(best.equations, own, own.free | {"mounting"}, predicted)
+    found = _fitted(trial, options, progress)
+    turned = (rms(fit.errors.angle) for fit in (found, best))
+    after, before = turned
+    return found if found.criterion < best.criterion and after < _LEAST_FALL * before else best
+
+
+def _fitted(
+    equations: Equations,
+    options: Options,
+    progress: ProgressCallback,
+    from_fit: Fitted | None = None,
+) -> Fitted:
+    """Fit and variance components in turn until both have settled.
+
+    A model that contains another one starts at the fit of that, so that it fits at least as well.
+    """
+    given = options.sigma or {}
+    if from_fit is None:
+        equations, state = _start(equations, options)
+        weights = Weights(_sigma(equations, options))
+    else:
+        equations, state = _continued(equations, from_fit)
+        weights = Weights({**_sigma(equations, options), **from_fit.weights.sigma})
+    solution = solve(equations, state, weights, _reporter(progress, "fit"))
+    for _ in range(_NOISE_ROUNDS):
+        found = replace(re_estimated_weights(solution, weights, given), loss=options.loss)
+        if found.loss == weights.loss and _settled(found.sigma, weights.sigma):
+            break
+        weights = found
+        solution = solve(equations, solution.state, weights, _reporter(progress, "refit"))
+    return Fitted(equations, solution, weights)
+
+
+def _continued(equations: Equations, fitted: Fitted) -> tuple[Equations, State]:
+    """Equations with the priors of a fit of fewer parameters, and its end as their state."""
+    parameters, own = equations.parameters, fitted.equations.parameters
+    for name, indices in own.block.items():
+        parameters = parameters.starting(name, own.nominal[indices])
+    values = parameters.nominal
+    for name, indices in own.block.items():
+        values[parameters.block[name]] = fitted.solution.state.values[indices]
+    return replace(equations, parameters=parameters), State(values, fitted.solution.state.pose)
+
+
+def _start(equations: Equations, options: Options) -> tuple[Equations, State]:
+    """Nominal parameters within bounds, poses estimated with them, zeros of instruments."""
+    low, high = equations.parameters.bounds
+    values = np.clip(equations.parameters.nominal, low, high)
+    placing = Weights({**_sigma(equations, options), "swivel": np.inf, "cable_length": np.inf})
+    state = place(equations, State(values, start_of(equations)), placing)
+    parameters = equations.parameters
+    for kind, block in (("swivel", "swivel_zero"), ("cable_length", "length_offset")):
+        if block in parameters.block:
+            parameters = parameters.starting(block, equations.offsets(kind, state))
+    equations = replace(equations, parameters=parameters)
+    return equations, State(np.clip(parameters.nominal, low, high), state.pose)
+
+
+def _sigma(equations: Equations, options: Options) -> dict[str, float]:
+    given = options.sigma or {}
+    return {kind: given.get(kind, NOISE[kind].start) for kind in equations.kinds}
+
+
+def _reporter(progress: ProgressCallback, word: str) -> Callable[[int, float], None]:
+    return lambda step, cost: progress(f"{word}: step {step}, cost {cost:.6g}")
+
+
+def _settled(new: Mapping[str, float], old: Mapping[str, float]) -> bool:
+    return all(abs(new[kind] - old[kind]) <= _SETTLED_CHANGE * old[kind] for kind in new)

@@ -1,0 +1,337 @@
+"""``winchkit calibrate``: a robot's geometry and winches from poses of which anything was seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from winchkit.cli.core.command import Example
+from winchkit.cli.core.completion import complete_bench, complete_effect, complete_sim_bench
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import PROFILE, RUN, output_option
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.terminal import progress_bar
+from winchkit.cli.model.options import (
+    ManyValues,
+    figures_option,
+    html_option,
+    page_title,
+    read_all,
+    write_figures,
+    write_page,
+)
+from winchkit.errors import UsageError, suggest
+from winchkit.robot.cli.pose_series import pose_names
+
+if TYPE_CHECKING:
+    from winchkit.cli.core.terminal import ProgressCallback
+    from winchkit.robot.calibration.calibrate import Calibrated
+    from winchkit.robot.calibration.options import Options
+    from winchkit.robot.calibration.pose_design import NextPose
+    from winchkit.robot.cli.pose_series import PoseSeries
+
+Loss = Literal["least-squares", "huber", "cauchy"]
+
+_LOSSES: tuple[Loss, ...] = ("least-squares", "huber", "cauchy")
+_NOISE_DIMENSIONS = {
+    "closure": "length",
+    "position": "length",
+    "rotation": "angle",
+    "swivel": "angle",
+    "cable_length": "length",
+    "balance": "force",
+}
+
+
+@click.command(
+    cls=ManyValues,
+    examples=(
+        "winchkit calibrate cabtive poses.csv -o calibrated.toml",
+        "winchkit calibrate cabtive poses.csv --validate more.csv --next 5 -o calibrated.toml",
+        Example(
+            "winchkit calibrate cabtive --sim cabtive-robot -o calibrated.toml",
+            "takes minutes; a test executes it with fewer poses",
+        ),
+        Example(
+            "winchkit calibrate cabtive -b robot.toml --poses 60 -o calibrated.toml",
+            "needs a bench with a robot",
+        ),
+    ),
+)
+@click.argument("robot", type=PROFILE)
+@click.argument("runs", nargs=-1, metavar="[RUN...]", type=RUN)
+@click.option(
+    "-b",
+    "--bench",
+    metavar="FILE",
+    shell_complete=complete_bench,
+    help="Let this bench drive to the poses and measure them.",
+)
+@click.option(
+    "--sim",
+    metavar="NAME",
+    shell_complete=complete_sim_bench,
+    help="Let this simulated robot do so, in simulated time.",
+)
+@click.option(
+    "--poses",
+    type=click.IntRange(10),
+    default=60,
+    show_default=True,
+    help="Number of poses to drive to.",
+)
+@click.option(
+    "--held-out",
+    type=click.IntRange(1),
+    default=20,
+    show_default=True,
+    help="Number of poses for validation only.",
+)
+@click.option(
+    "--box",
+    metavar="LENGTH",
+    type=Quantity("length", example="75 mm"),
+    default="75 mm",
+    show_default=True,
+    help="Half width of the volume about home.",
+)
+@click.option(
+    "--turn",
+    metavar="ANGLE",
+    type=Quantity("angle", example="7.5 deg"),
+    default="7.5 deg",
+    show_default=True,
+    help="Largest rotation from home.",
+)
+@click.option(
+    "--accuracy",
+    metavar="LENGTH",
+    type=Quantity("length", example="1 mm"),
+    help="Add poses until the error is below this.",
+)
+@click.option(
+    "--validate",
+    "validate",
+    multiple=True,
+    metavar="RUN...",
+    type=RUN,
+    help="Run for validation only; without it every tenth pose.",
+)
+@output_option("Profile to write.", "NEW.toml", required=True)
+@click.option(
+    "--effect",
+    "effects",
+    multiple=True,
+    metavar="NAME",
+    shell_complete=complete_effect,
+    help="Fit this effect too.",
+)
+@click.option(
+    "--noise", "noise", multiple=True, metavar="KIND=VALUE",
+    help="A known standard deviation, e.g. position='0.02 mm'; else estimated.",
+)  # fmt: skip
+@click.option("--loss", type=click.Choice(_LOSSES), default="least-squares", show_default=True)
+@click.option(
+    "--middle-force",
+    metavar="FORCE",
+    type=Quantity("force", example="80 N"),
+    help="Cable force kept near, where not measured.",
+)
+@click.option(
+    "--next", "following", type=click.IntRange(0), default=0, help="Number of poses to propose."
+)
+@click.option("--fit-report", is_flag=True, help="Print the report of the fit too.")
+@click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+@html_option
+@figures_option
+def command(
+    robot: str,
+    runs: Sequence[str],
+    bench: str | None,
+    sim: str | None,
+    poses: int,
+    held_out: int,
+    box: str,
+    turn: str,
+    accuracy: str | None,
+    validate: Sequence[str],
+    output: str,
+    effects: Sequence[str],
+    noise: Sequence[str],
+    loss: str,
+    middle_force: str | None,
+    following: int,
+    fit_report: bool,
+    as_json: bool,
+    html: str | None,
+    figures: str | None,
+) -> None:
+    """Calibrate the robot of profile ROBOT on the poses of RUNs and write the better profile.
+
+    A row of a run is a pose: motor angles of all lines, and whatever else was measured there, in
+    any mix: position, rotation or some of its angles, swivel angles, cable lengths. The poses
+    themselves are always found beside the parameters. Exit status 1, and no file, where the
+    held-out error is larger than that of ROBOT.
+
+    With --bench there are no RUNs: the bench moves its robot to random poses about home, waits for
+    rest, averages the tracker and the load cells, fits, and judges other poses. Ctrl-C stops it.
+    With --sim a simulated robot does the same on a simulated clock, as fast as this computer can.
+    """
+    from winchkit.catalog import find
+    from winchkit.robot.calibration.pose_design import next_poses
+
+    source = find("profiles", robot)
+    options = _options(effects, noise, loss, middle_force)
+    if bool(runs) + bool(bench) + bool(sim) != 1:
+        raise UsageError(
+            "give the RUNs to fit, or --bench to drive to poses and measure them, or --sim for a "
+            "simulated robot"
+        )
+    with progress_bar() as progress:
+        if not runs:
+            series = _series(
+                robot,
+                Path(output),
+                options,
+                poses=poses,
+                held_out=held_out,
+                box=box,
+                turn=turn,
+                accuracy=accuracy,
+                progress=progress,
+            )
+            found = (series.on_bench(bench) if bench else series.simulated(str(sim))).calibrated
+            runs = [str(pose_names(Path(output))["fit"])]
+        else:
+            found = _calibrated(source, runs, validate, options, progress)
+        progress("proposing poses", None)
+        ahead = next_poses(found, following) if following else []
+    if len(ahead) < following:
+        click.echo(f"only {len(ahead)} of {following} poses can be held by the cables", err=True)
+    if not found.refusal:
+        _write(source, found, Path(output), runs)
+    _tell(found, ahead, as_json)
+    if fit_report and not as_json:
+        click.echo(f"\n{found.fit_report()}")
+    if html:
+        from winchkit.robot.report.calibration import calibration_html
+
+        title = page_title(found.equations.robot.profile.name, runs)
+        write_page(html, calibration_html(found, ahead, title, _source(robot, runs), output))
+    if figures:
+        from winchkit.robot.report.calibration import calibration_figures
+
+        write_figures(figures, calibration_figures(found, _source(robot, runs)))
+    if found.refusal:
+        click.echo(f"winchkit: {found.refusal}", err=True)
+        click.get_current_context().exit(1)
+    suggest_next("diagnose", runs, "-p", output)
+
+
+def _series(
+    robot: str,
+    output: Path,
+    options: Options,
+    *,
+    poses: int,
+    held_out: int,
+    box: str,
+    turn: str,
+    accuracy: str | None,
+    progress: ProgressCallback,
+) -> PoseSeries:
+    from winchkit.cli.core.quantities import optional, quantity
+    from winchkit.robot.bench.self_calibration import PoseVolume
+    from winchkit.robot.cli.pose_series import PoseSeries
+
+    volume = PoseVolume(quantity(box, "length"), quantity(turn, "angle"))
+    wanted = optional(accuracy, "length")
+    return PoseSeries(robot, output, poses, held_out, volume, options, wanted, progress)
+
+
+def _source(robot: str, runs: Sequence[str]) -> str:
+    """Profile, runs and version, as the figures name them."""
+    from importlib.metadata import version
+
+    names = ", ".join(Path(run).name for run in runs)
+    return f"profile {robot}; {names}; winchkit {version('winchkit')}"
+
+
+def _options(
+    effects: Sequence[str], noise: Sequence[str], loss: str, middle_force: str | None
+) -> Options:
+    from winchkit.cli.core.quantities import optional
+    from winchkit.robot.calibration.options import Options
+
+    middle = optional(middle_force, "force")
+    return Options(tuple(effects), _loss(loss), _noise(noise), middle)
+
+
+def _calibrated(
+    source: Path,
+    runs: Sequence[str],
+    validate: Sequence[str],
+    options: Options,
+    progress: ProgressCallback,
+) -> Calibrated:
+    """Fit all rows where others validate, else nine of ten."""
+    from winchkit.robot.calibration.calibrate import calibrate
+    from winchkit.robot.files.poses import read_poses
+    from winchkit.robot.geometry.robot import robot_of
+    from winchkit.schema.read import read_robot
+
+    profile = read_robot(source)
+    measured = read_poses(read_all(runs), profile)
+    held = read_poses(read_all(validate), profile) if validate else None
+    progress("fitting", None)
+    return calibrate(robot_of(profile), measured, held, options, note)
+
+
+def _tell(found: Calibrated, ahead: Sequence[NextPose], as_json: bool) -> None:
+    from winchkit.robot.calibration.results import calibration_json, calibration_text
+
+    if not as_json:
+        click.echo(calibration_text(found, ahead))
+        return
+    for warning in found.warnings:
+        click.echo(f"{warning} (warning)", err=True)
+    echo_json(calibration_json(found, ahead))
+
+
+def _loss(name: str) -> Loss:
+    return next(loss for loss in _LOSSES if loss == name)
+
+
+def _noise(given: Sequence[str]) -> Mapping[str, float]:
+    """``position=0.02 mm`` as SI by kind."""
+    from winchkit.cli.core.quantities import check_typed, quantity
+
+    out = {}
+    for text in given:
+        kind, equals, value = text.partition("=")
+        kind = kind.strip()
+        if not equals or kind not in _NOISE_DIMENSIONS:
+            known = list(_NOISE_DIMENSIONS)
+            raise UsageError(
+                f"--noise '{text}': write KIND=VALUE with one of {', '.join(known)}"
+                + ("" if kind in known else suggest(kind, known))
+            )
+        check_typed(f"--noise {kind}", value, _NOISE_DIMENSIONS[kind])
+        out[kind] = quantity(value, _NOISE_DIMENSIONS[kind])
+        if not out[kind] > 0:
+            raise UsageError(f"--noise '{text}': a standard deviation is above zero")
+    return out
+
+
+def _write(source: Path, found: Calibrated, out: Path, runs: Sequence[str]) -> None:
+    from datetime import UTC, datetime
+
+    from winchkit.robot.calibration.profile import Provenance, write_calibrated
+
+    today = datetime.now(UTC).date()
+    write_calibrated(source, found, out, Provenance([Path(run).name for run in runs], today))
+    note(f"written: {out}")

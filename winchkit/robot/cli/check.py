@@ -1,0 +1,106 @@
+"""What ``winchkit check`` says about robots: whether the cables can hold the platform at home."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from winchkit.errors import Fault
+
+if TYPE_CHECKING:
+    from winchkit.robot.geometry.robot import Robot
+    from winchkit.schema.read import Declared
+    from winchkit.schema.reading.lines import Key
+
+Said = list[tuple["Key", str]]
+_NEAR = 1e-3
+"""m and rad: far above the tolerance of the solution, below what a profile can mean by another
+pose."""
+
+
+def faults_and_warnings(file: str, value: Declared) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
+    """Faults and warnings of a robot's geometry at home; none of anything else."""
+    from winchkit.schema.profiles.robot import RobotProfile
+    from winchkit.schema.reading.source import open_source
+
+    if not isinstance(value, RobotProfile):
+        return (), ()
+    from winchkit.robot.geometry.robot import robot_of
+
+    source, robot = open_source(file), robot_of(value)
+    faults = _lengths(robot)
+    warnings: Said = []
+    if not faults and len(value.line) < 6:
+        faults, warnings = _hanging(robot)
+    elif not faults:
+        faults, warnings = _held(robot)
+    return (
+        tuple(source.fault(key, message) for key, message in faults),
+        tuple(source.fault(key, message) for key, message in warnings),
+    )
+
+
+def _lengths(robot: Robot) -> Said:
+    """Lines whose cable has no way from the pulley to the platform."""
+    from math import isfinite
+
+    return [
+        (
+            ("line", n, "anchor_point"),
+            f"at home the anchor of line {name} lies inside its swivel pulley "
+            f"(swivel_radius {radius * 1e3:g} mm); move home, or mend the points",
+        )
+        for n, (name, length, radius) in enumerate(
+            zip(robot.names, robot.home_length, robot.geometry.swivel_radius, strict=True)
+        )
+        if not (isfinite(length) and length > 0)
+    ]
+
+
+def _held(robot: Robot) -> tuple[Said, Said]:
+    """Six lines or more: do pulling cables balance the weight?"""
+    from winchkit.robot.forces.force_distribution import ForceLimits, wrench_feasibility
+
+    limits = ForceLimits(0.0, float("inf"))
+    weight = robot.weight(robot.home)[0]
+    found = wrench_feasibility(robot.structure(robot.home)[0], weight, limits)
+    mass = robot.profile.platform.mass
+    if not found.feasible:
+        return [
+            (
+                ("home",),
+                f"no pulling cables hold the platform of {mass:g} kg there: some cable would "
+                "have to push; move home, or mend exit_point, anchor_point or center_of_mass",
+            )
+        ], []
+    if mass == 0 and not found.margin > 0:
+        return [], [(("platform",), "without mass nothing keeps the cables taut; give mass")]
+    return [], []
+
+
+def _hanging(robot: Robot) -> tuple[Said, Said]:
+    """Fewer lines: the platform hangs, and home should be where it comes to rest."""
+    import numpy as np
+
+    from winchkit.model.rotation import angles_of
+    from winchkit.robot.geometry.forward import forward
+
+    platform = robot.profile.platform
+    if platform.mass == 0:
+        few = f"{len(robot.names)} lines leave the platform free, only its weight settles its pose"
+        return [(("platform",), f"{few}; give mass")], []
+    found = forward(robot.geometry, robot.home_length[None], robot.home, platform)
+    if not found.converged[0]:
+        return [(("home",), "with the cables' lengths at home the platform hangs nowhere")], []
+    there, turned = found.pose.position[0], angles_of(found.pose.rotation[0])
+    moved = float(np.linalg.norm(there - robot.home.position[0]))
+    if moved <= _NEAR and np.allclose(found.pose.rotation, robot.home.rotation, atol=_NEAR):
+        return [], []
+    place = ", ".join(f'"{x * 1e3:.4g} mm"' for x in there)
+    angles = ", ".join(f'"{np.degrees(angle):.4g} deg"' for angle in turned)
+    return [], [
+        (
+            ("home",),
+            f"the platform does not rest there; with these cables it hangs at "
+            f"position = [{place}], rotation = [{angles}]",
+        )
+    ]

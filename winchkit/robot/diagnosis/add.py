@@ -1,0 +1,213 @@
+"""Add an effect to a robot's profile or remove one, refitted and compared by held-out error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from winchkit.arguments import require_type, require_types
+from winchkit.diagnosis.add import Addition, Removal
+from winchkit.diagnosis.regression.gls import Fit
+from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.effect import Effect
+from winchkit.effects.placement import at_line
+from winchkit.errors import UsageError
+from winchkit.robot.diagnosis.candidates import lacking, with_needs_met
+from winchkit.robot.diagnosis.errors import Errors, FittedModel, errors_of, output_fits_of
+from winchkit.robot.diagnosis.preparation import Preparation, prepare_selection
+from winchkit.robot.diagnosis.regression import PoseRegression
+from winchkit.robot.effects.bind import declared_terms, robot_terms
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.robot import RobotProfile
+
+
+@dataclass(frozen=True)
+class FittedRobotAddition:
+    """An addition with everything that it was derived from, for reports.
+
+    Attributes
+    ----------
+    regression : PoseRegression
+        The poses and the model.
+    errors : tuple of two dict
+        Errors before and after, at every pose, SI.
+    addition : Addition
+        What is printed.
+    """
+
+    regression: PoseRegression
+    errors: tuple[Errors, Errors]
+    addition: Addition
+
+
+def add_to_robot(
+    effect_id: str,
+    runs: Sequence[Run],
+    profile: RobotProfile,
+    line: str | None = None,
+    catalogue: Catalogue | None = None,
+) -> Addition:
+    """Fit an effect at its place beside the profile's own, with the geometry of the file.
+
+    Parameters
+    ----------
+    effect_id
+        Name of the effect.
+    runs
+        Poses.
+    profile
+        The robot.
+    line
+        Line on which the effect acts; None for an effect on the whole robot.
+    catalogue
+        Effects; by default all that are installed.
+
+    Returns
+    -------
+    Addition
+        Every effect with its estimates, and the errors before and after.
+
+    Raises
+    ------
+    UsageError
+        For an effect that is unknown, present already, at no such place, or that the poses cannot
+        show.
+    RunError
+        With every fault of every run.
+    """
+    return fitted_robot_addition(effect_id, runs, profile, line, catalogue).addition
+
+
+def fitted_robot_addition(
+    effect_id: str,
+    runs: Sequence[Run],
+    profile: RobotProfile,
+    line: str | None = None,
+    catalogue: Catalogue | None = None,
+) -> FittedRobotAddition:
+    """The same as :func:`add_to_robot`, with the errors at every pose."""
+    require_types(runs, Run, "runs")
+    require_type(profile, RobotProfile, "profile")
+    catalogue = catalogue or load_catalogue()
+    effect = _placed(catalogue[effect_id], profile, line)
+    if any(term.effect.id == effect.id for term in robot_terms(profile, catalogue)):
+        raise UsageError(f"robot '{profile.name}' has the effect '{effect.id}' already")
+    preparation = prepare_selection(runs, profile, catalogue)
+    if missing := lacking(effect, preparation.dataset):
+        raise UsageError(
+            f"effect '{effect_id}' cannot be seen in these poses: without {', '.join(missing)}"
+        )
+    return _added(preparation, with_needs_met(effect, preparation.dataset))
+
+
+def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
+    names = [known.name for known in profile.line]
+    places = effect.places(moving=True)
+    if not places:
+        raise UsageError(f"effect '{effect.id}' shows in the motion of a single winch only")
+    if line is None:
+        if not places & {"all", "platform"}:
+            raise UsageError(
+                f"effect '{effect.id}' acts on one line: name it with --winch, one of "
+                f"{', '.join(names)}"
+            )
+        return effect
+    if "one" not in places:
+        raise UsageError(f"effect '{effect.id}' acts on the robot as a whole; leave --winch out")
+    if line not in names:
+        raise UsageError(f"no line '{line}'; the lines are {', '.join(names)}")
+    return at_line(effect, line)
+
+
+def _added(preparation: Preparation, effect: Effect) -> FittedRobotAddition:
+    engine = preparation.file_geometry()
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
+    scores = [s for s in engine.scores(initial_model, noise) if s.candidate.effect.id == effect.id]
+    if not scores:
+        raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
+    final: Fit = engine.trial(initial_model, scores[0], noise).fit
+    regression = engine.regression
+    before, after = (
+        FittedModel(regression, fit, noise, engine.regression.groups)
+        for fit in (initial_model, final)
+    )
+    spread = spread_of(regression, final, noise, engine.regression.blocks)
+    own = {
+        term.effect.id for term in declared_terms(preparation.dataset.robot, preparation.catalogue)
+    }
+    found = estimates(regression, final, spread)
+    # Effects of a line's winch are refitted too and stay in the winch's own profile.
+    terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
+    was, now = (
+        errors_of(regression, regression.at(fit.hypothesis)) for fit in (initial_model, final)
+    )
+    addition = Addition(
+        output_fits_of(before, after, preparation.noise), terms, preparation.dataset.notes
+    )
+    return FittedRobotAddition(regression, (was, now), addition)
+
+
+def remove_from_robot(
+    effect_id: str,
+    runs: Sequence[Run],
+    profile: RobotProfile,
+    catalogue: Catalogue | None = None,
+) -> Removal:
+    """Refit the profile's effects without one of them, ``EFFECT`` or ``EFFECT/LINE``.
+
+    ``home-length`` alone removes those of all lines.
+
+    Parameters
+    ----------
+    effect_id
+        Name of the effect, with its line where it has one.
+    runs
+        Poses.
+    profile
+        The robot.
+    catalogue
+        Effects; by default all that are installed.
+
+    Returns
+    -------
+    Removal
+        The other effects with their estimates, and the errors before and after.
+
+    Raises
+    ------
+    UsageError
+        For an effect that the profile itself does not have.
+    RunError
+        With every fault of every run.
+    """
+    require_types(runs, Run, "runs")
+    require_type(profile, RobotProfile, "profile")
+    catalogue = catalogue or load_catalogue()
+    own = [term.effect.id for term in declared_terms(profile, catalogue)]
+    gone = [name for name in own if name == effect_id]
+    if not gone and effect_id == "home-length":
+        gone = [name for name in own if name.startswith("home-length/")]
+    if not gone:
+        has = ", ".join(own) or "none"
+        raise UsageError(f"robot '{profile.name}' has no effect '{effect_id}'; it has {has}")
+    preparation = prepare_selection(runs, profile, catalogue)
+    engine = preparation.file_geometry()
+    initial_model, noise = engine.fit_with_noise(engine.initial_model)
+    hypothesis = initial_model.hypothesis
+    for index in reversed(range(len(hypothesis.terms))):
+        if hypothesis.terms[index].effect.id in gone:
+            hypothesis = hypothesis.without(index)
+    final, _ = engine.fit_with_noise(hypothesis)
+    regression = engine.regression
+    before, after = (
+        FittedModel(regression, fit, noise, engine.regression.groups)
+        for fit in (initial_model, final)
+    )
+    found = estimates(
+        regression, final, spread_of(regression, final, noise, engine.regression.blocks)
+    )
+    # Effects of a line's winch are refitted too and stay in the winch's own profile.
+    left = tuple(item for item in found if item[0].effect.id in own)
+    outputs = output_fits_of(before, after, preparation.noise)
+    return Removal(effect_id, outputs, left, preparation.dataset.notes)

@@ -1,0 +1,1 @@
+"""Data of a robot's diagnosis: poses at rest, or samples of a trajectory."""

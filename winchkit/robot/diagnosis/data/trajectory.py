@@ -1,0 +1,213 @@
+"""Trajectory of a robot: samples in time with the motion of platform and winches.
+
+Rows of a log are averaged over blocks in which no cable moves by more than 5 mm, a filter that all
+channels pass alike. The platform's motion is that of the motor angles by the profile without
+effects, smoothed; its derivatives give the inertial forces and the distance by which a delayed
+tracker lags. Samples that lack a channel take part in the motion and are not compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from winchkit.arrays import Array
+from winchkit.diagnosis.data.sampling import bridged
+from winchkit.errors import Fault, RunError
+from winchkit.model.line import Line
+from winchkit.model.rotation import rotation_by, rotation_vector
+from winchkit.model.smoothing_spline import SmoothingSpline
+from winchkit.robot.dynamics.dynamics import PlatformMotion, dynamic_wrench
+from winchkit.robot.dynamics.smoothed_motion import SmoothedMotion, smoothed_motion
+from winchkit.robot.files.holds import averaged
+from winchkit.robot.files.poses import Measured, Samples, joined
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.robot import robot_of
+from winchkit.robot.geometry.wrench import gravity_wrench
+from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
+
+_TRAVEL = 5e-3
+"""Cable travel within a block, m: the second order of a length of 0.5 m is then 2 µm."""
+_MOST = 300
+"""Samples that are kept, every m-th block of a longer log."""
+_LEAST = 50
+"""Samples of a run from which its noise has a spectrum."""
+_LEAST_KNOWN = 0.5
+"""Share of finite values from which a channel is compared."""
+_CHANNELS = ("position", "angles", "swivel", "cable_length", "tension")
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Motion at the p samples of a data set, run after run."""
+
+    time: Array
+    """Since each run's start, (p,), s."""
+    runs: tuple[slice, ...]
+    """Samples of each run."""
+    motor_rate: Array
+    """(p, n), rad/s."""
+    valid: NDArray[np.bool_]
+    """Samples that have every compared channel, (p,)."""
+    smoothed: tuple[SmoothedMotion, ...]
+    """Of each run."""
+    _shifts: dict[float, Array] = field(default_factory=dict, repr=False, compare=False)
+
+    @cached_property
+    def motion(self) -> PlatformMotion:
+        """Of all samples."""
+        parts = [each.motion for each in self.smoothed]
+        return PlatformMotion(
+            Pose(
+                np.concatenate([part.pose.position for part in parts]),
+                np.concatenate([part.pose.rotation for part in parts]),
+            ),
+            np.concatenate([part.velocity for part in parts]),
+            np.concatenate([part.acceleration for part in parts]),
+        )
+
+    def inertial_wrench(self, platform: PlatformSpec) -> Array:
+        """Inertial forces on a platform about its origin, (p, 6), N and N m."""
+        weight = gravity_wrench(platform, self.motion.pose.rotation)
+        return np.asarray(dynamic_wrench(platform, self.motion) - weight)
+
+    def force_std(self, platform: PlatformSpec) -> float:
+        """Standard deviation of the inertial force by that of the acceleration, rms, N."""
+        std = np.concatenate([each.acceleration_std[:, :3] for each in self.smoothed])
+        return platform.mass * float(np.sqrt(np.mean(np.sum(std**2, axis=1))))
+
+    def earlier(self, delay: float) -> Array:
+        """Displacement to the pose of a time before, (p, 6): position, m, and rotation vector, rad.
+
+        Before the first and after the last sample of a run the speed is taken to be constant.
+        """
+        if delay not in self._shifts:
+            self._shifts.clear()
+            parts = [
+                _displacement(curve, self.time[rows], delay)
+                for curve, rows in zip(self._curves, self.runs, strict=True)
+            ]
+            self._shifts[delay] = np.concatenate(parts)
+        return self._shifts[delay]
+
+    @cached_property
+    def _curves(self) -> list[CubicSpline]:
+        return [
+            CubicSpline(self.time[rows], each.coordinates)
+            for rows, each in zip(self.runs, self.smoothed, strict=True)
+        ]
+
+
+def _displacement(curve: CubicSpline, time: Array, delay: float) -> Array:
+    inside = np.clip(time - delay, time[0], time[-1])
+    here, beyond = curve(time), (time - delay - inside)[:, None]
+    there = curve(inside) + beyond * curve(inside, 1)
+    turned = rotation_by(there[:, 3:]) @ np.swapaxes(rotation_by(here[:, 3:]), 1, 2)
+    return np.hstack([there[:, :3] - here[:, :3], rotation_vector(turned)])
+
+
+def trajectory_of(samples: Samples, profile: RobotProfile) -> tuple[Measured, Trajectory]:
+    """Samples that are compared, and the motion along them.
+
+    Returns: ``measured``: means over blocks. Raises RunError for a run with fewer than 50 samples,
+    and where the motor angles fit no pose.
+    """
+    robot = robot_of(profile)
+    rows = samples.measured
+    parts, times, rates, motions, faults = [], [], [], [], []
+    stride = max(1, -(-sum(map(len, _blocks(samples, robot.lines))) // _MOST))
+    for number, blocks in enumerate(_blocks(samples, robot.lines)):
+        kept = blocks[::stride]
+        place = str(rows.place[blocks[0].start]).partition(" of ")[2] if blocks else ""
+        if len(kept) < _LEAST:
+            fault = f"only {len(kept)} samples in motion; at least {_LEAST} are needed"
+            faults.append(Fault(fault, place))
+            continue
+        time = averaged(samples.time[:, None], kept)[:, 0]
+        angle = averaged(_bridged(rows.motor_angle), kept)
+        found = robot.poses_at(angle)
+        missed = len(kept) - int(np.count_nonzero(found.converged))
+        if missed:
+            message = (
+                f"the motor angles of {missed} of {len(kept)} samples fit no pose of the robot "
+                f"'{profile.name}'; is this its profile, and are its lines those of the log?"
+            )
+            faults.append(Fault(message, place))
+            continue
+        moving = int(np.argmax(np.ptp(angle, axis=0)))
+        spline = SmoothingSpline.fit(time, angle[:, moving])
+        motions.append(smoothed_motion(spline, found.pose))
+        rates.append(np.stack([spline.smoothed(column, 1) for column in angle.T], axis=1))
+        parts.append(_averaged(rows, kept, angle, number))
+        times.append(time)
+    if faults:
+        raise RunError(faults)
+    measured = replace(joined(parts), notes=rows.notes, session_of_run=rows.session_of_run)
+    ends = np.cumsum([0, *map(len, parts)]).tolist()
+    valid, measured = _compared(measured)
+    runs = tuple(slice(a, b) for a, b in pairwise(ends))
+    motion = Trajectory(np.concatenate(times), runs, np.concatenate(rates), valid, tuple(motions))
+    return measured, motion
+
+
+def _blocks(samples: Samples, lines: tuple[Line, ...]) -> list[list[slice]]:
+    """Blocks of rows of each run, of equal length, in which no cable moves by more than 5 mm."""
+    rows, out = samples.measured, []
+    for number in range(int(rows.run.max()) + 1):
+        own = np.flatnonzero(rows.run == number)
+        angle = _bridged(rows.motor_angle[own])
+        travel = max(
+            float(np.quantile(np.abs(np.diff(angle[:, i])), 0.99)) * abs(line.arm(0.0))
+            for i, line in enumerate(lines)
+        )
+        size = int(np.clip(_TRAVEL / max(travel, 1e-9), 1, max(1, len(own) // _LEAST)))
+        first = int(own[0])
+        out.append([slice(at, at + size) for at in range(first, first + len(own) - size + 1, size)])
+    return out
+
+
+def _bridged(values: Array) -> Array:
+    """Columns with missing values interpolated; a column without any stays."""
+    return np.stack(
+        [bridged(column) if np.isfinite(column).any() else column for column in values.T], axis=1
+    )
+
+
+def _averaged(rows: Measured, blocks: list[slice], angle: Array, number: int) -> Measured:
+    """Means over blocks; NaN where one value of a block is missing."""
+    means: dict[str, Any] = {}
+    for name in (*_CHANNELS, "temperature"):
+        values = getattr(rows, name)
+        whole = np.stack([np.isfinite(values[block]).all(axis=0) for block in blocks])
+        mean = averaged(values, blocks, angles=name in ("angles", "swivel"))
+        means[name] = np.where(whole, mean, np.nan)
+    return replace(
+        rows,
+        **means,
+        motor_angle=angle,
+        run=np.full(len(blocks), number, dtype=np.intp),
+        place=rows.place[[block.start for block in blocks]],
+    )
+
+
+def _compared(measured: Measured) -> tuple[NDArray[np.bool_], Measured]:
+    """Samples that have all channels which most samples have; rarer channels are left out.
+
+    The equations of all samples are then the same, as a spectrum over time needs. Missing values
+    of the others are interpolated, and masked.
+    """
+    valid = np.ones(len(measured), dtype=bool)
+    kept: dict[str, Any] = {}
+    for name in _CHANNELS:
+        values = getattr(measured, name)
+        often = np.mean(np.isfinite(values), axis=0) > _LEAST_KNOWN
+        valid &= np.isfinite(values[:, often]).all(axis=1)
+        # A missing angle is masked, so that its branch does not matter.
+        kept[name] = np.where(often, _bridged(values), np.nan)
+    return valid, replace(measured, **kept)

@@ -1,0 +1,1 @@
+"""Dynamics of cable robots: motion, integration, and what control computes each cycle."""

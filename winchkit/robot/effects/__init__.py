@@ -1,0 +1,1 @@
+"""Effects on robots: their files, their binding to a profile, the standard poses."""

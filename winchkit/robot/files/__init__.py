@@ -1,0 +1,1 @@
+"""Runs of robots: measured poses, and the holds of a log."""

@@ -1,0 +1,1 @@
+"""Forces of cable robots: balance, distribution on the cables, elongation."""

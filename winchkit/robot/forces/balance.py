@@ -1,0 +1,174 @@
+"""Balance of cable forces and weight at the platform, as constraint equations of its poses.
+
+``balance`` (IPAnema paper, Eq. 7). The wrench Aᵀ f + w of measured cable forces f and weight w,
+multiplied by a matrix V with V Aᵀ A Vᵀ = 1, so that each row has the variance of one force reading.
+With the mass m and the centre of mass s of the platform
+
+    ∂w/∂m = [g; (R s) × g]                   ∂w/∂s_k = [0; R e_k × m g]
+
+The derivatives of V Aᵀ by pose and geometry are left out: the wrench that is left over is small.
+
+``hanging_balance``. A platform on fewer than six cables stands where their forces balance its
+weight. With the structure matrix Aᵀ, the measured cable forces f and the wrench w of the weight,
+six equations
+
+    S (Aᵀ f + w) = 0,      S = diag(1, 1, 1, 1/ρ, 1/ρ, 1/ρ)
+
+with the rms distance ρ of the anchor points from the platform's origin, so that all rows are
+forces. They determine the tilt that the cables leave free, so that their derivatives by pose, exit
+and anchor points and swivel radii are needed: central differences of 1 µm and 1 µrad.
+
+References
+----------
+IPAnema paper: docs/papers.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.robot.geometry.constraints import Constraint
+from winchkit.robot.geometry.kinematics import Geometry, Pose, structure_matrix
+from winchkit.robot.geometry.pose_estimation import moved_pose
+from winchkit.robot.geometry.wrench import gravity_wrench, weight_by_payload
+from winchkit.schema.profiles.robot import PlatformSpec
+
+_SEEN = 1e-6
+"""Singular values of a structure matrix below this share of the largest count as zero: rule of
+thumb, far above rounding and far below a robot that can be controlled."""
+
+_STEP = 1e-6
+"""m and rad, of central differences: the truncation (1e-12) and the rounding (2e-16/1e-6) stay
+below 1e-9 of a force. Also the least lever arm of a platform's anchor points, m."""
+
+
+def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSpec) -> Constraint:
+    """Whitened wrench of measured cable forces and weight, (p, 6), N.
+
+    V is the inverse of the Cholesky factor of Aᵀ A, so that the rows are NaN at poses where a force
+    is missing or the cables do not hold all six degrees of freedom.
+
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): measured cable
+    forces, N. Returns: ``by_robot`` has ``payload``: by mass and centre of mass, (p, 6, 4), and
+    ``tension``: by cable forces, (p, 6, n).
+    """
+    structure = structure_matrix(geometry, pose.position, pose.rotation)
+    spread = structure @ np.swapaxes(structure, 1, 2)
+    whiten = np.full_like(spread, np.nan)
+    good = np.all(np.isfinite(spread), axis=(1, 2)) & (np.linalg.matrix_rank(structure) == 6)
+    whiten[good] = np.linalg.inv(np.linalg.cholesky(spread[good]))
+    left = wrench_residual(structure, tension, gravity_wrench(platform, pose.rotation))
+    residual = (whiten @ left[..., None])[..., 0]
+    by_payload = whiten @ weight_by_payload(platform, pose.rotation)
+    by = {"payload": by_payload, "tension": whiten @ structure}
+    return Constraint(residual, np.zeros((*residual.shape, 6)), {}, by)
+
+
+def wrench_residual(structure: Array, tension: Array, weight: Array) -> Array:
+    """Wrench Aᵀ f + w that cable forces and weight leave over, (p, 6), N and N m.
+
+    ``structure`` (p, 6, n): structure matrices Aᵀ. ``tension`` (p, n): cable forces f, N.
+    ``weight`` (p, 6): wrench w of the weight, N and N m. Returns (p, 6): N and N m.
+    """
+    return np.asarray((structure @ tension[..., None])[..., 0] + weight)
+
+
+def force_basis(structure: Array) -> tuple[Array, Array]:
+    """Matrices from a wrench to whitened forces, and from these to cable forces.
+
+    ``structure`` (p, 6, n): structure matrices Aᵀ = U S Wᵀ (singular value decomposition). Returns:
+    ``to_forces`` (p, k, 6): V = S⁻¹ Uᵀ with k = min(6, n): a whitening as in :func:`balance`, from
+    which it differs by an orthogonal matrix. A row is NaN where the cables cannot carry its wrench,
+    so that robots of fewer than six cables keep the rows that they do carry. ``to_cables``
+    (p, n, k): W: the least change of cable forces that carries each of these forces.
+    """
+    good = np.all(np.isfinite(structure), axis=(1, 2))
+    left, size, right = np.linalg.svd(
+        np.where(good[:, None, None], structure, 0.0), full_matrices=False
+    )
+    seen = size > _SEEN * np.maximum(size[:, :1], 1e-300)
+    inverse = np.where(seen, 1 / np.where(seen, size, 1.0), np.nan)
+    to_forces = np.asarray(inverse[..., None] * np.swapaxes(left, 1, 2))
+    return to_forces, np.asarray(np.swapaxes(right, 1, 2))
+
+
+def hanging_residual(
+    geometry: Geometry,
+    pose: Pose,
+    tension: Array,
+    platform: PlatformSpec,
+    inertial: Array | float = 0.0,
+) -> Array:
+    """Residuals of :func:`hanging_balance` without their derivatives, (p, 6), N.
+
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): cable forces, N;
+    NaN where missing. ``inertial`` (p, 6): wrench of inertial forces, N and N m; zero at rest.
+    """
+    structure = structure_matrix(geometry, pose.position, pose.rotation)
+    weight = gravity_wrench(platform, pose.rotation) + inertial
+    return _scale(geometry) * wrench_residual(structure, tension, weight)
+
+
+def _scale(geometry: Geometry) -> Array:
+    """Diagonal of S, (6,)."""
+    lever = float(np.sqrt(np.mean(np.sum(geometry.anchor_point**2, axis=1))))
+    return np.repeat([1.0, 1.0 / max(lever, _STEP)], 3)
+
+
+def hanging_balance(
+    geometry: Geometry,
+    pose: Pose,
+    tension: Array,
+    platform: PlatformSpec,
+    inertial: Array | float = 0.0,
+) -> Constraint:
+    """Wrench of measured cable forces and weight, (p, 6), N.
+
+    ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): measured cable
+    forces, N; NaN where missing. ``inertial`` (p, 6): wrench of inertial forces, N and N m; zero at
+    rest. Returns: ``by_robot`` has ``payload``, (p, 6, 4), ``tension``, (p, 6, n), ``exit_point``
+    and ``anchor_point``, (p, 6, 3 n), and ``swivel_radius``, (p, 6, n).
+    """
+    scale = _scale(geometry)
+
+    def pulls(own: Geometry, at: Pose) -> Array:
+        """Wrench of each cable's force, (p, 6, n)."""
+        structure = structure_matrix(own, at.position, at.rotation)
+        return np.asarray(scale[:, None] * structure * tension[:, None, :])
+
+    def wrench(at: Pose) -> Array:
+        weight = scale * (gravity_wrench(platform, at.rotation) + inertial)
+        return np.asarray(pulls(geometry, at).sum(axis=2) + weight)
+
+    by_pose = np.empty((len(pose.position), 6, 6))
+    for index in range(6):
+        step = np.zeros((len(pose.position), 6))
+        step[:, index] = _STEP
+        ends = [wrench(moved_pose(pose, sign * step)) for sign in (1.0, -1.0)]
+        by_pose[..., index] = (ends[0] - ends[1]) / (2 * _STEP)
+    by = {
+        "payload": scale[:, None] * weight_by_payload(platform, pose.rotation),
+        "tension": scale[:, None] * structure_matrix(geometry, pose.position, pose.rotation),
+    }
+    # Each cable's wrench depends on its own points alone, so that all lines are moved at once.
+    for name in ("exit_point", "anchor_point", "swivel_radius"):
+        values = getattr(geometry, name)
+        parts = []
+        for move in _moves(values):
+            ends = [
+                pulls(replace(geometry, **{name: values + sign * move}), pose)
+                for sign in (1.0, -1.0)
+            ]
+            parts.append((ends[0] - ends[1]) / (2 * _STEP))
+        by[name] = np.stack(parts, axis=-1).reshape(len(pose.position), 6, values.size)
+    return Constraint(wrench(pose), by_pose, {}, by)
+
+
+def _moves(values: Array) -> list[Array]:
+    """Steps of one coordinate of all lines each."""
+    if values.ndim == 1:
+        return [np.full_like(values, _STEP)]
+    return [np.tile(row, (len(values), 1)) for row in _STEP * np.eye(values.shape[1])]

@@ -1,0 +1,1 @@
+"""Geometry of cable robots: kinematics with swivel pulleys, forward kinematics, poses."""

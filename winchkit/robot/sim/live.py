@@ -1,0 +1,64 @@
+"""The robot of a live simulated bench: its platform, and its tracker's datagrams."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from contextlib import suppress
+from importlib.util import find_spec
+from urllib.parse import urlsplit
+
+from winchkit.robot.sim.build import build_robot
+from winchkit.robot.sim.tracker import SimTracker
+from winchkit.schema.sim_platform import PlatformTruth
+from winchkit.schema.simbench import SimBench
+
+
+class LiveRobot:
+    """Platform, cable ends and tracker of a simulated bench; not thread-safe.
+
+    ``bench``: a bench with ``[robot]``. ``started``: time at which the winches start, s.
+    ``compiled``: whether the mechanics are compiled, where numba is installed; it takes a second or
+    two.
+    """
+
+    def __init__(
+        self,
+        bench: SimBench,
+        truth: PlatformTruth,
+        seed: int,
+        started: float,
+        *,
+        sends: bool,
+        compiled: bool,
+    ) -> None:
+        self._started = started
+        self.platform, self.profiles, self.ends, self.truth = build_robot(
+            bench, truth, compiled=compiled and find_spec("numba") is not None
+        )
+        self.on_pose: Callable[[bytes], None] | None = None
+        """Called with each datagram of the tracker, also in simulated time."""
+        self._socket: socket.socket | None = None
+        wiring = bench.bench.robot
+        if wiring is not None and wiring.tracker is not None and sends:
+            parts = urlsplit(wiring.tracker.listen)
+            self._address = (parts.hostname or "", parts.port or 0)
+            self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._tracker = SimTracker(self.platform, truth.tracker, seed, self._send)
+
+    def advance(self, now: float) -> None:
+        """Let the tracker measure and send at a time (s)."""
+        self._tracker.advance(now - self._started)
+
+    def close(self) -> None:
+        """Close the socket."""
+        if self._socket is not None:
+            self._socket.close()
+
+    def _send(self, datagram: bytes) -> None:
+        if self._socket is not None:
+            # A tracker sends whether its datagrams are received or not.
+            with suppress(OSError):
+                self._socket.sendto(datagram, self._address)
+        if self.on_pose is not None:
+            self.on_pose(datagram)

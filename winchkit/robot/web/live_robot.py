@@ -1,0 +1,48 @@
+"""The platform of a robot bench as its motor angles have it now."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from winchkit.robot.bench.wiring import robot_of_bench
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.web.robot import pose_picture
+from winchkit.schema.bench import BenchSpec
+
+_AGREE = 0.02
+"""Largest difference between a cable length by its drum and by the geometry, m, of
+``winchkit.robot.bench.platform``."""
+
+
+class LiveRobot:
+    """The robot of a bench, and the pose that was found last, from which the next is computed."""
+
+    def __init__(self, spec: BenchSpec) -> None:
+        robot = robot_of_bench(spec)
+        assert robot is not None, "the caller has looked"
+        self._robot = robot
+        self._last: Pose | None = None
+
+    def picture(self, status: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Pose and cables at a status; None where a motor angle is not known or fits no pose.
+
+        Returns: as of ``winchkit.robot.web.robot.pose_picture``, with ``row`` "live".
+        """
+        winches = [status.get("winch", {}).get(name, {}) for name in self._robot.names]
+        angles, tension = (
+            np.array([np.nan if one.get(key) is None else one[key] for one in winches], dtype=float)
+            for key in ("motor_angle", "tension")
+        )
+        if not np.isfinite(angles).all():
+            return None
+        forces = tension if np.isfinite(tension).all() else 0.0
+        found = self._robot.poses_at(angles[None, :], self._last, forces)
+        if not found.converged[0] or np.max(np.abs(found.residual[0])) > _AGREE:
+            self._last = None
+            return None
+        self._last = found.pose
+        source = "measured" if np.isfinite(tension).all() else "none"
+        return {"row": "live", **pose_picture(self._robot, found.pose, tension, source)}
