@@ -183,11 +183,16 @@ _FAILS: dict[str, Callable[[Line], bool]] = {
 }
 
 
+def fails(line: Line) -> bool:
+    """Whether an answer is not as the aims want it."""
+    return line["verdict"] in FAILED or _FAILS[line["kind"]](line)
+
+
 def failures(lines: Sequence[Line]) -> list[str]:
     """Cases that are not as the aims want them, a line each, with the errors over the noise."""
     out = []
     for line in lines:
-        if not (line["verdict"] in FAILED or _FAILS[line["kind"]](line)):
+        if not fails(line):
             continue
         errors = " ".join(
             f"{name} {o['before'] / o['noise']:.3g} -> {o['after'] / o['noise']:.3g}"
