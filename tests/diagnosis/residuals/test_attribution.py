@@ -10,7 +10,7 @@ import pytest
 from diagnosis_runs import recorded
 from winchkit.catalog import find
 from winchkit.diagnosis.data.dataset import prepare
-from winchkit.diagnosis.residuals.attribution import attributions, ranked
+from winchkit.diagnosis.residuals.attribution import Attribution, attributions, ranked
 from winchkit.diagnosis.search import selection_engine
 from winchkit.effects import load_catalogue
 from winchkit.schema.read import read_profile
@@ -24,15 +24,26 @@ class Told:
     share: float
 
 
-def first_followed(*physics: str) -> dict[str, str]:
-    """Per output the variable that its error follows most."""
+def followed(*physics: str) -> list[Attribution]:
+    """What the errors follow."""
     profile = read_profile(find("profiles", "bench-spiral"))
     engine = selection_engine(prepare(recorded(*physics), profile), load_catalogue())
     present, _ = engine.fit_with_noise(engine.initial_model)
+    return attributions(engine.regression, present.residual)
+
+
+def first_followed(*physics: str) -> dict[str, str]:
+    """Per output the variable that its error follows most."""
     out: dict[str, str] = {}
-    for found in attributions(engine.regression, present.residual):
+    for found in followed(*physics):
         out.setdefault(found.output, found.variable)
     return out
+
+
+def test_the_angles_and_the_length_are_one_variable() -> None:
+    told = {"drum_angle", "motor_angle", "cable_length"}
+    lengths = [f.variable for f in followed("fat drum") if f.output == "cable_length"]
+    assert len(told.intersection(lengths)) == 1
 
 
 @pytest.mark.slow

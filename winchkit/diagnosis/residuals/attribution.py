@@ -36,6 +36,9 @@ LEAST_TEMPERATURE_RANGE = 1.0
 """Range below which the temperature counts as constant, K: noise of the thermometer."""
 MOST_PLACES = 6
 """Lines of residual attribution that are reported."""
+_SAME_BINS = 0.95
+"""Share of samples in the same bins, above which two variables are names of one, such as drum and
+motor angle; the rest is play and the ends of bins."""
 _LEAST_JOINT_GAIN = 0.05
 """Share that two variables together must explain beyond either of them."""
 
@@ -73,7 +76,7 @@ def variables_of(recording: Recording) -> dict[str, Array]:
     """Variables that may explain a residual along one run, (n,) each."""
     known = [name for name in VARIABLES if name not in ("load", "tension", "temperature")]
     if isinstance(recording.raw.at.profile, AxisProfile):
-        known = [name for name in known if name not in _OF_THE_CABLE]
+        known = ["motor_angle", *(n for n in known if n not in {"motor_angle", *_OF_THE_CABLE})]
     out = {name: VARIABLES[name](recording.raw.at) for name in known}
     if recording.raw.load is not None:
         out["load"] = VARIABLES["load"](recording.smooth.at)
@@ -88,7 +91,7 @@ def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attr
     """Per output the variables that explain its residual, largest share first.
 
     ``residual`` (rows,). Returns: those whose share exceeds 2 % and three standard deviations of
-    its null distribution.
+    its null distribution; of several names of one variable the first.
     """
     out: list[Attribution] = []
     known = [variables_of(recording) for recording in regression.dataset.recordings]
@@ -96,16 +99,27 @@ def attributions(regression: TimeSeriesRegression, residual: Array) -> list[Attr
         runs = [s.run for s in regression.segments if s.output == output]
         valid = [regression.dataset.recordings[run].valid[output] for run in runs]
         error = regression.compared_samples(residual, output)
-        found, kept = [], kept_rows(regression, output)
+        found, seen, kept = [], list[NDArray[np.intp]](), kept_rows(regression, output)
         for name in known[runs[0]]:
             if any(name not in known[run] for run in runs):
                 continue
-            values = [known[run][name][v] for run, v in zip(runs, valid, strict=True)]
-            share = binned_share(np.concatenate(values), error, kept)
+            parts = [known[run][name][v] for run, v in zip(runs, valid, strict=True)]
+            values = np.concatenate(parts)
+            bins = quantile_bins(values)
+            if any(_are_one(bins, other) for other in seen):
+                continue
+            seen.append(bins)
+            share = binned_share(values, error, kept)
             if share > chance_share(BINS, kept):
                 found.append(Attribution(output, name, share))
         out += ranked(found)
     return out
+
+
+def _are_one(bins: NDArray[np.intp], other: NDArray[np.intp]) -> bool:
+    """Whether two variables rise or fall together, but for play and rounding."""
+    same = max(np.mean(bins == other), np.mean(bins == np.max(other) - other))
+    return bool(np.ptp(bins) > 0 and same > _SAME_BINS)
 
 
 def ranked(found: Iterable[_S]) -> list[_S]:
