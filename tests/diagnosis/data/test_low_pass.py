@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.low_pass import Compared, removed_by_low_pass, torque_cut_off
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.run import Channel, Run
@@ -110,3 +112,29 @@ def test_cogging_of_a_fast_motor_is_found_above_20_hz() -> None:
     assert values["amplitude"].value == pytest.approx(1e-3, abs=4 * values["amplitude"].std)
     assert values["amplitude"].std < 1e-4
     assert answer.diagnosis.verdict == "explained"
+
+
+def thinned(run: Run, step: int) -> Run:
+    """Every ``step``-th sample."""
+    channels = {
+        name: replace(channel, values=channel.values[::step])
+        for name, channel in run.channels.items()
+    }
+    return replace(run, name=f"{run.name}-slow", time=run.time[::step], channels=channels)
+
+
+def test_a_slow_logger_does_not_lower_the_cut_off_of_a_fast_one() -> None:
+    """At 50 Hz order 12 is seen beside its mirror images: the fast run tells which it is."""
+    runs = [fast_motor(1, 3e-3), thinned(fast_motor(2, 3e-3, seconds=8.0), 10)]
+    data = prepare(runs, AxisProfile(name="motor"))
+    fast, slow = (recording.bands["motor_torque"].cut_off for recording in data.recordings)
+    assert fast is not None
+    assert slow is not None
+    assert fast > 76.0
+    assert slow <= 20.0
+    (step,) = (
+        s
+        for s in diagnose(runs, AxisProfile(name="motor")).diagnosis.steps
+        if s.effects[0] == "motor-cogging"
+    )
+    assert step.parameters["motor-cogging"]["order"].value == 12

@@ -20,7 +20,7 @@ from winchkit.diagnosis.data.input_denoising import contrasts, denoised_motions
 from winchkit.diagnosis.data.low_pass import (
     Compared,
     RemovedBand,
-    cut_off_of,
+    cut_offs_of,
     removed_by_low_pass,
 )
 from winchkit.diagnosis.data.motor_current import with_torques
@@ -230,29 +230,21 @@ def prepare(
 
 
 def _removed(runs: Sequence[Run], dataset: Dataset) -> Iterator[RemovedBand]:
-    """What the low-pass of every output removes; of decimated runs from the measured output."""
+    """What the low-passes of every output remove; of decimated runs from the measured output."""
     for output in dataset.outputs:
-        own = [r for r in dataset.recordings if output in r.measured]
-        cut_off = own[0].bands[output].cut_off
-        if cut_off is None:
-            continue
-        if own[0].decimated:
-            compared = [
-                Compared(bridged(run["motor_angle"]), run[output], run[output], 1 / run.interval)
-                for run in runs
-                if output in run
-            ]
-        else:
-            compared = [
-                Compared(
-                    r.signals.motor_angle,
-                    r.measured[output],
-                    np.where(r.valid[output], r.measured[output] - r.nominal[output], np.nan),
-                    r.bands[output].rate,
-                )
-                for r in own
-            ]
-        yield removed_by_low_pass(compared, output, cut_off)
+        filtered: dict[float, list[Compared]] = {}
+        for run, r in zip(runs, dataset.recordings, strict=True):
+            cut_off = r.bands[output].cut_off if output in r.measured else None
+            if cut_off is None:
+                continue
+            if r.decimated:
+                whole = bridged(run["motor_angle"]), run[output], run[output], 1 / run.interval
+            else:
+                error = np.where(r.valid[output], r.measured[output] - r.nominal[output], np.nan)
+                whole = r.signals.motor_angle, r.measured[output], error, r.bands[output].rate
+            filtered.setdefault(cut_off, []).append(Compared(*whole))
+        for cut_off, compared in filtered.items():
+            yield removed_by_low_pass(compared, output, cut_off)
 
 
 def rounded_alike(dataset: Dataset, resolution: Mapping[str, float]) -> list[Finding]:
@@ -366,7 +358,9 @@ def assemble(
         else np.zeros(len(run), dtype=bool)
         for run, predicted, motion in zip(runs, nominal, raw, strict=True)
     ]
-    cut_off = filtering.band or cut_off_of(runs, nominal, stands, raw)
+    cut_offs = (
+        [filtering.band] * len(runs) if filtering.band else cut_offs_of(runs, nominal, stands, raw)
+    )
     outputs = ("motor_torque",) if isinstance(profile, AxisProfile) else OUTPUTS
     recordings = tuple(
         Recording(
@@ -384,8 +378,8 @@ def assemble(
             path=run.path,
             decimated=decimation is not None,
         )
-        for run, own, motion, denoised, predicted, still in zip(
-            runs, signals, raw, smooth, nominal, stands, strict=True
+        for run, own, motion, denoised, predicted, still, cut_off in zip(
+            runs, signals, raw, smooth, nominal, stands, cut_offs, strict=True
         )
         for shown in ([output for output in outputs if output in run and output in predicted],)
     )

@@ -36,6 +36,9 @@ _TORQUE_BAND = 20.0
 identification."""
 _HIGHEST_CUT_OFF = 0.4
 """In units of the sampling rate."""
+_SAME_RATE = 1.1
+"""Ratio of the sampling rates of two runs up to which they have one cut-off; clocks of one logger
+differ by less."""
 _ABOVE_ORDER = 1.5
 """Cut-off over the frequency of the highest order of a candidate: the filter passes 96 % there."""
 _AT_NOISE = 1.1
@@ -70,11 +73,11 @@ class Compared:
 
 
 def torque_cut_off(runs: Sequence[Compared], speed: float, lost: float = 0.0) -> float:
-    """Cut-off of the torque's low-pass, Hz, the same for all runs.
+    """Cut-off of the torque's low-pass, Hz, the same for all runs of a sampling rate.
 
-    ``runs``: torque of every run, at least one. ``speed``: highest speed of the motor, rad/s.
+    ``runs``: torque of every such run, at least one. ``speed``: highest speed of the motor, rad/s.
     Returns: 1.5 times the frequency of the highest order of a candidate at that speed, 20 Hz at
-    least and 0.4 of the lowest sampling rate at most. Where all above it is white noise, the
+    least and 0.4 of the sampling rate at most. Where all above it is white noise, the
     highest frequency at which a torque exceeds its noise, or 20 Hz or a tenth of the rate.
     """
     rate = min(run.rate for run in runs)
@@ -84,16 +87,16 @@ def torque_cut_off(runs: Sequence[Compared], speed: float, lost: float = 0.0) ->
     return min(max(usual, highest), max(_TORQUE_BAND, order), _HIGHEST_CUT_OFF * rate)
 
 
-def cut_off_of(
+def cut_offs_of(
     runs: Sequence[Run],
     nominal: Sequence[Mapping[str, Array]],
     stands: Sequence[NDArray[np.bool_]],
     motions: Sequence[Motion],
-) -> float | None:
-    """Cut-off of the torque's low-pass for all runs, Hz; None where no run has a torque.
+) -> list[float | None]:
+    """Cut-off of the torque's low-pass of every run, Hz; None for a run without a torque.
 
-    The acceleration of a known weight by differences of samples is too small at high frequencies:
-    1 % of the power may lie above the cut-off there.
+    Runs of one sampling rate have the same. The acceleration of a known weight by differences of
+    samples is too small at high frequencies: 1 % of the power may lie above the cut-off there.
     """
     compared = [
         Compared(
@@ -102,12 +105,20 @@ def cut_off_of(
             np.where(still, 0.0, run["motor_torque"] - own["motor_torque"]),
             1 / run.interval,
         )
-        for run, own, still, motion in zip(runs, nominal, stands, motions, strict=True)
         if "motor_torque" in run
+        else None
+        for run, own, still, motion in zip(runs, nominal, stands, motions, strict=True)
     ]
     speed = max(float(np.max(np.abs(motion.at.motor_rate))) for motion in motions)
     weighed = any(motion.load_mass is not None for motion in motions)
-    return torque_cut_off(compared, speed, weighed * LOST_POWER) if compared else None
+    lost = weighed * LOST_POWER
+
+    def cut_off(run: Compared) -> float:
+        alike = (other for other in compared if other is not None)
+        own = [one for one in alike if 1 / _SAME_RATE < one.rate / run.rate < _SAME_RATE]
+        return torque_cut_off(own, speed, lost)
+
+    return [None if run is None else cut_off(run) for run in compared]
 
 
 @dataclass(frozen=True)

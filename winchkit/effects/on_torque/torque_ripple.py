@@ -17,7 +17,8 @@ EFFECT = Effect(
     id="torque-ripple",
     stage=Stage.TORQUE_SIGNAL,
     parameters=(
-        Parameter("amplitude", "1", null=0.0, typical=0.02, low=0.0, high=10.0),
+        # Above 1 the torque constant would change its sign within a turn.
+        Parameter("amplitude", "1", null=0.0, typical=0.02, low=0.0, high=1.0),
         Parameter("phase", "rad", null=0.0, typical=1.0),
         order_per_turn(MOTOR_ORDERS, typical=2.0),
     ),
