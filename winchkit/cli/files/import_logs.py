@@ -225,7 +225,7 @@ def command(
     for finding in report["sanity"]:
         told.setdefault(f"{finding['channel']}: {finding['text']}", []).append(finding["run"])
     for text, names in told.items():
-        click.echo(f"{shortened(names)}: {text}", err=True)
+        click.echo(f"{shortened(list(dict.fromkeys(names)))}: {text}", err=True)
     report["runs"] = _written(results, targets, Path(output), as_json=as_json)
     if is_new or save_mapping:
         report["mapping"] = _saved(mapping_file, save_mapping or str(Path(output) / _MAPPING))
