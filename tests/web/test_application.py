@@ -21,10 +21,10 @@ pytest.importorskip("httpx2")
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from winchkit import index_library
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.write import write_addition
+from winchkit.fleet import index_library
 from winchkit.fleet.library.partitions import Partitions
 from winchkit.fleet.web.runs import Library
 from winchkit.robot.web.robot import RobotWork

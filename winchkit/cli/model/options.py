@@ -81,9 +81,25 @@ class Asked:
 
         return load_catalogue(self.effect_files)
 
-    def runs(self, paths: Sequence[str]) -> list[Run]:
-        """Runs of the one winch. Raises FileError with the faults of all files."""
+    def runs(
+        self, paths: Sequence[str], declared: WinchProfile | RobotProfile | None = None
+    ) -> list[Run]:
+        """Runs of the one winch, or of all lines of a robot.
+
+        Raises FileError with the faults of all files.
+        """
+        from winchkit.schema.profiles.robot import RobotProfile
+
+        if isinstance(declared, RobotProfile):
+            return read_all(paths)
         return read_runs(paths, self.winch)
+
+    def placed(self, effect: str, declared: WinchProfile | RobotProfile) -> str:
+        """``EFFECT/LINE`` where --winch names a line of a robot."""
+        from winchkit.schema.profiles.robot import RobotProfile
+
+        on_line = isinstance(declared, RobotProfile) and self.winch is not None
+        return f"{effect.partition('/')[0]}/{self.winch}" if on_line else effect
 
     @property
     def each(self) -> bool:
@@ -303,8 +319,14 @@ def declared_profile(path: Path) -> WinchProfile | RobotProfile:
     return value if isinstance(value, (WinchProfile, RobotProfile)) else read_profile(path)
 
 
-def refuse_options(band: float | None, winch: str | None = None) -> None:
+def refuse_options(
+    declared: WinchProfile | RobotProfile, band: float | None, winch: str | None = None
+) -> None:
     """Raise UsageError for options that mean nothing for a robot's poses."""
+    from winchkit.schema.profiles.robot import RobotProfile
+
+    if not isinstance(declared, RobotProfile):
+        return
     if band is not None:
         raise UsageError("--band: a robot's poses stand still and have no torque to filter")
     if winch is not None:

@@ -15,7 +15,7 @@ COMMANDS = {
 
 @click.group(
     cls=LazyGroup,
-    table=COMMANDS,
+    sections={"Commands": COMMANDS},
     examples=(
         "winchkit sim list",
         "winchkit sim record demo-elastic-rope programme-demo",

@@ -15,7 +15,7 @@ COMMANDS = {
 
 @click.group(
     cls=LazyGroup,
-    table=COMMANDS,
+    sections={"Commands": COMMANDS},
     examples=(
         Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
         Example(

@@ -15,7 +15,7 @@ COMMANDS = {
 
 @click.group(
     cls=LazyGroup,
-    table=COMMANDS,
+    sections={"Commands": COMMANDS},
     examples=(
         "winchkit library index .",
         "winchkit library list . --winch A",

@@ -26,15 +26,15 @@ import numpy as np
 from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.bench.lifecycle import stopped_after
+from winchkit.bench.tracker import Tracker, mean_pose
 from winchkit.catalog import find
 from winchkit.errors import NotPermitted, RunError, UsageError
 from winchkit.model.rotation import angles_of, rotation_of
 from winchkit.robot.bench.computation import Computation, at_once
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.planner import Planner, moved
-from winchkit.robot.bench.tracker import Tracker, mean_pose
 from winchkit.robot.bench.trajectory import PlatformTrajectory
-from winchkit.robot.bench.wiring import robot_of_bench
+from winchkit.robot.bench.wiring import wired_robot
 from winchkit.robot.calibration.calibrate import Calibrated, calibrate
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.pose_design import next_poses
@@ -364,7 +364,8 @@ def _refitted(spec: BenchSpec, fit: Run, options: Options | None) -> Robot | Non
     with TemporaryDirectory() as folder:
         path = Path(folder) / source.name
         write_calibrated(source, found, path, Provenance([fit.name], datetime.now(UTC).date()))
-        return robot_of_bench(replace(spec, robot=replace(spec.robot, profile=str(path))))
+        wired = wired_robot(replace(spec, robot=replace(spec.robot, profile=str(path))))
+        return None if wired is None else wired.robot
 
 
 def _fitted(
