@@ -6,7 +6,7 @@ from winchkit.wings import Wing
 
 WING = Wing(
     parts={
-        "wired_robot": "winchkit.robot.bench.wiring:wired_robot",
+        "wired_robot": "winchkit.robot.bench.wired:wired_robot",
         "live_robot": "winchkit.robot.web.live_robot:LiveRobot",
         "changes": "winchkit.robot.effects.reference:robot_changes",
         "simulated_profiles": "winchkit.robot.sim.build:profiles_of",

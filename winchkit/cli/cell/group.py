@@ -19,7 +19,7 @@ COMMANDS = {
 
 @click.group(
     cls=LazyGroup,
-    sections={"Commands": COMMANDS},
+    table=COMMANDS,
     examples=(
         "winchkit cell info",
         "winchkit cell diagnose --for 2s",

@@ -42,14 +42,16 @@ class LazyGroup(Group):
     def __init__(
         self,
         *args: Any,
-        sections: Mapping[str, Mapping[str, At]],
+        table: Mapping[str, At] | None = None,
+        sections: Mapping[str, Mapping[str, At]] | None = None,
         further: Found = tuple,
         foreign: Found = tuple,
         **options: Any,
     ) -> None:
         super().__init__(*args, **options)
-        self._own = {name: at for section in sections.values() for name, at in section.items()}
-        self._sections, self._further, self._foreign = sections, further, foreign
+        self._sections = {"Commands": table or {}} if sections is None else sections
+        self._own = {name: at for own in self._sections.values() for name, at in own.items()}
+        self._further, self._foreign = further, foreign
 
     @cached_property
     def sections(self) -> Mapping[str, Mapping[str, At]]:

@@ -39,7 +39,7 @@ _SHOW_PERIOD = 0.5
 
 @click.group(
     cls=LazyGroup,
-    sections={"Commands": COMMANDS},
+    table=COMMANDS,
     invoke_without_command=True,
     examples=(
         "winchkit log -o lift.mcap --for 5s",

@@ -15,7 +15,7 @@ COMMANDS = {
 
 @click.group(
     cls=LazyGroup,
-    sections={"Commands": COMMANDS},
+    table=COMMANDS,
     examples=(
         "winchkit sim list",
         "winchkit sim record demo-elastic-rope programme-demo",

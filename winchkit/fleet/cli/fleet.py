@@ -15,7 +15,7 @@ COMMANDS = {
 
 @click.group(
     cls=LazyGroup,
-    sections={"Commands": COMMANDS},
+    table=COMMANDS,
     examples=(
         Example("winchkit fleet diagnose . -p bench-spiral --jobs 1", "needs an index"),
         Example(

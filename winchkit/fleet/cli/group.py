@@ -15,7 +15,7 @@ COMMANDS = {
 
 @click.group(
     cls=LazyGroup,
-    sections={"Commands": COMMANDS},
+    table=COMMANDS,
     examples=(
         "winchkit library index .",
         "winchkit library list . --winch A",

@@ -15,7 +15,7 @@ from winchkit.model.rotation import angles_of, rotation_of
 from winchkit.robot.bench.checks import require_within_limits
 from winchkit.robot.bench.path import Waypoint, paths_through
 from winchkit.robot.bench.trajectory import PlatformTrajectory, plan_along
-from winchkit.robot.bench.wiring import wired_robot
+from winchkit.robot.bench.wiring import robot_of_bench
 from winchkit.robot.forces.force_distribution import ForceLimits
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
@@ -37,11 +37,10 @@ class Planner:
     @classmethod
     def of(cls, spec: BenchSpec) -> Planner:
         """The robot of a bench file; raises UsageError where it declares none."""
-        found = wired_robot(spec)
-        if found is None:
+        robot = robot_of_bench(spec)
+        if robot is None or spec.robot is None:
             raise no_robot(spec)
-        limits = {name: spec.winch[name].limits for name in found.robot.names}
-        return cls(found.robot, found.wiring, limits)
+        return cls(robot, spec.robot, {name: spec.winch[name].limits for name in robot.names})
 
     @property
     def tension(self) -> ForceLimits:

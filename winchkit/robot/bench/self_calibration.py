@@ -34,7 +34,7 @@ from winchkit.robot.bench.computation import Computation, at_once
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.planner import Planner, moved
 from winchkit.robot.bench.trajectory import PlatformTrajectory
-from winchkit.robot.bench.wiring import wired_robot
+from winchkit.robot.bench.wiring import robot_of_bench
 from winchkit.robot.calibration.calibrate import Calibrated, calibrate
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.pose_design import next_poses
@@ -364,8 +364,7 @@ def _refitted(spec: BenchSpec, fit: Run, options: Options | None) -> Robot | Non
     with TemporaryDirectory() as folder:
         path = Path(folder) / source.name
         write_calibrated(source, found, path, Provenance([fit.name], datetime.now(UTC).date()))
-        wired = wired_robot(replace(spec, robot=replace(spec.robot, profile=str(path))))
-        return None if wired is None else wired.robot
+        return robot_of_bench(replace(spec, robot=replace(spec.robot, profile=str(path))))
 
 
 def _fitted(

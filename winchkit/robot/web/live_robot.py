@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.robot.bench.wiring import wired_robot
+from winchkit.robot.bench.wiring import robot_of_bench
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.web.robot import pose_picture
 from winchkit.schema.bench import BenchSpec
@@ -21,9 +21,9 @@ class LiveRobot:
     """The robot of a bench, and the pose that was found last, from which the next is computed."""
 
     def __init__(self, spec: BenchSpec) -> None:
-        found = wired_robot(spec)
-        assert found is not None, "the caller has looked"
-        self._robot = found.robot
+        robot = robot_of_bench(spec)
+        assert robot is not None, "the caller has looked"
+        self._robot = robot
         self._last: Pose | None = None
 
     def picture(self, status: Mapping[str, Any]) -> dict[str, Any] | None:
