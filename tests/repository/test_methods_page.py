@@ -10,9 +10,7 @@ from snippets import ROOT
 
 PAGE = ROOT / "docs" / "methods.md"
 _MODULE = re.compile(r"`(\w+/\w+(?:/\w+)?\.py)`")
-_DIAGNOSES = [
-    ROOT / "winchkit" / part for part in ("diagnosis", "robot/diagnosis", "fleet/diagnosis")
-]
+_PARTS = ("diagnosis", "robot/diagnosis", "fleet/diagnosis")
 _CITED = re.compile(
     r"([A-ZŠ][\w']+)(?:(?:, | & | and )(?:[A-Z]\. )?[A-Z][\w']+)*(?: et al\.)?,? ((?:19|20)\d\d)\b"
 )

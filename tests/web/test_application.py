@@ -26,6 +26,7 @@ from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.write import write_addition
 from winchkit.fleet import index_library
 from winchkit.fleet.library.partitions import Partitions
+from winchkit.fleet.web.runs import Library
 from winchkit.runs.read import read_run
 from winchkit.runs.writer import write_run
 from winchkit.schema.read import read_profile
