@@ -22,6 +22,8 @@ _GROUP = "winchkit.wings"
 class Wing:
     """What a wing gives the core; things are ``module:name`` and imported when they are used."""
 
+    kinds: Mapping[str, str] = field(default_factory=dict)
+    """Readers of declarations by their kind, as those of :mod:`winchkit.schema.read`."""
     calls: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """By name of the type that decides: functions by name of the call."""
     parts: Mapping[str, str] = field(default_factory=dict)
@@ -46,6 +48,15 @@ def others() -> Iterator[Wing]:
     from importlib.metadata import entry_points
 
     return (point.load() for point in entry_points(group=_GROUP))
+
+
+def reader(kind: str) -> Any:
+    """The reader of a kind of declarations; None where no wing has it."""
+    for found in (own, others):
+        for wing in found():
+            if kind in wing.kinds:
+                return imported(wing.kinds[kind])
+    return None
 
 
 def call(name: str, of: object) -> Callable[..., Any] | None:
@@ -77,6 +88,4 @@ def _declared(name: str) -> Wing:
         return wing
     from importlib.metadata import entry_points
 
-    (point,) = entry_points(group=_GROUP, name=name)
-    other: Wing = point.load()
-    return other
+    return next((point.load() for point in entry_points(group=_GROUP, name=name)), Wing())

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import dataclass
 from importlib.metadata import EntryPoint
 from math import sin
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 from click.testing import CliRunner
@@ -14,6 +16,7 @@ from click.testing import CliRunner
 from snippets import ROOT
 from winchkit import wings
 from winchkit.cli import main
+from winchkit.cli.model.options import declared_profile
 
 _SEEN = (
     "import sys\nfound = [m for m in sys.modules if m.startswith(('winchkit.robot', "
@@ -63,16 +66,22 @@ def test_an_import_loads_no_wing(tmp_path: Path) -> None:
 @pytest.mark.parametrize("wing", list(wings.own()), ids=["robot", "fleet"])
 def test_everything_that_a_wing_declares_is_there(wing: wings.Wing) -> None:
     calls = [place for functions in wing.calls.values() for place in functions.values()]
-    for place in (*calls, *wing.parts.values(), *wing.views):
+    for place in (*calls, *wing.kinds.values(), *wing.parts.values(), *wing.views):
         assert wings.imported(place) is not None
 
 
+@dataclass(frozen=True)
 class _Crane:
-    wing = "crane"
-    name = "crane"
+    wing: ClassVar[str] = "crane"
+    boom: float
+
+
+def crane_of(reading: object, tree: dict[str, float]) -> _Crane:
+    return _Crane(**tree)
 
 
 WING = wings.Wing(
+    kinds={"crane": "wing_of_cranes:crane_of"},
     calls={"_Crane": {"compare": "builtins:len"}},
     commands={"Cranes": {"slew": ("winchkit.cli.files.completion", "Turn a crane.")}},
 )
@@ -91,9 +100,13 @@ def crane(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("crane")
-def test_another_distribution_adds_a_type_and_a_command() -> None:
-    assert wings.call("compare", _Crane()) is len
-    assert wings.call("diagnose", _Crane()) is None
+def test_another_distribution_adds_a_kind_of_profile_and_a_command(tmp_path: Path) -> None:
+    path = tmp_path / "crane.toml"
+    path.write_text('schema = 1\nkind = "crane"\nboom = 12.0\n')
+    declared = declared_profile(path)
+    assert declared == _Crane(12.0)
+    assert wings.call("compare", declared) is len
+    assert wings.call("diagnose", declared) is None
     assert CliRunner().invoke(main, ["slew", "--help"]).exit_code == 0
     assert "slew" not in main.table
 

@@ -5,6 +5,10 @@ from __future__ import annotations
 from winchkit.wings import Wing
 
 WING = Wing(
+    kinds={
+        "robot": "winchkit.robot.files.profile:robot",
+        "robot-programme": "winchkit.robot.files.profile:programme",
+    },
     parts={
         "wired_robot": "winchkit.robot.bench.wired:wired_robot",
         "live_robot": "winchkit.robot.web.live_robot:LiveRobot",

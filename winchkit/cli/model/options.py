@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit import wings
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.early_checks import check_folder, check_new_file
@@ -88,9 +89,7 @@ class Asked:
 
         Raises FileError with the faults of all files.
         """
-        from winchkit.schema.profiles.robot import RobotProfile
-
-        if isinstance(declared, RobotProfile):
+        if declared is not None and wings.call("compare", declared) is not None:
             return read_all(paths)
         return read_runs(paths, self.winch)
 
@@ -310,13 +309,15 @@ def suggest_with(
 
 def declared_profile(path: Path) -> WinchProfile | RobotProfile:
     """The profile of a winch or of a robot. Raises FileError."""
-    from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
     from winchkit.schema.read import read_any, read_profile
 
-    value = read_any(path)
+    value: Any = read_any(path)
+    if isinstance(value, WinchProfile) or wings.call("compare", value) is not None:
+        declared: WinchProfile | RobotProfile = value
+        return declared
     # The reader of winches refuses every other kind in its own words.
-    return value if isinstance(value, (WinchProfile, RobotProfile)) else read_profile(path)
+    return read_profile(path)
 
 
 def refuse_options(
