@@ -28,7 +28,6 @@ from typing import Any
 import numpy as np
 
 from winchkit.catalog import find
-from winchkit.estimation.elongation import ElongationCorrection
 from winchkit.model.trajectory import plan
 from winchkit.robot import (
     PLAIN,
@@ -40,6 +39,7 @@ from winchkit.robot import (
     flat_pose,
     robot_of,
 )
+from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
 from winchkit.robot.sim.platform import Body, CablePlatform, Pulleys
 from winchkit.schema.read import read_robot
 

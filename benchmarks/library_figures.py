@@ -34,8 +34,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from summaries import print_summary
-from winchkit import diagnose_library, index_library, query_library, write_run
+from winchkit import write_run
 from winchkit.catalog import find
+from winchkit.fleet import diagnose_library, index_library, query_library
 from winchkit.fleet.library import cluster
 from winchkit.fleet.library.partitions import Partitions
 from winchkit.fleet.library.sessions import winch_sessions

@@ -25,15 +25,15 @@ from typing import Any
 import numpy as np
 from click.testing import CliRunner
 
-from winchkit import open_bench, read_robot, robot_of
+from winchkit import open_bench
 from winchkit.bench.bench import Bench
+from winchkit.bench.tracker import Tracker
 from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.errors import NotPermitted
-from winchkit.robot import lengths
+from winchkit.robot import lengths, read_robot, robot_of
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.planner import coordinates_of, moved
-from winchkit.robot.bench.tracker import Tracker
 from winchkit.robot.sim.build import build_robot
 from winchkit.schema.read import read_simbench
 from winchkit.schema.simbench import HiddenSpec, SimBench

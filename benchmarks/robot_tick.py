@@ -22,7 +22,6 @@ from time import perf_counter
 import numpy as np
 
 from winchkit.catalog import find
-from winchkit.estimation.elongation import ElongationCorrection
 from winchkit.model.rotation import rotation_by
 from winchkit.robot import (
     PLAIN,
@@ -38,6 +37,7 @@ from winchkit.robot import (
     forward,
     robot_of,
 )
+from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
 from winchkit.schema.read import read_robot
 
 LIMITS = {

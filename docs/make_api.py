@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 import re
+from importlib import import_module
 from pathlib import Path
-
-import winchkit
+from types import ModuleType
 
 PAGE = Path(__file__).with_name("api.md")
 SECTIONS = {
@@ -25,41 +25,39 @@ SECTIONS = {
     ),
     "A simulated bench": ("LiveBench", "SimulatedClock", "simulate", "listed_benches"),
     "Files": (
-        *("find", "check", "read_profile", "read_robot", "read_size"),
+        *("find", "check", "read_profile", "read_size"),
         *("read_bench", "read_programme", "write_programme", "read_simbench", "read_mapping"),
     ),
     "Runs": (
-        *("read_run", "read_poses", "write_run", "open_writer", "Run", "run_of", "export"),
-        *(
-            "index_library",
-            "diagnose_library",
-            "library_history",
-            "LibraryHistory",
-            "library_runs",
-            "library_estimates",
-            "query_library",
-        ),
+        *("read_run", "write_run", "open_writer", "Run", "run_of", "export"),
         *("read_log", "info_of", "recover", "open_replay"),
     ),
     "Diagnosis": (
-        *("compare", "diagnose", "diagnose_each", "plan", "add", "remove"),
+        *("compare", "diagnose", "plan", "add", "remove"),
         *("write_addition", "write_removal", "extended_name", "undo", "ladder"),
         *("load_catalogue", "new_effect", "Effect", "Parameter", "sized"),
     ),
-    "Cable robots": (
-        *("robot_of", "Robot", "Pose", "RobotCycle", "ForceLimits"),
-        *("calibrate", "next_poses", "write_calibrated"),
-        *("self_calibrated", "ComputationProcess", "Tracker", "PoseVolume", "SelfCalibration"),
-        *("compare_robot", "diagnose_robot", "plan_poses", "add_to_robot", "remove_from_robot"),
-    ),
-    "Estimators": ("DahlEstimator", "identify_dahl", "ElongationCorrection"),
+    "Estimators": ("DahlEstimator", "identify_dahl"),
     "The page": ("serve",),
     "Errors": (
         *("WinchkitError", "UsageError", "FileError", "Fault", "RunError", "ConnectionLost"),
         *("NoReply", "DeviceRefused", "MotionError", "DriveFault", "LimitTripped", "NotPermitted"),
     ),
+    "Cable robots: winchkit.robot": (
+        *("read_robot", "robot_of", "Robot", "Pose", "RobotCycle", "ForceLimits"),
+        *("read_poses", "calibrate", "next_poses", "write_calibrated"),
+        *("self_calibrated", "ComputationProcess", "Tracker", "PoseVolume", "SelfCalibration"),
+        "ElongationCorrection",
+    ),
+    "Many winches: winchkit.fleet": (
+        *("diagnose_each", "index_library", "diagnose_library"),
+        *("library_history", "LibraryHistory"),
+        *("library_runs", "library_estimates", "query_library"),
+    ),
 }
-"""Public names by subject; ``__version__`` is a text."""
+"""Public names by subject, of ``winchkit`` unless the title names another module.
+
+``__version__`` is a text. ``winchkit.robot`` has further names, for control loops."""
 _BEGIN = """\
 # Public names
 
@@ -70,11 +68,13 @@ by hand. `help(winchkit.open_bench)` shows the same in Python.
 from winchkit import diagnose, read_profile, read_run
 ```
 
-For effects of your own there are `winchkit.effects` and `winchkit.model.stages` besides, for
-control loops `winchkit.robot` and `winchkit.estimation`, for tests `winchkit.testing`. Paths
-of other modules may change with any version; [stability.md](stability.md) says what is promised,
-and which call each command is. `import winchkit` loads no other package: a name is
-imported when it is first used. `winchkit.__version__` is the version.
+Names of robots are in `winchkit.robot` (with more for control loops than are listed here), those of
+many winches in `winchkit.fleet`. For effects of your own there are `winchkit.effects` and
+`winchkit.model.stages` besides, for control loops `winchkit.estimation`, for tests
+`winchkit.testing`. Paths of other modules may change with any version;
+[stability.md](stability.md) says what is promised, and which call each command is.
+`import winchkit` loads no other package: a name is imported when it is first used.
+`winchkit.__version__` is the version.
 """
 
 
@@ -86,24 +86,31 @@ _SECTION = re.compile(r"^(\w[\w ]*)\n-{3,}$", re.MULTILINE)
 def page() -> str:
     """The page: public names by subject in tables, then signature and docstring of each."""
     parts, details = [_BEGIN], []
-    signatures = _signatures()
     for title, names in SECTIONS.items():
+        face = face_of(title)
+        signatures = _signatures(face.__name__)
         parts.append(f"## {title}\n\n| name | what |\n|---|---|")
-        parts += [f"| [`{name}`](#{name.lower()}) | {_summary(name)} |" for name in names]
+        public = {name: getattr(face, name) for name in names}
+        parts += [f"| [`{n}`](#{n.lower()}) | {_summary(one)} |" for n, one in public.items()]
         parts.append("")
-        details += [_entry(name, signatures[name]) for name in names]
+        details += [_entry(name, signatures[name], one) for name, one in public.items()]
     return "\n".join([*parts, "## Signatures\n", *details])
 
 
-def _signatures() -> dict[str, str]:
-    """Lines of each public name of ``winchkit`` in the file of signatures."""
+def face_of(title: str) -> ModuleType:
+    """The module whose names a section has."""
+    return import_module(title.partition(": ")[2] or "winchkit")
+
+
+def _signatures(module: str) -> dict[str, str]:
+    """Lines of each public name of a module in the file of signatures."""
     text = SIGNATURES.read_text(encoding="utf-8")
-    (own,) = re.findall(r"^winchkit\n((?: .*\n)+)", text, re.MULTILINE)
+    (own,) = re.findall(rf"^{module}\n((?: .*\n)+)", text, re.MULTILINE)
     found = re.findall(r"^  (?:class )?(\w+)(.*\n(?: {4}.*\n)*)", own, re.MULTILINE)
     return {name: (name + rest).rstrip() for name, rest in found}
 
 
-def _entry(name: str, signature: str) -> str:
+def _entry(name: str, signature: str, public: object) -> str:
     """Section of one name."""
     lines = [
         f"### {name}\n",
@@ -111,7 +118,7 @@ def _entry(name: str, signature: str) -> str:
         re.sub(r"^ {2}", "", signature, flags=re.MULTILINE),
         "```\n",
     ]
-    doc = inspect.getdoc(getattr(winchkit, name)) or ""
+    doc = inspect.getdoc(public) or ""
     begin, *sections = _SECTION.split(_plain(doc))
     lines.append(begin.strip() + "\n")
     for title, body in zip(sections[::2], sections[1::2], strict=True):
@@ -139,8 +146,8 @@ def _plain(doc: str) -> str:
     return _ROLE.sub(r"`\1`", doc).replace("``", "`")
 
 
-def _summary(name: str) -> str:
-    first = (inspect.getdoc(getattr(winchkit, name)) or "").split("\n")[0]
+def _summary(public: object) -> str:
+    first = (inspect.getdoc(public) or "").split("\n")[0]
     return first.replace("``", "`").removesuffix(".").replace("|", "\\|")
 
 

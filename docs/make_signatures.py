@@ -22,8 +22,9 @@ FILE = Path(__file__).with_name("public_names.txt")
 PACKAGES = (
     "winchkit.effects",
     "winchkit.estimation",
-    "winchkit.robot",
+    "winchkit.fleet",
     "winchkit.model.stages",
+    "winchkit.robot",
     "winchkit.testing.plugin",
 )
 """Modules whose ``__all__`` is public besides that of ``winchkit``."""
@@ -33,15 +34,14 @@ RESULTS = {
     "winchkit.robot.calibration.calibrate": ("Calibrated", "Options"),
     "winchkit.robot.calibration.parameters": ("Estimated",),
     "winchkit.diagnosis.add": ("Addition", "Removal"),
-    "winchkit.diagnosis.diagnose": ("WinchAnswer",),
-    "winchkit.diagnosis.plan": ("Plan",),
+    "winchkit.diagnosis.diagnose": ("Answer", "WinchAnswer"),
+    "winchkit.diagnosis.plan": ("Plan", "WinchPlan"),
     "winchkit.diagnosis.residuals.traces": ("PoseTrace", "Trace"),
     "winchkit.diagnosis.residuals.attribution": ("Attribution",),
     "winchkit.diagnosis.results": (
         *("CandidateScore", "Combination", "Comparison", "Detectable", "Diagnosis", "Doubt"),
         *("Estimate", "NextRun", "OutputError", "OutputFit", "RobotDiagnosis", "Step"),
     ),
-    "winchkit.robot.diagnosis.diagnose": ("RobotAnswer",),
     "winchkit.fit_statistics": ("Correlation", "FitStatistics", "FittedParameter"),
     "winchkit.runs.run": ("Channel",),
     "winchkit.schema.profiles.axis": ("AxisProfile",),

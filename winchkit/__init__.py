@@ -1,8 +1,9 @@
 """winchkit: winch and load-cell drivers, winch models, and diagnosis of missing physical effects.
 
 The public names are below, described in docs/api.md; each is imported when it is first used, so
-that ``import winchkit`` loads no numpy. ``winchkit.effects``, ``winchkit.model`` and
-``winchkit.testing`` are for those who extend it.
+that ``import winchkit`` loads no numpy. Robots have theirs in ``winchkit.robot``, fleets in
+``winchkit.fleet``. ``winchkit.effects``, ``winchkit.model`` and ``winchkit.testing`` are for those
+who extend it.
 """
 
 from __future__ import annotations
@@ -73,31 +74,10 @@ if TYPE_CHECKING:
     )
     from winchkit.estimation.dahl import DahlEstimator
     from winchkit.estimation.dahl_identification import identify_dahl
-    from winchkit.estimation.elongation import ElongationCorrection
-    from winchkit.fleet.diagnosis.diagnose import diagnose_each
-    from winchkit.fleet.library.diagnose import diagnose_library
-    from winchkit.fleet.library.history import LibraryHistory, library_history
-    from winchkit.fleet.library.index import index_library
-    from winchkit.fleet.library.query import library_estimates, library_runs, query_library
     from winchkit.model.sizing.sizing import sized
     from winchkit.profile_edit.history import ladder
     from winchkit.profile_edit.ledger import undo
     from winchkit.profile_edit.naming import extended_name
-    from winchkit.robot.bench.computation import ComputationProcess
-    from winchkit.robot.bench.self_calibration import PoseVolume, SelfCalibration, self_calibrated
-    from winchkit.robot.bench.tracker import Tracker
-    from winchkit.robot.calibration.calibrate import calibrate
-    from winchkit.robot.calibration.pose_design import next_poses
-    from winchkit.robot.calibration.profile import write_calibrated
-    from winchkit.robot.diagnosis.add import add_to_robot, remove_from_robot
-    from winchkit.robot.diagnosis.compare import compare_robot
-    from winchkit.robot.diagnosis.diagnose import diagnose_robot
-    from winchkit.robot.diagnosis.plan import plan_poses
-    from winchkit.robot.dynamics.cycle import RobotCycle
-    from winchkit.robot.files.poses import read_poses
-    from winchkit.robot.forces.force_distribution import ForceLimits
-    from winchkit.robot.geometry.kinematics import Pose
-    from winchkit.robot.geometry.robot import Robot, robot_of
     from winchkit.runs.export import export
     from winchkit.runs.info import info_of
     from winchkit.runs.read import read_log, read_run
@@ -111,7 +91,6 @@ if TYPE_CHECKING:
         read_mapping,
         read_profile,
         read_programme,
-        read_robot,
         read_simbench,
         read_size,
     )
@@ -124,40 +103,28 @@ if TYPE_CHECKING:
 __all__ = [
     "Bench",
     "BenchSnapshot",
-    "ComputationProcess",
     "ConnectionLost",
     "DahlEstimator",
     "DeviceRefused",
     "DriveFault",
     "Effect",
-    "ElongationCorrection",
     "Fault",
     "FileError",
-    "ForceLimits",
-    "LibraryHistory",
     "LimitTripped",
     "LiveBench",
     "MotionError",
     "NoReply",
     "NotPermitted",
     "Parameter",
-    "Pose",
-    "PoseVolume",
-    "Robot",
-    "RobotCycle",
     "Run",
     "RunError",
-    "SelfCalibration",
     "SimulatedClock",
-    "Tracker",
     "UsageError",
     "WinchkitError",
     "__version__",
     "add",
-    "add_to_robot",
     "attach",
     "bus_load",
-    "calibrate",
     "can_bus",
     "cell_health",
     "cell_info",
@@ -168,60 +135,44 @@ __all__ = [
     "check",
     "commission",
     "compare",
-    "compare_robot",
     "config_diff",
     "config_load",
     "config_restore",
     "config_save",
     "config_store",
     "diagnose",
-    "diagnose_each",
-    "diagnose_library",
-    "diagnose_robot",
     "drive_info",
     "export",
     "extended_name",
     "find",
     "fit_cell",
     "identify_dahl",
-    "index_library",
     "info_of",
     "ladder",
-    "library_estimates",
-    "library_history",
-    "library_runs",
     "listed_benches",
     "load_catalogue",
     "lss_identify",
     "lss_list",
     "lss_set",
     "new_effect",
-    "next_poses",
     "open_bench",
     "open_replay",
     "open_writer",
     "plan",
-    "plan_poses",
-    "query_library",
     "read_bench",
     "read_log",
     "read_mapping",
     "read_points",
-    "read_poses",
     "read_profile",
     "read_programme",
-    "read_robot",
     "read_run",
     "read_simbench",
     "read_size",
     "recover",
     "remove",
-    "remove_from_robot",
-    "robot_of",
     "run_of",
     "run_programme",
     "scan",
-    "self_calibrated",
     "serve",
     "simulate",
     "sized",
@@ -229,7 +180,6 @@ __all__ = [
     "stop_on_bus",
     "undo",
     "write_addition",
-    "write_calibrated",
     "write_programme",
     "write_removal",
     "write_run",
@@ -246,9 +196,6 @@ _NAMES = {
         "cell_zero",
     ),
     "winchkit.bench.commissioning.calls": ("commission",),
-    "winchkit.robot.bench.computation": ("ComputationProcess",),
-    "winchkit.robot.bench.self_calibration": ("PoseVolume", "SelfCalibration", "self_calibrated"),
-    "winchkit.robot.bench.tracker": ("Tracker",),
     "winchkit.bench.control.snapshot": ("BenchSnapshot",),
     "winchkit.bench.drives.calls": (
         "bus_load",
@@ -272,36 +219,16 @@ _NAMES = {
     "winchkit.calibration.cell.files": ("read_points",),
     "winchkit.calibration.cell.fit": ("fit_cell",),
     "winchkit.calibration.cell.static_effects": ("static_effects",),
-    "winchkit.robot.calibration.calibrate": ("calibrate",),
-    "winchkit.robot.calibration.pose_design": ("next_poses",),
-    "winchkit.robot.calibration.profile": ("write_calibrated",),
     "winchkit.catalog": ("find",),
     "winchkit.cli.files.check": ("check",),
-    "winchkit.diagnosis.add": (
-        "add",
-        "remove",
-    ),
+    "winchkit.diagnosis.add": ("add", "remove"),
     "winchkit.diagnosis.compare": ("compare",),
     "winchkit.diagnosis.diagnose": ("diagnose",),
-    "winchkit.fleet.diagnosis.diagnose": ("diagnose_each",),
     "winchkit.diagnosis.new_effect": ("new_effect",),
     "winchkit.diagnosis.plan": ("plan",),
-    "winchkit.robot.diagnosis.add": (
-        "add_to_robot",
-        "remove_from_robot",
-    ),
-    "winchkit.robot.diagnosis.compare": ("compare_robot",),
-    "winchkit.robot.diagnosis.diagnose": ("diagnose_robot",),
-    "winchkit.robot.diagnosis.plan": ("plan_poses",),
-    "winchkit.diagnosis.write": (
-        "write_addition",
-        "write_removal",
-    ),
+    "winchkit.diagnosis.write": ("write_addition", "write_removal"),
     "winchkit.effects.catalogue": ("load_catalogue",),
-    "winchkit.effects.effect": (
-        "Effect",
-        "Parameter",
-    ),
+    "winchkit.effects.effect": ("Effect", "Parameter"),
     "winchkit.errors": (
         "ConnectionLost",
         "DeviceRefused",
@@ -318,47 +245,23 @@ _NAMES = {
     ),
     "winchkit.estimation.dahl": ("DahlEstimator",),
     "winchkit.estimation.dahl_identification": ("identify_dahl",),
-    "winchkit.estimation.elongation": ("ElongationCorrection",),
-    "winchkit.fleet.library.history": ("LibraryHistory", "library_history"),
-    "winchkit.fleet.library.diagnose": ("diagnose_library",),
-    "winchkit.fleet.library.index": ("index_library",),
-    "winchkit.fleet.library.query": (
-        "library_estimates",
-        "library_runs",
-        "query_library",
-    ),
-    "winchkit.robot.dynamics.cycle": ("RobotCycle",),
-    "winchkit.robot.forces.force_distribution": ("ForceLimits",),
-    "winchkit.robot.geometry.kinematics": ("Pose",),
-    "winchkit.robot.geometry.robot": (
-        "Robot",
-        "robot_of",
-    ),
     "winchkit.model.sizing.sizing": ("sized",),
     "winchkit.profile_edit.history": ("ladder",),
     "winchkit.profile_edit.ledger": ("undo",),
     "winchkit.profile_edit.naming": ("extended_name",),
     "winchkit.runs.export": ("export",),
     "winchkit.runs.info": ("info_of",),
-    "winchkit.robot.files.poses": ("read_poses",),
-    "winchkit.runs.read": (
-        "read_log",
-        "read_run",
-    ),
+    "winchkit.runs.read": ("read_log", "read_run"),
     "winchkit.runs.recover": ("recover",),
     "winchkit.runs.run": ("Run",),
     "winchkit.runs.tables": ("run_of",),
-    "winchkit.runs.writer": (
-        "open_writer",
-        "write_run",
-    ),
+    "winchkit.runs.writer": ("open_writer", "write_run"),
     "winchkit.schema.programme": ("write_programme",),
     "winchkit.schema.read": (
         "read_bench",
         "read_mapping",
         "read_profile",
         "read_programme",
-        "read_robot",
         "read_simbench",
         "read_size",
     ),

@@ -25,7 +25,7 @@ _CALLS = {
     "Programme": "read_programme(path)",
     "Removal": "remove(effect, runs, profile)",
     "Robot": "robot_of(profile)",
-    "RobotAnswer": "diagnose_robot(runs, profile)",
+    "RobotAnswer": "diagnose(runs, profile)",
     "RobotProfile": "read_robot(path)",
     "Run": "read_run(path)",
     "SimBench": "read_simbench(path)",

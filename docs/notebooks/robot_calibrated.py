@@ -11,18 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from winchkit import (
-    Pose,
-    calibrate,
-    compare_robot,
-    diagnose_robot,
-    find,
-    read_poses,
-    read_robot,
-    robot_of,
-    run_of,
-)
-from winchkit.robot import rotation_of
+from winchkit import compare, diagnose, find, run_of
+from winchkit.robot import Pose, calibrate, read_poses, read_robot, robot_of, rotation_of
 
 drawings = read_robot(find("profiles", "cabtive"))
 drawings
@@ -123,10 +113,10 @@ known = replace(
     ),
 )
 second = measured_run(known, 75, rng, "second-campaign")
-compare_robot([second], machine)
+compare([second], machine)
 
 # %%
-answer = diagnose_robot([second], machine)
+answer = diagnose([second], machine)
 answer
 
 # %%

@@ -7,8 +7,8 @@ import pytest
 
 from ipanema3_poses import TABLE_2, figures, predicted
 from winchkit.catalog import find
-from winchkit.estimation.elongation import ElongationCorrection
 from winchkit.robot import Linear, Pose, Robot, approximate_forces, flat_pose, robot_of
+from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
 from winchkit.schema.read import read_robot
 
 WITHOUT, WITH = TABLE_2[:, 3], TABLE_2[:, 4]

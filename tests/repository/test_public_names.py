@@ -13,13 +13,23 @@ import sys
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import winchkit
+import winchkit.fleet
+import winchkit.robot
 from snippets import ROOT
 
+FACES = (winchkit, winchkit.robot, winchkit.fleet)
 NAMES = sorted(set(winchkit.__all__) - {"__version__"})
+PAGE = runpy.run_path(str(ROOT / "docs/make_api.py"))
+LISTED = [
+    (PAGE["face_of"](title).__name__, name)
+    for title, names in PAGE["SECTIONS"].items()
+    for name in names
+]
 PAGES = sorted(
     path
     for pattern in ("*.md", "docs/**/*.md", "docs/*.py", "examples/**/*.py")
@@ -29,16 +39,21 @@ HEAVY = {"numpy", "scipy", "can", "canopen", "pymodbus", "pydantic", "rich", "cl
 _IMPORT = re.compile(r"^ *from (winchkit[\w.]*) import (?:\(([^)]*)\)|(.+))$", re.MULTILINE)
 
 
-def test_importing_winchkit_stays_light_and_knows_its_names() -> None:
-    code = "import sys, winchkit; print(*dir(winchkit)); print(*sys.modules)"
+@pytest.mark.parametrize("face", FACES, ids=lambda face: face.__name__)
+def test_importing_a_face_stays_light_and_knows_its_names(face: ModuleType) -> None:
+    name = face.__name__
+    code = f"import sys, {name}; print(*dir({name})); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     names, modules = (set(line.split()) for line in done.stdout.splitlines())
-    assert set(winchkit.__all__) <= names
+    assert set(face.__all__) <= names
     assert not HEAVY & modules
+    parts = {m for m in modules if m.startswith(("winchkit.robot.", "winchkit.fleet."))}
+    assert not parts
 
 
-def test_type_checkers_see_the_names_that_there_are() -> None:
-    tree = ast.parse(Path(winchkit.__file__).read_text(encoding="utf-8"))
+@pytest.mark.parametrize("face", FACES, ids=lambda face: face.__name__)
+def test_type_checkers_see_the_names_that_there_are(face: ModuleType) -> None:
+    tree = ast.parse(Path(str(face.__file__)).read_text(encoding="utf-8"))
     (typed,) = (node for node in tree.body if isinstance(node, ast.If))
     seen = {
         alias.name: node.module
@@ -46,9 +61,9 @@ def test_type_checkers_see_the_names_that_there_are() -> None:
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
-    assert sorted(seen) == NAMES
+    assert sorted(seen) == sorted(set(face.__all__) - {"__version__"})
     for name, module in seen.items():
-        assert getattr(importlib.import_module(str(module)), name) is getattr(winchkit, name)
+        assert getattr(importlib.import_module(str(module)), name) is getattr(face, name)
 
 
 def test_a_wrong_name_is_an_attribute_error() -> None:
@@ -56,9 +71,9 @@ def test_a_wrong_name_is_an_attribute_error() -> None:
         _ = winchkit.open_becnh
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_a_public_name_is_described_with_the_sections_that_apply(name: str) -> None:
-    assert not lacking(getattr(winchkit, name))
+@pytest.mark.parametrize(("face", "name"), LISTED)
+def test_a_public_name_is_described_with_the_sections_that_apply(face: str, name: str) -> None:
+    assert not lacking(getattr(importlib.import_module(face), name))
 
 
 def lacking(public: object) -> list[str]:
@@ -138,10 +153,15 @@ def deep_imports(text: str) -> Iterator[tuple[str, str]]:
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_pages_and_examples_import_public_names_from_winchkit(path: Path) -> None:
-    public = {id(getattr(winchkit, name)) for name in NAMES}
+    home = {
+        id(getattr(face, name)): face.__name__
+        for face in FACES
+        for name in face.__all__
+        if callable(getattr(face, name))
+    }
     for module, name in deep_imports(path.read_text(encoding="utf-8")):
         found = getattr(importlib.import_module(module), name, None)
-        assert found is None or id(found) not in public, f"from winchkit import {name}"
+        assert home.get(id(found), module) == module, f"from {home[id(found)]} import {name}"
 
 
 def test_deep_imports_are_found_in_groups_and_lists() -> None:
@@ -151,8 +171,8 @@ def test_deep_imports_are_found_in_groups_and_lists() -> None:
 
 
 def test_the_page_of_public_names_is_up_to_date() -> None:
-    script = runpy.run_path(str(ROOT / "docs/make_api.py"))
-    listed = [name for names in script["SECTIONS"].values() for name in names]
-    assert sorted(listed) == NAMES
+    assert sorted(name for face, name in LISTED if face == "winchkit") == NAMES
+    fleets = [name for face, name in LISTED if face == "winchkit.fleet"]
+    assert sorted(fleets) == sorted(winchkit.fleet.__all__)
     there = (ROOT / "docs/api.md").read_text(encoding="utf-8")
-    assert there == script["page"](), "run: python docs/make_api.py"
+    assert there == PAGE["page"](), "run: python docs/make_api.py"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import runpy
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -21,18 +22,22 @@ from winchkit.robot.files.poses import read_poses
 
 FILES = r"str \| Path|PathLike|Path|Wiring"
 OURS = r"Run|WinchProfile|RobotProfile|Robot|Measured|Log|CalibrationPoint|Calibrated|WinchAnswer"
-OURS += r"|RobotAnswer|Addition|Removal|Programme|SimBench|SizeSpec|BenchSpec|Tracker"
+OURS += (
+    r"|Profile|Answer|RobotAnswer|Addition|Removal|Programme|SimBench|SizeSpec|BenchSpec|Tracker"
+)
 TAKES = re.compile(rf"({FILES}|{OURS}|\||Sequence|Mapping|None|str|[\[\], ])+")
+FACES = runpy.run_path(str(ROOT / "docs/make_api.py"))
 FUNCTIONS = {
-    name: inspect.signature(value)
-    for name in winchkit.__all__
-    if inspect.isfunction(value := getattr(winchkit, name))
+    name: value
+    for title, names in FACES["SECTIONS"].items()
+    for name in names
+    if inspect.isfunction(value := getattr(FACES["face_of"](title), name))
 }
 MEANT = re.compile(rf"\b({FILES}|{OURS})\b")
 CASES = [
     (name, parameter.name)
-    for name, signature in FUNCTIONS.items()
-    for parameter in signature.parameters.values()
+    for name, value in FUNCTIONS.items()
+    for parameter in inspect.signature(value).parameters.values()
     if TAKES.fullmatch(str(parameter.annotation)) and MEANT.search(str(parameter.annotation))
 ]
 
@@ -48,7 +53,7 @@ def winch_run(tmp_path_factory: pytest.TempPathFactory) -> winchkit.Run:
 @pytest.fixture(scope="module")
 def valid(winch_run: winchkit.Run, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """A right value by annotation, as far as one is at hand without a computation."""
-    robot = winchkit.read_robot(winchkit.find("profiles", "cabtive"))
+    robot = winchkit.robot.read_robot(winchkit.find("profiles", "cabtive"))
     columns = [f"{line.name}.motor_angle [rad]" for line in robot.line]
     rows = [",".join([str(k), *["0.1" if k % 2 else str(k)] * len(columns)]) for k in range(12)]
     poses = tmp_path_factory.mktemp("poses") / "p.csv"
@@ -58,8 +63,9 @@ def valid(winch_run: winchkit.Run, tmp_path_factory: pytest.TempPathFactory) -> 
         "Mapping[str, Sequence[Run]]": {"A": [winch_run]},
         "Run": winch_run,
         "WinchProfile": winchkit.read_profile(winchkit.find("profiles", "bench-spiral")),
+        "Profile": winchkit.read_profile(winchkit.find("profiles", "bench-spiral")),
         "RobotProfile": robot,
-        "Robot": winchkit.robot_of(robot),
+        "Robot": winchkit.robot.robot_of(robot),
         "SimBench": winchkit.read_simbench(winchkit.find("sim", "demo-elastic-rope")),
         "Measured": read_poses([winchkit.read_run(poses)], robot),
         "str | Path": poses.parent / "absent.py",
@@ -113,7 +119,8 @@ def test_a_wrong_argument_is_named(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    signature = FUNCTIONS[function]
+    called = FUNCTIONS[function]
+    signature = inspect.signature(called)
     annotation = str(signature.parameters[parameter].annotation)
     others = {
         other.name: valid.get(str(other.annotation))
@@ -124,7 +131,7 @@ def test_a_wrong_argument_is_named(
         if accepted(annotation, kind):
             continue
         with pytest.raises(WinchkitError) as error:
-            finished(getattr(winchkit, function)(**{**others, parameter: value}))
+            finished(called(**{**others, parameter: value}))
         assert str(error.value), kind
         if re.search(rf"^(Sequence\[|Mapping\[str, Sequence\[)?({OURS})\b", annotation):
             assert kind == "empty" or str(error.value).startswith(parameter), (kind, error.value)
@@ -134,8 +141,11 @@ def test_all_public_functions_that_take_runs_are_tried() -> None:
     tried = {name for name, _ in CASES}
     takes = {
         name
-        for name, signature in FUNCTIONS.items()
-        if any(p in signature.parameters for p in ("runs", "run", "winches", "fit", "paths"))
+        for name, value in FUNCTIONS.items()
+        if any(
+            p in inspect.signature(value).parameters
+            for p in ("runs", "run", "winches", "fit", "paths")
+        )
     }
     assert takes <= tried
     assert len(takes) > 10

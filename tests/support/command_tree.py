@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import click
 
-from winchkit.cli import COMMANDS, main
+from winchkit.cli import main
 from winchkit.cli.core.command import Example
 
 
@@ -14,7 +14,7 @@ def commands() -> Iterator[tuple[str, click.Command]]:
     """Each command and group with its words; the root has none."""
     yield "", main
     root = click.Context(main, info_name="winchkit", **main.context_settings)
-    for name in COMMANDS:
+    for name in main.table:
         yield from _below(root, main, name, name)
 
 

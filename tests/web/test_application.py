@@ -21,19 +21,19 @@ pytest.importorskip("httpx2")
 from starlette.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
-from winchkit import index_library
 from winchkit.diagnosis.add import add
 from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.write import write_addition
+from winchkit.fleet import index_library
 from winchkit.fleet.library.partitions import Partitions
 from winchkit.fleet.web.runs import Library
-from winchkit.robot.web.robot import RobotWork
 from winchkit.runs.read import read_run
 from winchkit.runs.writer import write_run
 from winchkit.schema.read import read_profile
 from winchkit.web.application import application
 from winchkit.web.examples import example_runs
 from winchkit.web.state import Judgement
+from winchkit.web.views import views_of
 from winchkit.web.workspace import Workspace
 
 TOKEN = "t0ken"
@@ -53,7 +53,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def client(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     workspace = Workspace(tmp_path_factory.mktemp("page"))
-    app = application(workspace, TOKEN, Library(recorded), RobotWork(workspace.folder))
+    app = application(workspace, TOKEN, views_of(workspace, recorded))
     with TestClient(app, base_url="http://127.0.0.1:1234") as opened:
         opened.workspace = workspace  # type: ignore[attr-defined]
         yield opened

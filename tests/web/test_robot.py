@@ -16,10 +16,9 @@ pytest.importorskip("httpx2")
 from starlette.testclient import TestClient
 
 from robot_poses.truth import Truth, csv, poses
-from winchkit.fleet.web.runs import Library
-from winchkit.robot.web.robot import RobotWork
 from winchkit.schema.read import read_robot
 from winchkit.web.application import application
+from winchkit.web.views import views_of
 from winchkit.web.workspace import Workspace
 
 TOKEN = "t0ken"
@@ -31,7 +30,7 @@ LIMITS = "low=20&high=150"
 def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     folder = tmp_path_factory.mktemp("page")
     workspace = Workspace(folder)
-    app = application(workspace, TOKEN, Library(folder), RobotWork(folder))
+    app = application(workspace, TOKEN, views_of(workspace, folder))
     with TestClient(app, base_url="http://127.0.0.1:1234") as opened:
         opened.workspace = workspace  # type: ignore[attr-defined]
         yield opened

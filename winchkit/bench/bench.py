@@ -27,6 +27,7 @@ from winchkit.bench.remote.commander import Commanders, NotCommander, NotRelease
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.life_sign import LifeSigns
+from winchkit.bench.robot import no_robot
 from winchkit.bench.winch import Winch
 from winchkit.drivers.clock import Clock
 from winchkit.errors import (
@@ -36,7 +37,6 @@ from winchkit.errors import (
     MotionError,
     NotPermitted,
 )
-from winchkit.robot.bench.wiring import no_robot
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
@@ -149,12 +149,8 @@ class Bench(BenchConnection):
         )
 
     def _robot_platform(self) -> Platform | None:
-        robot, wiring = self._wired.robot, self.spec.robot
-        if robot is None or wiring is None:
-            return None
-        from winchkit.robot.bench.platform import Platform
-
-        return Platform(self, wiring, robot, self.winch)
+        robot = self._wired.robot
+        return None if robot is None else robot.platform(self, self.winch)
 
     @property
     def robot(self) -> Platform:

@@ -32,7 +32,7 @@ from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
-    from winchkit.robot.bench.tracker import Tracker
+    from winchkit.bench.tracker import Tracker
 
 _WATCHED = 2.0
 """Frames are collected for so long after somebody asked for them, s."""
@@ -130,7 +130,7 @@ class BenchConnection(ABC):
         wiring = None if self.spec.robot is None else self.spec.robot.tracker
         if wiring is None:
             return None
-        from winchkit.robot.bench.tracker import Tracker
+        from winchkit.bench.tracker import Tracker
 
         with self._tracker_lock:
             if self._tracker is None:

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
 
 from winchkit import catalog
 from winchkit.bench.cells.instruments import can_buses, device_of, instruments
@@ -26,6 +25,7 @@ from winchkit.bench.control.winch_state import WinchParts
 from winchkit.bench.drives.set_up_progress import SetUpProgress, Tell, to_stderr
 from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
+from winchkit.bench.robot import WiredRobot, robot_of_bench
 from winchkit.drivers.can.bus.bus import CanBus
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.can.cia402.commission import WatchSpec
@@ -35,15 +35,11 @@ from winchkit.drivers.instrument_process.process import InstrumentProcess
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import ConnectionLost, Fault, FileError
-from winchkit.robot.bench.wiring import line_profiles, robot_of_bench
 from winchkit.schema.bench import BenchSpec, LimitSpec, WinchWiring
 from winchkit.schema.bench_warnings import bench_warnings
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.units import GRAVITY
 from winchkit.version import __version__
-
-if TYPE_CHECKING:
-    from winchkit.robot.geometry.robot import Robot
 
 _STALE_BEATS = 2
 """Feedback may be this many heartbeats old: the bench file says how soon silence must count."""
@@ -76,7 +72,7 @@ class Wired:
     lines: Sequence[SlowLine]
     slow: SlowDevices
     metadata: Mapping[str, str]
-    robot: Robot | None = None
+    robot: WiredRobot | None = None
     """The robot that the winches move."""
     process: InstrumentProcess | None = None
     """The process that serves the lines that are not CAN; None where threads of this one do."""
@@ -119,7 +115,7 @@ def wire(
     profiles = {name: _profile(spec, winch) for name, winch in spec.winch.items()}
     robot = robot_of_bench(spec)
     if robot is not None:
-        profiles |= line_profiles(robot)
+        profiles |= robot.profiles
     catalogue = load_catalogue(spec.effect_files)
     cables = {
         name: CableMap.of(

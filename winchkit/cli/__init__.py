@@ -1,17 +1,19 @@
 """The command line: one file per command, in folders by subject.
 
-``bench``, ``cell``, ``drive``, ``files``, ``library``, ``log``, ``model``, ``sim`` and ``web`` have
-the commands, ``core`` their common parts. The table below is all that ``--help`` needs: a command
-imports other packages when it runs. :func:`~winchkit.cli.main` is the entry.
+``bench``, ``cell``, ``drive``, ``files``, ``log``, ``model``, ``sim`` and ``web`` have the
+commands, ``core`` their common parts; the wings have their own. The tables are all that ``--help``
+needs: a command imports other packages when it runs. :func:`~winchkit.cli.main` is the entry.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Iterator
 from typing import Any, NoReturn
 
 import click
 
+from winchkit import wings
 from winchkit.cli.core.command import Example
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.outcome import finish
@@ -45,14 +47,10 @@ SECTIONS: dict[str, dict[str, At]] = {
             "winchkit.cli.web.serve",
             "Serve the page in the browser: all of this, with figures.",
         ),
-        "fleet": At("winchkit.fleet.cli.fleet", "Many winches: diagnose a library of runs."),
         "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
         "effects": At("winchkit.cli.model.effects", "List the physical effects, or describe one."),
         "size": At(
             "winchkit.cli.model.size", "Size a winch: compare each requirement with its limit."
-        ),
-        "calibrate": At(
-            "winchkit.robot.cli.calibrate", "Calibrate a cable robot from measured poses."
         ),
     },
     "Bench": {
@@ -96,20 +94,21 @@ SECTIONS: dict[str, dict[str, At]] = {
             "Import recordings of other programs: channels and units.",
         ),
         "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
-        "library": At(
-            "winchkit.fleet.cli.group", "Tables of the runs of a folder: index, list, query."
-        ),
         "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
         "completion": At(
             "winchkit.cli.files.completion", "Print the completion script of a shell."
         ),
     },
 }
-"""Commands by subject, as ``--help`` lists them."""
+"""The core's commands by subject, as ``--help`` lists them; those of the wings follow."""
 
-COMMANDS: dict[str, At] = {
-    name: entry for section in SECTIONS.values() for name, entry in section.items()
-}
+
+def _of(declared: Iterable[wings.Wing]) -> Iterator[tuple[str, str, At]]:
+    """Section, name and place of the commands of wings."""
+    for wing in declared:
+        for section, commands in wing.commands.items():
+            for name, (module, words) in commands.items():
+                yield section, name, At(module, words)
 
 
 class _Main(LazyGroup):
@@ -123,8 +122,9 @@ class _Main(LazyGroup):
 
 @click.group(
     cls=_Main,
-    table=COMMANDS,
     sections=SECTIONS,
+    further=lambda: _of(wings.own()),
+    foreign=lambda: _of(wings.others()),
     examples=(
         Example("winchkit demo", "takes half a minute; .ci/run executes it"),
         "winchkit sim record demo-elastic-rope programme-demo",

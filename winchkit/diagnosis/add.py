@@ -6,8 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from winchkit.arguments import require_type, require_types
+from winchkit.arguments import require_types
 from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.exclusion import without_impacts
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
@@ -31,7 +33,6 @@ from winchkit.effects.transition import with_transitions
 from winchkit.errors import UsageError
 from winchkit.rendering import Shown
 from winchkit.runs.run import Run
-from winchkit.schema.profiles.winch import WinchProfile
 
 _STARTS = 4
 """Grid points of the effect from which `add` begins a fit; computing cost, rule of thumb."""
@@ -94,30 +95,34 @@ def fitted_json(
 
 @dataclass(frozen=True)
 class FittedAddition:
-    """An addition with the fits that it was derived from, for reports.
+    """An addition with the data and the model that it was derived from, for reports."""
+
+    regression: Regression
+    addition: Addition
+    """What is printed."""
+
+
+@dataclass(frozen=True)
+class FittedWinchAddition(FittedAddition):
+    """An addition to a winch's profile.
 
     Attributes
     ----------
-    regression : TimeSeriesRegression
-        The runs and the model.
     initial_model : Fit
         The profile's effects, refitted.
     final : Fit
         The same with the new effect.
-    addition : Addition
-        What is printed.
     """
 
     regression: TimeSeriesRegression
     initial_model: Fit
     final: Fit
-    addition: Addition
 
 
 def add(
     effect_id: str,
     runs: Sequence[Run],
-    profile: WinchProfile,
+    profile: Profile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Addition:
@@ -130,11 +135,11 @@ def add(
     runs
         Recorded runs.
     profile
-        The winch.
+        The winch, or the robot, whose effect on one line is ``EFFECT/LINE``.
     catalogue
         Effects; by default all that are installed.
     band
-        Cut-off frequency of the torque's low-pass filter, Hz.
+        Cut-off frequency of the torque's low-pass filter, Hz; of a winch only.
 
     Returns
     -------
@@ -154,24 +159,28 @@ def add(
 def fitted_addition(
     effect_id: str,
     runs: Sequence[Run],
-    profile: WinchProfile,
+    profile: Profile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> FittedAddition:
     """The same as :func:`add`, with the fits."""
     require_types(runs, Run, "runs")
-    require_type(profile, WinchProfile, "profile")
-    catalogue = catalogue or load_catalogue()
+    if (by_wing := of_wing("add", profile, band)) is not None:
+        found: FittedAddition = by_wing(effect_id, runs, profile, catalogue)
+        return found
+    profile, catalogue = require_winch(profile), catalogue or load_catalogue()
     dataset = prepare(runs, profile, band, decimate=True, fast=True, catalogue=catalogue)
     return fitted_addition_to(effect_id, dataset, catalogue)
 
 
-def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedAddition:
+def fitted_addition_to(
+    effect_id: str, dataset: Dataset, catalogue: Catalogue
+) -> FittedWinchAddition:
     """The same as :func:`fitted_addition` on a prepared data set, as that of a diagnosis."""
     effect = catalogue[effect_id]
     if not effect.repeatable and any(t.id == effect.id for t in dataset.profile.effect):
         return _refitted(effect_id, dataset, catalogue)
-    candidates = Catalogue([*catalogue, _placed(effect, dataset)])
+    candidates = Catalogue([*catalogue.of_winches(), _placed(effect, dataset)])
     engine = _engine(dataset, candidates, effect)
     lacking = engine.regression.missing_needs(effect)
     if lacking:
@@ -200,18 +209,19 @@ def fitted_addition_to(effect_id: str, dataset: Dataset, catalogue: Catalogue) -
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     outputs = output_fits(engine, before, (best.fit, best.noise))
     terms = tuple(estimates(engine.regression, best.fit, spread))
-    return FittedAddition(
-        engine.regression, before[0], best.fit, Addition(outputs, terms, _notes(engine, best))
+    return FittedWinchAddition(
+        engine.regression, Addition(outputs, terms, _notes(engine, best)), before[0], best.fit
     )
 
 
-def _refitted(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedAddition:
+def _refitted(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedWinchAddition:
     """The profile's effects refitted, one of them last, beside their file values."""
     engine = selection_engine(dataset, catalogue)
     fitted, noise = engine.fit_with_noise(engine.initial_model)
     transitions = scanned_transitions(engine, fitted, noise)
     if transitions:
-        rounded = Catalogue(with_transitions(other, transitions) for other in catalogue)
+        known = catalogue.of_winches()
+        rounded = Catalogue(with_transitions(other, transitions) for other in known)
         again = selection_engine(dataset, rounded)
         fitted, noise = again.fit_with_noise(again.initial_model)
         fitted = with_fitted_transitions(again, fitted, noise)
@@ -224,7 +234,7 @@ def _refitted(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedA
         key=lambda pair: pair[0].effect.id == effect_id,
     )
     addition = Addition(outputs, tuple(terms), _notes(engine, best))
-    return FittedAddition(engine.regression, before, best.fit, addition)
+    return FittedWinchAddition(engine.regression, addition, before, best.fit)
 
 
 def _engine(dataset: Dataset, catalogue: Catalogue, effect: Effect) -> TimeSeriesSelection:
@@ -234,7 +244,8 @@ def _engine(dataset: Dataset, catalogue: Catalogue, effect: Effect) -> TimeSerie
     candidate explains more; else only the signatures of thermal effects enter the noise.
     """
     whole = not dataset.repeated or has_orders(effect)
-    needed = [e for e in catalogue if whole or e.id == effect.id or "temperature" in e.needs]
+    known = catalogue.of_winches()
+    needed = [e for e in known if whole or e.id == effect.id or "temperature" in e.needs]
     return selection_engine(dataset, catalogue, needed)
 
 
@@ -292,7 +303,7 @@ class Removal(Shown):
 def remove(
     effect_id: str,
     runs: Sequence[Run],
-    profile: WinchProfile,
+    profile: Profile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Removal:
@@ -305,11 +316,11 @@ def remove(
     runs
         Recorded runs.
     profile
-        The winch.
+        The winch, or the robot, whose effect on one line is ``EFFECT/LINE``.
     catalogue
         Effects; by default all that are installed.
     band
-        Cut-off frequency of the torque's low-pass filter, Hz.
+        Cut-off frequency of the torque's low-pass filter, Hz; of a winch only.
 
     Returns
     -------
@@ -323,7 +334,10 @@ def remove(
     RunError
         With every fault of every run.
     """
-    catalogue = catalogue or load_catalogue()
+    if (by_wing := of_wing("remove", profile, band)) is not None:
+        found: Removal = by_wing(effect_id, runs, profile, catalogue)
+        return found
+    profile, catalogue = require_winch(profile), catalogue or load_catalogue()
     dataset = prepare(runs, profile, band, decimate=True, catalogue=catalogue)
 
     def fitted_on(runs: Dataset) -> tuple[TimeSeriesSelection, Fit, Noise]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,8 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.spectrum import WHOLE_TRANSITION
+from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
+from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import evaluated
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.noise import replicate_rms
@@ -30,26 +33,25 @@ from winchkit.schema.profiles.winch import WinchProfile
 
 @dataclass(frozen=True)
 class Compared:
-    """A comparison with everything that it was derived from, for reports.
+    """A comparison with the data and the model that it was derived from, for reports."""
 
-    Attributes
-    ----------
-    regression : TimeSeriesRegression
-        The runs and the model.
-    residual : ndarray of shape (n_rows,)
-        Measured minus predicted.
-    comparison : Comparison
-        What is printed.
-    """
+    regression: Regression
+    comparison: Comparison
+    """What is printed."""
+
+
+@dataclass(frozen=True)
+class WinchCompared(Compared):
+    """A comparison of a winch's runs."""
 
     regression: TimeSeriesRegression
     residual: Array
-    comparison: Comparison
+    """Measured minus predicted, shape (n_rows,)."""
 
 
 def compare(
     runs: Sequence[Run],
-    profile: WinchProfile,
+    profile: Profile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
 ) -> Comparison:
@@ -58,9 +60,9 @@ def compare(
     Parameters
     ----------
     runs
-        Recorded runs.
+        Recorded runs; of a robot with motor angles and measured poses.
     profile
-        The winch.
+        The winch, or the robot, of which nothing is fitted.
     catalogue
         Effects; by default all that are installed.
     band
@@ -79,13 +81,35 @@ def compare(
     return compared(runs, profile, catalogue, band).comparison
 
 
+@overload
 def compared(
     runs: Sequence[Run],
     profile: WinchProfile,
     catalogue: Catalogue | None = None,
     band: float | None = None,
+) -> WinchCompared: ...
+
+
+@overload
+def compared(
+    runs: Sequence[Run],
+    profile: Profile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+) -> Compared: ...
+
+
+def compared(
+    runs: Sequence[Run],
+    profile: Profile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
 ) -> Compared:
-    """The same as :func:`compare`, with the residual."""
+    """The same as :func:`compare`, with the data and the model."""
+    if (by_wing := of_wing("compare", profile, band)) is not None:
+        found: Compared = by_wing(runs, profile, catalogue)
+        return found
+    profile = require_winch(profile)
     regression = TimeSeriesRegression(
         prepare(runs, profile, band, kept_cut_offs=WHOLE_TRANSITION, catalogue=catalogue)
     )
@@ -126,7 +150,7 @@ def compared(
         caveats=dataset.caveats,
         traces=traces_of(regression, residual),
     )
-    return Compared(regression, residual, comparison)
+    return WinchCompared(regression, comparison, residual)
 
 
 def initial_residual(catalogue: Catalogue, regression: TimeSeriesRegression) -> Array:

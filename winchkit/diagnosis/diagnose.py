@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import overload
 
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
+from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.run_offsets import run_offsets
@@ -137,6 +139,7 @@ class WinchAnswer(Answer):
         super().__init__(engine, result, diagnosis, sets, pairs)
 
 
+@overload
 def diagnose(
     runs: Sequence[Run],
     profile: WinchProfile,
@@ -147,15 +150,42 @@ def diagnose(
     as_recorded: bool = False,
     progress: ProgressCallback = no_progress,
     interrupted: Callable[[WinchAnswer], None] | None = None,
-) -> WinchAnswer:
-    """Find the effects that a winch's profile lacks on its runs.
+) -> WinchAnswer: ...
+
+
+@overload
+def diagnose(
+    runs: Sequence[Run],
+    profile: Profile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+    *,
+    decimate: bool = True,
+    as_recorded: bool = False,
+    progress: ProgressCallback = no_progress,
+    interrupted: Callable[[WinchAnswer], None] | None = None,
+) -> Answer: ...
+
+
+def diagnose(
+    runs: Sequence[Run],
+    profile: Profile,
+    catalogue: Catalogue | None = None,
+    band: float | None = None,
+    *,
+    decimate: bool = True,
+    as_recorded: bool = False,
+    progress: ProgressCallback = no_progress,
+    interrupted: Callable[[WinchAnswer], None] | None = None,
+) -> Answer:
+    """Find the effects that a profile lacks on its runs.
 
     Parameters
     ----------
     runs
-        Recorded runs.
+        Recorded runs; of a robot with motor angles and measured poses.
     profile
-        The winch.
+        The winch, or the robot: the options below ``band`` are of winches, except ``progress``.
     catalogue
         Effects; by default all that are installed.
     band
@@ -173,8 +203,8 @@ def diagnose(
 
     Returns
     -------
-    WinchAnswer
-        The diagnosis with everything that it was derived from.
+    Answer
+        The diagnosis with everything that it was derived from; a WinchAnswer of a winch.
 
     Raises
     ------
@@ -182,7 +212,13 @@ def diagnose(
         With every fault of every run.
     FileError
         For effects that do not bind.
+    UsageError
+        For a band with a robot.
     """
+    if (by_wing := of_wing("diagnose", profile, band)) is not None:
+        found: Answer = by_wing(runs, profile, catalogue, progress)
+        return found
+    profile = require_winch(profile)
     catalogue = catalogue or load_catalogue()
     progress("reading the signals", 0.0)
     dataset = prepare(runs, profile, band, decimate=decimate, fast=True, catalogue=catalogue)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, overload
 
+from winchkit import wings
 from winchkit.arguments import require_type
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.design.plan import Offer, inseparable, offers, programme_of
 from winchkit.diagnosis.design.programmes import OperatingRange, range_of_limits, range_of_runs
-from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.rendering import Shown
@@ -19,14 +20,24 @@ from winchkit.schema.programme import Programme
 
 @dataclass(frozen=True, repr=False)
 class Plan(Shown):
-    """Candidate motion programmes for the next run, the best first."""
+    """What to record next, the best first."""
+
+    pairs: tuple[tuple[Term, Term], ...]
+    """Effects that the runs so far cannot distinguish; the first powers of an offer are theirs."""
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON of ``winchkit plan --json``, without the file written."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, repr=False)
+class WinchPlan(Plan):
+    """Candidate motion programmes for the next run of a winch."""
 
     dataset: Dataset
     """Runs so far."""
     operating_range: OperatingRange
     """Operating range of the programmes."""
-    pairs: tuple[tuple[Term, Term], ...]
-    """Effects that the runs so far cannot distinguish."""
     offers: tuple[Offer, ...]
     """Programmes with their time and power, the best first."""
 
@@ -44,10 +55,22 @@ class Plan(Shown):
         return {"schema": 1, "offers": [offer.to_json(self.pairs) for offer in self.offers]}
 
 
+@overload
 def plan(
     answer: WinchAnswer, catalogue: Catalogue | None = None, limits: LimitSpec | None = None
+) -> WinchPlan: ...
+
+
+@overload
+def plan(
+    answer: Answer, catalogue: Catalogue | None = None, limits: LimitSpec | None = None
+) -> Plan: ...
+
+
+def plan(
+    answer: Answer, catalogue: Catalogue | None = None, limits: LimitSpec | None = None
 ) -> Plan:
-    """Propose the next motion programme after a diagnosis.
+    """Propose the next motion programme after a diagnosis, or the next poses of a robot.
 
     Programmes are simulated on the nominal model with the noise of the runs; those that separate
     effects that the runs cannot distinguish come first, then those that make effects detectable.
@@ -60,22 +83,26 @@ def plan(
         Effects whose detection is of interest; by default all that are installed.
     limits
         Limits of the bench on which the programme is to run; by default the programme keeps to the
-        stroke, speed and load of the runs so far.
+        stroke, speed and load of the runs so far. Both are of winches only.
 
     Returns
     -------
     Plan
-        Candidate programmes, the best first.
+        Candidates, the best first: programmes in a WinchPlan, poses in a PosePlan.
 
     Notes
     -----
     The power is that of a noncentral χ² test (:mod:`winchkit.diagnosis.design.discrimination`).
     """
+    if (by_wing := wings.call("plan", answer)) is not None:
+        poses: Plan = by_wing(answer)
+        return poses
     require_type(answer, WinchAnswer, "answer")
+    assert isinstance(answer, WinchAnswer), "just required"
     regression, noise = answer.engine.regression, answer.result.noise.rms
     dataset = regression.dataset
     allowed = range_of_runs(dataset) if limits is None else range_of_limits(dataset, limits)
-    effects = list(load_catalogue() if catalogue is None else catalogue)
+    effects = list((catalogue or load_catalogue()).of_winches())
     found = offers(
         regression,
         answer.pairs,
@@ -84,4 +111,4 @@ def plan(
         threshold=answer.threshold,
         operating_range=allowed,
     )
-    return Plan(dataset, allowed, answer.pairs, tuple(found))
+    return WinchPlan(answer.pairs, dataset, allowed, tuple(found))

@@ -52,11 +52,11 @@ def selection_engine(
 ) -> TimeSeriesSelection:
     """Selection engine whose initial model is the profile's own effects.
 
-    Candidates are all effects of the catalogue, or those that are given.
+    Candidates are all effects of winches, or those that are given.
     """
     regression = TimeSeriesRegression(dataset)
     initial_model = initial_hypothesis(dataset.profile, catalogue, regression)
-    chosen = catalogue if candidates is None else candidates
+    chosen = catalogue.of_winches() if candidates is None else candidates
     absent = [located(effect, dataset.motions) for effect in chosen]
     return TimeSeriesSelection(regression, initial_model, absent)
 
@@ -113,7 +113,7 @@ def _with_transitions(
     result = stepwise_selection(engine, known)
     if not transitions:
         return result, None
-    rounded = Catalogue(with_transitions(effect, transitions) for effect in catalogue)
+    rounded = Catalogue(with_transitions(effect, transitions) for effect in catalogue.of_winches())
     again = selection_engine(engine.regression.dataset, rounded)
     again.on_trial = trials
     return stepwise_selection(again), (again, rounded)
@@ -137,7 +137,7 @@ def _with_plain_laws(
     }
     if not degenerate or not predicts_better(before, (engine, plain.final, plain.noise)):
         return engine, plain
-    others = [effect for effect in catalogue if effect.id not in degenerate]
+    others = [effect for effect in catalogue.of_winches() if effect.id not in degenerate]
     again = selection_engine(engine.regression.dataset, catalogue, others)
     again.on_trial = engine.on_trial
     found = _simplified(again, stepwise_selection(again))

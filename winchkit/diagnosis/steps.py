@@ -239,3 +239,15 @@ def candidates_of(engine: SelectionEngine, result: SelectionResult) -> tuple[Can
             rms = engine.held_out_errors(fitted, result.initial_noise, folds)
         out.append(CandidateScore(item.candidate.effect.id, item.net_gain, rms))
     return tuple(out)
+
+
+def place_text(step: Step) -> str:
+    """``motor: motor_torque over speed``, by which a step that is not certain is followed.
+
+    The id of its first effect where it has no place.
+    """
+    if not step.place:
+        return step.effects[0]
+    first = step.place[0]
+    over = f" over {first.variable}" if first.variable else ""
+    return f"{first.part}: {', '.join(dict.fromkeys(at.output for at in step.place))}{over}"

@@ -1,15 +1,15 @@
 """Physical effects: the catalogue, and the binding of effects to profiles.
 
-``on_length``, ``on_tension``, ``on_torque``, ``on_axis`` and ``on_robot`` have one effect per file,
-ordered by the first output that it changes. ``bind`` and ``bind_robot`` make terms of the tables of
-a profile, ``parametrization`` gives the coordinates in which a fit changes their values.
+``on_length``, ``on_tension``, ``on_torque`` and ``on_axis`` have one effect per file, ordered by
+the first output that it changes. ``bind`` makes terms of the tables of a profile,
+``parametrization`` gives the coordinates in which a fit changes their values. Effects of robots are
+in ``winchkit.robot.effects``.
 """
 
 from winchkit.effects.bind import check_profile, line_of, terms_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.effects.term import Term, modifiers_of, robot_with_terms
-from winchkit.robot.effects.bind import robot_terms, robot_with_effects
+from winchkit.effects.term import Term, modifiers_of
 
 __all__ = [
     "Catalogue",
@@ -21,8 +21,5 @@ __all__ = [
     "line_of",
     "load_catalogue",
     "modifiers_of",
-    "robot_terms",
-    "robot_with_effects",
-    "robot_with_terms",
     "terms_of",
 ]

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from winchkit import wings
 from winchkit.arrays import Array
 from winchkit.effects.effect import NEED_WORDS, Effect, Parameter, Values
 from winchkit.effects.reference_motion import STANDARD_PROFILE, standard_motion
 from winchkit.effects.term import Term
 from winchkit.model.line import Line
-from winchkit.robot.effects.reference import robot_changes
 
 _PLACES = {"all": "all lines equally", "one": "one line", "platform": "the platform"}
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
@@ -60,7 +60,7 @@ def signature(effect: Effect, values: Values | None = None) -> Signature:
     """
     values = usual_values(effect) if values is None else values
     if effect.of_robots:
-        length, changed = robot_changes(effect, dict(values))
+        length, changed = wings.part("robot", "changes")(effect, dict(values))
         poses = np.arange(len(length), dtype=float)
         return Signature(values, poses, length, changed)
     motion = standard_motion()

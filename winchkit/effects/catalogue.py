@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from functools import cache
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from functools import cache, cached_property
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from pkgutil import iter_modules
 
+from winchkit import wings
 from winchkit.arguments import require_types
 from winchkit.effects.effect import NEED_WORDS, Effect, Parameter
 from winchkit.effects.empirical import EMPIRICAL
@@ -22,36 +23,57 @@ _ROOMS = (
     "winchkit.effects.on_tension",
     "winchkit.effects.on_torque",
     "winchkit.effects.on_axis",
-    "winchkit.robot.effects.on_robot",
 )
 
 
 class Catalogue:
     """Effects by id, in a fixed order: simple ones first.
 
-    Empirical effects are found by name and not listed, since a free curve fits any residual.
+    Empirical effects are found by name and not listed, since a free curve fits any residual. Those
+    of the wings are imported when all effects, or one that no winch has, are asked for.
     """
 
-    def __init__(self, effects: Iterable[Effect]) -> None:
-        self._by_id = {effect.id: effect for effect in effects}
+    def __init__(
+        self, effects: Iterable[Effect], of_wings: Callable[[], Sequence[Effect]] = tuple
+    ) -> None:
+        self._of_winches = {effect.id: effect for effect in effects}
+        self._of_wings = of_wings
+
+    @cached_property
+    def _by_id(self) -> dict[str, Effect]:
+        further = self._of_wings()
+        every = [*self._of_winches.values(), *further]
+        return {effect.id: effect for effect in (_simple_first(every) if further else every)}
+
+    def of_winches(self) -> Iterator[Effect]:
+        """Effects without those of the wings."""
+        return iter(self._of_winches.values())
 
     def __iter__(self) -> Iterator[Effect]:
         return iter(self._by_id.values())
+
+    def __bool__(self) -> bool:
+        return bool(self._of_winches) or bool(self._by_id)
 
     def __len__(self) -> int:
         return len(self._by_id)
 
     def __contains__(self, effect_id: object) -> bool:
-        return effect_id in self._by_id or effect_id in EMPIRICAL
+        return effect_id in {**self._of_winches, **EMPIRICAL} or effect_id in self._by_id
 
     def __getitem__(self, effect_id: str) -> Effect:
-        found = self._by_id.get(effect_id) or EMPIRICAL.get(effect_id)
+        found = self._of_winches.get(effect_id) or EMPIRICAL.get(effect_id)
+        found = found or self._by_id.get(effect_id)
         if found is None:
             raise UsageError(
                 f"no effect '{effect_id}'{suggest(effect_id, [*self._by_id, *EMPIRICAL])}"
                 " ('winchkit effects' lists them)"
             )
         return found
+
+
+def _simple_first(effects: Iterable[Effect]) -> list[Effect]:
+    return sorted(effects, key=lambda effect: (len(effect.parameters), effect.id))
 
 
 def load_catalogue(files: Sequence[str | Path] = ()) -> Catalogue:
@@ -81,24 +103,32 @@ def load_catalogue(files: Sequence[str | Path] = ()) -> Catalogue:
     found = list(_installed())
     for path in dict.fromkeys(Path(file).absolute() for file in files):
         for effect in _from_file(path):
-            if any(other.id == effect.id for other in found):
+            if any(other.id == effect.id for other in (*found, *_of_wings())):
                 message = f"there is an effect '{effect.id}' already; give yours another id"
                 raise FileError(Fault(message, str(path)))
             found.append(effect)
-    return Catalogue(sorted(found, key=lambda effect: (len(effect.parameters), effect.id)))
+    return Catalogue(_simple_first(found), _of_wings)
 
 
 @cache
 def _installed() -> tuple[Effect, ...]:
     """Effects of the package and of entry points; these are searched in every distribution."""
-    found: list[Effect] = []
-    for room in _ROOMS:
-        package = import_module(room)
-        for module in iter_modules(package.__path__):
-            found.append(import_module(f"{package.__name__}.{module.name}").EFFECT)
+    found = [effect for room in _ROOMS for effect in _in_package(room)]
     for point in entry_points(group="winchkit.effects"):
         found.extend(_effects_in(point.load(), point.name))
     return tuple(found)
+
+
+@cache
+def _of_wings() -> tuple[Effect, ...]:
+    return tuple(e for wing in wings.own() for room in wing.effects for e in _in_package(room))
+
+
+def _in_package(name: str) -> Iterator[Effect]:
+    """The effect of every module of a package."""
+    package = import_module(name)
+    for module in iter_modules(package.__path__):
+        yield import_module(f"{name}.{module.name}").EFFECT
 
 
 def _from_file(path: Path) -> list[Effect]:

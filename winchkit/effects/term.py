@@ -1,4 +1,4 @@
-"""Terms: effects with values, as modifiers of a line or a robot."""
+"""Terms: effects with values, as modifiers of a line."""
 
 from __future__ import annotations
 
@@ -11,11 +11,8 @@ from typing import Any
 import numpy as np
 
 from winchkit.effects.effect import Effect, Values
-from winchkit.effects.placement import HOME, line_of_effect
 from winchkit.errors import Fault, FileError, WinchkitError
-from winchkit.model.stages import At, Modifier, Stage
-from winchkit.robot.geometry.robot import Robot, robot_of
-from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.model.stages import At, Modifier
 
 _ORDERS_IN_LABEL = 6
 """Numbers that a label lists; with the rest counted it fits a line of a report."""
@@ -83,46 +80,3 @@ def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:
         In the order of the terms.
     """
     return tuple(term.modifier() for term in terms)
-
-
-def robot_with_terms(profile: RobotProfile, terms: Iterable[Term]) -> Robot:
-    """The robot with these effects in place of its own.
-
-    Parameters
-    ----------
-    profile : RobotProfile
-        The robot.
-    terms : iterable of Term
-        Effects with values, in place of those of the profile.
-
-    Returns
-    -------
-    Robot
-        Kinematic model.
-    """
-    lines: dict[str, list[Modifier]] = {line.name: [] for line in profile.line}
-    payload: list[Modifier] = []
-    tracker: list[Modifier] = []
-    for term in terms:
-        modifier, place = term.modifier(), line_of_effect(term.effect)
-        if term.effect.stage is Stage.PAYLOAD:
-            payload.append(modifier)
-            continue
-        if term.effect.stage is Stage.TRACKER:
-            tracker.append(modifier)
-            continue
-        for name in [place] if place else lines:
-            lines[name].append(modifier)
-            if offset := term.values.get(HOME + name):
-                lines[name].append(Modifier(Stage.HOME_LENGTH, _Longer(offset)))
-    return robot_of(profile, list(lines.values()), payload, tracker)
-
-
-class _Longer:
-    """A constant additional cable length."""
-
-    def __init__(self, offset: float) -> None:
-        self.offset = offset
-
-    def __call__(self, length: float, at: object) -> float:
-        return length + self.offset

@@ -1,9 +1,7 @@
 """Online estimators for control: tension and elongation that no instrument measures.
 
-``dahl`` removes the friction of pulleys from a cell's reading, ``elongation`` corrects a robot's
-kinematics, ``cable_state`` serves the control loop. The public names are
-:class:`winchkit.DahlEstimator`, :func:`winchkit.identify_dahl` and
-:class:`winchkit.ElongationCorrection`.
+``dahl`` removes the friction of pulleys from a cell's reading, ``cable_state`` serves the control
+loop. The public names are :class:`winchkit.DahlEstimator` and :func:`winchkit.identify_dahl`.
 """
 
 from winchkit.estimation.dahl import DahlEstimator, PlatformTension

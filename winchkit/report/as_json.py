@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from winchkit import wings
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -13,8 +14,6 @@ from winchkit.report.detectability import untestable
 from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.figures.waterfall import Waterfall, waterfall_of
 from winchkit.report.words.sentence import changes_text, sentence
-from winchkit.robot.diagnosis.diagnose import RobotAnswer
-from winchkit.robot.report.pose_traces import traces
 
 
 def report_json(answer: Answer) -> dict[str, Any]:
@@ -23,8 +22,8 @@ def report_json(answer: Answer) -> dict[str, Any]:
     Returns: values in SI.
     """
     diagnosis, ladder = answer.diagnosis, waterfall_of(answer)
-    if isinstance(answer, RobotAnswer):
-        drawn = _of_poses(answer)
+    if (by_wing := wings.call("json", answer)) is not None:
+        drawn = by_wing(answer)
     else:
         assert isinstance(answer, WinchAnswer)
         drawn = _of_runs(answer)
@@ -41,15 +40,6 @@ def report_json(answer: Answer) -> dict[str, Any]:
 
 def _of_runs(answer: WinchAnswer) -> dict[str, Any]:
     return {"residuals": _states(answer, _curves), "maps": _states(answer, _maps)}
-
-
-def _of_poses(answer: RobotAnswer) -> dict[str, Any]:
-    """Errors over the variables to which they were attributed, before and after."""
-    selection = answer.selection
-    drawn = traces(selection.final.regression, *selection.errors)
-    after = [t.to_json(t.after) for t in drawn if t.after is not None]
-    before = [t.to_json(t.before) for t in drawn]
-    return {"residuals": {"before": before, "after": after if answer.diagnosis.steps else None}}
 
 
 def _states(

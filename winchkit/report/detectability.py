@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, isinf, isnan, log10
 
-from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.results import CandidateScore, Detectable, Diagnosis
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.effect import Effect, Parameter
@@ -81,7 +81,8 @@ def untestable(answer: Answer) -> list[tuple[str, list[str]]]:
     """Effects of the catalogue that cannot be tested, each with its missing parts or channels."""
     tried = {e.partition("/")[0] for e in effects_of(answer)}
     out = []
-    for effect in load_catalogue():
+    known = load_catalogue()
+    for effect in known.of_winches() if isinstance(answer, WinchAnswer) else known:
         lacking = answer.engine.regression.missing_needs(effect) if effect.id not in tried else []
         if lacking:
             out.append((effect.id, list(lacking)))

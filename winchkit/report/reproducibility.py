@@ -9,11 +9,9 @@ from importlib.metadata import version
 from platform import python_version
 from typing import Any
 
-import numpy as np
-
+from winchkit import wings
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.report.html.markup import Markup, compact, details, element, folded, table
-from winchkit.robot.diagnosis.data.dataset import RobotDataset
 
 _FEW = 3
 """Runs that a command names; more are written with a wildcard."""
@@ -31,17 +29,12 @@ class Command:
     @property
     def profile(self) -> str:
         """The profile as commands name it."""
-        if isinstance(self.dataset, RobotDataset):
-            return self.named or self.dataset.robot.name
-        return self.named or self.dataset.profile.name
+        return self.named or self.dataset.profile_name
 
     @property
     def source(self) -> str:
         """Profile, runs and version, as figures print them."""
-        if isinstance(self.dataset, RobotDataset):
-            names = list(self.dataset.runs)
-        else:
-            names = [recording.name for recording in self.dataset.recordings]
+        names = self.dataset.run_names
         runs = (
             ", ".join(names)
             if len(names) <= _FEW
@@ -74,9 +67,7 @@ class Command:
 
     @property
     def _runs(self) -> str:
-        if isinstance(self.dataset, RobotDataset):
-            return " ".join(map(_quoted, self.dataset.runs))
-        return " ".join(_quoted(r.path or r.name) for r in self.dataset.recordings)
+        return " ".join(map(_quoted, self.dataset.run_files))
 
     @property
     def _options(self) -> str:
@@ -98,8 +89,8 @@ def repeat(command: Command, commands: Sequence[str], what: str, raw: Mapping[st
 
 
 def _runs(dataset: Dataset) -> Markup:
-    if isinstance(dataset, RobotDataset):
-        return _poses(dataset)
+    if (by_wing := wings.call("runs_table", dataset)) is not None:
+        return Markup(by_wing(dataset))
     sets = {run: n for n, group in enumerate(dataset.repeated, 1) for run in group.runs}
     rows = []
     for index, recording in enumerate(dataset.recordings):
@@ -117,18 +108,6 @@ def _runs(dataset: Dataset) -> Markup:
         )
     head = ["run", "programme", "repeats", "samples", "length", "excluded"]
     return table("Runs; those of one set are repeats of each other.", head, rows, words=3)
-
-
-def _poses(dataset: RobotDataset) -> Markup:
-    """Runs of a robot: a row is a pose."""
-    often = np.bincount(dataset.pose)
-    rows = []
-    for number, name in enumerate(dataset.runs):
-        own = dataset.pose[dataset.measured.run == number]
-        again = int(np.count_nonzero(often[own] > 1))
-        rows.append([name, f"{len(own)}", f"{len(np.unique(own))}", f"{again}"])
-    head = ["run", "poses", "distinct", "repeated"]
-    return table("Runs; a row of a run is a pose.", head, rows)
 
 
 def _quoted(text: str) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from math import degrees, isnan
 from typing import TYPE_CHECKING
 
+from winchkit import wings
 from winchkit.diagnosis.data.sanity import ALARMING
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
@@ -47,8 +48,6 @@ from winchkit.report.words.vocabulary import (
     parameter_name,
     values_text,
 )
-from winchkit.robot.diagnosis.diagnose import RobotAnswer
-from winchkit.robot.diagnosis.excitation import missing_pose_excitation
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal
@@ -109,8 +108,8 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
 
 def _limits(answer: Answer) -> list[str]:
     """Notes on what these data cannot show, which are no fault of them."""
-    if isinstance(answer, RobotAnswer):
-        return missing_pose_excitation(answer.selection.preparation)
+    if (by_wing := wings.call("limits", answer)) is not None:
+        return list(by_wing(answer))
     assert isinstance(answer, WinchAnswer)
     return missing_excitation(answer.engine.regression)
 

@@ -17,8 +17,17 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from winchkit.bench.tracker import Tracker
     from winchkit.model.elastic import ElongationLaw, Exponential, Linear, Quartic
     from winchkit.model.rotation import angles_of, rotation_of
+    from winchkit.robot.bench.computation import ComputationProcess
+    from winchkit.robot.bench.platform import Platform
+    from winchkit.robot.bench.self_calibration import PoseVolume, SelfCalibration, self_calibrated
+    from winchkit.robot.calibration.calibrate import calibrate
+    from winchkit.robot.calibration.pose_design import next_poses
+    from winchkit.robot.calibration.profile import write_calibrated
+    from winchkit.robot.diagnosis.diagnose import RobotAnswer
+    from winchkit.robot.diagnosis.plan import PosePlan
     from winchkit.robot.dynamics.cycle import RobotCycle, flat_pose
     from winchkit.robot.dynamics.dynamics import (
         InverseDynamics,
@@ -28,7 +37,11 @@ if TYPE_CHECKING:
         motion_of,
     )
     from winchkit.robot.dynamics.dynamics_cycle import DynamicsCycle, DynamicTarget
+    from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
     from winchkit.robot.dynamics.kernels import PLAIN, RobotKernels, compiled, fastest
+    from winchkit.robot.effects.bind import robot_terms, robot_with_effects
+    from winchkit.robot.effects.term import robot_with_terms
+    from winchkit.robot.files.poses import read_poses
     from winchkit.robot.forces.force_distribution import (
         Feasibility,
         ForceLimits,
@@ -57,11 +70,14 @@ if TYPE_CHECKING:
     )
     from winchkit.robot.geometry.robot import Robot, cables_of, robot_of
     from winchkit.robot.geometry.wrench import gravity_wrench
+    from winchkit.schema.read import read_robot
 
 __all__ = [
     "PLAIN",
+    "ComputationProcess",
     "DynamicTarget",
     "DynamicsCycle",
+    "ElongationCorrection",
     "ElongationLaw",
     "Exponential",
     "Feasibility",
@@ -71,16 +87,23 @@ __all__ = [
     "Geometry",
     "InverseDynamics",
     "Linear",
+    "Platform",
     "PlatformMotion",
     "Pose",
+    "PosePlan",
+    "PoseVolume",
     "Quartic",
     "Robot",
+    "RobotAnswer",
     "RobotCycle",
     "RobotKernels",
+    "SelfCalibration",
     "Sensitivities",
+    "Tracker",
     "angles_of",
     "approximate_forces",
     "cables_of",
+    "calibrate",
     "closed_form",
     "compiled",
     "distributed_forces",
@@ -95,9 +118,16 @@ __all__ = [
     "inverse_dynamics",
     "lengths",
     "motion_of",
+    "next_poses",
     "quadratic",
+    "read_poses",
+    "read_robot",
     "robot_of",
+    "robot_terms",
+    "robot_with_effects",
+    "robot_with_terms",
     "rotation_of",
+    "self_calibrated",
     "sensitivities",
     "steepest_force",
     "structure_matrix",
@@ -105,23 +135,22 @@ __all__ = [
     "swivel_sensitivities",
     "wrap_angle",
     "wrench_feasibility",
+    "write_calibrated",
 ]
 
 _NAMES = {
-    "winchkit.model.elastic": (
-        "ElongationLaw",
-        "Exponential",
-        "Linear",
-        "Quartic",
-    ),
-    "winchkit.model.rotation": (
-        "angles_of",
-        "rotation_of",
-    ),
-    "winchkit.robot.dynamics.cycle": (
-        "RobotCycle",
-        "flat_pose",
-    ),
+    "winchkit.bench.tracker": ("Tracker",),
+    "winchkit.model.elastic": ("ElongationLaw", "Exponential", "Linear", "Quartic"),
+    "winchkit.model.rotation": ("angles_of", "rotation_of"),
+    "winchkit.robot.bench.computation": ("ComputationProcess",),
+    "winchkit.robot.bench.platform": ("Platform",),
+    "winchkit.robot.bench.self_calibration": ("PoseVolume", "SelfCalibration", "self_calibrated"),
+    "winchkit.robot.calibration.calibrate": ("calibrate",),
+    "winchkit.robot.calibration.pose_design": ("next_poses",),
+    "winchkit.robot.calibration.profile": ("write_calibrated",),
+    "winchkit.robot.diagnosis.diagnose": ("RobotAnswer",),
+    "winchkit.robot.diagnosis.plan": ("PosePlan",),
+    "winchkit.robot.dynamics.cycle": ("RobotCycle", "flat_pose"),
     "winchkit.robot.dynamics.dynamics": (
         "InverseDynamics",
         "PlatformMotion",
@@ -129,16 +158,12 @@ _NAMES = {
         "inverse_dynamics",
         "motion_of",
     ),
-    "winchkit.robot.dynamics.dynamics_cycle": (
-        "DynamicTarget",
-        "DynamicsCycle",
-    ),
-    "winchkit.robot.dynamics.kernels": (
-        "PLAIN",
-        "RobotKernels",
-        "compiled",
-        "fastest",
-    ),
+    "winchkit.robot.dynamics.dynamics_cycle": ("DynamicTarget", "DynamicsCycle"),
+    "winchkit.robot.dynamics.elongation_correction": ("ElongationCorrection",),
+    "winchkit.robot.dynamics.kernels": ("PLAIN", "RobotKernels", "compiled", "fastest"),
+    "winchkit.robot.effects.bind": ("robot_terms", "robot_with_effects"),
+    "winchkit.robot.effects.term": ("robot_with_terms",),
+    "winchkit.robot.files.poses": ("read_poses",),
     "winchkit.robot.forces.force_distribution": (
         "Feasibility",
         "ForceLimits",
@@ -151,10 +176,7 @@ _NAMES = {
         "steepest_force",
         "wrench_feasibility",
     ),
-    "winchkit.robot.geometry.forward": (
-        "Found",
-        "forward",
-    ),
+    "winchkit.robot.geometry.forward": ("Found", "forward"),
     "winchkit.robot.geometry.kinematics": (
         "Geometry",
         "Pose",
@@ -168,12 +190,9 @@ _NAMES = {
         "swivel_sensitivities",
         "wrap_angle",
     ),
-    "winchkit.robot.geometry.robot": (
-        "Robot",
-        "cables_of",
-        "robot_of",
-    ),
+    "winchkit.robot.geometry.robot": ("Robot", "cables_of", "robot_of"),
     "winchkit.robot.geometry.wrench": ("gravity_wrench",),
+    "winchkit.schema.read": ("read_robot",),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from winchkit import wings
 from winchkit.arguments import path_of
 from winchkit.catalog import Kind, find
 from winchkit.errors import Fault, FileError
@@ -26,7 +27,6 @@ from winchkit.schema.profiles.sizing import SizeSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import Programme
 from winchkit.schema.reading import bench as benches
-from winchkit.schema.reading import robot as robots
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.parts import Reading
 from winchkit.schema.reading.source import open_source
@@ -47,6 +47,7 @@ Declared = (
     | ImportMapping
 )
 T = TypeVar("T")
+Reader = Callable[[Reading, dict[str, Any]], Declared | None]
 PathLike = str | Path
 
 
@@ -276,7 +277,8 @@ def load(path: PathLike, kind: str | None = None) -> Declaration:
         without = ", which has no drum and no cable" if found == "axis" else ""
         message = f"is '{found}'{without}; a '{kind}' is needed here"
         raise FileError(reading.source.fault(("kind",), message))
-    value = _READERS[found](reading, reading.source.tree)
+    read: Reader = _READERS.get(found) or wings.reader(found)
+    value = read(reading, reading.source.tree)
     reading.refuse_faults()
     assert value is not None, "a reader that returns nothing has noted why"
     return Declaration(found, value, _warnings(reading, value))
@@ -327,13 +329,11 @@ def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
     return device
 
 
-_READERS: dict[str, Callable[[Reading, dict[str, Any]], Declared | None]] = {
+_READERS: dict[str, Reader] = {
     "winch": lambda reading, tree: reading.winch(tree, reading.stem),
     "axis": Reading.axis,
-    "robot": lambda reading, tree: robots.robot(reading, tree, read_winch),
     "bench": lambda reading, tree: benches.bench(reading, tree, read_device, read_robot),
     "programme": _table(Programme),
-    "robot-programme": _table(RobotProgramme),
     "sim-bench": lambda reading, tree: benches.sim_bench(reading, tree, read_device, read_robot),
     "device": _device,
     "size": _table(SizeSpec),

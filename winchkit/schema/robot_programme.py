@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from winchkit.schema.quantity import (
     Angle,
@@ -80,6 +80,8 @@ class PoseStep(Table):
 @dataclass(frozen=True)
 class RobotProgramme(Table):
     """A programme of the platform; the whole list of steps runs ``repeat`` times."""
+
+    wing: ClassVar[str] = "robot"
 
     name: str
     step: tuple[PoseStep, ...]

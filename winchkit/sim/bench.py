@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from random import Random
 
+from winchkit import wings
 from winchkit.catalog import find, folder, names
 from winchkit.errors import FileError, suggest
 from winchkit.regular_file import file_kind
@@ -26,9 +27,8 @@ def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
     from winchkit.schema.read import read_winch
 
     if bench.platform is not None:
-        from winchkit.robot.sim.build import build_robot
-
-        return build_robot(bench, bench.platform).profiles
+        profiles: dict[str, WinchProfile] = wings.part("robot", "simulated_profiles")(bench)
+        return profiles
     return {
         name: read_winch(find("profiles", wiring.profile, beside=bench.bench.path or None))
         for name, wiring in bench.bench.winch.items()

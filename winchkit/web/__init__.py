@@ -3,6 +3,6 @@
 It holds no physics and no supervision: :mod:`~winchkit.web.workspace` holds the runs and the
 profile of the page, :mod:`~winchkit.web.ladder` and :mod:`~winchkit.web.curves` the data of its
 drawings, :mod:`~winchkit.web.application` the routes, :mod:`~winchkit.web.guard` what is refused,
-:func:`~winchkit.web.server.serve` the entry. The Bench and the Library view are the folders
-``bench`` and ``library``; the browser's part is in ``static``.
+:func:`~winchkit.web.server.serve` the entry. The Bench view is the folder ``bench``; those of the
+wings are :mod:`~winchkit.web.views`; the browser's part is in ``static``.
 """

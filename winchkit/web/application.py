@@ -6,6 +6,7 @@ import asyncio
 import json
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
@@ -20,12 +21,10 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from winchkit.catalog import names
 from winchkit.errors import UsageError, WinchkitError
-from winchkit.fleet.web.fleet import Fleet
-from winchkit.fleet.web.runs import Library
-from winchkit.robot.web.robot import RobotWork, is_robot
 from winchkit.version import __version__
 from winchkit.web.foreign import is_run, preview
 from winchkit.web.guard import Guard
+from winchkit.web.views import View, attachment
 from winchkit.web.workspace import Workspace
 
 if TYPE_CHECKING:
@@ -43,14 +42,12 @@ _LARGEST_MESSAGE = 64_000
 def application(
     workspace: Workspace,
     token: str,
-    library: Library,
-    robot: RobotWork,
+    views: Sequence[View] = (),
     bench: BenchView | None = None,
 ) -> Starlette:
     """The page as an ASGI application."""
     listeners = _Listeners()
     workspace.changed = listeners.wake
-    fleet = Fleet(library, workspace.effects)
 
     @asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
@@ -60,9 +57,9 @@ def application(
         workspace.close()
 
     routes = [
-        *_Work(workspace, library, fleet, robot, has_bench=bench is not None).routes(listeners),
-        *_Drawings(workspace, library, fleet).routes(),
-        *_RobotDrawings(robot).routes(),
+        *_Work(workspace, views, has_bench=bench is not None).routes(listeners),
+        *_Drawings(workspace).routes(),
+        *(route for view in views for route in view.routes()),
         *([] if bench is None else bench.routes()),
         Route("/", _page),
         Mount("/static", StaticFiles(directory=_STATIC)),
@@ -103,19 +100,9 @@ class _Listeners:
 class _Work:
     """Routes that change the workspace, and its view."""
 
-    def __init__(
-        self,
-        workspace: Workspace,
-        library: Library,
-        fleet: Fleet,
-        robot: RobotWork,
-        *,
-        has_bench: bool,
-    ) -> None:
+    def __init__(self, workspace: Workspace, views: Sequence[View], *, has_bench: bool) -> None:
         self.workspace = workspace
-        self.library = library
-        self.fleet = fleet
-        self.robot = robot
+        self.views = views
         self.has_bench = has_bench
 
     def routes(self, listeners: _Listeners) -> list[Route | WebSocketRoute]:
@@ -134,11 +121,10 @@ class _Work:
         ]
 
     def _shown(self) -> dict[str, Any]:
-        return self.workspace.view() | {
-            "bench": self.has_bench,
-            "robot": self.robot.summary(),
-            "version": __version__,
-        }
+        shown = self.workspace.view() | {"bench": self.has_bench, "version": __version__}
+        for view in self.views:
+            shown |= view.shown()
+        return shown
 
     async def _view(self, request: Request) -> Response:
         return JSONResponse(self._shown())
@@ -146,15 +132,14 @@ class _Work:
     async def _choices(self, request: Request) -> Response:
         effects = [effect.id for effect in self.workspace.catalogue]
         known = names("profiles")
-        robots = [name for name in known if is_robot(name)]
-        return JSONResponse(
-            {
-                "profiles": [name for name in known if name not in robots],
-                "robots": robots,
-                "examples": names("sim"),
-                "effects": effects,
-            }
-        )
+        choices: dict[str, Any] = {
+            "profiles": [name for name in known if self._view_of(name) is None],
+            "examples": names("sim"),
+            "effects": effects,
+        }
+        for view in self.views:
+            choices |= view.choices(known)
+        return JSONResponse(choices)
 
     async def _drop(self, request: Request) -> Response:
         name = unquote(request.headers.get("x-file-name", ""))
@@ -162,10 +147,9 @@ class _Work:
         if path.suffix == ".toml":
             self._open_profile(str(path))
         elif await asyncio.to_thread(is_run, path):
-            if request.headers.get("x-view") == "robot":
-                open_robot(self.workspace, self.robot, [path])
-            else:
-                self.workspace.open([path])
+            there = request.headers.get("x-view")
+            opens = next((view for view in self.views if view.name == there), self.workspace)
+            opens.open([path])
         else:
             found = await asyncio.to_thread(preview, path)
             return JSONResponse({"import": found, "file": path.name})
@@ -181,17 +165,11 @@ class _Work:
         asked, work = await _object(request), self.workspace
         actions: dict[str, Callable[[], object]] = {
             "profile": lambda: self._open_profile(str(asked["name"])),
-            "calibrate": lambda: work.task("calibrating", self.robot.calibrate),
-            "propose": lambda: work.task("proposing poses", self.robot.propose),
             "example": lambda: work.example(str(asked["name"])),
             "mystery": lambda: work.mystery(int(asked["seed"])),
             "use": lambda: work.use(str(asked["name"]), used=bool(asked["used"])),
             "remove": lambda: work.remove(str(asked["name"])),
             "import": lambda: work.take(str(asked["file"]), dict(asked["answers"])),
-            "library": lambda: work.show(
-                [self.library.run(str(name)) for name in asked["names"]], asked.get("profile")
-            ),
-            "fleet": lambda: work.task("fitting the fleet", lambda: self._fit_fleet(asked)),
             "diagnose": work.diagnose,
             "add": lambda: work.add(str(asked["effect"])),
             "undo": work.undo,
@@ -200,21 +178,20 @@ class _Work:
             "end": work.end_comparison,
             "cancel": work.cancel,
         }
+        for view in self.views:
+            actions |= {key: partial(order, asked) for key, order in view.orders().items()}
         name = str(asked.get("do"))
         if name not in actions:
             raise UsageError(f"there is no action '{name}'; there are {', '.join(actions)}")
         actions[name]()
         return _accepted()
 
-    def _fit_fleet(self, asked: dict[str, Any]) -> None:
-        effects = [str(effect) for effect in asked.get("effects", ())]
-        self.fleet.fit(str(asked["profile"]), effects, self.workspace.progress)
-
     def _open_profile(self, name: str) -> None:
-        if is_robot(name):
-            open_robot(self.workspace, self.robot, [], name)
-        else:
-            self.workspace.open([], name)
+        (self._view_of(name) or self.workspace).open([], name)
+
+    def _view_of(self, profile: str) -> View | None:
+        """The view that opens a profile; None for one of a winch."""
+        return next((view for view in self.views if view.is_profile(profile)), None)
 
     async def _live(self, socket: WebSocket, listeners: _Listeners) -> None:
         await socket.accept()
@@ -236,12 +213,10 @@ class _Work:
 
 
 class _Drawings:
-    """Routes that read: curves, cards, files to save, and the library."""
+    """Routes that read: curves, cards, and files to save."""
 
-    def __init__(self, workspace: Workspace, library: Library, fleet: Fleet) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
-        self.library = library
-        self.fleet = fleet
 
     def routes(self) -> list[Route]:
         """The routes."""
@@ -252,10 +227,6 @@ class _Drawings:
             Route("/api/truth", self._truth),
             Route("/api/profile", self._profile),
             Route("/api/report", self._report),
-            Route("/api/runs", self._runs),
-            Route("/api/overlay", self._overlay),
-            Route("/api/fleet", self._fleet),
-            Route("/api/fleet/runs", self._fleet_runs),
         ]
 
     async def _curve(self, request: Request) -> Response:
@@ -281,77 +252,11 @@ class _Drawings:
 
     async def _profile(self, request: Request) -> Response:
         name, text = self.workspace.profile_text()
-        return _attachment(text, name, "application/toml")
+        return attachment(text, name, "application/toml")
 
     async def _report(self, request: Request) -> Response:
         text = await asyncio.to_thread(self.workspace.report)
-        return _attachment(text, "report.html", "text/html")
-
-    async def _runs(self, request: Request) -> Response:
-        judged = dict(self.workspace.judged)
-        return JSONResponse(await asyncio.to_thread(self.library.rows, judged))
-
-    async def _overlay(self, request: Request) -> Response:
-        query = request.query_params
-        wanted, channel = query.getlist("name"), query.get("channel", "tension")
-        return JSONResponse(await asyncio.to_thread(self.library.overlay, wanted, channel))
-
-    async def _fleet(self, request: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(self.fleet.view))
-
-    async def _fleet_runs(self, request: Request) -> Response:
-        query = request.query_params
-        winch, time = query["winch"], float(query["time"])
-        return JSONResponse(await asyncio.to_thread(self.fleet.runs, winch, time))
-
-
-class _RobotDrawings:
-    """Routes of the Robot view that read."""
-
-    def __init__(self, robot: RobotWork) -> None:
-        self.robot = robot
-
-    def routes(self) -> list[Route]:
-        """The routes."""
-        return [
-            Route("/api/robot", self._view),
-            Route("/api/robot/picture", self._picture),
-            Route("/api/robot/slice", self._slice),
-            Route("/api/robot/profile", self._profile),
-            Route("/api/robot/report", self._report),
-        ]
-
-    async def _view(self, request: Request) -> Response:
-        return JSONResponse(await asyncio.to_thread(self.robot.view))
-
-    async def _picture(self, request: Request) -> Response:
-        query = request.query_params
-        limits = float(query["low"]), float(query["high"])
-        return JSONResponse(await asyncio.to_thread(self.robot.picture, int(query["row"]), limits))
-
-    async def _slice(self, request: Request) -> Response:
-        query = request.query_params
-        limits = float(query["low"]), float(query["high"])
-        height, row = float(query["z"]), int(query["row"])
-        return JSONResponse(await asyncio.to_thread(self.robot.slice, height, row, limits))
-
-    async def _profile(self, request: Request) -> Response:
-        name, text = await asyncio.to_thread(self.robot.profile_text)
-        return _attachment(text, name, "application/toml")
-
-    async def _report(self, request: Request) -> Response:
-        text = await asyncio.to_thread(self.robot.report)
-        return _attachment(text, "calibration.html", "text/html")
-
-
-def open_robot(
-    workspace: Workspace, robot: RobotWork, runs: Sequence[str | Path], profile: str | None = None
-) -> None:
-    """Open a robot's profile or its poses in the thread of the workspace.
-
-    ``workspace``: whose thread works, and which shows faults.
-    """
-    workspace.task("calibrating", lambda: robot.open(runs, profile))
+        return attachment(text, "report.html", "text/html")
 
 
 def _version(asked: object) -> int | str:
@@ -397,8 +302,3 @@ async def _until_closed(socket: WebSocket) -> None:
             await socket.receive_text()
     except (WebSocketDisconnect, RuntimeError, KeyError):
         return
-
-
-def _attachment(text: str, name: str, media: str) -> Response:
-    headers = {"content-disposition": f'attachment; filename="{name}"'}
-    return Response(text, media_type=media, headers=headers)

@@ -72,13 +72,12 @@ def serve(
     try:
         import uvicorn
 
-        from winchkit.web.application import application, open_robot
+        from winchkit.web.application import application
     except ImportError as error:
         raise UsageError(
             f"the page needs the extra 'web' ({error.name} is missing): pip install 'winchkit[web]'"
         ) from None
-    from winchkit.fleet.web.runs import Library
-    from winchkit.robot.web.robot import RobotWork, is_robot
+    from winchkit.web.views import views_of
     from winchkit.web.workspace import Workspace
 
     token = secrets.token_urlsafe(24)
@@ -98,17 +97,17 @@ def serve(
             view = stack.enter_context(
                 BenchView(bench, effects, allow_motion=allow_motion, folder=own)
             )
-        robot = RobotWork(own)
-        app = application(workspace, token, Library(folder), robot, view)
-        of_robot = profile is not None and is_robot(profile)
+        views = views_of(workspace, folder)
+        app = application(workspace, token, views, view)
+        shown = next((one for one in views if profile and one.is_profile(profile)), None)
         if mystery is not None:
             workspace.mystery(mystery)
-        elif of_robot:
-            open_robot(workspace, robot, runs, profile)
         elif runs or profile:
-            workspace.open(runs, profile)
-        if view is not None and view.robot_profile and not of_robot:
-            open_robot(workspace, robot, [], view.robot_profile)
+            (shown or workspace).open(runs, profile)
+        if view is not None and view.robot_profile and shown is None:
+            for one in views:
+                if one.is_profile(view.robot_profile):
+                    one.open([], view.robot_profile)
         listening = stack.enter_context(_listening(port))
         config = uvicorn.Config(
             app,
@@ -117,7 +116,7 @@ def serve(
             timeout_graceful_shutdown=_SHUTDOWN,
             lifespan="on",
         )
-        at = "#robot" if of_robot else ""
+        at = "" if shown is None else f"#{shown.name}"
         ready(f"http://{_HOST}:{listening.getsockname()[1]}/?token={token}{at}")
         _run(uvicorn.Server(config), listening)
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.steps import place_text
 from winchkit.errors import UsageError
-from winchkit.fleet.diagnosis.meta_analysis import place_text
 from winchkit.model.variables import ANGLES
 from winchkit.profile_edit.naming import extended_name
 from winchkit.runs.run import Run

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import initial_residual
@@ -22,7 +22,6 @@ from winchkit.diagnosis.diagnose import WinchAnswer, diagnose_prepared
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.errors import FileError, UsageError, WinchkitError
-from winchkit.fleet.web.runs import LibraryRun
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
@@ -61,6 +60,17 @@ class _Work:
     what: str = ""
     share: float = 0.0
     cancelled: threading.Event = field(default_factory=threading.Event)
+
+
+class StoredRun(Protocol):
+    """A winch of a run in a file."""
+
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    def read(self) -> Run:
+        """Read it; raises FileError."""
 
 
 class Workspace:
@@ -105,7 +115,7 @@ class Workspace:
         """Load run files, and a profile by name or file."""
         return self.task("reading files", lambda: self._open(paths, profile))
 
-    def show(self, runs: Sequence[LibraryRun], profile: str | None = None) -> Future[None]:
+    def show(self, runs: Sequence[StoredRun], profile: str | None = None) -> Future[None]:
         """Show runs of the library in place of the loaded ones."""
         return self.task("reading files", lambda: self._show(runs, profile))
 
@@ -282,7 +292,7 @@ class Workspace:
             runs.append(LoadedRun(file, run, folder=file.parent.name if twin else ""))
         self._loaded(runs, faults)
 
-    def _show(self, chosen: Sequence[LibraryRun], profile: str | None) -> None:
+    def _show(self, chosen: Sequence[StoredRun], profile: str | None) -> None:
         if profile:
             self._open_profile(profile)
         runs: list[LoadedRun] = []

@@ -19,7 +19,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import winchkit
-from winchkit.cli import COMMANDS, main
+from winchkit.cli import main
 from winchkit.cli.core.output import to_json
 from winchkit.errors import (
     ConnectionLost,
@@ -79,7 +79,7 @@ def test_start_up_imports_nothing_heavy(code: str) -> None:
 def test_help_lists_every_command() -> None:
     result = CliRunner().invoke(main, ["--help"])
     assert result.exit_code == 0
-    for name, entry in COMMANDS.items():
+    for name, entry in main.table.items():
         assert f"  {name} " in result.output
         assert entry.help in result.output
 
@@ -95,7 +95,7 @@ def test_the_package_is_the_command_line_too() -> None:
     assert told == f"winchkit, version {winchkit.__version__}\n"
 
 
-@pytest.mark.parametrize("name", sorted(COMMANDS))
+@pytest.mark.parametrize("name", sorted(main.table))
 def test_every_command_of_the_table_is_there(name: str) -> None:
     result = CliRunner().invoke(main, [name, "--help"])
     assert result.exit_code == 0

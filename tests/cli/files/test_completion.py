@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from can_commands import invoke
 from winchkit import catalog
-from winchkit.cli import COMMANDS, main
+from winchkit.cli import main
 
 BENCH = 'schema = 1\nkind = "bench"\n[winch.left]\n[winch.right]\n[winch."a b"]\n'
 
@@ -122,7 +122,7 @@ def test_an_unknown_shell() -> None:
 def every_option() -> Iterator[tuple[str, click.Option]]:
     """Each option of each command, with the command's words."""
     context = click.Context(main, info_name="winchkit", **main.context_settings)
-    for name in COMMANDS:
+    for name in main.table:
         command = main.get_command(context, name)
         assert command is not None
         yield from options_of(context, command, name)

@@ -23,9 +23,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from winchkit import FileError, diagnose_library, index_library, open_writer, write_run
+from winchkit import FileError, open_writer, write_run
 from winchkit.catalog import find
 from winchkit.errors import ConnectionLost
+from winchkit.fleet import diagnose_library, index_library
 from winchkit.fleet.library import cluster, diagnose
 from winchkit.fleet.library.cluster import cluster_outcomes
 from winchkit.fleet.library.history import library_history

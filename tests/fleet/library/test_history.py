@@ -16,10 +16,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fleet_campaign
-from winchkit import index_library, write_run
+from winchkit import write_run
 from winchkit.catalog import find
 from winchkit.cli import main
 from winchkit.effects.term import Term
+from winchkit.fleet import index_library
 from winchkit.fleet.diagnosis.history import fleet_history
 from winchkit.fleet.diagnosis.sessions import SessionEstimate
 from winchkit.fleet.library.history import common_effects

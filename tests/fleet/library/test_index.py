@@ -13,15 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from winchkit import (
-    FileError,
-    UsageError,
-    index_library,
-    library_runs,
-    open_writer,
-    query_library,
-    write_run,
-)
+from winchkit import FileError, UsageError, open_writer, write_run
+from winchkit.fleet import index_library, library_runs, query_library
 from winchkit.fleet.library.index import IndexReport
 from winchkit.fleet.library.partitions import FOLDER, Partitions
 from winchkit.fleet.library.tables import TABLES, arrow_schema

@@ -10,8 +10,8 @@ import pytest
 
 pytest.importorskip("pyarrow")
 
-from winchkit import index_library
 from winchkit.errors import UsageError
+from winchkit.fleet import index_library
 from winchkit.fleet.diagnosis.history import fleet_history
 from winchkit.fleet.diagnosis.sessions import SessionEstimate
 from winchkit.fleet.library.history import LibraryHistory

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from winchkit import find, read_robot, read_run, robot_of
+from winchkit import find, read_run
 from winchkit.bench.bench import Bench
 from winchkit.bench.lifecycle import stopped_after
 from winchkit.errors import FileError, LimitTripped, MotionError, NotPermitted, UsageError
+from winchkit.robot import read_robot, robot_of
 from winchkit.robot.bench.planner import Planner
 from winchkit.robot.bench.programme import planned_motions, run_robot_programme
 from winchkit.schema.bench import LimitSpec

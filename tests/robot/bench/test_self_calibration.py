@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 import robot_rectangle
 import robot_self_calibrated
 from winchkit.bench.bench import Bench
+from winchkit.bench.tracker import TrackedPose, Tracker
 from winchkit.errors import MotionError, UsageError
 from winchkit.robot.bench.self_calibration import PoseVolume, _stages, self_calibrated
-from winchkit.robot.bench.tracker import TrackedPose, Tracker
 from winchkit.runs.run import Run
 
 

@@ -9,8 +9,9 @@ import pytest
 
 from robot_poses.cases import CASES
 from robot_poses.hidden import profile_text, record
-from winchkit.effects import Term, load_catalogue, robot_with_terms
+from winchkit.effects import Term, load_catalogue
 from winchkit.effects.placement import at_line
+from winchkit.robot import robot_with_terms
 from winchkit.robot.diagnosis.data.dataset import prepare_poses
 from winchkit.robot.diagnosis.equations import Equations, start_pose
 from winchkit.runs import read_run

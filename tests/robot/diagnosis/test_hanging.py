@@ -10,8 +10,8 @@ import pytest
 
 from robot_poses.hanging import Hanging
 from winchkit.arrays import Array
-from winchkit.robot.diagnosis.compare import compare_robot
-from winchkit.robot.diagnosis.diagnose import diagnose_robot
+from winchkit.diagnosis.compare import compare
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
@@ -57,7 +57,7 @@ def test_what_is_hidden_is_named(
     profile: RobotProfile,
     tmp_path: Path,
 ) -> None:
-    found = diagnose_robot([run_of(robot, poses, tmp_path)], profile).diagnosis
+    found = diagnose([run_of(robot, poses, tmp_path)], profile).diagnosis
     if named is None:
         assert found.verdict == "adequate"
         assert found.steps == ()
@@ -76,7 +76,7 @@ def test_the_error_of_cable_lengths_is_that_of_the_drums(
 ) -> None:
     """Four cables alone determine no redundancy; swivels, statics and the IMU do."""
     wrong = replace(RIGHT, ratio=(1.0, 1.0, 1.03, 1.0))
-    error = compare_robot([run_of(wrong, poses, tmp_path)], profile).outputs["cable_length"]
+    error = compare([run_of(wrong, poses, tmp_path)], profile).outputs["cable_length"]
     wound = np.array([RIGHT.motor_angles(pose) for pose in poses]) * RIGHT.truth.winding[2]
     expected = 0.03 * float(np.sqrt(np.mean(wound[:, 2] ** 2) / 4))
     assert error.rms == pytest.approx(expected, rel=0.35)

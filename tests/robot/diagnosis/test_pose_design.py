@@ -17,8 +17,8 @@ from robot_poses.hidden import BASE, profile_text, record
 from robot_poses.truth import turn
 from winchkit.cli import main
 from winchkit.diagnosis.design.discrimination import SEPARATED_AT, power_of, separation
+from winchkit.diagnosis.diagnose import diagnose
 from winchkit.diagnosis.verdict.equivalence import pairs_of
-from winchkit.robot.diagnosis.diagnose import diagnose_robot
 from winchkit.robot.diagnosis.pose_design import pose_offers
 from winchkit.runs import read_run
 from winchkit.schema.read import read_robot
@@ -98,7 +98,7 @@ def test_taking_such_poses_names_one_of_them(flat: tuple[Path, Path], tmp_path: 
 def test_the_power_is_that_of_all_rows_at_once(flat: tuple[Path, Path]) -> None:
     """Pose by pose and in one least-squares problem: the same λ."""
     profile, run = flat
-    answer = diagnose_robot([read_run(run)], read_robot(profile))
+    answer = diagnose([read_run(run)], read_robot(profile))
     (pair,) = pairs_of(answer.sets)
     regression, final = answer.engine.regression, answer.result.final.hypothesis
     whole = separation(regression, *pair, dict.fromkeys(regression.dataset.outputs, 1.0))

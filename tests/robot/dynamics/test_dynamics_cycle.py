@@ -10,7 +10,6 @@ import pytest
 
 from robot_cases import near, shipped
 from winchkit.errors import UsageError
-from winchkit.estimation.elongation import ElongationCorrection
 from winchkit.model.rotation import rotation_by
 from winchkit.model.stages import Signals
 from winchkit.robot import (
@@ -24,6 +23,7 @@ from winchkit.robot import (
     flat_pose,
 )
 from winchkit.robot.dynamics.dynamics import PlatformMotion, dynamic_wrench, motion_of
+from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
 from winchkit.schema.profiles.robot import PlatformSpec
 
 BODY = PlatformSpec(12.0, (0.02, -0.01, 0.05), (0.3, 0.4, 0.5))

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from effect_lines import CATALOGUE, ROBOT_EFFECTS
-from winchkit.effects import Effect, Term, robot_with_effects, robot_with_terms
+from winchkit.effects import Effect, Term
 from winchkit.effects.card import usual_values
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.placement import at_line, placements
 from winchkit.errors import FileError
-from winchkit.robot import robot_of, rotation_of, wrap_angle
+from winchkit.robot import robot_of, robot_with_effects, robot_with_terms, rotation_of, wrap_angle
 from winchkit.robot.effects.bind import check_robot, robot_terms
 from winchkit.robot.effects.reference import STANDARD_ROBOT, robot_changes, standard_poses
 from winchkit.schema.read import read_robot

@@ -12,7 +12,6 @@ from scipy.optimize import root
 
 from robot_cases import near, shipped
 from winchkit.errors import UsageError
-from winchkit.estimation.elongation import ElongationCorrection
 from winchkit.model.rotation import rotation_by
 from winchkit.robot import (
     ElongationLaw,
@@ -26,6 +25,7 @@ from winchkit.robot import (
     flat_pose,
     robot_of,
 )
+from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
 
 Array = np.ndarray
 LINEAR = Linear(439.13e3)

@@ -17,7 +17,7 @@ from winchkit.drivers.reading import Reading, Sensor
 from winchkit.runs.layout import Layout, RowRule, Samples, Signal, Source
 
 if TYPE_CHECKING:
-    from winchkit.robot.bench.tracker import TrackedPose, Tracker
+    from winchkit.bench.tracker import TrackedPose, Tracker
 
 CHANNELS: dict[str, tuple[str, str]] = {
     "cell": ("tension", "N"),

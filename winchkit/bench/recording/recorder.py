@@ -33,7 +33,7 @@ from winchkit.runs.recording.rotation import Rotation
 from winchkit.runs.recording.sync import Syncer
 
 if TYPE_CHECKING:
-    from winchkit.robot.bench.tracker import Tracker
+    from winchkit.bench.tracker import Tracker
 
 _LOGGER = logging.getLogger(__name__)
 _PERIOD = {".csv": 0.05}

@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from winchkit import wings
 from winchkit.bench.bench import Bench
 from winchkit.bench.control.dead_man import LIFE_SIGN
 from winchkit.bench.programme import earlier_runs, run_programme
@@ -142,9 +143,9 @@ class ProgrammeRun:
                 check=self._require_going,
                 replace=self._replace,
             )
-        from winchkit.robot.bench.programme import run_robot_programme
-
-        return run_robot_programme(
+        execute = wings.call("execute", declared)
+        assert execute is not None, "its type names the wing"
+        written: list[Path] = execute(
             self._bench,
             declared,
             self._folder,
@@ -153,6 +154,7 @@ class ProgrammeRun:
             check=self._require_going,
             replace_files=self._replace,
         )
+        return written
 
     def _at_step(self, repeat: int, number: int, step: Step) -> None:
         self._require_going()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from winchkit.cli.bench.direction_option import direction_options, read_direction
+from winchkit.cli.bench.pose_option import pose_line, read_pose
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.options import (
     bench_option,
@@ -20,7 +21,6 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
-from winchkit.robot.cli.pose_option import pose_line, read_pose
 from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit import wings
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.early_checks import check_folder, check_winches
 from winchkit.cli.core.messages import note, suggest_next
@@ -82,15 +83,13 @@ def command(
     Ctrl-C, a trip or a fault stops the winches; what was logged until then is kept.
     """
     from winchkit.schema.read import load, read_bench, read_programme
-    from winchkit.schema.robot_programme import RobotProgramme
     from winchkit.sim.bench import programme_path
 
     path = programme_path(programme)
-    if isinstance(poses := load(path).value, RobotProgramme):
-        from winchkit.robot.cli.run import run_robot
-
-        run_robot(
-            poses,
+    value = load(path).value
+    if (by_wing := wings.call("run_command", value)) is not None:
+        by_wing(
+            value,
             bench,
             effects,
             output,

@@ -164,7 +164,7 @@ def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
     """The bench with simulated drives, in simulated time; frames of the host are collected."""
     from winchkit.bench.open import open_bench
     from winchkit.bench.remote.station import LocalStation
-    from winchkit.robot.bench.wiring import line_profiles, robot_of_bench
+    from winchkit.bench.robot import robot_of_bench
     from winchkit.sim.clock.simulated_clock import SimulatedClock
     from winchkit.sim.live.bench import LiveBench
 
@@ -174,8 +174,8 @@ def _rehearsal(spec: BenchSpec, frames: list[Frame]) -> Iterator[Station]:
     clock, robot = SimulatedClock(), robot_of_bench(spec)
     profiles, mass = None, None
     if robot is not None:
-        profiles = line_profiles(robot)
-        mass = robot.profile.platform.mass / len(profiles)
+        profiles = robot.profiles
+        mass = robot.mass / len(profiles)
     with LiveBench(_simulated(spec, mass), profiles=profiles, simulated_time=clock) as live:
         for name, wire in live.wire.items():
             wire.taps.append(_tap(name, clock.now(), frames))

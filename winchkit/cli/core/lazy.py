@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any, NamedTuple
@@ -28,19 +29,42 @@ class At(NamedTuple):
     """Of the click command within the module."""
 
 
+Found = Callable[[], Iterable[tuple[str, str, At]]]
+"""Section, name and place of commands that are declared elsewhere."""
+
+
 class LazyGroup(Group):
-    """A group whose commands stand in a table until one of them is called."""
+    """A group whose commands stand in tables until one of them is called.
+
+    ``further`` are listed with them, ``foreign`` looked for where no other name fits.
+    """
 
     def __init__(
         self,
         *args: Any,
-        table: Mapping[str, At],
+        table: Mapping[str, At] | None = None,
         sections: Mapping[str, Mapping[str, At]] | None = None,
+        further: Found = tuple,
+        foreign: Found = tuple,
         **options: Any,
     ) -> None:
         super().__init__(*args, **options)
-        self.table = table
-        self.sections = sections or {"Commands": table}
+        self._sections = {"Commands": table or {}} if sections is None else sections
+        self._own = {name: at for own in self._sections.values() for name, at in own.items()}
+        self._further, self._foreign = further, foreign
+
+    @cached_property
+    def sections(self) -> Mapping[str, Mapping[str, At]]:
+        """Listed commands by subject."""
+        found = {title: dict(entries) for title, entries in self._sections.items()}
+        for title, name, at in self._further():
+            found.setdefault(title, {})[name] = at
+        return found
+
+    @property
+    def table(self) -> Mapping[str, At]:
+        """Listed commands by name."""
+        return {name: at for section in self.sections.values() for name, at in section.items()}
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in the order of the table."""
@@ -48,7 +72,7 @@ class LazyGroup(Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """Import the command."""
-        entry = self.table.get(cmd_name)
+        entry = self._place(cmd_name)
         if entry is None:
             return None
         if find_spec(entry.module) is None:
@@ -58,12 +82,16 @@ class LazyGroup(Group):
             _name_variables(command, f"{ctx.auto_envvar_prefix}_{cmd_name}")
         return command
 
+    def _place(self, name: str) -> At | None:
+        found = self._own.get(name) or self.table.get(name)
+        return found or next((at for _, known, at in self._foreign() if known == name), None)
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Find the command that the arguments begin with; a misspelt one gets a guess."""
         name = args[0] if args else ""
-        if name and name not in self.table and not name.startswith("-"):
+        if name and not name.startswith("-") and self._place(name) is None:
             ctx.fail(f"no command '{name}'{self._like(name)}")
         return super().resolve_command(ctx, args)
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit import wings
 from winchkit.arguments import require_type
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import TABLE, effects_option
@@ -167,13 +168,13 @@ def _declaration(file: str, effects: Sequence[str]) -> Verdict:
     from winchkit.cli.files.check_drums import stroke_of, warnings_of_drums
     from winchkit.cli.files.check_effects import bench_of
     from winchkit.cli.files.check_effects import faults_and_warnings as of_effects
-    from winchkit.robot.cli.check import faults_and_warnings as of_robots
     from winchkit.schema.read import load
 
     declaration = load(file)
     bench = bench_of(declaration.value)
     drives = report_of(declaration.value)
-    robot_faults, robot_warnings = of_robots(file, declaration.value)
+    by_wing = wings.call("check", declaration.value)
+    robot_faults, robot_warnings = ((), ()) if by_wing is None else by_wing(file, declaration.value)
     effect_faults, effect_warnings = of_effects(file, declaration.value, effects)
     faults = (*effect_faults, *drives.faults, *robot_faults)
     warnings = (

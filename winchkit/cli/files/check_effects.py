@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from winchkit import wings
 from winchkit.errors import Fault
 
 if TYPE_CHECKING:
@@ -41,7 +42,6 @@ def faults_and_warnings(
     if not (effects or robot or any(profile.effect for profile in profiles)):
         return [], warnings
     from winchkit.effects import check_profile, load_catalogue
-    from winchkit.robot.effects.bind import check_robot
 
     catalogue = load_catalogue(effects)
     if unread:
@@ -50,7 +50,8 @@ def faults_and_warnings(
             for item in profiles
         ]
     faults = [fault for profile in profiles for fault in check_profile(profile, catalogue)]
-    faults += [] if robot is None else check_robot(robot, catalogue)
+    if robot is not None and (by_wing := wings.call("check_effects", robot)) is not None:
+        faults += by_wing(robot, catalogue)
     return list(dict.fromkeys(faults)), warnings
 
 

@@ -21,7 +21,6 @@ from winchkit.cli.model.options import (
     json_option,
     model_options,
     page_title,
-    read_all,
     suggest_with,
     write_figures,
     write_page,
@@ -29,7 +28,6 @@ from winchkit.cli.model.options import (
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition
-    from winchkit.schema.profiles.robot import RobotProfile
 
 
 @click.command(
@@ -72,18 +70,15 @@ def command(
     from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.add import fitted_addition
     from winchkit.diagnosis.write import write_addition
-    from winchkit.schema.profiles.robot import RobotProfile
 
     declared, catalogue = declared_profile(asked.source), asked.catalogue
+    refuse_options(declared, asked.band)
     names = [Path(run).name for run in runs]
-    if isinstance(declared, RobotProfile):
-        refuse_options(asked.band)
-        _to_robot(effect, runs, declared, asked, output, as_json, html, figures)
-        return
     with progress_bar() as progress:
-        own = asked.runs(runs)
+        own = asked.runs(runs, declared)
         progress(f"fitting {effect}", None)
-        fitted = fitted_addition(effect, own, declared, catalogue, asked.band)
+        named = asked.placed(effect, declared)
+        fitted = fitted_addition(named, own, declared, catalogue, asked.band)
     write_addition(asked.source, fitted.addition, names, Path(output))
     _tell(fitted.addition, output, as_json)
     if html:
@@ -98,44 +93,6 @@ def command(
 
         source = Command(fitted.regression.dataset, asked.profile).source
         write_figures(figures, addition_figures(fitted, source))
-    suggest_with("compare", asked, runs, profile=output)
-
-
-def _to_robot(
-    effect: str,
-    runs: Sequence[str],
-    declared: RobotProfile,
-    asked: Asked,
-    output: str,
-    as_json: bool,
-    html: str | None,
-    figures: str | None,
-) -> None:
-    """Fit an effect of a robot, on the line that ``EFFECT/LINE`` or --winch names."""
-    from winchkit.diagnosis.write import write_addition
-    from winchkit.robot.diagnosis.add import fitted_robot_addition
-
-    name, _, place = effect.partition("/")
-    line = asked.winch or place or None
-    with progress_bar() as progress:
-        measured = read_all(runs)
-        progress(f"fitting {effect}", None)
-        fitted = fitted_robot_addition(name, measured, declared, line, asked.catalogue)
-    write_addition(asked.source, fitted.addition, [Path(r).name for r in runs], Path(output))
-    _tell(fitted.addition, output, as_json)
-    if html:
-        from winchkit.robot.report.diagnosis import robot_addition_html
-
-        title = page_title(declared.name, runs, effect)
-        options = asked.options
-        page = robot_addition_html(fitted, title, asked.profile, output, options=options)
-        write_page(html, page)
-    if figures:
-        from winchkit.report.reproducibility import Command
-        from winchkit.robot.report.diagnosis import robot_addition_figures
-
-        source = Command(fitted.regression.dataset, asked.profile).source
-        write_figures(figures, robot_addition_figures(fitted, source))
     suggest_with("compare", asked, runs, profile=output)
 
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit import wings
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.messages import is_verbose, note, suggest_next
-from winchkit.cli.core.outcome import threads_abandoned
-from winchkit.cli.core.output import echo_each, echo_json
+from winchkit.cli.core.messages import is_verbose, suggest_next
+from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
@@ -21,12 +19,7 @@ from winchkit.cli.model.options import (
     json_option,
     model_options,
     page_title,
-    pages_beside,
-    read_all,
-    read_each,
     runs_argument,
-    save_figures,
-    save_page,
     suggest_with,
     write_figures,
     write_page,
@@ -77,35 +70,34 @@ def command(
     itself and reports what they have in common.
     """
     from winchkit.cli.model.options import declared_profile, refuse_options
-    from winchkit.schema.profiles.robot import RobotProfile
+    from winchkit.schema.profiles.winch import WinchProfile
 
     declared = declared_profile(asked.source)
     how = {"decimate": not every_sample, "as_recorded": as_recorded}
-    if isinstance(declared, RobotProfile):
-        refuse_options(asked.band, asked.winch)
-        _tell_robot(runs, declared, asked, as_json, html, figures)
-    elif asked.each:
-        _tell_each(runs, declared, asked, how, as_json, html, figures)
+    refuse_options(declared, asked.band, asked.winch)
+    if asked.each and isinstance(declared, WinchProfile):
+        by_winch = wings.part("fleet", "diagnose_command")
+        by_winch(runs, declared, asked, how, as_json, html, figures)
     else:
         _tell_one(runs, declared, asked, how, as_json, html, figures)
 
 
 def _tell_one(
     runs: Sequence[str],
-    declared: WinchProfile,
+    declared: WinchProfile | RobotProfile,
     asked: Asked,
     how: Mapping[str, bool],
     as_json: bool,
     html: str | None,
     figures: str | None,
 ) -> None:
-    """Diagnosis of one winch, with a page where one is requested."""
+    """Diagnosis of one winch or robot, with a page where one is requested."""
     from winchkit.diagnosis.diagnose import diagnose
 
     known: list[WinchAnswer] = []
     try:
         with progress_bar() as progress:
-            own, catalogue = asked.runs(runs), asked.catalogue
+            own, catalogue = asked.runs(runs, declared), asked.catalogue
             answer = diagnose(
                 own,
                 declared,
@@ -119,11 +111,11 @@ def _tell_one(
         for each in known:  # The bar has ended: nothing is printed into its line.
             _tell_known(each, as_json)
         raise
-    (echo_json if as_json else click.echo)(_said(answer, as_json))
+    (echo_json if as_json else click.echo)(said(answer, as_json))
     if html:
-        write_page(html, _page(answer, page_title(declared.name, runs), asked))
+        write_page(html, answer_page(answer, page_title(declared.name, runs), asked))
     if figures:
-        write_figures(figures, _figures(answer, asked))
+        write_figures(figures, answer_figures(answer, asked))
     _suggest(answer.diagnosis, runs, asked)
 
 
@@ -132,85 +124,11 @@ def _tell_known(known: WinchAnswer, as_json: bool) -> None:
     if as_json:
         echo_json(known.diagnosis.to_json())
     else:
-        click.echo(_said(known, as_json))
+        click.echo(said(known, as_json))
 
 
-def _tell_each(
-    runs: Sequence[str],
-    declared: WinchProfile,
-    asked: Asked,
-    how: Mapping[str, bool],
-    as_json: bool,
-    html: str | None,
-    figures: str | None,
-) -> None:
-    """Diagnosis of every winch of the runs by itself, and their common effects."""
-    from winchkit.fleet.diagnosis.diagnose import diagnose_each
-    from winchkit.fleet.diagnosis.meta_analysis import alarms, shared_effects
-    from winchkit.fleet.report.comparison import shared_effects_text
-
-    said: dict[str, Any] = {}
-    found: dict[str, Diagnosis] = {}
-    present: dict[str, float] = {}
-    title, catalogue = page_title(declared.name, runs), asked.catalogue
-    with threads_abandoned(), progress_bar() as progress:
-        winches = read_each(runs)
-        pages = pages_beside(html, list(winches)) if html else {}
-        each = diagnose_each(winches, declared, catalogue, asked.band, **how, progress=progress)
-        for name, answer in each:
-            # Without the traces, which are megabytes each.
-            found[name] = replace(answer.diagnosis, traces=())
-            said[name] = _said(answer, as_json)
-            present[name] = answer.result.lack_of_fit_test.p_value
-            if html:
-                own = _page(answer, f"{title}, {name}", replace(asked, winch=name))
-                save_page(str(Path(html).with_name(pages[name])), own)
-            if figures:
-                save_figures(figures, _figures(answer, asked), name)
-            del answer  # hundreds of megabytes after long runs
-    shared, chances = shared_effects(found, catalogue), alarms(found, present)
-    if as_json:
-        together = {"effects": [one.to_json() for one in shared], "alarms": chances}
-        echo_json({"schema": 1, "winches": said, "shared": together})
-    else:
-        echo_each(said, shared_effects_text(found, shared, chances))
-    if html:
-        from winchkit.fleet.report.comparison import shared_effects_html
-
-        write_page(html, shared_effects_html(found, shared, chances, title, pages))
-    if figures:
-        note(f"figures: {figures}")
-
-
-def _tell_robot(
-    runs: Sequence[str],
-    declared: RobotProfile,
-    asked: Asked,
-    as_json: bool,
-    html: str | None,
-    figures: str | None,
-) -> None:
-    """Diagnosis of a robot from poses."""
-    from winchkit.robot.diagnosis.diagnose import diagnose_robot
-
-    with progress_bar() as progress:
-        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, progress)
-    (echo_json if as_json else click.echo)(_said(answer, as_json))
-    if html:
-        from winchkit.robot.report.diagnosis import robot_report_html
-
-        title = page_title(declared.name, runs)
-        write_page(html, robot_report_html(answer, title, asked.profile, options=asked.options))
-    if figures:
-        from winchkit.report.reproducibility import Command
-        from winchkit.robot.report.diagnosis import robot_report_figures
-
-        source = Command(answer.selection.preparation.dataset, asked.profile).source
-        write_figures(figures, robot_report_figures(answer, source))
-    _suggest(answer.diagnosis, runs, asked)
-
-
-def _figures(answer: WinchAnswer, asked: Asked) -> Sequence[Figure]:
+def answer_figures(answer: Answer, asked: Asked) -> Sequence[Figure]:
+    """Figures of the page of an answer."""
     from winchkit.report.pages.pages import report_figures
     from winchkit.report.reproducibility import Command
 
@@ -247,14 +165,14 @@ def _mending(diagnosis: Diagnosis) -> str:
     return next((mending_column(f) for f in diagnosis.sanity if f.code in ALARMING), "")
 
 
-def _page(answer: WinchAnswer, title: str, asked: Asked) -> str:
+def answer_page(answer: Answer, title: str, asked: Asked) -> str:
     """An answer as a page, with the commands that repeat it."""
     from winchkit.report.pages.pages import report_html
 
     return report_html(answer, title, profile=asked.profile, options=asked.options)
 
 
-def _said(answer: Answer, as_json: bool) -> Any:
+def said(answer: Answer, as_json: bool) -> Any:
     """An answer as JSON data or as text, without the data behind it."""
     if as_json:
         from winchkit.report.as_json import report_json

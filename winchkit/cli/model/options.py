@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from winchkit import wings
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.early_checks import check_folder, check_new_file
@@ -81,9 +82,23 @@ class Asked:
 
         return load_catalogue(self.effect_files)
 
-    def runs(self, paths: Sequence[str]) -> list[Run]:
-        """Runs of the one winch. Raises FileError with the faults of all files."""
+    def runs(
+        self, paths: Sequence[str], declared: WinchProfile | RobotProfile | None = None
+    ) -> list[Run]:
+        """Runs of the one winch, or of all lines of a robot.
+
+        Raises FileError with the faults of all files.
+        """
+        if declared is not None and wings.call("compare", declared) is not None:
+            return read_all(paths)
         return read_runs(paths, self.winch)
+
+    def placed(self, effect: str, declared: WinchProfile | RobotProfile) -> str:
+        """``EFFECT/LINE`` where --winch names a line of a robot."""
+        from winchkit.schema.profiles.robot import RobotProfile
+
+        on_line = isinstance(declared, RobotProfile) and self.winch is not None
+        return f"{effect.partition('/')[0]}/{self.winch}" if on_line else effect
 
     @property
     def each(self) -> bool:
@@ -294,17 +309,25 @@ def suggest_with(
 
 def declared_profile(path: Path) -> WinchProfile | RobotProfile:
     """The profile of a winch or of a robot. Raises FileError."""
-    from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
     from winchkit.schema.read import read_any, read_profile
 
-    value = read_any(path)
+    value: Any = read_any(path)
+    if isinstance(value, WinchProfile) or wings.call("compare", value) is not None:
+        declared: WinchProfile | RobotProfile = value
+        return declared
     # The reader of winches refuses every other kind in its own words.
-    return value if isinstance(value, (WinchProfile, RobotProfile)) else read_profile(path)
+    return read_profile(path)
 
 
-def refuse_options(band: float | None, winch: str | None = None) -> None:
+def refuse_options(
+    declared: WinchProfile | RobotProfile, band: float | None, winch: str | None = None
+) -> None:
     """Raise UsageError for options that mean nothing for a robot's poses."""
+    from winchkit.schema.profiles.robot import RobotProfile
+
+    if not isinstance(declared, RobotProfile):
+        return
     if band is not None:
         raise UsageError("--band: a robot's poses stand still and have no torque to filter")
     if winch is not None:

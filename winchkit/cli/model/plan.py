@@ -20,8 +20,6 @@ from winchkit.cli.model.options import (
     Asked,
     json_option,
     model_options,
-    read_all,
-    refuse_options,
     runs_argument,
     suggest_with,
 )
@@ -29,124 +27,10 @@ from winchkit.errors import UsageError, suggest
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.design.plan import Offer
-    from winchkit.diagnosis.plan import Plan
+    from winchkit.diagnosis.plan import WinchPlan
     from winchkit.effects.term import Term
-    from winchkit.robot.diagnosis.plan import PosePlan
     from winchkit.schema.bench import LimitSpec
-    from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.profiles.winch import WinchProfile
-
-
-def tell_poses(
-    runs: Sequence[str],
-    declared: RobotProfile,
-    asked: Asked,
-    output: str | None,
-    bench: str | None,
-    as_json: bool,
-) -> None:
-    """Diagnose, then propose poses; raises UsageError for options that mean nothing here."""
-    from winchkit.robot.diagnosis.diagnose import diagnose_robot
-    from winchkit.robot.diagnosis.plan import plan_poses
-
-    refuse_options(asked.band, asked.winch)
-    if bench is not None:
-        raise UsageError(
-            "--bench: a robot's plan keeps to the poses that pulling cables can hold inside its "
-            "frame; leave it out"
-        )
-    if output is not None and Path(output).suffix == ".toml":
-        raise UsageError(
-            f"-o {output}: a robot's plan is a list of poses and no programme; name a .csv file"
-        )
-    with progress_bar() as progress:
-        answer = diagnose_robot(read_all(runs), declared, asked.catalogue, progress)
-        progress("designing poses", None)
-        plan = plan_poses(answer)
-    best = plan.best
-    if output and best is not None:
-        from winchkit.runs import write_run
-
-        write_run(plan.run(best), output)
-        note(f"written: {output}, the poses '{best.kind.name}'")
-    elif output:
-        click.echo(f"nothing written to {output}: no such poses show more", err=True)
-    if as_json:
-        echo_json({**plan.to_json(), "written": output if best is not None else None})
-    else:
-        click.echo(_poses_text(plan))
-
-
-def _poses_text(plan: PosePlan) -> str:
-    """A line a kind, the best first, then its poses."""
-    from math import degrees
-
-    from winchkit.quantity_text import percent
-    from winchkit.report.words.columns import hanging
-    from winchkit.robot.diagnosis.pose_design import reach
-
-    if not plan.offers:
-        return (
-            "nothing to distinguish, and every effect of usual size is detectable with these poses"
-        )
-    letters = ascii_uppercase[: len(plan.pairs)]
-    head = ["poses to record next (nothing to distinguish: what else they would show)"]
-    if plan.pairs:
-        head = ["poses to record next, with the power to distinguish"]
-        head += [
-            f"  {letter}: {a.effect.id} / {b.effect.id}"
-            for letter, (a, b) in zip(letters, plan.pairs, strict=False)
-        ]
-    rows = [["poses", "reach", "turn", *letters, "shows besides"]]
-    for offer in plan.offers:
-        away, turned = reach(offer)
-        powers = [percent(power) for power in plan.of_pairs(offer)]
-        shown = plan.shows(offer)
-        listed = ", ".join(shown[:_FEW]) or "—"
-        listed += f" and {len(shown) - _FEW} more" if len(shown) > _FEW else ""
-        far = [f"{away * 1e3:.0f} mm", f"{degrees(turned):.0f}°"]
-        rows.append([f"{len(offer.pose.position)} {offer.kind.name}", *far, *powers, listed])
-    return "\n".join([*head, *hanging(rows), *_indistinguishable(plan), *_listed(plan)])
-
-
-def _indistinguishable(plan: PosePlan) -> list[str]:
-    """What no poses distinguish, and what does."""
-    from winchkit.diagnosis.design.discrimination import LEAST_POWER
-    from winchkit.effects.effect import told_apart
-    from winchkit.report.words.columns import paragraph
-
-    lines = []
-    for index, (first, second) in enumerate(plan.pairs):
-        if max(offer.powers[index] for offer in plan.offers) < LEAST_POWER:
-            names = f"{first.effect.id} / {second.effect.id}"
-            what = told_apart(first.effect, second.effect)
-            lines += paragraph(f"{names}: no such poses distinguish them. What does: {what}")
-    if plan.best is None and not plan.pairs:
-        hidden = ", ".join(term.effect.id for term in plan.hidden)
-        lines += paragraph(f"No such poses would show what these did not: {hidden}.")
-    return lines
-
-
-def _listed(plan: PosePlan) -> list[str]:
-    """The poses of the best offer."""
-    from math import degrees
-
-    from winchkit.model.rotation import angles_of
-    from winchkit.report.words.columns import aligned
-
-    offer = plan.best
-    if offer is None:
-        return []
-    rows = [["", "x [mm]", "y [mm]", "z [mm]", "roll [°]", "pitch [°]", "yaw [°]"]]
-    turned = angles_of(offer.pose.rotation).tolist()
-    for number, (place, angles) in enumerate(
-        zip(offer.pose.position.tolist(), turned, strict=True), start=1
-    ):
-        cells = [f"{v * 1e3:.0f}" for v in place]
-        cells += [f"{round(degrees(v), 1) + 0.0:.1f}" for v in angles]
-        rows.append([str(number), *cells])
-    head = f"the poses '{offer.kind.name}', in this order; -o FILE.csv writes them"
-    return ["", head, *aligned(rows)]
 
 
 _FEW = 2
@@ -183,16 +67,15 @@ def command(
     could not. Run the file with 'winchkit run NEXT.toml --bench B' and diagnose again.
     For a robot's profile the plan is a list of poses, and NEXT.csv a run of them to measure at.
     """
+    from winchkit import wings
     from winchkit.cli.model.options import declared_profile
-    from winchkit.schema.profiles.robot import RobotProfile
+    from winchkit.diagnosis.profiles import require_winch
 
     declared = declared_profile(asked.source)
-    if isinstance(declared, RobotProfile):
-        from winchkit.cli.model.plan import tell_poses
-
-        tell_poses(runs, declared, asked, output, bench, as_json)
+    if (by_wing := wings.call("plan_command", declared)) is not None:
+        by_wing(runs, declared, asked, output, bench, as_json)
     else:
-        _plan_winch(runs, declared, asked, output, bench, as_json)
+        _plan_winch(runs, require_winch(declared), asked, output, bench, as_json)
 
 
 def _plan_winch(
@@ -270,7 +153,7 @@ def _limits(bench: str, winch: str | None) -> LimitSpec:
     return wired[name].limits
 
 
-def _silent(found: Plan, *, widened: bool) -> list[str]:
+def _silent(found: WinchPlan, *, widened: bool) -> list[str]:
     """What none of these programmes distinguishes, and what does."""
     from winchkit.effects.effect import told_apart
 

@@ -18,7 +18,6 @@ from winchkit.cli.model.options import (
     ManyValues,
     json_option,
     model_options,
-    read_all,
     suggest_with,
 )
 
@@ -54,20 +53,15 @@ def command(effect: str, runs: Sequence[str], output: str, asked: Asked, as_json
     from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.add import remove
     from winchkit.diagnosis.write import write_removal
-    from winchkit.schema.profiles.robot import RobotProfile
 
     declared, removal = declared_profile(asked.source), None
+    refuse_options(declared, asked.band)
+    effect = asked.placed(effect, declared)
     with progress_bar() as progress:
         progress("fitting", None)
-        if isinstance(declared, RobotProfile):
-            from winchkit.robot.diagnosis.add import remove_from_robot
-
-            refuse_options(asked.band)
-            effect = f"{effect}/{asked.winch}" if asked.winch else effect
-            if runs:
-                removal = remove_from_robot(effect, read_all(runs), declared, asked.catalogue)
-        elif runs:
-            removal = remove(effect, asked.runs(runs), declared, asked.catalogue, asked.band)
+        if runs:
+            own = asked.runs(runs, declared)
+            removal = remove(effect, own, declared, asked.catalogue, asked.band)
     names = [Path(run).name for run in runs]
     write_removal(asked.source, effect, removal, names, output)
     note(f"written: {output}")

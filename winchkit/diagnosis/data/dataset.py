@@ -125,6 +125,21 @@ class Dataset:
         return tuple(recording.raw.at for recording in self.recordings)
 
     @property
+    def profile_name(self) -> str:
+        """Name within the profile's file."""
+        return self.profile.name
+
+    @property
+    def run_names(self) -> tuple[str, ...]:
+        """Names of the runs."""
+        return tuple(recording.name for recording in self.recordings)
+
+    @property
+    def run_files(self) -> tuple[str, ...]:
+        """Files of the runs; the name of a run that is in none."""
+        return tuple(recording.path or recording.name for recording in self.recordings)
+
+    @property
     def used_share(self) -> dict[str, float]:
         """Share of the samples that is compared, by output."""
         out = {}

@@ -3,8 +3,7 @@
 A regression has rows (observations), each with a noise band, and predicts them from a hypothesis:
 effects with values, nuisance parameters and initial states. What the rows are - spectral
 coefficients of a winch's runs or equations of a robot's poses - is known to its implementations
-only: :class:`~winchkit.diagnosis.regression.time_series.TimeSeriesRegression` and
-:class:`~winchkit.robot.diagnosis.regression.PoseRegression`.
+only: :class:`~winchkit.diagnosis.regression.time_series.TimeSeriesRegression` and that of robots.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.diagnosis.data.spectrum import Band
 from winchkit.diagnosis.regression.hypothesis import START, Hypothesis
@@ -53,6 +53,8 @@ class Regression(ABC):
 
     Attributes
     ----------
+    dataset : Dataset
+        The data.
     n_rows : int
         Number of rows.
     nominal_residual : ndarray of shape (n_rows,)
@@ -76,6 +78,7 @@ class Regression(ABC):
     (:class:`~winchkit.effects.parametrization.Coordinates`), then the initial states.
     """
 
+    dataset: Dataset
     nominal_residual: Array
     nuisance_columns: Array
     fits_offset: bool = False

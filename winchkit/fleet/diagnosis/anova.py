@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.diagnosis.compare import Compared
+from winchkit.diagnosis.compare import WinchCompared
 from winchkit.diagnosis.residuals.attribution import (
     BINS,
     chance_share,
@@ -84,7 +84,7 @@ class SharedError:
         return {**vars(self), "winches": dict(self.winches), "follows": follows}
 
 
-def errors_of(compared: Compared) -> dict[str, WinchErrors]:
+def errors_of(compared: WinchCompared) -> dict[str, WinchErrors]:
     """Errors per output of one winch, decimated to at most about 50,000 samples."""
     regression, out = compared.regression, {}
     for output, compared_output in compared.comparison.outputs.items():

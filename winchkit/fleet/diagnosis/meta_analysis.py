@@ -23,6 +23,7 @@ from scipy.special import chdtrc
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.results import Diagnosis, Place, Step
+from winchkit.diagnosis.steps import place_text
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect, Parameter
 
@@ -171,18 +172,6 @@ def _members(step: Step) -> list[Member]:
         return _names(step)[:1]
     places: list[Member] = [(place_text(step), ())] if step.place else []
     return [*places, *_names(step)]
-
-
-def place_text(step: Step) -> str:
-    """``motor: motor_torque over speed``, by which a step that is not certain is followed.
-
-    The id of its first effect where it has no place.
-    """
-    if not step.place:
-        return step.effects[0]
-    first = step.place[0]
-    over = f" over {first.variable}" if first.variable else ""
-    return f"{first.part}: {', '.join(dict.fromkeys(at.output for at in step.place))}{over}"
 
 
 def _names(step: Step) -> list[Member]:

@@ -152,7 +152,7 @@ def _shared(task: Task) -> Row:
 
 
 def _rows(task: Task, answer: WinchAnswer) -> Outcome:
-    from winchkit.fleet.diagnosis.meta_analysis import place_text
+    from winchkit.diagnosis.steps import place_text
 
     diagnosis = answer.diagnosis
     row = _shared(task) | {
@@ -172,7 +172,7 @@ def _rows(task: Task, answer: WinchAnswer) -> Outcome:
 
 def _estimates(answer: WinchAnswer) -> list[Row]:
     """Rows of the effects of all steps, of the other members of their sets, of combinations."""
-    from winchkit.fleet.diagnosis.meta_analysis import place_text
+    from winchkit.diagnosis.steps import place_text
 
     model: list[Row] = []
     others: list[Row] = []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from winchkit import wings
 from winchkit.arrays import Array
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.residuals.attribution import Attribution
@@ -15,16 +16,13 @@ from winchkit.report.figures.reduction import curve_of, strongest
 from winchkit.report.words.sentence import capital, main_patterns, where_text
 from winchkit.report.words.steps import has_other_law
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, variable_name
-from winchkit.robot.diagnosis.diagnose import RobotAnswer
-from winchkit.robot.report.pose_traces import trace_over
 
 
 def unexplained_curve(answer: Answer, where: Attribution) -> tuple[Array, Array]:
     """Mean of the variable and of the residual in every bin, (bins,) each, SI."""
-    if isinstance(answer, RobotAnswer):
-        regression, errors = answer.selection.rest
-        trace = trace_over(regression, where, errors)
-        return trace.means(trace.before)
+    if (by_wing := wings.call("unexplained", answer)) is not None:
+        at, mean = by_wing(answer, where)
+        return at, mean
     assert isinstance(answer, WinchAnswer)
     curve = curve_of(answer.engine.regression, answer.result.final.residual, where)
     return curve.x, curve.mean

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from winchkit.robot.calibration.calibrate import Calibrated
 
 _OUTPUT_HEIGHT, _CHANNEL_HEIGHT, _POSE_HEIGHT = 2.5, 1.15, 2.0
 """Inches per output, channel and pose trace."""
@@ -68,7 +67,7 @@ def result_figure(
         last.set_xlabel("time, runs one after the other [s]" if several else "time [s]")
         last.margins(x=0.01)
         _name_runs(grid[0], [trace for trace in own if trace.output == outputs[0]])
-        _legend(figure, *grid[:2])
+        legend(figure, *grid[:2])
         figure.align_ylabels()
     return figure
 
@@ -95,65 +94,13 @@ def run_figure(
         for axis, name in zip(axes, names, strict=True):
             rows = decimated([run[name]], _POINTS // 2)
             time, values = run.time[rows], run[name][rows]
-            scale = _scale([values], run.channels[name].unit)
+            scale = common_scale([values], run.channels[name].unit)
             axis.plot(time, values / scale.worth, color=BLUE)
-            axis.set_ylabel(_label(name.replace("_", " "), scale, broken=True))
+            axis.set_ylabel(axis_label(name.replace("_", " "), scale, broken=True))
         axes[0].set_title(run.name, loc="left")
         axes[-1].set_xlabel("time [s]")
         figure.align_ylabels()
     return figure
-
-
-def calibration_figure(found: Calibrated, *, figsize: Size = None) -> Figure:
-    """Pose errors before and after a robot's calibration, of fitted and of held-out poses.
-
-    ``figsize``: width and height, inches.
-    """
-    sides = [
-        ("poses fitted", found.fit_before, found.fit_after),
-        ("poses held out", found.validation_before, found.validation_after),
-    ]
-    sides = [side for side in sides if np.isfinite(side[2].distance).any()]
-    rows = [("position error", "m", "distance"), ("rotation error", "rad", "angle")]
-    rows = [row for row in rows if any(np.isfinite(getattr(s[2], row[2])).any() for s in sides)]
-    if not sides:
-        raise UsageError("no position was measured: there are no pose errors to draw")
-    with new_figure(figsize or (WIDTH, 2.3 * len(rows) + 0.2)) as figure:
-        widths = [max(3.0, np.sqrt(len(side[1].distance))) for side in sides]
-        axes = figure.subplots(
-            len(rows), len(sides), sharey="row", width_ratios=widths, squeeze=False
-        )
-        for row, (name, unit, field) in enumerate(rows):
-            scale = _scale([getattr(s[k], field) for s in sides for k in (1, 2)], unit)
-            for column, (title, *errors) in enumerate(sides):
-                axis = axes[row, column]
-                for error, color, word in zip(errors, (ORANGE, BLUE), _BEFORE_AFTER, strict=True):
-                    values = getattr(error, field) / scale.worth
-                    _draw_sizes(axis, values, color, word)
-                if row == 0:
-                    axis.set_title(title, loc="left")
-                if row == len(rows) - 1:
-                    axis.set_xlabel("number of the pose")
-            shown = next(axis for axis in axes[row] if axis.axison)
-            shown.set_ylabel(_label(name, scale))
-        _legend(figure, axes[0, 0])
-    return figure
-
-
-_BEFORE_AFTER = ("before", "after calibration")
-
-
-def _draw_sizes(axis: Axes, values: Array, color: str, word: str) -> None:
-    """Positive values over their number on a logarithmic scale, with their rms."""
-    known = np.isfinite(values) & (values > 0)
-    if not known.any():
-        axis.set_axis_off()
-        return
-    number = np.arange(1, len(values) + 1)
-    axis.plot(number[known], values[known], ".", ms=3, color=color, label=word)
-    rms = float(np.sqrt(np.mean(values[known] ** 2)))
-    axis.axhline(rms, color=color, lw=0.8, ls="--", label=f"rms {word}")
-    axis.set_yscale("log")
 
 
 def _pose_figure(
@@ -165,7 +112,7 @@ def _pose_figure(
         for axis, trace in zip(axes, traces, strict=True):
             before = trace.residual_before
             parts = [trace.residual] if before is None else [before, trace.residual]
-            scale = _scale(parts, trace.unit)
+            scale = common_scale(parts, trace.unit)
             _band(axis, noise.get(trace.output), scale)
             tones = [BLUE] if before is None else [ORANGE, BLUE]
             words = ["profile"] if before is None else ["profile", "with the named effects"]
@@ -174,9 +121,9 @@ def _pose_figure(
                 lines = axis.plot(number, part / scale.worth, ".", ms=2.5, color=color)
                 lines[0].set_label(word)
             axis.axhline(0.0, color=BLACK, lw=0.5)
-            axis.set_ylabel(_label(f"{_name(trace.output)}:\nresidual", scale))
+            axis.set_ylabel(axis_label(f"{_name(trace.output)}:\nresidual", scale))
         axes[-1].set_xlabel("number of the pose")
-        _legend(figure, axes[0])
+        legend(figure, axes[0])
         figure.align_ylabels()
     return figure
 
@@ -185,10 +132,10 @@ def _draw_output(upper: Axes, lower: Axes, traces: Sequence[Trace], noise: float
     """Measured and predicted above, the residual with the noise band below."""
     starts = _starts(traces)
     measured = [trace.measured for trace in traces]
-    scale = _scale(measured, traces[0].unit)
+    scale = common_scale(measured, traces[0].unit)
     residuals = [trace.residual_before for trace in traces], [trace.residual for trace in traces]
     drawn = [part for group in residuals for part in group if part is not None]
-    fine = _scale(drawn, traces[0].unit, share=3.0)
+    fine = common_scale(drawn, traces[0].unit, share=3.0)
     _band(lower, noise, fine)
     named = any(trace.before is not None for trace in traces)
     after = "with the named effects" if named else "predicted"
@@ -211,8 +158,8 @@ def _draw_output(upper: Axes, lower: Axes, traces: Sequence[Trace], noise: float
         for start in starts[1:]:
             axis.axvline(start, color=GREY, lw=0.4, ls=":")
     lower.axhline(0.0, color=BLACK, lw=0.5)
-    upper.set_ylabel(_label(_name(traces[0].output), scale, broken=True))
-    lower.set_ylabel(_label("residual", fine, broken=True))
+    upper.set_ylabel(axis_label(_name(traces[0].output), scale, broken=True))
+    lower.set_ylabel(axis_label("residual", fine, broken=True))
 
 
 def _starts(traces: Sequence[Trace]) -> list[float]:
@@ -245,12 +192,13 @@ def _band(axis: Axes, noise: float | None, scale: Scale) -> None:
         axis.axhspan(-size, size, color=GREY, alpha=0.3, lw=0, label="noise, ± rms")
 
 
-def _legend(figure: Figure, *axes: Axes) -> None:
+def legend(figure: Figure, *axes: Axes) -> None:
+    """Legend of several axes above the figure."""
     pairs = [pair for axis in axes for pair in zip(*axis.get_legend_handles_labels(), strict=True)]
     figure.legend(*zip(*pairs, strict=True), loc="outside upper center", ncols=4)
 
 
-def _scale(parts: Sequence[Array | None], unit: str, share: float = 1.0) -> Scale:
+def common_scale(parts: Sequence[Array | None], unit: str, share: float = 1.0) -> Scale:
     """Unit for the largest value, or for some rms of it."""
     values = np.concatenate(
         [np.zeros(0), *(np.abs(part).ravel() for part in parts if part is not None)]
@@ -263,7 +211,8 @@ def _scale(parts: Sequence[Array | None], unit: str, share: float = 1.0) -> Scal
     return Scale("rad", 1.0) if unit == "rad" and size > 2 * np.pi else scale_for(size, unit)
 
 
-def _label(name: str, scale: Scale, *, broken: bool = False) -> str:
+def axis_label(name: str, scale: Scale, *, broken: bool = False) -> str:
+    """``Name [unit]``, on two lines where it is broken."""
     unit = f" [{scale.label}]" if scale.label else ""
     return capital(name) + (unit.replace(" [", "\n[") if broken else unit)
 

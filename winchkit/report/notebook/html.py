@@ -17,22 +17,22 @@ from winchkit.report.comparison_rows import HEAD, followed, size_rows
 from winchkit.report.html.markup import Markup, details, element, table
 from winchkit.report.notebook.declarations import declared_rows
 from winchkit.report.notebook.text import plan_screen, run_head, run_rows
-from winchkit.report.words.sentence import capital, sentence
+from winchkit.report.words.sentence import sentence
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VERDICT_NAMES, meaning, values_text
 from winchkit.runs.run import Run
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal
-    from winchkit.diagnosis.plan import Plan
-    from winchkit.robot.calibration.calibrate import Calibrated
+    from winchkit.diagnosis.plan import WinchPlan
 
-_TONES = {
+TONES = {
     "adequate": "#2b7a4b",
     "explained": "#2b7a4b",
     "partly": "#9a6a00",
     "unknown": "#a83232",
     "undecided": "#5c6670",
 }
+"""Colour of the edge, by verdict."""
 _BOX = "border-left:4px solid {tone};padding:.3em 1em;margin:.3em 0"
 _FIRST = 12
 """Rows of a table that are open: about one screen."""
@@ -47,16 +47,16 @@ def run_cell(run: Run) -> str:
     rows = [[name, unit, *numbers, _course(run[name])] for name, unit, *numbers in run_rows(run)]
     head = ["channel", "unit", "lowest", "highest", "missing", "over time"]
     told = ", ".join(f"{key} = {value}" for key, value in run.metadata.items())
-    shown = _shortened(f"{run.name}: {run_head(run)}", head, rows, words=2)
-    return _box("#5c6670", *shown, element("p", told))
+    shown = shortened(f"{run.name}: {run_head(run)}", head, rows, words=2)
+    return framed("#5c6670", *shown, element("p", told))
 
 
 def profile_cell(profile: Any) -> str:
     """A profile: its parts with the declared values, and its effects."""
     caption = f"{type(profile).__name__} {profile.name}"
     about = element("p", profile.description) if profile.description else Markup("")
-    shown = _shortened(caption, ["part", "declared"], declared_rows(profile), words=2)
-    return _box("#5c6670", *shown, about)
+    shown = shortened(caption, ["part", "declared"], declared_rows(profile), words=2)
+    return framed("#5c6670", *shown, about)
 
 
 def comparison_cell(comparison: Comparison) -> str:
@@ -68,14 +68,14 @@ def comparison_cell(comparison: Comparison) -> str:
         )
     ]
     caption = "Measured less predicted, with the values of the profile's file."
-    return _box("#5c6670", table(caption, ["output", "explained by", *HEAD[1:]], rows, words=2))
+    return framed("#5c6670", table(caption, ["output", "explained by", *HEAD[1:]], rows, words=2))
 
 
 def diagnosis_cell(diagnosis: Diagnosis) -> str:
     """A diagnosis: verdict, steps with their doubts, and held-out errors."""
     name = "Interrupted" if diagnosis.interrupted else VERDICT_NAMES[diagnosis.verdict]
-    return _box(
-        _TONES[diagnosis.verdict],
+    return framed(
+        TONES[diagnosis.verdict],
         element("b", name),
         element("p", unbroken(sentence(diagnosis))),
         tables.steps(diagnosis),
@@ -100,59 +100,29 @@ def addition_cell(addition: Addition | Removal) -> str:
         sizes = (output.heldout_rms_before, output.heldout_rms_after)
         noise = "unknown" if output.noise_rms is None else scale.text(output.noise_rms)
         errors.append([OUTPUT_NAMES.get(name, name), *map(scale.text, sizes), noise])
-    return _box(
-        _TONES["explained"],
+    return framed(
+        TONES["explained"],
         table("Effects of the new profile.", ["effect", "meaning", "values"], rows, words=3),
         table("Held-out error, rms.", ["output", "before", "after", "noise"], errors),
     )
 
 
-def plan_cell(plan: Plan) -> str:
+def plan_cell(plan: WinchPlan) -> str:
     """A plan: the best programmes with their time and power."""
-    return _box("#5c6670", element("pre", plan_screen(plan)))
-
-
-def calibration_cell(found: Calibrated) -> str:
-    """A robot's calibration: errors before and after, and its parameters."""
-    from winchkit.robot.calibration.prediction import rms
-    from winchkit.robot.calibration.results import in_words
-
-    pairs = {
-        "fitted": (found.fit_before, found.fit_after),
-        "held out": (found.validation_before, found.validation_after),
-    }
-    errors = [
-        [
-            name,
-            str(len(after.distance)),
-            *(f"{rms(e.distance) * 1e3:.3g} mm" for e in (before, after)),
-        ]
-        for name, (before, after) in pairs.items()
-        if len(after.distance)
-    ]
-    rows = [[name, *in_words(estimate)] for name, estimate in found.estimates.items()]
-    head = ["parameter", "nominal", "value", "sigma", "unit"]
-    notes = [element("li", capital(note)) for note in found.warnings]
-    return _box(
-        _TONES["unknown" if found.refusal else "explained"],
-        element("b", "Not calibrated" if found.refusal else "Calibrated"),
-        element("p", found.refusal) if found.refusal else Markup(""),
-        table("Position error, rms.", ["poses", "number", "before", "after"], errors),
-        *_shortened("Parameters with their posterior standard deviation.", head, rows),
-        element("ul", *notes) if notes else Markup(""),
-    )
+    return framed("#5c6670", element("pre", plan_screen(plan)))
 
 
 def fit_cell(fit: FitStatistics) -> str:
     """The report of a fit."""
-    return _box("#5c6670", element("pre", fit.text()))
+    return framed("#5c6670", element("pre", fit.text()))
 
 
-def _box(tone: str, *inside: str) -> str:
+def framed(tone: str, *inside: str) -> str:
+    """Parts of a result with an edge of a colour."""
     return element("div", *inside, style=_BOX.format(tone=tone), class_="winchkit")
 
 
-def _shortened(
+def shortened(
     caption: str, head: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1
 ) -> Iterable[Markup]:
     """A table of the first rows, and the others in a block to be opened."""

@@ -1,34 +1,31 @@
-"""Registration of the renderers of all result types; imported when the first result is shown."""
+"""Registration of the renderers of result types; imported when the first result is shown."""
 
 from __future__ import annotations
 
+from winchkit import wings
 from winchkit.diagnosis.add import Addition, Removal
 from winchkit.diagnosis.diagnose import Answer
-from winchkit.diagnosis.plan import Plan
+from winchkit.diagnosis.plan import WinchPlan
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.fit_statistics import FitStatistics
 from winchkit.rendering import Renderer, renderers
 from winchkit.report.notebook import figures, html, text
-from winchkit.report.notebook.profile_figures import robot_figure, winch_figure
-from winchkit.robot.calibration.calibrate import Calibrated
+from winchkit.report.notebook.profile_figures import winch_figure
 from winchkit.runs.run import Run
-from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
 
 for _kind, _renderer in (
     (Run, Renderer(text.run_screen, html.run_cell, figures.run_figure)),
     (WinchProfile, Renderer(text.profile_screen, html.profile_cell, winch_figure)),
-    (RobotProfile, Renderer(text.profile_screen, html.profile_cell, robot_figure)),
     (Comparison, Renderer(text.comparison_screen, html.comparison_cell, figures.result_figure)),
     (Diagnosis, Renderer(text.diagnosis_screen, html.diagnosis_cell, figures.result_figure)),
     (Answer, Renderer(text.answer_screen, html.answer_cell, figures.answer_figure)),
     (Addition, Renderer(text.addition_screen, html.addition_cell)),
     (Removal, Renderer(text.addition_screen, html.addition_cell)),
-    (Plan, Renderer(text.plan_screen, html.plan_cell)),
-    (
-        Calibrated,
-        Renderer(text.calibration_screen, html.calibration_cell, figures.calibration_figure),
-    ),
+    (WinchPlan, Renderer(text.plan_screen, html.plan_cell)),
     (FitStatistics, Renderer(text.fit_screen, html.fit_cell)),
 ):
     renderers.register(_kind, _renderer)
+for _wing in wings.own():
+    for _module in _wing.renderers:
+        renderers.load_from(_module)

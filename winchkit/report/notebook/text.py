@@ -18,8 +18,7 @@ from winchkit.runs.run import Run
 
 if TYPE_CHECKING:
     from winchkit.diagnosis.add import Addition, Removal
-    from winchkit.diagnosis.plan import Plan
-    from winchkit.robot.calibration.calibrate import Calibrated
+    from winchkit.diagnosis.plan import WinchPlan
 
 _LINES = 24
 """Lines of a terminal window."""
@@ -110,7 +109,7 @@ def addition_screen(addition: Addition | Removal) -> str:
     return screen(addition_text(addition), "; to_json() has all")
 
 
-def plan_screen(plan: Plan) -> str:
+def plan_screen(plan: WinchPlan) -> str:
     """A plan: the best programmes with their time and power."""
     pairs = [f"{a.effect.id} / {b.effect.id}" for a, b in plan.pairs]
     rows = [["programme", "minutes", *pairs]]
@@ -120,14 +119,6 @@ def plan_screen(plan: Plan) -> str:
     head = "motion programmes to run next" + (", with the power to distinguish" if pairs else "")
     more = len(plan.offers) - _PROGRAMMES
     return "\n".join([head, *aligned(rows), *([f"  … {more} more"] if more > 0 else [])])
-
-
-def calibration_screen(found: Calibrated) -> str:
-    """A robot's calibration: errors before and after, and the first parameters."""
-    from winchkit.robot.calibration.results import calibration_text
-
-    lines = paragraph(found.refusal) if found.refusal else []
-    return screen("\n".join([*lines, calibration_text(found, ())]), "; fit_report() has all")
 
 
 def fit_screen(fit: FitStatistics) -> str:

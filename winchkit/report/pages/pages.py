@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from winchkit.diagnosis.add import FittedAddition
-from winchkit.diagnosis.compare import Compared
-from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit import wings
+from winchkit.diagnosis.add import FittedAddition, FittedWinchAddition
+from winchkit.diagnosis.compare import Compared, WinchCompared
+from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.profile_edit.naming import extended_name
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.ladder import error_ladder, present
@@ -24,7 +25,7 @@ from winchkit.report.words.headline import size_texts, worst_outputs
 
 
 def report_html(
-    answer: WinchAnswer,
+    answer: Answer,
     title: str,
     story: Sequence[str] = (),
     truth: Mapping[str, object] | None = None,
@@ -33,6 +34,9 @@ def report_html(
     options: Sequence[str] = (),
 ) -> str:
     """The page of a diagnosis."""
+    if (by_wing := wings.call("html", answer)) is not None:
+        return str(by_wing(answer, title, profile, options=options))
+    assert isinstance(answer, WinchAnswer), "of a winch"
     command = Command(answer.engine.regression.dataset, profile, options)
     residuals = residuals_of(answer, command.source)
     drawn, cards = _cards(residuals, size_texts(answer.diagnosis.outputs))
@@ -58,8 +62,11 @@ def report_html(
     return page(title, [*present(ladder), *drawn, *laws, *patterns], content, headed=False)
 
 
-def report_figures(answer: WinchAnswer, source: str = "") -> list[Figure]:
+def report_figures(answer: Answer, source: str = "") -> list[Figure]:
     """The figures of the page of a diagnosis, the worst output first."""
+    if (by_wing := wings.call("figures", answer)) is not None:
+        return list(by_wing(answer, source))
+    assert isinstance(answer, WinchAnswer), "of a winch"
     residuals = residuals_of(answer, source)
     drawn, _ = _cards(residuals, {})
     ladder = error_ladder(
@@ -91,7 +98,7 @@ def _changed(effects: Sequence[str]) -> str:
     return f"with {effects[0]}" if len(effects) == 1 else f"with {len(effects)} effects"
 
 
-def residuals_of_comparison(compared: Compared, source: str = "") -> Residuals:
+def residuals_of_comparison(compared: WinchCompared, source: str = "") -> Residuals:
     """Residuals on the page of a comparison."""
     outputs = compared.comparison.outputs
     noise = {name: error.noise_rms for name, error in outputs.items()}
@@ -101,7 +108,7 @@ def residuals_of_comparison(compared: Compared, source: str = "") -> Residuals:
     )
 
 
-def residuals_of_addition(fitted: FittedAddition, source: str = "") -> Residuals:
+def residuals_of_addition(fitted: FittedWinchAddition, source: str = "") -> Residuals:
     """Residuals on the page of an addition."""
     outputs = fitted.addition.outputs
     return Residuals(
@@ -119,6 +126,9 @@ def comparison_html(
     compared: Compared, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
     """The page of a comparison; ``profile`` and ``options`` as in :func:`report_html`."""
+    if (by_wing := wings.call("html", compared)) is not None:
+        return str(by_wing(compared, title, profile, options=options))
+    assert isinstance(compared, WinchCompared), "of a winch"
     command = Command(compared.regression.dataset, profile, options)
     residuals = residuals_of_comparison(compared, command.source)
     own = residual_figures(residuals)
@@ -133,6 +143,9 @@ def comparison_html(
 
 def comparison_figures(compared: Compared, source: str = "") -> list[Figure]:
     """The figures of the page of a comparison, the worst output first."""
+    if (by_wing := wings.call("figures", compared)) is not None:
+        return list(by_wing(compared, source))
+    assert isinstance(compared, WinchCompared), "of a winch"
     ladder = error_ladder(compared.comparison.outputs, source=source)
     return [*present(ladder), *_cards(residuals_of_comparison(compared, source), {})[0]]
 
@@ -146,6 +159,9 @@ def addition_html(
     options: Sequence[str] = (),
 ) -> str:
     """The page of an added effect; ``better`` is the written profile, the others as above."""
+    if (by_wing := wings.call("html", fitted)) is not None:
+        return str(by_wing(fitted, title, profile, better, options=options))
+    assert isinstance(fitted, FittedWinchAddition), "of a winch"
     command = Command(fitted.regression.dataset, profile, options)
     outputs, residuals = fitted.addition.outputs, residuals_of_addition(fitted, command.source)
     drawn, cards = _cards(residuals, size_texts(outputs))
@@ -157,6 +173,9 @@ def addition_html(
 
 def addition_figures(fitted: FittedAddition, source: str = "") -> list[Figure]:
     """The figures of the page of an addition, the worst output first."""
+    if (by_wing := wings.call("figures", fitted)) is not None:
+        return list(by_wing(fitted, source))
+    assert isinstance(fitted, FittedWinchAddition), "of a winch"
     residuals = residuals_of_addition(fitted, source)
     ladder = error_ladder(
         fitted.addition.outputs, extended=True, changed=residuals.changed, source=source

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from winchkit import wings
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.results import Comparison, Diagnosis
 from winchkit.quantity_text import unbroken
@@ -14,7 +15,6 @@ from winchkit.report.html.page import figure_block
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.sentence import capital
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, listed
-from winchkit.robot.diagnosis.data.dataset import RobotDataset
 
 _ICONS = {
     "adequate": '<circle cx="8" cy="8" r="6"/><path d="M5.2 8.2l2 2 3.6-4.2"/>',
@@ -87,11 +87,10 @@ def code_block(*commands: str) -> Markup:
     return element("pre", element("code", "\n".join(commands)), tabindex="0")
 
 
-def compared_text(dataset: Dataset | RobotDataset, profile: str) -> str:
+def compared_text(dataset: Dataset, profile: str) -> str:
     """``4 runs, 46.4 s: demo 10 kg (2), demo 20 kg (2); profile bench-spiral``."""
-    if isinstance(dataset, RobotDataset):
-        count = len(dataset.pose)
-        return f"{count} poses of {len(dataset.names)} cables; profile {profile}"
+    if (by_wing := wings.call("size_text", dataset)) is not None:
+        return f"{by_wing(dataset)}; profile {profile}"
     times = [recording.signals.time for recording in dataset.recordings]
     whole = sum(float(time[-1] - time[0]) for time in times)
     names = run_names(dataset)

@@ -9,12 +9,13 @@ import numpy as np
 
 from winchkit.arguments import number, positive
 from winchkit.arrays import Array
+from winchkit.bench.robot import no_robot
 from winchkit.errors import NotPermitted, UsageError
 from winchkit.model.rotation import angles_of, rotation_of
 from winchkit.robot.bench.checks import require_within_limits
 from winchkit.robot.bench.path import Waypoint, paths_through
 from winchkit.robot.bench.trajectory import PlatformTrajectory, plan_along
-from winchkit.robot.bench.wiring import no_robot, robot_of_bench
+from winchkit.robot.bench.wiring import robot_of_bench
 from winchkit.robot.forces.force_distribution import ForceLimits
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot

@@ -26,13 +26,13 @@ import numpy as np
 from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.bench.lifecycle import stopped_after
+from winchkit.bench.tracker import Tracker, mean_pose
 from winchkit.catalog import find
 from winchkit.errors import NotPermitted, RunError, UsageError
 from winchkit.model.rotation import angles_of, rotation_of
 from winchkit.robot.bench.computation import Computation, at_once
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.planner import Planner, moved
-from winchkit.robot.bench.tracker import Tracker, mean_pose
 from winchkit.robot.bench.trajectory import PlatformTrajectory
 from winchkit.robot.bench.wiring import robot_of_bench
 from winchkit.robot.calibration.calibrate import Calibrated, calibrate

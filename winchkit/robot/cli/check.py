@@ -8,7 +8,7 @@ from winchkit.errors import Fault
 
 if TYPE_CHECKING:
     from winchkit.robot.geometry.robot import Robot
-    from winchkit.schema.read import Declared
+    from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.reading.lines import Key
 
 Said = list[tuple["Key", str]]
@@ -17,14 +17,12 @@ _NEAR = 1e-3
 pose."""
 
 
-def faults_and_warnings(file: str, value: Declared) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
-    """Faults and warnings of a robot's geometry at home; none of anything else."""
-    from winchkit.schema.profiles.robot import RobotProfile
-    from winchkit.schema.reading.source import open_source
-
-    if not isinstance(value, RobotProfile):
-        return (), ()
+def faults_and_warnings(
+    file: str, value: RobotProfile
+) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
+    """Faults and warnings of a robot's geometry at home."""
     from winchkit.robot.geometry.robot import robot_of
+    from winchkit.schema.reading.source import open_source
 
     source, robot = open_source(file), robot_of(value)
     faults = _lengths(robot)

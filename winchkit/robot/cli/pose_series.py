@@ -15,10 +15,10 @@ from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.bench import Bench
+    from winchkit.bench.tracker import Tracker
     from winchkit.cli.core.terminal import ProgressCallback
     from winchkit.robot.bench.computation import Computation
     from winchkit.robot.bench.self_calibration import PoseVolume, SelfCalibration
-    from winchkit.robot.bench.tracker import Tracker
     from winchkit.robot.calibration.options import Options
     from winchkit.runs.run import Run
     from winchkit.schema.bench import BenchSpec
@@ -70,8 +70,8 @@ class PoseSeries:
     def simulated(self, name: str) -> SelfCalibration:
         """Calibrate a simulated robot, by the same loop and frames in simulated time."""
         from winchkit.bench.open import open_bench
+        from winchkit.bench.tracker import Tracker
         from winchkit.catalog import find
-        from winchkit.robot.bench.tracker import Tracker
         from winchkit.schema.read import read_simbench
         from winchkit.sim.clock.simulated_clock import SimulatedClock
         from winchkit.sim.live.bench import LiveBench

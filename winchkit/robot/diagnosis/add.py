@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from winchkit.arguments import require_type, require_types
-from winchkit.diagnosis.add import Addition, Removal
+from winchkit.diagnosis.add import Addition, FittedAddition, Removal
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -23,90 +24,48 @@ from winchkit.schema.profiles.robot import RobotProfile
 
 
 @dataclass(frozen=True)
-class FittedRobotAddition:
-    """An addition with everything that it was derived from, for reports.
+class FittedRobotAddition(FittedAddition):
+    """An addition to a robot's profile."""
 
-    Attributes
-    ----------
-    regression : PoseRegression
-        The poses and the model.
-    errors : tuple of two dict
-        Errors before and after, at every pose, SI.
-    addition : Addition
-        What is printed.
-    """
+    wing: ClassVar[str] = "robot"
 
     regression: PoseRegression
     errors: tuple[Errors, Errors]
-    addition: Addition
+    """Before and after, at every pose, SI."""
 
 
-def add_to_robot(
+def fitted_addition(
     effect_id: str,
     runs: Sequence[Run],
     profile: RobotProfile,
-    line: str | None = None,
-    catalogue: Catalogue | None = None,
-) -> Addition:
-    """Fit an effect at its place beside the profile's own, with the geometry of the file.
-
-    Parameters
-    ----------
-    effect_id
-        Name of the effect.
-    runs
-        Poses.
-    profile
-        The robot.
-    line
-        Line on which the effect acts; None for an effect on the whole robot.
-    catalogue
-        Effects; by default all that are installed.
-
-    Returns
-    -------
-    Addition
-        Every effect with its estimates, and the errors before and after.
-
-    Raises
-    ------
-    UsageError
-        For an effect that is unknown, present already, at no such place, or that the poses cannot
-        show.
-    RunError
-        With every fault of every run.
-    """
-    return fitted_robot_addition(effect_id, runs, profile, line, catalogue).addition
-
-
-def fitted_robot_addition(
-    effect_id: str,
-    runs: Sequence[Run],
-    profile: RobotProfile,
-    line: str | None = None,
     catalogue: Catalogue | None = None,
 ) -> FittedRobotAddition:
-    """The same as :func:`add_to_robot`, with the errors at every pose."""
+    """Fit ``EFFECT`` or ``EFFECT/LINE`` beside the profile's own, with the geometry of the file.
+
+    Raises UsageError for an effect that is unknown, present already, at no such place, or that the
+    poses cannot show; RunError with every fault of every run.
+    """
     require_types(runs, Run, "runs")
     require_type(profile, RobotProfile, "profile")
     catalogue = catalogue or load_catalogue()
-    effect = _placed(catalogue[effect_id], profile, line)
+    base, _, line = effect_id.partition("/")
+    effect = _placed(catalogue[base], profile, line)
     if any(term.effect.id == effect.id for term in robot_terms(profile, catalogue)):
         raise UsageError(f"robot '{profile.name}' has the effect '{effect.id}' already")
     preparation = prepare_selection(runs, profile, catalogue)
     if missing := lacking(effect, preparation.dataset):
         raise UsageError(
-            f"effect '{effect_id}' cannot be seen in these poses: without {', '.join(missing)}"
+            f"effect '{base}' cannot be seen in these poses: without {', '.join(missing)}"
         )
     return _added(preparation, with_needs_met(effect, preparation.dataset))
 
 
-def _placed(effect: Effect, profile: RobotProfile, line: str | None) -> Effect:
+def _placed(effect: Effect, profile: RobotProfile, line: str) -> Effect:
     names = [known.name for known in profile.line]
     places = effect.places(moving=True)
     if not places:
         raise UsageError(f"effect '{effect.id}' shows in the motion of a single winch only")
-    if line is None:
+    if not line:
         if not places & {"all", "platform"}:
             raise UsageError(
                 f"effect '{effect.id}' acts on one line: name it with --winch, one of "
@@ -145,10 +104,10 @@ def _added(preparation: Preparation, effect: Effect) -> FittedRobotAddition:
     addition = Addition(
         output_fits_of(before, after, preparation.noise), terms, preparation.dataset.notes
     )
-    return FittedRobotAddition(regression, (was, now), addition)
+    return FittedRobotAddition(regression, addition, (was, now))
 
 
-def remove_from_robot(
+def remove(
     effect_id: str,
     runs: Sequence[Run],
     profile: RobotProfile,
@@ -156,30 +115,8 @@ def remove_from_robot(
 ) -> Removal:
     """Refit the profile's effects without one of them, ``EFFECT`` or ``EFFECT/LINE``.
 
-    ``home-length`` alone removes those of all lines.
-
-    Parameters
-    ----------
-    effect_id
-        Name of the effect, with its line where it has one.
-    runs
-        Poses.
-    profile
-        The robot.
-    catalogue
-        Effects; by default all that are installed.
-
-    Returns
-    -------
-    Removal
-        The other effects with their estimates, and the errors before and after.
-
-    Raises
-    ------
-    UsageError
-        For an effect that the profile itself does not have.
-    RunError
-        With every fault of every run.
+    ``home-length`` alone removes those of all lines. Raises UsageError for an effect that the
+    profile itself does not have, and RunError with every fault of every run.
     """
     require_types(runs, Run, "runs")
     require_type(profile, RobotProfile, "profile")

@@ -23,10 +23,11 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.parametrization import Coordinates
-from winchkit.effects.term import Term, robot_with_terms
+from winchkit.effects.term import Term
 from winchkit.robot.diagnosis.data.dataset import RobotDataset
 from winchkit.robot.diagnosis.equations import POSED, Equations, start_pose
 from winchkit.robot.diagnosis.prior import GeometryPrior, profile_with_geometry
+from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.geometry.constraints import ZERO_STD, Constraint, mean_offset
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.compare import Compared
 from winchkit.diagnosis.data.input_denoising import contrasts
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.traces import pose_traces
@@ -26,49 +28,21 @@ from winchkit.schema.profiles.robot import RobotProfile
 
 
 @dataclass(frozen=True)
-class RobotCompared:
-    """Comparison with regression and errors, for reports."""
+class RobotCompared(Compared):
+    """A comparison of poses."""
 
-    comparison: Comparison
+    wing: ClassVar[str] = "robot"
+
     regression: PoseRegression
     errors: Errors
     followed: Mapping[str, Attribution]
     """By output the variable with the largest share of its error."""
 
 
-def compare_robot(
-    runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue | None = None
-) -> Comparison:
-    """Compare poses with a robot's profile at its file values.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        With motor angles and measured poses.
-    profile : RobotProfile
-        With its own effects.
-    catalogue : Catalogue, optional
-        Of effects; the one that ships by default.
-
-    Returns
-    -------
-    Comparison
-        Errors by output, SI, and the variables that explain them.
-
-    Raises
-    ------
-    RunError
-        With every fault of every run.
-    FileError
-        For effects that cannot be bound to the robot.
-    """
-    return compared_robot(runs, profile, catalogue).comparison
-
-
-def compared_robot(
+def compared(
     runs: Sequence[Run], profile: RobotProfile, catalogue: Catalogue | None = None
 ) -> RobotCompared:
-    """As :func:`compare_robot`, with regression and errors."""
+    """Compare poses with a robot's profile at its file values."""
     dataset = prepare_poses(runs, profile)
     terms = robot_terms(profile, catalogue, moving=dataset.moves)
     pose = placed(dataset, terms, START)
@@ -96,7 +70,7 @@ def compared_robot(
         most.setdefault(followed.output, followed)
     traces = pose_traces(column_names(dataset, errors), UNITS, errors)
     comparison = Comparison(outputs, None, dataset.notes, traces=traces)
-    return RobotCompared(comparison, regression, errors, most)
+    return RobotCompared(regression, comparison, errors, most)
 
 
 def _largest(name: str, error: Array) -> float:

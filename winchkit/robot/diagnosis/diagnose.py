@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.diagnose import Answer
@@ -97,6 +98,8 @@ class RobotAnswer(Answer):
     diagnosis
         What is printed.
     """
+
+    wing: ClassVar[str] = "robot"
 
     engine: PoseSelection
 
@@ -404,37 +407,13 @@ _TENTH = 0.1
 share of a residual that a variable must explain for it to be no noise: the tenth of the verdict."""
 
 
-def diagnose_robot(
+def diagnose(
     runs: Sequence[Run],
     profile: RobotProfile,
     catalogue: Catalogue | None = None,
     progress: ProgressCallback = no_progress,
 ) -> RobotAnswer:
-    """Find the effects that a robot's model lacks on its poses.
-
-    Parameters
-    ----------
-    runs
-        Poses.
-    profile
-        The robot.
-    catalogue
-        Effects; by default all that are installed.
-    progress
-        Called with the present step and the share of the work done, 0 to 1.
-
-    Returns
-    -------
-    RobotAnswer
-        The diagnosis with everything that it was derived from.
-
-    Raises
-    ------
-    RunError
-        With every fault of every run.
-    FileError
-        For effects that do not bind.
-    """
+    """Find the effects that a robot's model lacks on its poses."""
     progress("estimating the noise", 0.0)
     preparation = prepare_selection(runs, profile, catalogue or load_catalogue())
     progress("searching", 0.4)

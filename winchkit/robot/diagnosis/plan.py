@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.arguments import require_type
 from winchkit.diagnosis.design.discrimination import LEAST_POWER, SEPARATED_AT
+from winchkit.diagnosis.plan import Plan
 from winchkit.diagnosis.verdict.equivalence import pairs_of
 from winchkit.effects.card import usual_values
 from winchkit.effects.parametrization import Coordinates
@@ -32,11 +32,9 @@ _MOST = 6
 
 
 @dataclass(frozen=True)
-class PosePlan:
+class PosePlan(Plan):
     """Kinds of poses, the most informative first, and the questions that they answer."""
 
-    pairs: tuple[tuple[Term, Term], ...]
-    """Pairs of effects to separate; the first powers of every offer are theirs."""
     hidden: tuple[Term, ...]
     """Effects that are not detectable in their usual size with the poses so far."""
     offers: tuple[PoseOffer, ...]
@@ -106,23 +104,12 @@ class PosePlan:
         return Run("proposed", time, channels, metadata)
 
 
-def plan_poses(answer: RobotAnswer, count: int = POSES) -> PosePlan:
-    """Rank kinds of poses by simulation on the model of a diagnosis.
+def plan(answer: RobotAnswer, count: int = POSES) -> PosePlan:
+    """Rank kinds of poses, ``count`` each, by simulation on the model of a diagnosis.
 
-    Parameters
-    ----------
-    answer : RobotAnswer
-        Of a diagnosis.
-    count : int
-        Poses per offer.
-
-    Returns
-    -------
-    PosePlan
-        Ranked by the number of pairs separated, then by their powers, then the same for
-        detectable effects.
+    Ranked by the number of pairs separated, then by their powers, then the same for detectable
+    effects.
     """
-    require_type(answer, RobotAnswer, "answer")
     regression, final = answer.engine.regression, answer.result.final.hypothesis
     pairs = tuple(pairs_of(answer.sets))
     hidden = _hidden(answer)

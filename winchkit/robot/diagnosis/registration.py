@@ -17,9 +17,10 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.catalogue import Catalogue
-from winchkit.effects.term import Term, robot_with_terms
+from winchkit.effects.term import Term
 from winchkit.model.rotation import rotation_by, rotation_vector
 from winchkit.robot.diagnosis.data.dataset import RobotDataset
+from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.geometry.constraints import rotation_residual
 from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose
 from winchkit.robot.geometry.robot import Robot

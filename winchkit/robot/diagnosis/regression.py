@@ -21,13 +21,14 @@ from winchkit.diagnosis.data.spectrum import Band
 from winchkit.diagnosis.regression.base import Folds, Regression, Segment
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.effects.effect import Effect
-from winchkit.effects.term import Term, robot_with_terms
+from winchkit.effects.term import Term
 from winchkit.model.stages import At, Stage
 from winchkit.robot.diagnosis.adjustment import STD_OF_ZERO, instrument_zeros
 from winchkit.robot.diagnosis.candidates import lacking, lacking_parts
 from winchkit.robot.diagnosis.data.dataset import LEAST_POSES, RobotDataset
 from winchkit.robot.diagnosis.equations import POSED, Equations
 from winchkit.robot.diagnosis.prior import GeometryPrior, profile_with_geometry
+from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.geometry.constraints import mean_offset
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot

@@ -13,8 +13,9 @@ from winchkit.effects.bind import not_in, terms_of, values_of
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import at_line
-from winchkit.effects.term import Term, robot_with_terms
+from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError, suggest
+from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile

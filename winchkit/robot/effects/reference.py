@@ -10,8 +10,9 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import at_line
-from winchkit.effects.term import Term, robot_with_terms
+from winchkit.effects.term import Term
 from winchkit.model.rotation import rotation_of
+from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.forces.force_distribution import approximate_forces
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot, robot_of

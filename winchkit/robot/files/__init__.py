@@ -1,1 +1,4 @@
-"""Runs of robots: measured poses, and the holds of a log."""
+"""Runs of robots.
+
+``poses`` reads measured poses and samples in motion, ``holds`` finds stretches at rest in a log.
+"""

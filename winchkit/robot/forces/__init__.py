@@ -1,1 +1,5 @@
-"""Forces of cable robots: balance, distribution on the cables, elongation."""
+"""Forces of cable robots.
+
+``balance`` and ``force_distribution`` have the cable forces that hold a wrench, ``elongation`` the
+forces of stretched cables.
+"""

@@ -243,7 +243,7 @@ def robot_of(
         With the winch of each line read.
     modifiers : sequence, optional
         Modifiers of each line. Without them it is the nominal robot;
-        ``winchkit.effects.robot_with_effects`` applies the profile's own effects.
+        ``winchkit.robot.robot_with_effects`` applies the profile's own effects.
     payload : sequence, optional
         Modifiers of the platform.
     tracker : sequence, optional

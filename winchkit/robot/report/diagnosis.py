@@ -189,7 +189,7 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(known**2))) if known.size else nan
 
 
-def robot_report_html(
+def report_html(
     answer: RobotAnswer, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
     """The page of a robot's diagnosis; ``profile`` and ``options`` as the user gave them."""
@@ -208,7 +208,7 @@ def robot_report_html(
     return page(title, [*present(ladder), *drawn.values(), *patterns], content, headed=False)
 
 
-def robot_report_figures(answer: RobotAnswer, source: str = "") -> list[Figure]:
+def report_figures(answer: RobotAnswer, source: str = "") -> list[Figure]:
     """The figures of the page of a robot's diagnosis."""
     drawn = _report_figures(answer, source).values()
     ladder = _report_ladder(answer, source)
@@ -250,7 +250,7 @@ def _report_figures(answer: RobotAnswer, source: str) -> dict[str, Figure]:
     )
 
 
-def robot_comparison_html(
+def comparison_html(
     compared: RobotCompared, title: str, profile: str = "", *, options: Sequence[str] = ()
 ) -> str:
     """The page of a robot's comparison."""
@@ -266,7 +266,7 @@ def robot_comparison_html(
     return page(title, [*present(ladder), *drawn.values()], content, headed=False)
 
 
-def robot_comparison_figures(compared: RobotCompared, source: str = "") -> list[Figure]:
+def comparison_figures(compared: RobotCompared, source: str = "") -> list[Figure]:
     """The figures of the page of a robot's comparison."""
     ladder = error_ladder(compared.comparison.outputs, source=source)
     return [*present(ladder), *_comparison_figures(compared, source).values()]
@@ -281,7 +281,7 @@ def _comparison_figures(compared: RobotCompared, source: str) -> dict[str, Figur
     )
 
 
-def robot_addition_html(
+def addition_html(
     fitted: FittedRobotAddition,
     title: str,
     profile: str = "",
@@ -300,7 +300,7 @@ def robot_addition_html(
     return page(title, [*present(ladder), *drawn.values()], content, headed=False)
 
 
-def robot_addition_figures(fitted: FittedRobotAddition, source: str = "") -> list[Figure]:
+def addition_figures(fitted: FittedRobotAddition, source: str = "") -> list[Figure]:
     """The figures of the page of an effect added to a robot."""
     ladder = _addition_ladder(fitted, source)
     return [*present(ladder), *_addition_figures(fitted, source).values()]

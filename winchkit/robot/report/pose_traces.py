@@ -18,6 +18,7 @@ from winchkit.robot.diagnosis.attribution import (
     pose_attributions,
     variables_of_poses,
 )
+from winchkit.robot.diagnosis.diagnose import RobotAnswer
 from winchkit.robot.diagnosis.errors import UNITS, Errors
 from winchkit.robot.diagnosis.regression import PoseRegression
 
@@ -64,6 +65,22 @@ class Trace:
             "x": [float(f"{v:.{_DIGITS}g}") for v in x],
             "mean": [float(f"{v:.{_DIGITS}g}") for v in mean],
         }
+
+
+def traces_json(answer: RobotAnswer) -> dict[str, Any]:
+    """Errors over the variables to which they were attributed, before and after."""
+    selection = answer.selection
+    drawn = traces(selection.final.regression, *selection.errors)
+    after = [t.to_json(t.after) for t in drawn if t.after is not None]
+    before = [t.to_json(t.before) for t in drawn]
+    return {"residuals": {"before": before, "after": after if answer.diagnosis.steps else None}}
+
+
+def unexplained_curve(answer: RobotAnswer, where: Attribution) -> tuple[Array, Array]:
+    """Mean of the variable and of the unexplained residual in every bin, (bins,) each, SI."""
+    regression, errors = answer.selection.rest
+    trace = trace_over(regression, where, errors)
+    return trace.means(trace.before)
 
 
 def unit_of(variable: str) -> str:

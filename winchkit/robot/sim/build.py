@@ -90,3 +90,10 @@ def _winch(winch: str | WinchProfile, name: str) -> WinchProfile:
     if not isinstance(winch, WinchProfile):
         raise FileError(f"line {name}: winch '{winch}' has not been read")
     return winch
+
+
+def profiles_of(bench: SimBench) -> dict[str, WinchProfile]:
+    """Declared profile of every winch, with the cable's length at home."""
+    if bench.platform is None:
+        raise FileError(f"{bench.name}: declares no [platform]")
+    return build_robot(bench, bench.platform).profiles

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from importlib.util import find_spec
+from typing import Any
 from urllib.parse import urlsplit
 
 from winchkit.robot.sim.build import build_robot
+from winchkit.robot.sim.cable_end import CableEnd
 from winchkit.robot.sim.tracker import SimTracker
+from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.sim_platform import PlatformTruth
-from winchkit.schema.simbench import SimBench
+from winchkit.schema.simbench import SimBench, WinchTruth
 
 
 class LiveRobot:
@@ -33,9 +36,11 @@ class LiveRobot:
         compiled: bool,
     ) -> None:
         self._started = started
-        self.platform, self.profiles, self.ends, self.truth = build_robot(
-            bench, truth, compiled=compiled and find_spec("numba") is not None
-        )
+        built = build_robot(bench, truth, compiled=compiled and find_spec("numba") is not None)
+        self.platform: Any = built.platform
+        self.profiles: Mapping[str, WinchProfile] = built.profiles
+        self.ends: Mapping[str, CableEnd] = built.ends
+        self.truth: Mapping[str, WinchTruth] = built.truth
         self.on_pose: Callable[[bytes], None] | None = None
         """Called with each datagram of the tracker, also in simulated time."""
         self._socket: socket.socket | None = None
@@ -44,7 +49,7 @@ class LiveRobot:
             parts = urlsplit(wiring.tracker.listen)
             self._address = (parts.hostname or "", parts.port or 0)
             self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._tracker = SimTracker(self.platform, truth.tracker, seed, self._send)
+        self._tracker = SimTracker(built.platform, truth.tracker, seed, self._send)
 
     def advance(self, now: float) -> None:
         """Let the tracker measure and send at a time (s)."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.catalog import find
-from winchkit.errors import UsageError, WinchkitError
+from winchkit.errors import UsageError
 from winchkit.model.rotation import rotation_of
 from winchkit.plain_json import finite_or_none, significant
 from winchkit.profile_edit.naming import extended_name
@@ -31,7 +31,7 @@ from winchkit.robot.geometry.robot import Robot, robot_of
 from winchkit.robot.report.calibration import calibration_html, headline, largest_changes
 from winchkit.runs.read import read_run
 from winchkit.schema.profiles.robot import RobotProfile
-from winchkit.schema.read import read_any, read_robot
+from winchkit.schema.read import read_robot
 from winchkit.units import GRAVITY
 
 _GRID = 22
@@ -42,14 +42,6 @@ _LOWEST, _HIGHEST = 0.7, 5.0
 """Default limits of the cable forces in weights of the platform (the picture only)."""
 _NO_MASS = (20.0, 150.0)
 """The same where the profile has no mass, N."""
-
-
-def is_robot(name: str) -> bool:
-    """Whether a profile, by name or file, is that of a robot; False where it cannot be read."""
-    try:
-        return isinstance(read_any(find("profiles", name)), RobotProfile)
-    except WinchkitError:
-        return False  # the reader of winches says what is wrong with it
 
 
 @dataclass(frozen=True)

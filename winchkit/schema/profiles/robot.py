@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from winchkit.rendering import Plotted
 from winchkit.schema.profiles.instruments import InstrumentSpec
@@ -114,6 +114,8 @@ class FittedSpec(Table):
 @dataclass(frozen=True, repr=False)
 class RobotProfile(Plotted, Table):
     """A cable robot as declared; frozen, SI."""
+
+    wing: ClassVar[str] = "robot"
 
     name: str
     home: HomeSpec

@@ -9,11 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from winchkit import wings
 from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError, suggest
 from winchkit.regular_file import regular
 from winchkit.schema.reading.lines import Key, line_of, lines_of_keys
 
+# As messages list them; those of robots are read by their wing.
 KINDS = (
     "winch",
     "axis",
@@ -123,7 +125,7 @@ def _source(path: str, tree: dict[str, Any], lines: dict[Key, int]) -> Source:
         )
     if kind is None:
         faults.append(source.fault(("kind",), f"missing; use one of {', '.join(KINDS)}"))
-    elif kind not in KINDS:
+    elif kind not in KINDS and wings.reader(str(kind)) is None:
         message = f"unknown kind {kind!r}; use one of {', '.join(KINDS)}"
         faults.append(source.fault(("kind",), message + suggest(str(kind), list(KINDS))))
     if faults:

@@ -12,8 +12,8 @@ from pathlib import Path
 from time import monotonic
 from types import TracebackType
 
+from winchkit import wings
 from winchkit.errors import NotPermitted, UsageError, suggest
-from winchkit.robot.sim.live import LiveRobot
 from winchkit.schema.bench import BenchSpec, BusSpec
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.programme import ALL, Step
@@ -25,6 +25,7 @@ from winchkit.sim.live.bench_file import write_bench
 from winchkit.sim.live.buses import CanPort, Interface, Wire, wired
 from winchkit.sim.live.lines import Line, Placed, open_line
 from winchkit.sim.live.real_time import TICK, serve
+from winchkit.sim.live.robot import SimulatedRobot
 from winchkit.sim.live.winch import LiveWinch
 from winchkit.sim.plant.hanging_load import Load
 
@@ -100,7 +101,7 @@ class LiveBench:
         self.wire: dict[str, Wire] = {}
         """Wires of the CAN buses, by bus."""
         self.winches: dict[str, LiveWinch] = {}
-        self.robot: LiveRobot | None = None
+        self.robot: SimulatedRobot | None = None
         """Platform and tracker of a robot; None for winches with a load each."""
         self.bench_spec: BenchSpec = self.sim_bench.bench
         self.overruns = 0
@@ -305,7 +306,7 @@ class LiveBench:
         if sim.platform is None:
             profiles = profiles_of(sim) if self._profiles is None else self._profiles
         else:
-            self.robot = LiveRobot(
+            robot: SimulatedRobot = wings.part("robot", "simulated")(
                 sim,
                 sim.platform,
                 self.seed,
@@ -313,8 +314,8 @@ class LiveBench:
                 sends=self._simulated is None,
                 compiled=self._compiled,
             )
-            profiles, loads = self.robot.profiles, self.robot.ends
-            truth = self.robot.truth
+            self.robot = robot
+            profiles, loads, truth = robot.profiles, robot.ends, robot.truth
         for name, wiring in sim.bench.winch.items():
             port = self._ports.get(wiring.servo.bus)
             if port is None:

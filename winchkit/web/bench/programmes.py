@@ -10,16 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from winchkit import wings
 from winchkit.bench.programme_plan import plan_programme
 from winchkit.catalog import folder as shipped
 from winchkit.errors import UsageError
 from winchkit.plain_json import significant
-from winchkit.robot.bench.planner import Planner
-from winchkit.robot.bench.programme import planned_motions
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.programme import Programme
 from winchkit.schema.read import load
-from winchkit.schema.robot_programme import RobotProgramme
 
 _DIGITS = 6
 _NO_NAME = re.compile(r"[^\w.-]+")
@@ -70,8 +68,9 @@ class Programmes:
         ``steps`` in words, ``asks``: time and text, ``time`` (s) and ``curves`` by name in m.
         """
         declared = load(self.path(name), self._kind).value
-        if isinstance(declared, RobotProgramme):
-            return self._robot(declared)
+        if (by_wing := wings.call("preview", declared)) is not None:
+            moved: dict[str, Any] = by_wing(declared, self.spec)
+            return _about(declared) | moved
         assert isinstance(declared, Programme)
         limits = {winch: item.limits for winch, item in self.spec.winch.items()}
         start = {winch: here.get(winch, np.nan) for winch in limits}
@@ -85,30 +84,8 @@ class Programmes:
             "curves": curves,
         }
 
-    def _robot(self, declared: RobotProgramme) -> dict[str, Any]:
-        planner = Planner.of(self.spec)
-        motions, _ = planned_motions(planner, declared, planner.robot.home)
-        now, time, places = 0.0, [], []
-        for motion in motions:
-            if isinstance(motion, float):
-                now += motion
-                continue
-            time.append(now + motion.time)
-            places.append(motion.pose.position)
-            now += motion.duration
-        if not time:
-            raise UsageError(f"the programme '{declared.name}' moves nothing")
-        position = np.concatenate(places)
-        return _about(declared) | {
-            "duration": now,
-            "steps": [f"{len(declared.step)} steps, planned from the home pose"],
-            "asks": [],
-            "time": significant(np.concatenate(time), _DIGITS),
-            "curves": {axis: significant(position[:, i], _DIGITS) for i, axis in enumerate("xyz")},
-        }
 
-
-def _about(declared: Programme | RobotProgramme) -> dict[str, Any]:
+def _about(declared: Any) -> dict[str, Any]:
     return {
         "name": declared.name,
         "description": declared.description,

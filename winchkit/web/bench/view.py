@@ -13,10 +13,10 @@ import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Protocol, Self
 from urllib.parse import unquote
 
 from starlette.requests import Request
@@ -24,13 +24,13 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from winchkit import wings
 from winchkit.bench.control.dead_man import DEAD_MAN
 from winchkit.bench.remote.client import RemoteStation
 from winchkit.bench.remote.session import attach
 from winchkit.catalog import find
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, UsageError, WinchkitError
-from winchkit.robot.web.live_robot import LiveRobot
 from winchkit.schema.read import read_bench
 from winchkit.web.bench import messages
 from winchkit.web.bench.browser import BEGINS_NOTHING, Browser, counting, received
@@ -84,6 +84,13 @@ class _Period:
         return self._due - now
 
 
+class LiveRobot(Protocol):
+    """The robot of a bench as its wing draws it."""
+
+    def picture(self, status: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Pose and cables at a status; None where they are not known."""
+
+
 class BenchView:
     """A bench as the page shows and commands it; a context manager."""
 
@@ -104,7 +111,10 @@ class BenchView:
         self._lent = threading.Event()
         """Set while the bench is given away, so that a drive can be written to."""
         self._model = LiveModel(self.spec, self.file, self.effects)
-        self._robot = None if self.spec.robot is None else LiveRobot(self.spec)
+        live: LiveRobot | None = None
+        if self.spec.robot is not None:
+            live = wings.part("robot", "live_robot")(self.spec)
+        self._robot = live
         self._posed: dict[str, Any] | None = None
         self._words = FrameWords(self.spec)
         self._programmes = Programmes(self.spec, folder, Path.cwd())

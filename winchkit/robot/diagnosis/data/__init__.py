@@ -1,1 +1,4 @@
-"""Data of a robot's diagnosis: poses at rest, or samples of a trajectory."""
+"""Data of a robot's diagnosis.
+
+``dataset`` has poses at rest, or samples of a motion with their ``trajectory``.
+"""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,8 @@ _LEAST_KNOWN_SHARE = 0.5
 class RobotDataset(Dataset):
     """Poses of one robot: a row is a pose at rest, without order in time, or a sample in motion."""
 
+    wing: ClassVar[str] = "robot"
+
     robot: RobotProfile
     measured: Measured
     pose: NDArray[np.intp]
@@ -44,6 +47,21 @@ class RobotDataset(Dataset):
     """Motion along the rows where they are samples in time; None for poses at rest."""
     balanced: bool = True
     """Whether the measured tensions balance the platform's weight well enough to be used."""
+
+    @property
+    def profile_name(self) -> str:
+        """Name within the robot's file."""
+        return self.robot.name
+
+    @property
+    def run_names(self) -> tuple[str, ...]:
+        """Files of the runs."""
+        return self.runs
+
+    @property
+    def run_files(self) -> tuple[str, ...]:
+        """Files of the runs."""
+        return self.runs
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -1,22 +1,20 @@
-"""Cable robots from TOML: lines with their winches inline or by the name of a profile."""
+"""Robots from TOML: a profile, whose lines have their winches inline or by name; a programme."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 from winchkit.errors import FileError
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.schema.read import read_winch
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.parts import Reading
+from winchkit.schema.robot_programme import RobotProgramme
 
 
-def robot(
-    reading: Reading, tree: dict[str, Any], read_winch: Callable[[Path], WinchProfile]
-) -> RobotProfile | None:
-    """A robot; ``read_winch`` reads the profile of a line that names one."""
+def robot(reading: Reading, tree: dict[str, Any]) -> RobotProfile | None:
+    """A robot, with the profiles of the lines that name one."""
     tree = {"name": reading.stem, **tree}
     if "effect" in tree:
         tree["effect"] = reading.effects(tree["effect"])
@@ -26,13 +24,11 @@ def robot(
             for name, value in prior.items()
         }
     if isinstance(lines := tree.get("line"), list):
-        tree["line"] = [_line(reading, raw, ("line", n), read_winch) for n, raw in enumerate(lines)]
+        tree["line"] = [_line(reading, raw, ("line", n)) for n, raw in enumerate(lines)]
     return reading.table(RobotProfile, tree)
 
 
-def _line(
-    reading: Reading, raw: object, at: Key, read_winch: Callable[[Path], WinchProfile]
-) -> object:
+def _line(reading: Reading, raw: object, at: Key) -> object:
     """A line with its winch's profile in place of a name or a table."""
     if not isinstance(raw, dict) or "winch" not in raw:
         return raw
@@ -40,7 +36,7 @@ def _line(
     if isinstance(winch, dict):
         profile = reading.winch(winch, str(raw.get("name", "")), place)
     elif isinstance(winch, str):
-        profile = _named_winch(reading, winch, place, read_winch)
+        profile = _named_winch(reading, winch, place)
     else:
         profile = None
         reading.fault(place, f"expected the name of a winch or its tables, not {winch!r}")
@@ -48,9 +44,7 @@ def _line(
     return {**raw, "winch": profile or str(winch)}
 
 
-def _named_winch(
-    reading: Reading, name: str, at: Key, read_winch: Callable[[Path], WinchProfile]
-) -> WinchProfile | None:
+def _named_winch(reading: Reading, name: str, at: Key) -> WinchProfile | None:
     path = reading.shipped("profiles", name, at)
     if path is None:
         return None
@@ -59,3 +53,8 @@ def _named_winch(
     except FileError as error:
         reading.faults += error.faults
         return None
+
+
+def programme(reading: Reading, tree: dict[str, Any]) -> RobotProgramme | None:
+    """A programme of the platform, with the file's name where it gives itself none."""
+    return reading.table(RobotProgramme, {"name": reading.stem, **tree})

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from winchkit.bench.tracker import TrackedPose, Tracker, mean_pose, parse_pose
 from winchkit.errors import ConnectionLost, NoReply
-from winchkit.robot.bench.tracker import TrackedPose, Tracker, mean_pose, parse_pose
 
 GOOD = {
     "schema": 1,
