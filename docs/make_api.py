@@ -40,6 +40,7 @@ SECTIONS = {
             "query_library",
         ),
         *("read_log", "info_of", "recover", "open_replay"),
+        *("decode_trace", "DecodedTrace"),
     ),
     "Diagnosis": (
         *("compare", "diagnose", "diagnose_each", "plan", "add", "remove"),

@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.robot.diagnose import diagnose_robot
     from winchkit.diagnosis.robot.plan import plan_poses
     from winchkit.diagnosis.write import write_addition, write_removal
+    from winchkit.drivers.can.tools.decoded_trace import DecodedTrace, decode_trace
     from winchkit.effects.catalogue import load_catalogue
     from winchkit.effects.effect import Effect, Parameter
     from winchkit.errors import (
@@ -127,6 +128,7 @@ __all__ = [
     "ComputationProcess",
     "ConnectionLost",
     "DahlEstimator",
+    "DecodedTrace",
     "DeviceRefused",
     "DriveFault",
     "Effect",
@@ -174,6 +176,7 @@ __all__ = [
     "config_restore",
     "config_save",
     "config_store",
+    "decode_trace",
     "diagnose",
     "diagnose_each",
     "diagnose_library",
@@ -297,6 +300,7 @@ _NAMES = {
         "write_addition",
         "write_removal",
     ),
+    "winchkit.drivers.can.tools.decoded_trace": ("DecodedTrace", "decode_trace"),
     "winchkit.effects.catalogue": ("load_catalogue",),
     "winchkit.effects.effect": (
         "Effect",

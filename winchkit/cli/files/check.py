@@ -124,7 +124,7 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
         if suffix == ".toml" or not Path(file).is_file():
             return _declaration(file, effects)
         known = ", ".join((".toml", *EDS, *RUNS))
-        from winchkit.runs.importing.formats.can_trace import trace_advice
+        from winchkit.can_trace import trace_advice
 
         message = trace_advice(Path(file)) or f"'{suffix}' is none of {known}"
         return Verdict(file, "", faults=(Fault(message, file),))

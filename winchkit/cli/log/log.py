@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from winchkit.bench.remote.station import Station
 
 COMMANDS = {
+    "decode": At("winchkit.cli.log.decode", "Print a trace of CAN frames in words."),
     "info": At("winchkit.cli.log.info", "What a log holds: channels, rates, gaps, counters."),
     "recover": At("winchkit.cli.log.recover", "Save what is whole of a log that was cut off."),
     "export": At("winchkit.cli.files.export", "Convert a log to CSV, MCAP, Parquet or MF4."),
