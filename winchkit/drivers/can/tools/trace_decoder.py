@@ -41,10 +41,9 @@ from winchkit.drivers.can.tools.decode import (
 )
 from winchkit.errors import Fault, FileError
 from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.eds.eds import SUFFIXES
 from winchkit.schema.read import read_device
 
-DESCRIPTIONS = (".eds", ".dcf", ".xdd", ".xdc")
-"""Suffixes of descriptions by the maker; others are device files."""
 _DIRECTIONS: tuple[Direction, Direction] = ("tpdo", "rpdo")
 _IDENTIFIER = 0x7FF
 _REQUEST, _REPLY, _HEARTBEAT, _EMERGENCY = 0x600, 0x580, 0x700, 0x080
@@ -78,7 +77,7 @@ def read_description(path: str) -> Description:
 
     Raises FileError for a file that cannot be read, and for a device that is on no CAN bus.
     """
-    if Path(path).suffix.lower() in DESCRIPTIONS:
+    if Path(path).suffix.lower() in SUFFIXES:
         read_dictionary(Path(path), 1)
         return Description(path)
     device = read_device(path)
