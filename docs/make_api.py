@@ -16,6 +16,7 @@ SECTIONS = {
     ),
     "Instruments": (
         *("cell_info", "cell_rate", "cell_health", "cell_tare", "cell_zero", "cell_store"),
+        *("recorded_cell_health", "CellFindings"),
         *("read_points", "fit_cell", "static_effects"),
     ),
     "Drives": (

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from winchkit.bench.robot.tracker import Tracker
     from winchkit.calibration.cell.files import read_points
     from winchkit.calibration.cell.fit import fit_cell
+    from winchkit.calibration.cell.recordings import CellFindings, recorded_cell_health
     from winchkit.calibration.cell.static_effects import static_effects
     from winchkit.calibration.robot.calibrate import calibrate
     from winchkit.calibration.robot.pose_design import next_poses
@@ -125,6 +126,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Bench",
     "BenchSnapshot",
+    "CellFindings",
     "ComputationProcess",
     "ConnectionLost",
     "DahlEstimator",
@@ -217,6 +219,7 @@ __all__ = [
     "read_run",
     "read_simbench",
     "read_size",
+    "recorded_cell_health",
     "recover",
     "remove",
     "remove_from_robot",
@@ -272,6 +275,7 @@ _NAMES = {
     "winchkit.bench.programme": ("run_programme",),
     "winchkit.bench.recording.replay": ("open_replay",),
     "winchkit.bench.remote.session": ("attach",),
+    "winchkit.calibration.cell.recordings": ("CellFindings", "recorded_cell_health"),
     "winchkit.calibration.cell.files": ("read_points",),
     "winchkit.calibration.cell.fit": ("fit_cell",),
     "winchkit.calibration.cell.static_effects": ("static_effects",),

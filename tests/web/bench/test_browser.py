@@ -156,7 +156,9 @@ def test_emps_from_its_authors_file_and_a_log_of_another_program(
     lay_out("emps", tmp_path)
     profile, log = tmp_path / "emps.toml", tmp_path / "log.csv"
     profile.write_text(EMPS)
-    rows = "\n".join(f"{i * 0.02:.2f};{57.3 * abs(i % 100 - 50):.3f};{9 + i % 3}" for i in range(300))
+    rows = "\n".join(
+        f"{i * 0.02:.2f};{57.3 * abs(i % 100 - 50):.3f};{9 + i % 3}" for i in range(300)
+    )
     log.write_text(f"Zeit [s];Pos [deg];Kraft\n{rows}\n")
     served = Served("--folder", str(tmp_path))
     page, complaints = opened(browser, served.url, accept_downloads=True)

@@ -248,7 +248,12 @@ def examine_recording(recording: CellRecording) -> CellFindings:
         remarks.append(f"{saturated} readings are saturated: overload or a broken wire")
     if lost := health.readings - health.usable - saturated:
         remarks.append(f"{lost} readings are unusable")
-    remarks += [item.text for item in inspection.findings if item.code in _CODES]
+    # The rest of a sentence on the clock concerns derivatives, of which a cell has none.
+    remarks += [
+        item.text.partition(":")[0] if item.code == "clock-jitter" else item.text
+        for item in inspection.findings
+        if item.code in _CODES
+    ]
     slope, std = _temperature(recording, samples.usable & ~spikes)
     if abs(slope) > _SIGNIFICANT * std:
         remarks.append(

@@ -31,6 +31,11 @@ if TYPE_CHECKING:
     from winchkit.schema.mapping import ImportMapping
 
 _MAPPING = "mapping.toml"
+_CELL_ALONE = (
+    "no column is the motor angle or velocity: a run of a load cell alone, for `winchkit cell "
+    "diagnose --run`; import the file together with the one that has the angle, or name it by "
+    '--column "motor_angle=COLUMN [deg]", for a run of a winch'
+)
 _NO_ANGLE = (
     "no column is the motor angle or velocity, without which there is no run: name it by --column "
     '"motor_angle=COLUMN [deg]", or import the file together with the one that has it'
@@ -369,7 +374,8 @@ def _guesses(
             has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
             raise UsageError(f"{option}: there is no column '{name}'; there are {has}")
     if declared is None and _lack_angle(guesses):
-        guesses = [replace(guess, notes=(*guess.notes, _NO_ANGLE)) for guess in guesses]
+        text = _CELL_ALONE if _have(guesses, {"tension", "load"}) else _NO_ANGLE
+        guesses = [replace(guess, notes=(*guess.notes, text)) for guess in guesses]
     return guesses, declared
 
 
@@ -537,7 +543,7 @@ def _runs(
     others = [index for index in range(len(parts)) if index not in angles]
     if others and angles and (len(angles) == 1 or is_joined):
         is_joined = True
-    elif others and len(parts) > 1 and not is_joined:
+    elif others and angles and len(parts) > 1 and not is_joined:
         names = ", ".join(files[index] for index in others)
         raise UsageError(
             f"{names}: no motor angle; import each with the one file that it belongs to, by --join"
