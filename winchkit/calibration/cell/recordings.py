@@ -69,7 +69,9 @@ class CellFindings:
 
     Attributes
     ----------
-    name, unit : str
+    name : str
+        As of the recording.
+    unit : str
         As of the recording.
     health : Health
         Counts of all readings; noise, drift, hum and mean of the longest stretch without a change
