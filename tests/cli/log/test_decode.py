@@ -78,6 +78,23 @@ def test_a_trace_is_imported_as_a_run_in_si(trace: Path, tmp_path: Path) -> None
     np.testing.assert_allclose(got["motor_torque"][1:], torque[1:], atol=2e-3)
 
 
+def test_several_nodes_are_winches_and_several_buses_are_refused(
+    trace: Path, tmp_path: Path
+) -> None:
+    lines = trace.read_text().splitlines()
+    second = [line.replace(" 181#", " 182#").replace(" 281#", " 282#") for line in lines]
+    both = tmp_path / "both.log"
+    both.write_text("\n".join(line for pair in zip(lines, second, strict=True) for line in pair))
+    run("import", both, "--device", "generic-cia402", "-y", "-o", tmp_path / "runs")
+    got = read_run(tmp_path / "runs" / "both.csv")
+    assert got.winches() == ["1", "2"]
+    np.testing.assert_array_equal(got["1.motor_angle"], got["2.motor_angle"])
+    buses = {line.split()[1] for line in lines}
+    both.write_text(both.read_text().replace(f"{buses.pop()} 182#", "other 182#"))
+    told = run("import", both, "--device", "generic-cia402", code=3).stderr
+    assert "split it by bus" in told
+
+
 def test_by_an_eds_alone_the_import_asks_for_the_units(trace: Path) -> None:
     eds = catalog.find("devices", "generic-cia402").parent / "generic-cia402.eds"
     shown = run("import", trace, "--device", eds).stdout

@@ -54,13 +54,20 @@ def read_trace_table(path: str, devices: Sequence[str]) -> Table:
         raise RunError(Fault(text, path))
     columns: list[Column] = []
     scaled = {key: _scaled(path, one, notes) for key, one in trace.nodes.items()}
-    is_one = len({bus for bus, _ in trace.nodes}) < 2
+    buses = list(dict.fromkeys(bus for bus, _, _ in found))
+    if len(buses) > 1:
+        text = f"has values of the buses {', '.join(buses)}; split it by bus and join the runs"
+        raise RunError(Fault(text, path))
+    is_alone = len({node for _, node, _ in found}) < 2
     for (bus, node, what), rows in found.items():
-        label = f"node {node}" if is_one else f"{bus} node {node}"
+        label = f"node {node}"
         dictionary = trace.nodes[bus, node].known.dictionary
         names = {name: named(name, dictionary) for _, values in rows for name in values}
         known = {name: (text, "", 1.0) for name, text in names.items()} | scaled[bus, node]
-        columns += _columns(f"{label} {what}", label, rows, known)
+        if not is_alone:
+            # Channels of several nodes are those of winches with the nodes' numbers.
+            known = {name: (f"{label} {text}", *rest) for name, (text, *rest) in known.items()}
+        columns += _columns(f"{label} {what}", rows, known)
     layout = f"trace of CAN frames ({trace.layout})"
     return Table(path, layout, named_apart(columns), notes=tuple(dict.fromkeys(notes)))
 
@@ -96,7 +103,6 @@ def _scaled(path: str, one: TracedNode, notes: list[str]) -> dict[str, tuple[str
 
 def _columns(
     group: str,
-    label: str,
     rows: Sequence[tuple[TraceFrame, dict[str, float]]],
     known: dict[str, tuple[str, str, float]],
 ) -> Iterator[Column]:
@@ -115,4 +121,4 @@ def _columns(
         for name in part:
             channel, unit, factor = known[name]
             numbers = np.array([values.get(name, math.nan) for _, values in own], dtype=np.float64)
-            yield Column(channel, factor * numbers, unit, (label,), group=place)
+            yield Column(channel, factor * numbers, unit, group=place)

@@ -134,8 +134,12 @@ def test_a_block_download_is_no_other_transfer() -> None:
 def test_a_pdo_of_another_length_has_no_values_and_a_note() -> None:
     decoder = TraceDecoder(read_description("generic-cia402"))
     found = said(decoder, 0x181, "370610270000")
-    assert "0637h operation enabled, 6064h Position actual value 10000 (6 of the 7" in found.text
+    assert (
+        "0637h operation enabled, 6064h Position actual value 10000 (6 bytes; its mapping"
+        in found.text
+    )
     assert not found.values
+    assert not said(decoder, 0x181, "3706102700000900").values, "longer ones are of another mapping"
     assert any("has 6 bytes in 1 frames" in note for note in notes(decoder))
 
 

@@ -178,8 +178,8 @@ def _pdo(pdo: MappedPdo, node: int, known: KnownNode, data: bytes) -> Decoded:
     """A PDO in words; one of another length has words and no values."""
     values = pdo.values(data, known.dictionary)
     words = _mapped(values, known) or data.hex(" ")
-    if len(data) < pdo.size:
-        words += f" ({len(data)} of the {pdo.size} bytes of its mapping)"
+    if len(data) != pdo.size:
+        words += f" ({len(data)} bytes; its mapping has {pdo.size})"
         values = {}
     plain = {object_name(*key): value for key, value in values.items()}
     return Decoded(pdo.kind, node, f"{known.name}: {words}", plain)
