@@ -66,7 +66,7 @@ def read_trace_table(path: str, devices: Sequence[str]) -> Table:
         known = {name: (text, "", 1.0) for name, text in names.items()} | scaled[bus, node]
         if not is_alone:
             # Channels of several nodes are those of winches with the nodes' numbers.
-            known = {name: (f"{label} {text}", *rest) for name, (text, *rest) in known.items()}
+            known = {name: (f"{label} {one[0]}", one[1], one[2]) for name, one in known.items()}
         columns += _columns(f"{label} {what}", rows, known)
     layout = f"trace of CAN frames ({trace.layout})"
     return Table(path, layout, named_apart(columns), notes=tuple(dict.fromkeys(notes)))
