@@ -141,7 +141,7 @@ def test_any_text_is_read_or_refused(tmp_path_factory: pytest.TempPathFactory, t
     assert read_trace(path).frames
 
 
-def test_a_cut_off_blf_is_told(tmp_path: Path) -> None:
+def test_a_cut_off_blf_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "t.blf"
     with can.BLFWriter(str(path)) as writer:
         for number in range(20_000):

@@ -104,7 +104,7 @@ def test_a_temperature_that_the_reading_follows_is_named(path: Path) -> None:
     assert not any("follows" in text for text in still.remarks)
 
 
-def test_a_stuck_stretch_and_held_words_are_told_apart(path: Path) -> None:
+def test_a_stuck_stretch_and_held_words_are_distinguished(path: Path) -> None:
     time, value = signal()
     stuck = value.copy()
     stuck[1000:1060] = stuck[1000]
@@ -119,7 +119,7 @@ def test_a_stuck_stretch_and_held_words_are_told_apart(path: Path) -> None:
     assert not any("stood still" in text for text in found.remarks)
 
 
-def test_saturation_is_told(path: Path) -> None:
+def test_saturation_is_reported(path: Path) -> None:
     time, value = signal()
     swing = value + 3000 * np.sin(2 * np.pi * time / 9)
     found = findings(path, time, np.minimum(swing, 52_000))

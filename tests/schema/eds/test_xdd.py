@@ -124,7 +124,7 @@ def test_what_is_no_xdd_is_refused_with_its_line(
     assert refused.value.faults[0].line == 1 + content.count("\n", 0, content.index(at))
 
 
-def test_a_parameter_that_is_missing_is_told(tmp_path: Path) -> None:
+def test_a_parameter_that_is_missing_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "drive.xdd"
     path.write_text(text(POSITION.replace("index=", 'uniqueIDRef="none" index=')), encoding="utf-8")
     _, warnings = read_eds(path, 5)

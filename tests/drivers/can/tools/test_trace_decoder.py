@@ -143,7 +143,7 @@ def test_a_pdo_of_another_length_has_no_values_and_a_note() -> None:
     assert any("has 6 bytes in 1 frames" in note for note in notes(decoder))
 
 
-def test_a_description_of_another_device_is_told() -> None:
+def test_a_description_of_another_device_is_reported() -> None:
     decoder = TraceDecoder(read_description("maxon-epos4"))
     said(decoder, 0x601, "4018100100000000")
     said(decoder, 0x581, "4318100133020000")
