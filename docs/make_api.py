@@ -16,6 +16,7 @@ SECTIONS = {
     ),
     "Instruments": (
         *("cell_info", "cell_rate", "cell_health", "cell_tare", "cell_zero", "cell_store"),
+        *("recorded_cell_health", "CellFindings"),
         *("read_points", "fit_cell", "static_effects"),
     ),
     "Drives": (
@@ -31,6 +32,7 @@ SECTIONS = {
     "Runs": (
         *("read_run", "write_run", "open_writer", "Run", "run_of", "export"),
         *("read_log", "info_of", "recover", "open_replay"),
+        *("decode_trace", "DecodedTrace"),
     ),
     "Diagnosis": (
         *("compare", "diagnose", "plan", "add", "remove"),

@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from winchkit.bench.remote.session import attach
     from winchkit.calibration.cell.files import read_points
     from winchkit.calibration.cell.fit import fit_cell
+    from winchkit.calibration.cell.recordings import CellFindings, recorded_cell_health
     from winchkit.calibration.cell.static_effects import static_effects
     from winchkit.catalog import find
     from winchkit.cli.files.check import check
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.new_effect import new_effect
     from winchkit.diagnosis.plan import plan
     from winchkit.diagnosis.write import write_addition, write_removal
+    from winchkit.drivers.can.tools.decoded_trace import DecodedTrace, decode_trace
     from winchkit.effects.catalogue import load_catalogue
     from winchkit.effects.effect import Effect, Parameter
     from winchkit.errors import (
@@ -103,8 +105,10 @@ if TYPE_CHECKING:
 __all__ = [
     "Bench",
     "BenchSnapshot",
+    "CellFindings",
     "ConnectionLost",
     "DahlEstimator",
+    "DecodedTrace",
     "DeviceRefused",
     "DriveFault",
     "Effect",
@@ -140,6 +144,7 @@ __all__ = [
     "config_restore",
     "config_save",
     "config_store",
+    "decode_trace",
     "diagnose",
     "drive_info",
     "export",
@@ -168,6 +173,7 @@ __all__ = [
     "read_run",
     "read_simbench",
     "read_size",
+    "recorded_cell_health",
     "recover",
     "remove",
     "run_of",
@@ -216,6 +222,7 @@ _NAMES = {
     "winchkit.bench.programme": ("run_programme",),
     "winchkit.bench.recording.replay": ("open_replay",),
     "winchkit.bench.remote.session": ("attach",),
+    "winchkit.calibration.cell.recordings": ("CellFindings", "recorded_cell_health"),
     "winchkit.calibration.cell.files": ("read_points",),
     "winchkit.calibration.cell.fit": ("fit_cell",),
     "winchkit.calibration.cell.static_effects": ("static_effects",),
@@ -227,6 +234,7 @@ _NAMES = {
     "winchkit.diagnosis.new_effect": ("new_effect",),
     "winchkit.diagnosis.plan": ("plan",),
     "winchkit.diagnosis.write": ("write_addition", "write_removal"),
+    "winchkit.drivers.can.tools.decoded_trace": ("DecodedTrace", "decode_trace"),
     "winchkit.effects.catalogue": ("load_catalogue",),
     "winchkit.effects.effect": ("Effect", "Parameter"),
     "winchkit.errors": (

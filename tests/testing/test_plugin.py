@@ -91,7 +91,7 @@ def test_frames_have_names_and_values(sim: OpenedBench) -> None:
     everything = sim.frames
     assert [frame.time for frame in everything] == sorted(frame.time for frame in everything)
     writes = [frame for frame in everything if "write 6060h" in frame.words]
-    assert writes[-1].words.endswith("= 9 (9h)")
+    assert writes[-1].words.endswith("= 9 CSV")
     assert sim.frames_of("nmt")[-1].words == "A: start"
     assert {frame.words for frame in sim.frames_of("host.heartbeat")} == {"host: operational"}
     assert "080#" in str(sim.frames_of("sync")[0])

@@ -59,6 +59,7 @@ def stop_on_bus(spec: BenchSpec, clock: Clock | None = None) -> list[Stopped]:
         Per drive whether it confirmed; one whose bus does not open has not.
     """
     require_type(spec, BenchSpec, "spec")
+    spec.require_winches()
     clock = clock or MonotonicClock()
     mark_stop(spec)
     with ExitStack() as stack:

@@ -59,6 +59,7 @@ def open_bench(
         Another program owns the bench, or real-time settings are demanded and refused.
     """
     spec = bench if isinstance(bench, BenchSpec) else read_bench(path_of(bench, "bench"))
+    spec.require_winches()
     return Bench(
         spec.with_effects(effects),
         clock or MonotonicClock(),

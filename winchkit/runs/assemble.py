@@ -95,8 +95,10 @@ def _header_faults(recording: Recording, names: list[str]) -> Iterator[Fault]:
     is_poses = _is_poses(names)
     if "time" not in names and not is_poses:
         yield _missing("time [s]", names, recording)
-    is_static = "tension" in names and ("load" in names or "load_mass" in recording.metadata)
-    if not is_static and not any(name.rpartition(".")[2] == "motor_angle" for name in names):
+    # Of a cell alone, a run of readings without motion: its health, or its static calibration.
+    kinds = {name.rpartition(".")[2] for name in names}
+    is_misspelt = any(near_miss(name) == "motor_angle" for name in kinds)
+    if "motor_angle" not in kinds and (is_misspelt or kinds.isdisjoint({"tension", "load"})):
         yield _missing("motor_angle [rad]", names, recording)
     rows, needed = recording.rows, 0 if recording.is_part else 1 if is_poses else 2
     if rows < needed:

@@ -112,7 +112,7 @@ def _format_of(path: str | Path) -> str:
         raise RunError(Fault(message, str(path)))
     if suffix not in SUFFIXES:
         known = ", ".join(SUFFIXES)
-        from winchkit.runs.importing.formats.can_trace import trace_advice
+        from winchkit.can_trace import trace_advice
 
         message = trace_advice(Path(path)) or (
             f"'{suffix}' is no format of a run; use one of {known}, or `winchkit import` for files "
@@ -122,9 +122,21 @@ def _format_of(path: str | Path) -> str:
     return suffix
 
 
+def _read_csv(path: Path, *, is_part: bool = False) -> Run:
+    """Run of a CSV file; a trace of CAN frames is refused with what to do."""
+    from winchkit.can_trace import trace_advice
+
+    try:
+        return read_csv(path, is_part=is_part)
+    except RunError:
+        if advice := trace_advice(path):
+            raise RunError(Fault(advice, str(path))) from None
+        raise
+
+
 def _read_run(path: Path) -> Run:
     if _format_of(path) == ".csv":
-        return read_csv(path)
+        return _read_csv(path)
     from winchkit.runs.formats.mcap_read import read_mcap
 
     return read_mcap(path)
@@ -132,7 +144,7 @@ def _read_run(path: Path) -> Run:
 
 def _read_log(path: Path, *, is_part: bool) -> Log:
     if _format_of(path) == ".csv":
-        log = log_of_run(read_csv(path, is_part=is_part), closed=None)
+        log = log_of_run(_read_csv(path, is_part=is_part), closed=None)
         return replace(log, events=read_events(path))
     from winchkit.runs.formats.mcap_read import read_mcap_log
 

@@ -223,12 +223,24 @@ class WinchWiring(Table):
 
 
 @dataclass(frozen=True)
+class CellWiring(Table):
+    """Instruments of a winch without a drive: they are read, tared, calibrated and logged."""
+
+    cell: DeviceRef | None = None
+    load: DeviceRef | None = None
+    length: DeviceRef | None = None
+    temperature: DeviceRef | None = None
+
+
+@dataclass(frozen=True)
 class BenchSpec(Table):
-    """A bench: buses and winches."""
+    """A bench: buses and winches, or instruments only."""
 
     name: str
     winch: Mapping[str, WinchWiring]
     bus: Mapping[str, BusSpec]
+    cells: Mapping[str, CellWiring] = field(default_factory=dict)
+    """The tables ``[winch.NAME]`` of a bench without any profile, drive and limits."""
     cycle: Annotated[
         float,
         Quantity("time", 1e-4, 0.1, why="limits are tested and targets sent once per cycle"),
@@ -260,8 +272,18 @@ class BenchSpec(Table):
         """The files of ``effects``; relative paths start at the folder of the bench file."""
         return tuple(Path(self.path).parent / file for file in self.effects)
 
+    def require_winches(self) -> None:
+        """Raise UsageError for a bench of instruments only."""
+        if self.cells:
+            raise UsageError(
+                f"bench '{self.name}' has no winch, only the instruments of {', '.join(self.cells)}"
+                ": `cell`, `tare`, `log` and `check` are its commands; a winch has `profile`, "
+                "`servo` and `limits` in its table [winch.NAME]"
+            )
+
     def winch_named(self, name: str | None) -> str:
         """The name of a winch, or of the only one for None; raises UsageError."""
+        self.require_winches()
         if name is None and len(self.winch) == 1:
             return next(iter(self.winch))
         if name is None or name not in self.winch:

@@ -9,7 +9,7 @@ Every function raises FileError with all faults of the file at once, each with i
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,6 +21,7 @@ from winchkit.errors import Fault, FileError
 from winchkit.schema.bench import BenchSpec
 from winchkit.schema.calibration import CellCalibration, TareBook
 from winchkit.schema.devices.device import DeviceSpec
+from winchkit.schema.devices.register_numbers import with_addresses
 from winchkit.schema.mapping import ImportMapping
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.sizing import SizeSpec
@@ -318,6 +319,8 @@ def _with_path(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
 
 
 def _device(reading: Reading, tree: dict[str, Any]) -> DeviceSpec | None:
+    if isinstance(modbus := tree.get("modbus"), Mapping):
+        tree = {**tree, "modbus": with_addresses(modbus, reading.fault)}
     device = reading.table(DeviceSpec, _with_path(reading, tree))
     for table in ("servo", "process"):
         part = getattr(device, table, None)

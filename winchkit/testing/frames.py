@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from winchkit.drivers.can.canopen.emergency import parse_emergency
-from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.tools.decode import KnownNode, decode, known_node
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.sim.live.buses import Carried
@@ -58,10 +57,9 @@ class FrameNames:
             (_HEARTBEAT, "heartbeat"),
         ):
             self._names[first + node] = f"{winch}.{kind}"
-        for number in known.tpdo:
-            self._names[cob_id("tpdo", number, node)] = f"{winch}.tpdo{number}"
-        commands = {cob_id("rpdo", number, node): number for number in known.rpdo}
-        self._names.update({cob: f"{winch}.rpdo{number}" for cob, number in commands.items()})
+        for identifier, pdo in known.pdos.items():
+            self._names[identifier] = f"{winch}.{pdo.kind.lower()}{pdo.number}"
+        commands = {number for number, pdo in known.pdos.items() if pdo.kind == "RPDO"}
         self._from_host |= {_SDO_REQUEST + node, *commands}
 
     @property
@@ -86,7 +84,7 @@ class FrameNames:
     def frame(self, carried: Carried) -> Frame:
         """Read a frame."""
         said = decode(carried.identifier, carried.data, self._nodes)
-        values = dict(said.values)
+        values = {name: int(value) for name, value in said.values.items()}
         if said.kind == "EMCY":
             emergency = parse_emergency(carried.data, carried.time)
             values |= {} if emergency is None else {"code": emergency.code}

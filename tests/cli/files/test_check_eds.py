@@ -145,12 +145,12 @@ def test_fixed_pdos_carry_what_they_hold(tmp_path: Path) -> None:
     assert "have no room for 606Ch (32 bits)" in check(changed(tmp_path, DRIVE, **bodies))
 
 
-@pytest.mark.parametrize("name", ["drive.xdd", "drive.xdc", "drive.XML", "drive.eds"])
-def test_a_description_in_xml_is_refused_with_what_to_do(tmp_path: Path, name: str) -> None:
+@pytest.mark.parametrize("name", ["drive.xml", "drive.xdc", "drive.XML", "drive.eds"])
+def test_another_description_in_xml_is_refused_with_what_to_do(tmp_path: Path, name: str) -> None:
     path = tmp_path / name
-    path.write_text('<?xml version="1.0"?>\n<ISO15745ProfileContainer/>\n', encoding="utf-8")
+    path.write_text('<?xml version="1.0"?>\n<EtherCATInfo/>\n', encoding="utf-8")
     result = CliRunner().invoke(command, [str(path)])
     assert result.exit_code == 3
-    assert result.output.startswith(f"{path}:1: is XML (XDD or XDC of CiA 311")
+    assert result.output.startswith(f"{path}:2: is XML of <EtherCATInfo>")
     assert "use the maker's EDS" in result.output
     assert len(result.output.splitlines()) == 1

@@ -128,7 +128,7 @@ def test_check_of_a_file_of_no_kind(tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("hello")
     result = invoke("check", tmp_path / name)
     assert result.exit_code == 3
-    assert "is none of .toml, .eds, .dcf, .csv, .mcap" in result.stderr
+    assert "is none of .toml, .eds, .dcf, .xdd, .xdc, .csv, .mcap" in result.stderr
 
 
 @pytest.mark.slow

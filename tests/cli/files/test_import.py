@@ -130,13 +130,14 @@ def test_a_file_without_a_motor_angle_is_reported_when_it_is_looked_at(tmp_path:
     path.write_text("time [s],force [N]\n" + "\n".join(rows) + "\n")
     looked = command(path)
     assert looked.exit_code == 0
-    assert (
-        "no column is the motor angle or velocity, without which there is no run" in looked.stdout
-    )
+    assert "no column is the motor angle or velocity: a run of a load cell alone" in looked.stdout
+    alone = command(path, "-o", tmp_path / "alone")
+    assert alone.exit_code == 0, alone.output
+    assert list(read_run(tmp_path / "alone" / "cell.csv")) == ["tension"]
     found = json.loads(command(path, "--json").stdout)["files"][0]
     assert any("motor_angle=COLUMN" in note for note in found["notes"])
     drive = log(tmp_path / "drive.csv", HEAD.replace("[%]", "[Nm]"))
-    assert "without which" not in command(path, drive).stdout
+    assert "a load cell alone" not in command(path, drive).stdout
     rows = (f"{k / 100},{k % 9}.5,{k % 7}.5,{k % 5}" for k in range(100))
     path.write_text("time [s],position [deg],position [rad],force [N]\n" + "\n".join(rows) + "\n")
     asked = command(path).stdout

@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from winchkit.can_trace import is_can_trace
 from winchkit.errors import RunError
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.assignment import Assignment, Guess
-from winchkit.runs.importing.formats.can_trace import is_can_trace
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.runs import run_of

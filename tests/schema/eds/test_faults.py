@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -90,6 +92,54 @@ def test_what_can_be_mended_is_read_with_a_warning(
     line = line_of(text, place)
     assert str(told[0]).startswith(f"{path}:{line}: "), (line, str(told[0]))
     assert (0x1000, 0) in read_for_simulation(path, 5)
+
+
+def test_numbers_with_leading_zeros_are_read(tmp_path: Path) -> None:
+    """As editors of object dictionaries write them; a digit 8 or 9 makes one decimal."""
+    text = GOOD.replace("SupportedObjects=3", "SupportedObjects=0003").replace(
+        "ObjectType=0x9\nSubNumber=2", "ObjectType=09\nSubNumber=002"
+    )
+    text = text.replace("DataType=0x0004", "DataType=0004").replace("LowLimit=-5", "LowLimit=0009")
+    text = text.replace("VendorNumber=0x12", "VendorNumber=0018").replace("+0x80", "+0128")
+    dictionary, warnings = read_eds(written(tmp_path, text), 5)
+    assert dictionary.device_information.vendor_number == 18
+    assert dictionary[0x6064].data_type == 4
+    assert dictionary[0x6064].min == 9
+    assert dictionary[0x1014].default == 128 + 5
+    assert len(dictionary[0x1018]) == 2
+    # 0x12 as the default of 1018h:1 is 18 too.
+    assert not [str(fault) for fault in warnings if "0018" not in fault.message]
+    assert (0x6064, 0) in read_for_simulation(written(tmp_path, text), 5)
+
+
+@pytest.mark.parametrize("spell", [str.upper, str.lower])
+def test_sections_in_any_case(tmp_path: Path, spell: Callable[[str], str]) -> None:
+    text = re.sub(r"\[[A-Za-z]+\]", lambda found: spell(found[0]), GOOD)
+    dictionary, warnings = read_eds(written(tmp_path, text), 5)
+    assert warnings == ()
+    assert dictionary.device_information.vendor_number == 0x12
+    assert dictionary.device_information.product_number == 3
+
+
+@pytest.mark.parametrize(
+    ("commissioned", "value", "of_node_9", "said"),
+    [
+        ("", "0x85", 0x89, "it is of node 5, read as $NODEID+0x80"),
+        ("[DeviceComissioning]\nNodeID=5\n", "0x85", 0x89, "it is of node 5"),
+        ("[DeviceCommissioning]\nNodeId=0x7\n", "0x85", 0x85, "every node, 7 included"),
+        ("", "0x80000085", 0x80000089, "it is of node 5, read as $NODEID+0x80000080"),
+        ("", "0x700", 0x700, "the same for every node"),
+        ("", "$NODEID+0x90", 0x99, ""),
+    ],
+)
+def test_a_value_of_one_node_stands_against_a_default_of_any(
+    tmp_path: Path, commissioned: str, value: str, of_node_9: int, said: str
+) -> None:
+    text = GOOD.replace("+0x80\n", f"+0x80\nParameterValue={value}\n") + commissioned
+    dictionary, warnings = read_eds(written(tmp_path, text), 9)
+    assert dictionary[0x1014].value == of_node_9
+    assert [fault.line for fault in warnings] == [line_of(text, "ParameterValue")] * bool(said)
+    assert all(said in fault.message for fault in warnings)
 
 
 def test_the_same_section_twice_counts_once(tmp_path: Path) -> None:
@@ -195,7 +245,9 @@ def test_hexadecimal_values_are_the_bits_of_their_type(
     dictionary, warnings = read_eds(written(tmp_path, eds), 5)
     variable = dictionary[0x6064]
     assert (variable.default if key == "DefaultValue" else variable.value) == value
-    assert warnings == ()
+    # A number with a leading zero is octal by CiA 306, and often meant to be decimal.
+    assert all("010 begins with 0" in warning.message for warning in warnings)
+    assert len(warnings) == (text == "010")
 
 
 def test_the_node_number_counts_in_any_spelling(tmp_path: Path) -> None:
@@ -243,7 +295,7 @@ def test_all_faults_of_a_file_are_reported_at_once(tmp_path: Path) -> None:
         (b"", ":1: is not an EDS: it has no sections"),
         (b"; only a comment\n", ":1: is not an EDS: it has no sections"),
         (b"\n\nhello = 3\n", ":3: is not an EDS: expected a section"),
-        (b"<?xml version='1.0'?>\n", ":1: is XML (XDD or XDC of CiA 311"),
+        (b"<?xml version='1.0'?>\n", ":2: is not well-formed XML: no element found"),
         (b"[FileInfo]\n\x00\x01\x02", ":2: is binary, not the text of an EDS"),
     ],
 )

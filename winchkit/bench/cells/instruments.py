@@ -92,7 +92,7 @@ def refs_of(spec: BenchSpec) -> dict[tuple[str, str], DeviceRef]:
     """Instruments as they are wired, by winch and role."""
     return {
         (name, role): ref
-        for name, winch in spec.winch.items()
+        for name, winch in (*spec.winch.items(), *spec.cells.items())
         for role in ROLES
         if (ref := getattr(winch, role)) is not None
     }
@@ -118,7 +118,9 @@ def instruments(
     not started yet, is to serve the lines that are not CAN.
     """
     wired: dict[tuple[str, int | None], _Wired] = {}
-    placed: dict[str, dict[str, tuple[str, int | None]]] = {name: {} for name in spec.winch}
+    placed: dict[str, dict[str, tuple[str, int | None]]] = {
+        name: {} for name in (*spec.winch, *spec.cells)
+    }
     tares = tares_of(spec)
     for (name, role), ref in refs_of(spec).items():
         key = placed[name][role] = _address(spec, ref)

@@ -61,6 +61,7 @@ def commission_bench(spec: BenchSpec, dialogue: Dialogue, clock: Clock) -> Recor
 
     Raises NotPermitted for what was not confirmed or did not stop, and every error of opening.
     """
+    spec.require_winches()
     if not spec.path:
         raise NotPermitted("a bench without a file cannot be commissioned; write a bench file")
     by = dialogue.ask("by", "Who commissions this bench (name, for the record)?")

@@ -71,15 +71,20 @@ class Feed:
         sensors: Mapping[str, Mapping[str, Sensor]],
         opened: float,
         tracker: Tracker | None = None,
+        *,
+        has_drives: bool = True,
     ) -> None:
-        """Listen to winches with their sensors by role, and a tracker, from ``opened`` (s) on."""
+        """Listen to winches with their sensors by role, and a tracker, from ``opened`` (s) on.
+
+        Without drives no snapshots are given.
+        """
         prefix = {name: f"{name}." if len(sensors) > 1 else "" for name in sensors}
         self.lost = 0
         """Cycles and readings that were dropped because they were not taken in time."""
         self._snapshots: deque[BenchSnapshot] = deque(maxlen=_WAITING)
         self._readings: dict[str, deque[Reading]] = {}
         self._listening: list[tuple[Sensor, Callable[[Reading], None]]] = []
-        self._drives = {name: f"/{name}/drive" for name in sensors}
+        self._drives = {name: f"/{name}/drive" for name in sensors if has_drives}
         sources = [_drive_source(topic, prefix[name]) for name, topic in self._drives.items()]
         topics: dict[int, str] = {}
         base = _slowest(sensors)
@@ -89,6 +94,11 @@ class Feed:
                 topics.setdefault(id(instrument), topic)
                 sources.append(_sensor_source(topic, prefix[name], role, instrument))
                 self._listen(topic, instrument)
+        if base is None and not has_drives:
+            base = max(
+                (one for by_role in sensors.values() for one in by_role.values()),
+                key=lambda item: item.period,
+            )
         rule = (
             RowRule(next(iter(self._drives.values())), opened, _BARE_PERIOD)
             if base is None

@@ -64,7 +64,7 @@ def _versions() -> dict[str, str]:
 def _calibrations(spec: BenchSpec) -> dict[str, str]:
     """Content of every calibration file that the wiring names, as JSON."""
     found = {}
-    for name, winch in spec.winch.items():
+    for name, winch in (*spec.winch.items(), *spec.cells.items()):
         for role in _ROLES:
             ref = getattr(winch, role)
             file = getattr(ref, "calibration", None)

@@ -63,15 +63,16 @@ class Recorder:
         tracker: Tracker | None = None,
         rotation: Rotation | None = None,
         replace: bool = False,
+        has_drives: bool = True,
     ) -> None:
         """Log winches with their sensors by role, and the robot's tracker.
 
-        ``replace`` removes an earlier log of that name.
+        Without drives ``feed`` is not called. ``replace`` removes an earlier log of that name.
         Raises FileError where it cannot write, UsageError where that would be another log's loss.
         """
         self._sensors, self._clock, self._detach = sensors, clock, detach
         self._offset = _utc_less(clock)
-        self._feed = Feed(sensors, clock.now(), tracker)
+        self._feed = Feed(sensors, clock.now(), tracker, has_drives=has_drives)
         layout = dataclasses.replace(self._feed.layout, clock_offset=self._offset)
         self._about = {**metadata, "clock_offset": f"{self._offset / 1e9:.6f} s"}
         self._tares = tares_in_force(sensors)

@@ -33,9 +33,19 @@ def at_cells(bench_file: str | Path, clock: Clock | None = None) -> Iterator[Cel
         finally:
             remote.close()
         return
+    with own_cells(spec, "cell", clock) as desk:
+        yield LocalCells(desk)
+
+
+@contextmanager
+def own_cells(spec: BenchSpec, client: str, clock: Clock | None = None) -> Iterator[CellDesk]:
+    """The instruments of a bench, opened here as its owner.
+
+    Raises NotPermitted where another process owns it, FileError, ConnectionLost.
+    """
     with ExitStack() as stack:
-        stack.callback(own(spec, client_name("cell")).close)
-        yield LocalCells(_opened(spec, clock or MonotonicClock(), stack))
+        stack.callback(own(spec, client_name(client)).close)
+        yield _opened(spec, clock or MonotonicClock(), stack)
 
 
 def _opened(spec: BenchSpec, clock: Clock, stack: ExitStack) -> CellDesk:

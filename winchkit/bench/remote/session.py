@@ -114,6 +114,7 @@ def _attached(
 
     Raises MotionError where a stop came meanwhile, but for those who only look on.
     """
+    spec.require_winches()
     with unless_stopped(spec) as check:
         station = _sought(spec, effects, name, observer=observer)
         if station is not None and not observer:

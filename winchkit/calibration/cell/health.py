@@ -35,6 +35,8 @@ _ONE_MINUTE = 60.0
 from 10 min on, a third of the creep would be stated)."""
 _FADED = 0.05
 """Autocorrelation at which its sum ends: the noise of an estimate from 400 readings (1/√400)."""
+_NO_CHANCE = -20.0
+"""Logarithm of a probability of 2e-9."""
 _ALIASED = 0.02
 """Distance of a tone from zero and from half the rate, as a share of the rate, to be separable."""
 
@@ -45,6 +47,7 @@ class Samples:
 
     time: Array
     raw: Array
+    """Counts; NaN where they are not known."""
     value: Array
     usable: NDArray[np.bool_]
     saturated: NDArray[np.bool_]
@@ -121,7 +124,7 @@ def examine(samples: Samples) -> Health:
             f"{int(good.sum())} usable readings of {len(good)}; at least {_FEWEST} are needed"
         )
     time, value, raw = samples.time[good], samples.value[good], samples.raw[good]
-    at = _step_at(value)
+    at = step_at(value)
     creep = None
     if at is not None:
         creep = _creep(time, value, at)
@@ -129,8 +132,9 @@ def examine(samples: Samples) -> Health:
         late = time > time[0] + _SETTLED
         if int(late.sum()) >= _FEWEST:
             time, value, raw = time[late], value[late], raw[late]
-    slope, slope_std, rest = _line(time, value)
-    still = np.diff(raw) == 0
+    slope, slope_std, rest = line_fit(time, value)
+    words = raw if np.isfinite(raw).all() else value
+    still = np.diff(words) == 0
     scale = _scale(raw, value)
     health = Health(
         readings=len(good),
@@ -138,9 +142,9 @@ def examine(samples: Samples) -> Health:
         saturated=int(samples.saturated.sum()),
         rate=(len(good) - 1) / float(np.ptp(samples.time)),
         longest_gap=float(np.diff(samples.time).max()),
-        unique=len(np.unique(raw)),
+        unique=len(np.unique(words)),
         duplicates=float(still.mean()),
-        longest_still=_longest_still(time, raw),
+        longest_still=_longest_still(time, words),
         mean=float(value.mean()),
         low=float(value.min()),
         high=float(value.max()),
@@ -155,19 +159,19 @@ def examine(samples: Samples) -> Health:
     return _with_remarks(health, float(np.ptp(samples.time)))
 
 
-def _step_at(value: Array) -> int | None:
+def step_at(value: Array) -> int | None:
     """Index before the largest change between neighbours, if it is a change of load."""
-    if len(value) < 2 * _FEWEST:
+    if len(value) <= 2 * _FEWEST:
         return None
     changes = np.diff(value)
     noise = 1.4826 * float(np.median(np.abs(changes - np.median(changes))))
-    at = int(np.argmax(np.abs(changes)))
-    rest = len(value) - at - 1
+    # With enough readings on both sides to know the levels.
+    at = _FEWEST + int(np.argmax(np.abs(changes[_FEWEST : len(changes) - _FEWEST + 1])))
     before = np.median(value[max(0, at - _FEWEST) : at + 1])
     after = np.median(value[at + 1 : at + 1 + _FEWEST])
     lasting = abs(after - before) > 0.5 * abs(changes[at])
     big = abs(changes[at]) > _STEP * max(noise, 1e-12)
-    return at if big and lasting and at >= _FEWEST and rest >= _FEWEST else None
+    return at if big and lasting else None
 
 
 def _creep(time: Array, value: Array, at: int) -> Creep | None:
@@ -176,13 +180,13 @@ def _creep(time: Array, value: Array, at: int) -> Creep | None:
     late = since > _SETTLED
     if int(late.sum()) < _FEWEST:
         return None
-    slope, std, _ = _line(np.log(since[late]), value[late])
+    slope, std, _ = line_fit(np.log(since[late]), value[late])
     decades = math.log(_THIRTY_MINUTES / _ONE_MINUTE)
     step = float(np.median(value[late]) - np.median(value[: at + 1]))
     return Creep(step, float(since[-1]), slope * decades, std * decades)
 
 
-def _line(x: Array, y: Array) -> tuple[float, float, Array]:
+def line_fit(x: Array, y: Array) -> tuple[float, float, Array]:
     """Slope, its standard error under correlated residuals, and the residuals of the line."""
     centred = x - x.mean()
     spread = float(centred @ centred)
@@ -206,7 +210,8 @@ def _memory(rest: Array) -> float:
 
 def _hum(time: Array, rest: Array, frequency: float) -> Hum:
     """Amplitude of a tone by least squares at the sampling times."""
-    rate = (len(time) - 1) / float(np.ptp(time))
+    # Readings that are left out do not change the rate at which the others alias.
+    rate = 1 / float(np.median(np.diff(time)))
     apparent = abs(frequency - rate * round(frequency / rate))
     if apparent < _ALIASED * rate or apparent > (0.5 - _ALIASED) * rate:
         return Hum(frequency, math.nan, math.nan)
@@ -221,6 +226,14 @@ def _longest_still(time: Array, raw: Array) -> float:
     changes = np.flatnonzero(np.diff(raw) != 0) + 1
     edges = np.concatenate([[0], changes, [len(raw) - 1]])
     return float(np.diff(time[edges]).max())
+
+
+def _is_stuck(health: Health) -> bool:
+    """Whether the longest standstill is no chance among readings that repeat as often as these."""
+    length, count = health.longest_still * health.rate, health.readings
+    others = (health.duplicates * count - length) / max(1.0, count - length)
+    log_chance = math.log(count) + length * math.log(max(others, 1 / count))
+    return log_chance < _NO_CHANCE
 
 
 def _scale(raw: Array, value: Array) -> float:
@@ -241,6 +254,11 @@ def _with_remarks(health: Health, duration: float) -> Health:
         remarks.append("the counts never change: a frozen cell, or a division far above its noise")
     elif health.noise_counts < 0.5:
         remarks.append("the noise is below half a count: the division is too coarse to measure it")
+    if health.unique > 1 and _is_stuck(health):
+        remarks.append(
+            f"the counts stood still for {health.longest_still:.3g} s, although they change "
+            "elsewhere: the cell, its converter or the logger was stuck"
+        )
     if health.duplicates > 0.5 and health.unique > 1:
         remarks.append(
             f"{health.duplicates:.0%} of the readings repeat the one before: it is polled faster "

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option, winch_argument
 from winchkit.cli.core.output import echo_json
+
+if TYPE_CHECKING:
+    from winchkit.schema.bench import BenchSpec
+
+_DURATION = 1.0
+"""s, as of `winchkit cell tare`."""
 
 
 @click.command(
@@ -30,9 +38,12 @@ def command(winch: str | None, bench: str, as_json: bool) -> None:
     from winchkit.schema.read import read_bench
 
     spec = read_bench(bench)
-    name = spec.winch_named(winch)
-    with at_station(spec, client="tare") as station:
-        tension = station.tare(name)
+    if spec.cells:
+        name, tension = _tare_alone(bench, spec, winch)
+    else:
+        name = spec.winch_named(winch)
+        with at_station(spec, client="tare") as station:
+            tension = station.tare(name)
     if as_json:
         echo_json({"schema": 1, "winch": name, "tension": tension})
     else:
@@ -41,3 +52,18 @@ def command(winch: str | None, bench: str, as_json: bool) -> None:
             f"  `winchkit cell tare {name} --clear -b {bench}` takes a tare of the host away, with "
             "--device the device's own"
         )
+
+
+def _tare_alone(bench: str, spec: BenchSpec, winch: str | None) -> tuple[str, float]:
+    """Tare a cell of a bench without drives; its winch, and what it reads then (N)."""
+    from winchkit.bench.cells.desk import full_name
+    from winchkit.bench.cells.instruments import device_of, refs_of
+    from winchkit.bench.remote.cell_session import at_cells
+
+    name = full_name(spec, winch)
+    place, _, role = name.rpartition(".")
+    device = device_of(spec, refs_of(spec)[place, role])
+    # A volatile tare of the device, as `winch.tare()` takes it.
+    task = "device tare" if device.commands.get("tare") is False else "host tare"
+    with at_cells(bench) as cells:
+        return place, float(cells.do(task, name, _DURATION)["after"])

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, NoReturn
 
 import click
 
-from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
+from winchkit.cli.cell.options import cells, shown, unit_of
 from winchkit.cli.core.command import Command
+from winchkit.cli.core.completion import complete_bench, complete_winch
+from winchkit.cli.core.options import TABLE, bench_by_default
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.quantity_type import Quantity
+from winchkit.errors import one_line
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.health import Health
@@ -35,9 +38,26 @@ _MEANINGS = {
     examples=(
         "winchkit cell diagnose",
         "winchkit cell diagnose A --for 2s --json",
+        "winchkit cell diagnose --run cell.csv",
     ),
 )
-@cell_options
+@click.argument("cell", required=False, shell_complete=complete_winch)
+@click.option(
+    "-b",
+    "--bench",
+    metavar="FILE",
+    shell_complete=complete_bench,
+    help="Bench file; not needed with --run.  [default: the only one of this folder]",
+)
+@click.option(
+    "--run",
+    metavar="FILE",
+    type=TABLE,
+    help="Examine a recording in place of readings: a run, a log, or a file of another program.",
+)
+@click.option(
+    "--column", metavar="COLUMN", help="Column of the cell in FILE, by its name or number."
+)
 @click.option(
     "--for",
     "duration",
@@ -46,12 +66,34 @@ _MEANINGS = {
     show_default=True,
     help="Duration of the readings.",
 )
-def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.pass_context
+def command(
+    context: click.Context,
+    cell: str | None,
+    bench: str | None,
+    run: str | None,
+    column: str | None,
+    duration: str,
+    *,
+    as_json: bool,
+) -> None:
     """Watch CELL and report rate, noise, drift, frozen or repeated counts, hum and creep.
 
     Leave the load alone, or change it once: then creep is reported as well. Exit 1 where something
-    is wrong with the readings themselves.
+    is wrong with the readings themselves. With --run these are the readings of a recording, which
+    needs no motion, no bench and no calibration; spikes and an influence of the temperature are
+    reported too, in the unit of the file.
     """
+    if run is not None:
+        if bench is not None and context.get_parameter_source("bench") is not _ENVIRONMENT:
+            raise click.UsageError("'--run' reads a file, so '--bench' has no place there.")
+        _examine_recording(run, column or cell, as_json=as_json)
+        return
+    if column is not None:
+        raise click.UsageError("'--column' is a column of '--run FILE'.")
+    bench = bench_by_default(context, _parameter(context, "bench"), bench)
+    assert bench is not None, "else UsageError"
     from winchkit.bench.cells.calls import samples_of_readings
     from winchkit.bench.cells.tasks import readings_of
     from winchkit.calibration.cell.health import examine
@@ -78,6 +120,36 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
         for remark in health.remarks:
             click.echo(f"  ! {remark}")
     if health.saturated or health.usable < health.readings or health.unique == 1:
+        click.get_current_context().exit(1)
+
+
+_ENVIRONMENT = click.core.ParameterSource.ENVIRONMENT
+
+
+def _parameter(context: click.Context, name: str) -> click.Parameter:
+    return next(item for item in context.command.params if item.name == name)
+
+
+def _examine_recording(run: str, column: str | None, *, as_json: bool) -> None:
+    """Report on every cell of a file; exit with 1 where its readings are wrong."""
+    from winchkit.calibration.cell.recordings import recorded_cell_health
+
+    found = recorded_cell_health(run, column)
+    if as_json:
+        echo_json({"schema": 1, "run": run, "cells": [dataclasses.asdict(one) for one in found]})
+    for one in found if not as_json else ():
+        unit = f" in {one.unit}" if one.unit else ""
+        click.echo(one_line(f"{one.name}{unit}, {run}:"))
+        for line in _lines(one.health, one.unit):
+            click.echo(f"  {line}")
+        if math.isfinite(one.temperature_slope):
+            slope = f"{one.temperature_slope:+.3g} ± {one.temperature_slope_std:.2g}"
+            click.echo(f"  over the temperature: {slope} {one.unit} per degree of its column")
+        for remark in one.remarks:
+            click.echo(f"  ! {remark}")
+    health = [one.health for one in found]
+    is_wrong = any(h.saturated or h.usable < h.readings or h.unique == 1 for h in health)
+    if is_wrong or any(one.spikes for one in found):
         click.get_current_context().exit(1)
 
 

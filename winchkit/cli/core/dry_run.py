@@ -125,7 +125,7 @@ def show_frames(
 
 def _digest(decoded: Sequence[tuple[Frame, Decoded]]) -> Iterator[str]:
     """A line for each frame; cyclic ones between changes of a control word are summed up."""
-    words: dict[tuple[str, int], int | None] = {}
+    words: dict[tuple[str, int], float | None] = {}
     quiet: list[Decoded] = []
     for frame, item in decoded:
         key = (frame.bus, frame.identifier)
@@ -147,7 +147,7 @@ def _summed(items: Sequence[Decoded]) -> Iterator[str]:
         return
     counts = {kind: sum(item.kind == kind for item in items) for kind in _CYCLIC}
     parts = [f"{count} × {kind}" for kind, count in counts.items() if count]
-    ranges: dict[tuple[int, str], list[int]] = {}
+    ranges: dict[tuple[int, str], list[float]] = {}
     for item in items:
         for name, value in item.values.items():
             ranges.setdefault((item.node, name), []).append(value)

@@ -17,14 +17,14 @@ from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.check_computer import about_computer, refusals
 from winchkit.errors import Fault, FileError, one_line
+from winchkit.schema.eds.eds import SUFFIXES
 
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
 
 RUNS = (".csv", ".mcap")
-EDS = (".eds", ".dcf")
-_XML = (".xdd", ".xdc", ".xml")
-"""Device descriptions that the reader of EDS files refuses, with what to do."""
+_XML = ".xml"
+"""Of device descriptions of CiA 311, and of others that their reader refuses, with what to do."""
 
 
 @dataclass(frozen=True)
@@ -72,10 +72,10 @@ def command(
 ) -> None:
     """Check files of any kind: profiles, benches, programmes, devices (.toml), runs (.csv, .mcap).
 
-    Of a drive's EDS or DCF it reports what matters for winchkit; of a device file and of a bench
-    whether the drives do it by their EDS, and how each notices a dead host. Every fault of
-    a file is reported with its line. Exits with 3 when a file has one. ``--computer`` reports
-    what this computer permits a control loop (docs/realtime.md).
+    Of a drive's EDS, DCF, XDD or XDC it reports what matters for winchkit; of a device file and
+    of a bench whether the drives do it by their EDS, and how each notices a dead host. Every
+    fault of a file is reported with its line. Exits with 3 when a file has one. ``--computer``
+    reports what this computer permits a control loop (docs/realtime.md).
     """
     if not files and not computer:
         raise click.UsageError("Missing argument 'FILE...'; or --computer.", ctx)
@@ -105,7 +105,7 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
     Parameters
     ----------
     file : str or Path
-        Declaration (.toml), run (.csv, .mcap), EDS or DCF.
+        Declaration (.toml), run (.csv, .mcap), EDS, DCF, XDD or XDC.
     effects : sequence of str
         Python files with effects of your own that a profile has.
 
@@ -120,12 +120,12 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
     try:
         if suffix in RUNS:
             return _run(file)
-        if suffix in (*EDS, *_XML):
+        if suffix in (*SUFFIXES, _XML):
             return _eds(file)
         if suffix == ".toml" or not Path(file).is_file():
             return _declaration(file, effects)
-        known = ", ".join((".toml", *EDS, *RUNS))
-        from winchkit.runs.importing.formats.can_trace import trace_advice
+        known = ", ".join((".toml", *SUFFIXES, *RUNS))
+        from winchkit.can_trace import trace_advice
 
         message = trace_advice(Path(file)) or f"'{suffix}' is none of {known}"
         return Verdict(file, "", faults=(Fault(message, file),))

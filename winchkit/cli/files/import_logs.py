@@ -18,6 +18,7 @@ from winchkit.cli.core.quantity_type import Quantity, naming
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
 from winchkit.cli.files.import_table import shortened
+from winchkit.cli.log.descriptions import device_option
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:
@@ -30,6 +31,11 @@ if TYPE_CHECKING:
     from winchkit.schema.mapping import ImportMapping
 
 _MAPPING = "mapping.toml"
+_CELL_ALONE = (
+    "no column is the motor angle or velocity: a run of a load cell alone, for `winchkit cell "
+    "diagnose --run`; import the file together with the one that has the angle, or name it by "
+    '--column "motor_angle=COLUMN [deg]", for a run of a winch'
+)
 _NO_ANGLE = (
     "no column is the motor angle or velocity, without which there is no run: name it by --column "
     '"motor_angle=COLUMN [deg]", or import the file together with the one that has it'
@@ -145,6 +151,7 @@ class _Written(Quantity):
     type=Quantity("mass", example="10 kg"),
     help="Mass on the cable, e.g. '10 kg': one for all runs, or one for each FILE in order.",
 )
+@device_option
 @click.option("--join", is_flag=True, help="Join all FILEs to one run.")
 @click.option(
     "--lag",
@@ -162,6 +169,7 @@ def command(
     mapping: str | None,
     save_mapping: str | None,
     load_masses: tuple[str, ...],
+    devices: tuple[str, ...],
     join: bool,
     lag: str | None,
     overwrite: bool,
@@ -180,7 +188,8 @@ def command(
     from winchkit.runs.importing.streams import streams_of
 
     masses = _masses(load_masses, len(files))
-    guesses, declared = _guesses(files, mapping, _answers(options), asking=_may_ask(yes, as_json))
+    tables = _tables(files, devices)
+    guesses, declared = _guesses(tables, mapping, _answers(options), asking=_may_ask(yes, as_json))
     is_new = declared is None
     report: dict[str, Any] = {
         "schema": 1,
@@ -305,24 +314,38 @@ def _lag(text: str | None) -> float | None:
     return -value if negative else value
 
 
+def _tables(files: Sequence[str], devices: Sequence[str]) -> list[Table]:
+    """Columns of every file, those of traces of CAN frames by their devices; all faults at once."""
+    from winchkit.can_trace import trace_advice
+    from winchkit.cli.files.import_trace import read_trace_table
+    from winchkit.runs.importing.formats.source import read_table
+
+    faults: list[Fault] = []
+    tables = []
+    for file in files:
+        is_trace = bool(devices) and bool(trace_advice(Path(file)))
+        try:
+            tables.append(read_trace_table(file, devices) if is_trace else read_table(file))
+        except FileError as error:
+            faults += error.faults
+    if faults:
+        raise RunError(faults)
+    if devices and not any(table.layout.startswith("trace of CAN frames") for table in tables):
+        raise UsageError("--device is of traces of CAN frames, and no FILE is one")
+    return tables
+
+
 def _guesses(
-    files: Sequence[str], mapping: str | None, answers: Answers, *, asking: bool
+    tables: Sequence[Table], mapping: str | None, answers: Answers, *, asking: bool
 ) -> tuple[list[Guess], ImportMapping | None]:
     """Assignments of every file; all faults of all files at once."""
     from winchkit.runs.importing.answers import answers_of
-    from winchkit.runs.importing.formats.source import read_table
     from winchkit.runs.importing.guess import guess_columns
     from winchkit.runs.importing.mapping import guess_by
     from winchkit.schema.read import read_mapping
 
     declared = None if mapping is None else read_mapping(mapping)
     faults: list[Fault] = []
-    tables = []
-    for file in files:
-        try:
-            tables.append(read_table(file))
-        except FileError as error:
-            faults += error.faults
     timed = [] if declared else _with_own_times(tables, answers)
     guesses = []
     for table in tables:
@@ -351,7 +374,8 @@ def _guesses(
             has = ", ".join(repr(c.source) for guess in guesses for c in guess.file.columns)
             raise UsageError(f"{option}: there is no column '{name}'; there are {has}")
     if declared is None and _lack_angle(guesses):
-        guesses = [replace(guess, notes=(*guess.notes, _NO_ANGLE)) for guess in guesses]
+        text = _CELL_ALONE if _have(guesses, {"tension", "load"}) else _NO_ANGLE
+        guesses = [replace(guess, notes=(*guess.notes, text)) for guess in guesses]
     return guesses, declared
 
 
@@ -519,7 +543,7 @@ def _runs(
     others = [index for index in range(len(parts)) if index not in angles]
     if others and angles and (len(angles) == 1 or is_joined):
         is_joined = True
-    elif others and len(parts) > 1 and not is_joined:
+    elif others and angles and len(parts) > 1 and not is_joined:
         names = ", ".join(files[index] for index in others)
         raise UsageError(
             f"{names}: no motor angle; import each with the one file that it belongs to, by --join"

@@ -22,10 +22,12 @@ from winchkit.cli.core.quantity_type import Quantity
 from winchkit.errors import UsageError, WinchkitError
 
 if TYPE_CHECKING:
+    from winchkit.bench.cells.cell_log import CellStation
     from winchkit.bench.recording.live_sinks import LiveSink
     from winchkit.bench.remote.station import Station
 
 COMMANDS = {
+    "decode": At("winchkit.cli.log.decode", "Print a trace of CAN frames in words."),
     "info": At("winchkit.cli.log.info", "What a log holds: channels, rates, gaps, counters."),
     "recover": At("winchkit.cli.log.recover", "Save what is whole of a log that was cut off."),
     "export": At("winchkit.cli.files.export", "Convert a log to CSV, MCAP, Parquet or MF4."),
@@ -97,7 +99,7 @@ def command(
     load cell (else of the length instrument); while it is silent, for samples of the others. A
     drive or instrument that falls silent is reported at once and at the end. Moves nothing, and
     keeps no program from owning the bench; when the owner ends, the log goes on in a file of its
-    own, FILE-2 and so on.
+    own, FILE-2 and so on. A bench of instruments only, without drives, is opened by the log itself.
     """
     if context.invoked_subcommand is not None:
         return
@@ -107,7 +109,6 @@ def command(
         check_output(output, (".csv", ".mcap"))
     _refuse(output, rotate, jsonl=jsonl, udp=udp, as_json=as_json)
     _refuse_to_lose(None if replace else output)
-    from winchkit.bench.remote.reconnection import watch
     from winchkit.cli.core.quantities import quantity, seconds
     from winchkit.cli.core.terminal import live_sinks
 
@@ -115,7 +116,7 @@ def command(
     with live_sinks(jsonl=jsonl, udp=udp) as sinks:
         log = _Log(output, rotate, replace, limit, pause if sinks else _CHECK_PERIOD, sinks)
         try:
-            watch(bench, "log", log.follow, log.lose, effects)
+            _follow(bench, log, effects)
         except KeyboardInterrupt as error:
             log.note_interrupt(error)
         except WinchkitError as error:
@@ -134,6 +135,26 @@ def command(
         raise log.terminated
     if strict and log.silences.summary:
         context.exit(WinchkitError.exit_code)
+
+
+def _follow(bench: str, log: _Log, effects: Sequence[str]) -> None:
+    """Log at the owner of a bench, or the instruments of a bench that has only these."""
+    from winchkit.bench.remote.reconnection import watch
+    from winchkit.schema.read import read_bench
+
+    spec = read_bench(bench)
+    if not spec.cells:
+        watch(bench, "log", log.follow, log.lose, effects)
+        return
+    if log.has_sinks:
+        raise UsageError(
+            f"bench '{spec.name}' has instruments only, of which there are no live pictures; leave "
+            "out --jsonl and --udp, and name a file by -o"
+        )
+    from winchkit.bench.cells.cell_log import at_cell_station
+
+    with at_cell_station(spec) as station:
+        log.follow(station)
 
 
 class _Log:
@@ -159,6 +180,11 @@ class _Log:
         self._start = 0.0
 
     @property
+    def has_sinks(self) -> bool:
+        """Whether live pictures are wanted."""
+        return bool(self._sinks)
+
+    @property
     def result(self) -> dict[str, Any]:
         """Content of the log as JSON."""
         return {
@@ -179,7 +205,7 @@ class _Log:
         goes_on = f"; the log goes on in {self._next()}" if self._output else ""
         click.echo(f"winchkit: {words}{goes_on}", err=True)
 
-    def follow(self, station: Station) -> None:
+    def follow(self, station: Station | CellStation) -> None:
         """Log at an owner until the time is over, or Ctrl-C."""
         file = self._next()
         self._start = self._start or time.monotonic()
@@ -198,19 +224,19 @@ class _Log:
         if file:
             self.files[file] = station.end_log()
 
-    def _note_rows(self, station: Station, file: str) -> None:
+    def _note_rows(self, station: Station | CellStation, file: str) -> None:
         """Counters and rows of a log that has failed, where its owner still answers."""
         with suppress(WinchkitError):
             self._note_counters(station)
             if file:
                 self.files[file] = int(self._counted.get("log", {}).get("rows") or 0)
 
-    def _note_counters(self, station: Station) -> None:
+    def _note_counters(self, station: Station | CellStation) -> None:
         """Take what has been counted, and report who fell silent or is heard again."""
         self._counted = station.counters()
         self.silences.note(self._counted.get("log", {}).get("silent", {}))
 
-    def _watch(self, station: Station, file: str, show: Callable[[], None]) -> None:
+    def _watch(self, station: Station | CellStation, file: str, show: Callable[[], None]) -> None:
         """Look after the log, and show every new picture, until the time is over."""
         seen = -1
         while self._limit is None or time.monotonic() - self._start < self._limit:
@@ -301,7 +327,7 @@ def _refuse(
 
 
 @contextmanager
-def _counter_row(station: Station) -> Iterator[Callable[[], None]]:
+def _counter_row(station: Station | CellStation) -> Iterator[Callable[[], None]]:
     """A live table of what is counted, where somebody sees it."""
     if not sys.stderr.isatty():
         yield lambda: None

@@ -107,7 +107,7 @@ def _check_files(
     if profile is not None:
         declared_profile(find("profiles", profile))
     if bench is not None:
-        read_bench(bench)
+        read_bench(bench).require_winches()
     if simulated is not None:
         read_simbench(find("sim", simulated))
 

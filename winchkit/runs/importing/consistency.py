@@ -160,6 +160,9 @@ def _matches(
     speeds = _options(velocity, _SPEEDS)
     clocks = _options(clock, CLOCKS)
     counted = is_counted(angle)
+    if counted and angle.factor is velocity.factor is None:
+        # Counts and counts a second agree for any number of counts in a turn, 360 among them.
+        clocks = [stamp for stamp in clocks if not ratio.agrees(stamp[1])]
     for speed in speeds:
         for stamp in clocks:
             if angle.factor is None and counted:

@@ -87,6 +87,11 @@ def has_angle(streams: Streams) -> bool:
     return any(name.rpartition(".")[2] == "motor_angle" for name in streams.channels)
 
 
+def has_cell(streams: Streams) -> bool:
+    """Whether a file has a load cell, of which a recording without motion is a run too."""
+    return any(name.rpartition(".")[2] in ("tension", "load") for name in streams.channels)
+
+
 def with_angle(streams: Streams) -> Streams:
     """Add the motor angle of a recording that has the motor velocity only.
 
@@ -132,7 +137,7 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
         found = (fault for item in streams.streams for fault in _time_faults(streams, item))
         # A row that has channels of several rates is one fault.
         faults += {fault.line: fault for fault in found}.values()
-    if streams.streams and not has_angle(streams):
+    if streams.streams and not has_angle(streams) and not has_cell(streams):
         message = (
             f"has no motor angle (it has {', '.join(streams.channels)}); import it together with "
             "the file that has it, which joins the two, or name its column by --column"

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
+from winchkit.schema.devices.register_numbers import address_of
 from winchkit.schema.quantity import (
     Duration,
     Flag,
@@ -71,8 +72,7 @@ class FieldSpec(Table):
     """Counts are divided by ten to this power, which is read from the device."""
 
 
-_NUMBERED, _NUMBERS = {40_001: 3, 30_001: 4}, 9_999
-"""Number of address 0 in the notation of many manuals, by function; and how many there are."""
+_ADDRESSES = 0x10000
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class ReadBlock(Table):
     """Registers that are read in one query, so that they are consistent."""
 
     start: int
-    """Wire address (from 0)."""
+    """Wire address (from 0); a file may give a manual's ``register`` (40008) in its place."""
     count: Annotated[int, Whole(1, 125)]
     function: Literal[3, 4] = 3
     fixed: Flag = False
@@ -94,14 +94,22 @@ class ReadBlock(Table):
     @property
     def doubt(self) -> str:
         """Why the start is likely a register's number of a manual; empty where it is not."""
-        for first, function in _NUMBERED.items():
-            if first <= self.start < first + _NUMBERS:
-                return (
-                    f"{self.start} looks like a register's number, of which the leading digit is "
-                    f"the kind: write start = {self.start - first}, function = {function}, and the "
-                    f"other registers less {first} too, unless the manual calls it an address"
-                )
-        return ""
+        found = address_of(self.start) if self.start < _ADDRESSES else None
+        if found is None:
+            return ""
+        return (
+            f"{self.start} looks like a register's number, of which the leading digit is the kind, "
+            f"not like an address: write register = {self.start} in place of start, and all "
+            f"registers as the manual numbers them; or start = {found[0]}, function = {found[1]} "
+            "and addresses"
+        )
+
+    def rules(self) -> Iterator[Rule]:
+        """An address has 16 bits."""
+        if not 0 <= self.start < _ADDRESSES:
+            number = address_of(self.start)
+            hint = "" if number is None else f"; register = {self.start} is a manual's number"
+            yield "start", f"{self.start} is no address (0 to {_ADDRESSES - 1}){hint}"
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Reader of EDS and DCF files, which repairs faults and reports each with its line.
+"""Reader of EDS, DCF, XDD and XDC files, which repairs faults and reports each with its line.
 
 Makers' files often deviate from CiA 306. The result is valid text of the format; every repair is a
 warning with its line. A file with faults that have no unique repair is refused, with all its faults
@@ -15,6 +15,10 @@ from pathlib import Path
 from winchkit.errors import Fault, FileError
 from winchkit.regular_file import regular
 from winchkit.schema.eds.repair import Findings, Section, canonical, canonical_key, mend
+from winchkit.schema.eds.xdd import read_xml
+
+SUFFIXES = (".eds", ".dcf", ".xdd", ".xdc")
+"""Descriptions of a device by its maker, and of a device as it is set up (DCF, XDC)."""
 
 _LARGEST = 8_000_000
 """Bytes: an EDS has some hundred kilobytes; a wrong file does not fill the memory."""
@@ -36,7 +40,7 @@ class EdsText:
 
 
 def read_eds_text(path: str | Path) -> EdsText:
-    """Read an EDS or DCF file.
+    """Read an EDS, DCF, XDD or XDC file.
 
     Returns: valid text, and a warning per repair. Raises FileError with every line that cannot be
     repaired.
@@ -79,6 +83,15 @@ def _text(path: Path, findings: Findings) -> str:
 def _sections(text: str, findings: Findings) -> list[Section]:
     """Split into sections; the first of two equal ones is kept."""
     found: dict[str, Section] = {}
+    is_xml = text.lstrip().startswith("<")
+    sections = read_xml(text, findings) if is_xml else _text_sections(text, findings)
+    for section in sections:
+        _keep_first(found, section, findings)
+    return [section for section in found.values() if not section.contradicts]
+
+
+def _text_sections(text: str, findings: Findings) -> list[Section]:
+    """Sections of CiA 306 in the order of the file."""
     sections: list[Section] = []
     for number, raw in enumerate(text.replace("\r\n", "\n").replace("\r", "\n").split("\n"), 1):
         line = _INLINE_COMMENT.sub("", raw).strip()
@@ -90,13 +103,6 @@ def _sections(text: str, findings: Findings) -> list[Section]:
         elif line.startswith("["):
             findings.fault(number, f"{line!r} is not a section; it should read [name]")
             sections.append(Section(line, number))
-        elif not sections and line.startswith("<"):
-            findings.fault(
-                number,
-                "is XML (XDD or XDC of CiA 311, or ESI of EtherCAT), not an EDS or DCF of CiA 306: "
-                "use the maker's EDS, or convert it by a CANopen editor",
-            )
-            return []
         elif not sections:
             findings.fault(
                 number, f"is not an EDS: expected a section such as [FileInfo], not {line!r}"
@@ -106,9 +112,7 @@ def _sections(text: str, findings: Findings) -> list[Section]:
             _take_key(sections[-1], number, line, findings)
     if not sections:
         findings.fault(1, "is not an EDS: it has no sections")
-    for section in sections:
-        _keep_first(found, section, findings)
-    return [section for section in found.values() if not section.contradicts]
+    return sections
 
 
 def _take_key(section: Section, number: int, line: str, findings: Findings) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from winchkit.errors import Fault
@@ -30,8 +31,16 @@ _DEVICE_KEYS = (
     "NrOfRXPDO",
     "NrOfTXPDO",
     "LSS_Supported",
+    "NodeID",
 )
 _IDENTITY = ("VendorNumber", "ProductNumber")
+_LISTS = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
+_COMMISSIONING = "DeviceComissioning"
+"""As CiA 306 spells it."""
+_SECTIONS = {
+    name.casefold(): name
+    for name in ("FileInfo", "DeviceInfo", "DummyUsage", "Comments", _COMMISSIONING, *_LISTS)
+} | {"devicecommissioning": _COMMISSIONING}
 _SPELLING = {key.casefold(): key for key in (*_OBJECT_KEYS, *_OTHER_KEYS, *_DEVICE_KEYS)}
 
 
@@ -93,10 +102,10 @@ class Findings:
 
 
 def canonical(name: str) -> str:
-    """One spelling for the sections of objects: ``6040``, ``1018sub1``, ``1003Name``."""
+    """One spelling: ``6040``, ``1018sub1``, ``1003Name``, and ``DeviceInfo`` in any case."""
     found = _OBJECT.match(name)
     if not found:
-        return name
+        return _SECTIONS.get(name.casefold(), name)
     tail = f"sub{int(found[2], 16):X}" if found[2] else "Name" if found[3] else ""
     return found[1].upper() + tail
 
@@ -109,8 +118,7 @@ def canonical_key(key: str) -> str:
 _VAR, _DOMAIN, _ARRAY, _RECORD = 0x7, 0x2, 0x8, 0x9
 _FIRST_OBJECT = 0x1000
 """Lower indices are data types (CiA 301)."""
-_MANDATORY = (0x1000, 0x1001, 0x1018)
-_LISTS = ("MandatoryObjects", "OptionalObjects", "ManufacturerObjects")
+MANDATORY = (0x1000, 0x1001, 0x1018)
 _NUMBERS = (
     "VendorNumber",
     "ProductNumber",
@@ -133,8 +141,9 @@ _BITS = {
 _OTHER_TYPES = {0x08, 0x09, 0x0A, 0x0B, 0x0C, 0x0D, 0x0F, 0x11}
 """Real numbers, strings, times and domains."""
 _SIGNED = {0x02, 0x03, 0x04, 0x10, 0x12, 0x13, 0x14, 0x15}
-_OCTAL = re.compile(r"0[0-7]+$")
+_ZEROS = re.compile(r"0\d+$")
 _NODE_ID = re.compile(r"\$NODEID", re.IGNORECASE)
+_COB_ID, _NODES = 0x7FF, 127
 _BYTES = "0x000F"
 _LAST_STANDARD = 0x1B
 """Data types to 001Bh are the standard's (UNSIGNED64); later ones are structures or a maker's."""
@@ -156,6 +165,9 @@ def mend(sections: list[Section], findings: Findings) -> list[Section]:
             objects[index] = _stand_in(index, members[0], findings)
     for section in objects.values():
         _mend_object(section, subs, findings)
+    commissioned = by_name.get(_COMMISSIONING, Section("", 1)).values.get("NodeID", "")
+    for section in sections:
+        _mend_node_id(section, _number(commissioned), findings)
     _check_lists(by_name, objects, findings)
     plain = [by_name[name] for name in ("FileInfo", "DeviceInfo", "DummyUsage") if name in by_name]
     plain += [by_name[name] for name in _LISTS if name in by_name]
@@ -172,12 +184,37 @@ def _whole(section: Section) -> bool:
 
 
 def _number(text: str) -> int | None:
-    """A number of CiA 306: decimal, hexadecimal after 0x, octal after 0; None for no number."""
+    """A number of CiA 306: decimal, hexadecimal after 0x, octal after 0; None for no number.
+
+    One with a leading zero that has a digit 8 or 9 is decimal.
+    """
     bare = text.replace(" ", "")
     try:
-        return int(bare, 8) if _OCTAL.match(bare) else int(bare, 0)
+        if _ZEROS.match(bare):
+            return int(bare, 10 if set(bare) & {"8", "9"} else 8)
+        return int(bare, 0)
     except ValueError:
         return None
+
+
+def _read_number(section: Section, key: str, text: str, findings: Findings) -> int | None:
+    """As ``_number``, with a warning where a leading zero makes another number of it."""
+    value, bare = _number(text), text.replace(" ", "")
+    if value is not None and _ZEROS.match(bare) and value != int(bare):
+        findings.warn(
+            section.line_of(key),
+            f"[{section.name}] {key} {bare} begins with 0, so that it is octal by CiA 306: "
+            f"{value}; write {int(bare)} if that is meant",
+        )
+    return value
+
+
+def _without_zeros(section: Section, keys: Iterable[str], findings: Findings) -> None:
+    """Write numbers with leading zeros (``0004``), which readers of EDS files refuse, without."""
+    for key in keys:
+        text = section.values.get(key, "")
+        if _ZEROS.match(text) and (value := _read_number(section, key, text, findings)) is not None:
+            section.values[key] = str(value)
 
 
 def _mend_device(sections: dict[str, Section], findings: Findings) -> None:
@@ -192,6 +229,7 @@ def _mend_device(sections: dict[str, Section], findings: Findings) -> None:
         said = "is empty" if not text else f"{text!r} is not a number"
         findings.warn(info.lines[key], f"[DeviceInfo] {key} {said}; taken as 0")
         info.values[key] = "0"
+    _without_zeros(info, _NUMBERS, findings)
 
 
 def _mend_dummies(sections: dict[str, Section], findings: Findings) -> None:
@@ -205,6 +243,7 @@ def _mend_dummies(sections: dict[str, Section], findings: Findings) -> None:
                 dummies.line_of(key), f"[DummyUsage] {key} is neither 0 nor 1; taken as 0"
             )
             dummies.values[key] = "0"
+        _without_zeros(dummies, [key], findings)
 
 
 def _stand_in(index: int, member: Section, findings: Findings) -> Section:
@@ -218,6 +257,7 @@ def _mend_object(section: Section, subs: dict[int, list[Section]], findings: Fin
     if index is None:
         return
     _mend_name(section, findings)
+    _without_zeros(section, ("ObjectType", "SubNumber", "CompactSubObj"), findings)
     kind = _number(section.values.get("ObjectType", hex(_VAR)))
     if kind is None:
         text = section.values["ObjectType"]
@@ -262,6 +302,7 @@ def _check_count(section: Section, found: int, findings: Findings) -> None:
 
 
 def _mend_variable(section: Section, findings: Findings) -> None:
+    _without_zeros(section, ("DataType", "PDOMapping"), findings)
     kind = _mend_type(section, findings)
     access = section.values.get("AccessType", "").lower()
     if access not in _ACCESS:
@@ -310,17 +351,37 @@ def _mend_numbers(section: Section, bits: int, signed: bool, findings: Findings)
             continue
         relative = _NODE_ID.search(text) is not None
         bare = re.sub(r"\+?\$NODEID\+?", "", text.replace(" ", "").upper()) or "0"
-        value = _number(bare)
+        value = _read_number(section, key, bare, findings)
         if value is None or not -(1 << bits - 1) <= value < 1 << bits:
             reason = "is not a number" if value is None else f"does not fit into {bits} bits"
             findings.warn(section.lines[key], f"[{section.name}] {key} {text!r} {reason}; left out")
             del section.values[key]
         elif relative:
-            section.values[key] = _NODE_ID.sub("$NODEID", text)
+            section.values[key] = f"$NODEID+{value:#x}" if value >= 0 else f"$NODEID{value}"
         else:
             kept = _of_type(value, bits, signed)
-            if kept != value or _OCTAL.match(bare):
+            if kept != value or _ZEROS.match(bare):
                 section.values[key] = str(kept)
+
+
+def _mend_node_id(section: Section, node: int | None, findings: Findings) -> None:
+    """A value of one node, of an object whose default follows the node's number.
+
+    ``node``: number of [DeviceComissioning]; None where it is not given.
+    """
+    default, text = (section.values.get(key, "") for key in ("DefaultValue", "ParameterValue"))
+    value = _number(text)
+    if "$NODEID" not in default or "$NODEID" in text or value is None:
+        return
+    base = _number(default.removeprefix("$NODEID+")) or 0
+    meant = (value & _COB_ID) - (base & _COB_ID)
+    said = f"[{section.name}] ParameterValue {text} stands against DefaultValue {default}: "
+    if 1 <= meant <= _NODES and node in (None, meant):
+        section.values["ParameterValue"] = f"$NODEID+{value - meant:#x}"
+        said += f"it is of node {meant}, read as $NODEID+{value - meant:#x}"
+    else:
+        said += "it is the same for every node" + (f", {node} included" if node else "")
+    findings.warn(section.line_of("ParameterValue"), said)
 
 
 def _of_type(value: int, bits: int, signed: bool) -> int:
@@ -333,6 +394,7 @@ def _names(sections: dict[str, Section], owner: Section, findings: Findings) -> 
     names = sections.get(f"{owner.name}Name")
     if names is None:
         return []
+    _without_zeros(names, ("NrOfEntries",), findings)
     if _number(names.values.get("NrOfEntries", "")) is None or "CompactSubObj" not in owner.values:
         findings.warn(
             names.line, f"[{names.name}] is left out: it names no compact array's entries"
@@ -349,7 +411,7 @@ def _check_lists(
         section = sections.get(name)
         if section is not None:
             listed |= _check_list(section, objects, findings)
-    for index in _MANDATORY:
+    for index in MANDATORY:
         if index not in objects:
             findings.warn(1, f"the mandatory object {index:04X}h is missing")
     for index, section in objects.items():

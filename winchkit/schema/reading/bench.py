@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.errors import FileError, suggest
-from winchkit.schema.bench import BenchSpec, latch_path
+from winchkit.schema.bench import BenchSpec, CellWiring, latch_path
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile
@@ -29,6 +29,7 @@ from winchkit.schema.simbench import (
 from winchkit.units import GRAVITY
 
 ROLES = ("servo", "cell", "load", "length", "temperature")
+_OF_DRIVE, _INSTRUMENTS = {"profile", "servo", "limits"}, set(ROLES[1:])
 _MEASURED = {"cell": "force", "load": "force", "length": "length", "temperature": "temperature"}
 """What an instrument of each role measures."""
 DeviceReader = Callable[[str | Path], DeviceSpec]
@@ -46,9 +47,10 @@ def bench(
     reading: Reading, tree: dict[str, Any], read_device: DeviceReader, read_robot: RobotReader
 ) -> BenchSpec | None:
     """Read a bench and check its references."""
-    for key in tree.keys() & {"path", "latch_file"}:
+    for key in tree.keys() & {"path", "latch_file", "cells"}:
         reading.fault((key,), "unknown key")
     _check_references(reading, tree, read_device)
+    tree = _with_cells(reading, tree)
     path = reading.source.path
     named = {"name": reading.stem, **tree, "path": path, "latch_file": latch_path(path)}
     spec = reading.table(BenchSpec, named)
@@ -56,8 +58,10 @@ def bench(
         if not file.is_file():
             at: Key = ("effects", index)
             reading.fault(at, f"no such file of effects: {file}; paths start at this file's folder")
-    if spec is not None and not spec.winch:
+    if spec is not None and not (spec.winch or spec.cells):
         reading.fault(("winch",), "a bench has at least one winch, in a table [winch.NAME]")
+    if spec is not None and spec.cells and spec.robot is not None:
+        reading.fault(("robot",), "its winches have no profile, servo and limits")
     if spec is not None:
         _check_deviations(reading, spec)
     if spec is not None and spec.robot is not None:
@@ -65,14 +69,35 @@ def bench(
     return spec
 
 
+def _with_cells(reading: Reading, tree: dict[str, Any]) -> dict[str, Any]:
+    """The tree with its winches as cells, where none of them has a drive."""
+    winches = tree.get("winch")
+    if not isinstance(winches, dict) or not winches:
+        return tree
+    if any(not isinstance(one, dict) or not _OF_DRIVE.isdisjoint(one) for one in winches.values()):
+        return tree
+    cells = {
+        name: reading.table(CellWiring, winch, ("winch", name)) for name, winch in winches.items()
+    }
+    for name, winch in winches.items():
+        if _INSTRUMENTS.isdisjoint(winch):
+            message = (
+                "has neither an instrument (cell, load, length, temperature) nor a drive (profile, "
+                "servo, limits)"
+            )
+            reading.fault(("winch", name), message)
+    known = {name: cell for name, cell in cells.items() if cell is not None}
+    return {**tree, "winch": {}, "cells": known}
+
+
 def _check_deviations(reading: Reading, spec: BenchSpec) -> None:
     """Whose answers do not name their request is the only device on its bus."""
     for name, bus in spec.bus.items():
         units = {
             ref.unit or 1
-            for winch in spec.winch.values()
+            for winch in (*spec.winch.values(), *spec.cells.values())
             for role in ROLES
-            if (ref := getattr(winch, role)) is not None and ref.bus == name
+            if (ref := getattr(winch, role, None)) is not None and ref.bus == name
         }
         if bus.deviations and len(units) > 1:
             listed = ", ".join(map(str, sorted(units)))

@@ -37,7 +37,7 @@ def nodes() -> dict[int, KnownNode]:
         (0x77F, "05", "heartbeat", "host: operational"),
         (0x703, "00", "heartbeat", "winch C: boot-up"),
         (0x603, "40 41 60 00 00 00 00 00", "SDO", "read 6041h Status"),
-        (0x603, "2f 60 60 00 09 00 00 00", "SDO", "write 6060h Modes of operation = 9 (9h)"),
+        (0x603, "2f 60 60 00 09 00 00 00", "SDO", "write 6060h Modes of operation = 9 CSV"),
         (0x583, "60 60 60 00 00 00 00 00", "SDO", "6060h Modes of operation written"),
         (0x583, "4b 41 60 00 37 06 00 00", "SDO", "0637h operation enabled"),
         (0x583, "80 00 20 00 00 00 02 06", "SDO", "2000h refused: Code 0x06020000"),

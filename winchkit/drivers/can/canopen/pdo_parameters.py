@@ -12,10 +12,10 @@ from winchkit.schema.devices.servo import PdoSpec
 
 Direction = Literal["tpdo", "rpdo"]
 
-_INVALID = 1 << 31
+INVALID = 1 << 31
 _NO_RTR = 1 << 30
-_COMMUNICATION = {"tpdo": 0x1800, "rpdo": 0x1400}
-_MAPPING = {"tpdo": 0x1A00, "rpdo": 0x1600}
+COMMUNICATION = {"tpdo": 0x1800, "rpdo": 0x1400}
+MAPPING = {"tpdo": 0x1A00, "rpdo": 0x1600}
 _FIRST_COB = {"tpdo": 0x180, "rpdo": 0x200}
 _PREDEFINED = range(1, 5)
 MOST_PDOS = 512
@@ -44,24 +44,24 @@ def set_up(node: SdoNode, direction: Direction, wanted: tuple[PdoCodec, ...]) ->
     """
     by_number = {codec.spec.number: codec for codec in wanted}
     for number in (*_PREDEFINED, *_beyond(node, direction)):
-        record = _COMMUNICATION[direction] + number - 1
+        record = COMMUNICATION[direction] + number - 1
         codec = by_number.get(number)
         if codec is not None:
             _map(node, direction, codec)
             continue
         identifier = node.read_if_there(record, 1)
-        if identifier is None or identifier & _INVALID:
+        if identifier is None or identifier & INVALID:
             continue
-        mapping = _MAPPING[direction] + number - 1
+        mapping = MAPPING[direction] + number - 1
         if node.writes(record, 1):
-            node.write(record, 1, identifier | _INVALID)
+            node.write(record, 1, identifier | INVALID)
         elif node.writes(mapping, 0):  # a PDO without objects is not used (CiA 301)
             node.write(mapping, 0, 0)
 
 
 def _beyond(node: SdoNode, direction: Direction) -> list[int]:
     """Numbers of the PDOs above four that the EDS declares."""
-    first = _COMMUNICATION[direction]
+    first = COMMUNICATION[direction]
     return [
         number
         for number in range(_PREDEFINED.stop, MOST_PDOS + 1)
@@ -71,14 +71,14 @@ def _beyond(node: SdoNode, direction: Direction) -> list[int]:
 
 def _map(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
     number = codec.spec.number
-    record = _COMMUNICATION[direction] + number - 1
-    mapping = _MAPPING[direction] + number - 1
+    record = COMMUNICATION[direction] + number - 1
+    mapping = MAPPING[direction] + number - 1
     identifier = cob_id(direction, number, node.node)
     if direction == "tpdo":
         identifier |= _NO_RTR
     renamed = node.writes(record, 1)
     if renamed:
-        node.write(record, 1, identifier | _INVALID)
+        node.write(record, 1, identifier | INVALID)
     else:
         _check_identifier(node, record, identifier)
     _set_transmission(node, record, codec.spec.transmission)
@@ -102,7 +102,7 @@ def _check_identifier(node: SdoNode, record: int, identifier: int) -> None:
     """A COB-ID that the EDS does not let change has to be in use, and the predefined one."""
     kept = node.read(record, 1)
     if (kept ^ identifier) & ~_NO_RTR:
-        state = "is not in use" if kept & _INVALID else f"is {kept & 0x7FF:03X}h"
+        state = "is not in use" if kept & INVALID else f"is {kept & 0x7FF:03X}h"
         raise NotPermitted(
             f"{node.place(record, 1)} cannot be written by its EDS and {state}, not "
             f"{identifier & 0x7FF:03X}h as the predefined connection set has it; use another PDO "
@@ -126,7 +126,7 @@ def _set_transmission(node: SdoNode, record: int, transmission: int) -> None:
 
 def _check_fixed(node: SdoNode, direction: Direction, codec: PdoCodec) -> None:
     """A mapping that the EDS does not let change has to be the one that is wanted."""
-    mapping = _MAPPING[direction] + codec.spec.number - 1
+    mapping = MAPPING[direction] + codec.spec.number - 1
     count = node.read(mapping, 0)
     held = [node.read(mapping, position) for position in range(1, count + 1)]
     if held != [item.entry for item in codec.objects]:

@@ -94,12 +94,15 @@ def mode_named(number: int) -> str:
 
 
 def status_words(mode: str, status: int) -> tuple[str, ...]:
-    """The bits of a status word that are set beside the state, in words, for a mode."""
+    """The bits of a status word that are set beside the state, in words, for a mode.
+
+    ``mode``: a name; for another text those bits that have one meaning in all modes.
+    """
     common = {
         int(StatusBit.WARNING): "warning",
         int(_LIMIT): "internal limit active",
     }
-    meaning = common | dict(MODES[mode].bits)
+    meaning = common | dict(MODES[mode].bits if mode in MODES else {})
     return tuple(word for mask, word in meaning.items() if status & mask)
 
 

@@ -9,11 +9,14 @@ from pathlib import Path
 from typing import Any
 
 import canopen
+from canopen.objectdictionary import datatypes
 
-from winchkit.drivers.can.canopen.emergency import parse_emergency
+from winchkit.drivers.can.canopen.emergency import error_text, parse_emergency
 from winchkit.drivers.can.canopen.nmt import command_text, state_text
 from winchkit.drivers.can.canopen.node import is_signed, object_name, read_dictionary
-from winchkit.drivers.can.canopen.pdo import MappedObject, PdoCodec, parse_object
+from winchkit.drivers.can.canopen.pdo import parse_object
+from winchkit.drivers.can.canopen.pdo_parameters import Direction, cob_id
+from winchkit.drivers.can.cia402.modes import mode_named, status_words
 from winchkit.drivers.can.cia402.state_machine import FAULT_RESET, HALT, state_of
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.servo import PdoSpec
@@ -44,21 +47,64 @@ _LSS = {
     0x5D: "ask for the serial number",
     0x5E: "ask for the node id",
 }
-_TPDO = {0x180: 1, 0x280: 2, 0x380: 3, 0x480: 4}
-_RPDO = {0x200: 1, 0x300: 2, 0x400: 3, 0x500: 4}
+_PDOS = dict.fromkeys((384, 640, 896, 1152), "TPDO")
+_PDOS |= dict.fromkeys((512, 768, 1024, 1280), "RPDO")
+"""Kinds of the predefined connection set (CiA 301)."""
+_TRANSFERS = {2: "read", 5: "block transfer of", 6: "block transfer of"}
+"""Command specifiers of the other SDO transfers (CiA 301)."""
+_MODE = (0x6061, 0)
+_WORDED = (0x6040, 0x6041, 0x6060, 0x6061, 0x603F)
+_ELEVEN_BITS = 0x800
+_FIRST_OBJECT = 0x1000
+"""Lower indices are data types: gaps in a mapping (CiA 301)."""
 _SDO_REQUEST, _SDO_REPLY, _HEARTBEAT = 0x600, 0x580, 0x700
 _SEGMENT = 7
 """Data bytes in a segment of an SDO transfer (CiA 301)."""
 
 
+Key = tuple[int, int]
+"""Index and sub-index of an object."""
+
+
+@dataclass(frozen=True)
+class MappedPdo:
+    """A PDO whose mapping is known."""
+
+    kind: str
+    """TPDO or RPDO."""
+    number: int
+    objects: tuple[Key, ...]
+    sizes: tuple[int, ...]
+    """bits."""
+
+    @property
+    def size(self) -> int:
+        """Bytes of its frame."""
+        return (sum(self.sizes) + 7) // 8
+
+    def values(self, data: bytes, dictionary: Any) -> dict[Key, float]:
+        """Values of the objects that a frame, which may be short, has whole."""
+        bits, place = int.from_bytes(data, "little"), 0
+        found: dict[Key, float] = {}
+        for key, size in zip(self.objects, self.sizes, strict=True):
+            if place + size > 8 * len(data):
+                break
+            if key[0] >= _FIRST_OBJECT:
+                found[key] = number_of(bits >> place & (1 << size) - 1, size, *key, dictionary)
+            place += size
+        return found
+
+
 @dataclass(frozen=True)
 class KnownNode:
-    """Known facts on a node: its name and, where it is a declared drive, its objects."""
+    """Known facts on a node: its name and, where it is a declared device, its objects."""
 
     name: str
     dictionary: Any = None
-    tpdo: Mapping[int, PdoCodec] = field(default_factory=dict)
-    rpdo: Mapping[int, PdoCodec] = field(default_factory=dict)
+    pdos: Mapping[int, MappedPdo] = field(default_factory=dict)
+    """By identifier."""
+    mode: str = ""
+    """Mode of operation, where it is known; bits of the status word depend on it."""
 
 
 @dataclass(frozen=True)
@@ -70,20 +116,42 @@ class Decoded:
     node: int
     """0 where it concerns no single node."""
     text: str
-    values: Mapping[str, int] = field(default_factory=dict)
-    """Of a PDO whose mapping is known, by object, in the drive's units."""
+    values: Mapping[str, float] = field(default_factory=dict)
+    """Of a PDO whose mapping is known, by object, in the device's units."""
 
 
 def known_node(name: str, device: DeviceSpec, node: int) -> KnownNode:
-    """A drive as its device file declares it; raises FileError."""
-    assert device.servo is not None, "the reader has checked it"
-    dictionary = read_dictionary(Path(device.path).parent / device.servo.eds, node)
-    return KnownNode(
-        name,
-        dictionary,
-        {pdo.number: _codec(pdo, dictionary) for pdo in device.servo.tpdo},
-        {pdo.number: _codec(pdo, dictionary) for pdo in device.servo.rpdo},
-    )
+    """A drive or CANopen instrument as its device file declares it; raises FileError."""
+    spec = device.servo or device.process
+    assert spec is not None, "the reader has checked it"
+    dictionary = read_dictionary(Path(device.path).parent / spec.eds, node)
+    return KnownNode(name, dictionary, declared_pdos(device, dictionary, node))
+
+
+def declared_pdos(device: DeviceSpec, dictionary: Any, node: int) -> dict[int, MappedPdo]:
+    """PDOs that a device file sets up, by identifier."""
+    spec = device.servo or device.process
+    assert spec is not None, "the reader has checked it"
+    directions: tuple[tuple[Direction, tuple[PdoSpec, ...]], ...]
+    directions = (("tpdo", spec.tpdo), ("rpdo", getattr(spec, "rpdo", ())))
+    found = {}
+    for direction, pdos in directions:
+        for pdo in pdos:
+            keys = tuple(map(parse_object, pdo.objects))
+            sizes = tuple(len(dictionary.get_variable(*key)) for key in keys)
+            mapped = MappedPdo(direction.upper(), pdo.number, keys, sizes)
+            found[cob_id(direction, pdo.number, node)] = mapped
+    return found
+
+
+def number_of(bits: int, size: int, index: int, sub: int, dictionary: Any) -> float:
+    """Number of an object's bits, by its type in a dictionary; unsigned where it is not known."""
+    variable = None if dictionary is None else dictionary.get_variable(index, sub)
+    if variable is not None and variable.data_type in datatypes.FLOAT_TYPES and size in (32, 64):
+        layout = "<f" if size == 32 else "<d"
+        return float(struct.unpack(layout, bits.to_bytes(size // 8, "little"))[0])
+    is_negative = is_signed(variable) and bits >> size - 1 & 1
+    return bits - (1 << size) if is_negative else bits
 
 
 def decode(identifier: int, data: bytes, nodes: Mapping[int, KnownNode]) -> Decoded:
@@ -96,15 +164,25 @@ def decode(identifier: int, data: bytes, nodes: Mapping[int, KnownNode]) -> Deco
         return Decoded("LSS", 0, _lss(data, reply=identifier == 0x7E4))
     node = identifier & 0x7F
     known = nodes.get(node, KnownNode(f"node {node}"))
+    for number, one in nodes.items():
+        if (pdo := one.pdos.get(identifier)) is not None:
+            return _pdo(pdo, number, one, data)
     base = identifier & ~0x7F
-    for kind, bases, codecs in (("TPDO", _TPDO, known.tpdo), ("RPDO", _RPDO, known.rpdo)):
-        if base in bases:
-            values = _values(data, codecs.get(bases[base]))
-            words = _mapped(values, known) if values else data.hex(" ")
-            plain = {object_name(*key): value for key, value in values.items()}
-            return Decoded(kind, node, f"{known.name}: {words}", plain)
+    if base in _PDOS and identifier < _ELEVEN_BITS:
+        return Decoded(_PDOS[base], node, f"{known.name}: {data.hex(' ')}")
     kind, words = _of_node(base, data, known)
     return Decoded(kind, node, f"{known.name}: {words}")
+
+
+def _pdo(pdo: MappedPdo, node: int, known: KnownNode, data: bytes) -> Decoded:
+    """A PDO in words; one of another length has words and no values."""
+    values = pdo.values(data, known.dictionary)
+    words = _mapped(values, known) or data.hex(" ")
+    if len(data) != pdo.size:
+        words += f" ({len(data)} bytes; its mapping has {pdo.size})"
+        values = {}
+    plain = {object_name(*key): value for key, value in values.items()}
+    return Decoded(pdo.kind, node, f"{known.name}: {words}", plain)
 
 
 def _nmt(data: bytes, nodes: Mapping[int, KnownNode]) -> Decoded:
@@ -122,7 +200,7 @@ def _of_node(base: int, data: bytes, known: KnownNode) -> tuple[str, str]:
         return "heartbeat", state_text(data[0] & 0x7F) if data else raw
     if base in (_SDO_REQUEST, _SDO_REPLY) and len(data) == 8:
         words = _request if base == _SDO_REQUEST else _reply
-        return "SDO", words(data, known.dictionary)
+        return "SDO", words(data, known)
     return "other", raw
 
 
@@ -143,34 +221,24 @@ def write_frames(node: int, index: int, sub: int, data: bytes) -> list[tuple[int
     return frames
 
 
-def _codec(spec: PdoSpec, dictionary: Any) -> PdoCodec:
-    objects = []
-    for text in spec.objects:
-        index, sub = parse_object(text)
-        variable = dictionary.get_variable(index, sub)
-        objects.append(MappedObject(index, sub, len(variable), is_signed(variable)))
-    return PdoCodec(spec, objects)
-
-
-def _values(data: bytes, codec: PdoCodec | None) -> dict[tuple[int, int], int]:
-    values = codec.decode(data) if codec is not None else None
-    if codec is None or values is None:
-        return {}
-    return dict(zip(codec.position, values, strict=True))
-
-
-def _mapped(values: Mapping[tuple[int, int], int], known: KnownNode) -> str:
+def _mapped(values: Mapping[Key, float], known: KnownNode) -> str:
+    mode = mode_named(int(values[_MODE])) if _MODE in values else known.mode
     return ", ".join(
-        f"{_named(*key, known.dictionary)} {_value(key[0], value)}" for key, value in values.items()
+        f"{_named(*key, known.dictionary)} {_in_words(key[0], value, mode) or f'{value:.9g}'}"
+        for key, value in values.items()
     )
 
 
-def _value(index: int, value: int) -> str:
+def _in_words(index: int, value: float, mode: str) -> str:
+    """A value in words where CiA 402 has them, else empty."""
+    word = int(value) if index in _WORDED else 0
     if index == 0x6040:
-        return f"{value:02X}h {_control(value)}"
+        return f"{word:02X}h {_control(word)}"
     if index == 0x6041:
-        return f"{value:04X}h {state_of(value)}"
-    return str(value)
+        return f"{word:04X}h {', '.join((str(state_of(word)), *status_words(mode, word)))}"
+    if index in (0x6060, 0x6061):
+        return f"{word} {mode_named(word)}"
+    return f"{word:04X}h {error_text(word)}" if index == 0x603F else ""
 
 
 def _control(word: int) -> str:
@@ -180,6 +248,12 @@ def _control(word: int) -> str:
     return f"{plain} + halt" if word & HALT else plain
 
 
+def named(name: str, dictionary: Any) -> str:
+    """``6064h Position actual value`` of ``6064h``; the same where a dictionary lacks it."""
+    index, _, sub = name.partition("h:")
+    return _named(int(index.removesuffix("h"), 16), int(sub or "0"), dictionary)
+
+
 def _named(index: int, sub: int, dictionary: Any) -> str:
     """``6040h Control word``; a sub-object with its record's name."""
     number = object_name(index, sub)
@@ -187,49 +261,68 @@ def _named(index: int, sub: int, dictionary: Any) -> str:
     return f"{number} {variable.name}" if variable is not None else number
 
 
-def _place(data: bytes, dictionary: Any) -> tuple[int, str]:
+def place_of(data: bytes) -> Key:
+    """Object of the first frame of an SDO transfer."""
     index, sub = struct.unpack_from("<HB", data, 1)
-    return index, _named(index, sub, dictionary)
+    return index, sub
 
 
-def _expedited(data: bytes) -> int | None:
-    """Number in an expedited transfer; None where it is not expedited."""
+def expedited(data: bytes) -> bytes | None:
+    """Content of an expedited transfer; None where it is not expedited."""
     if not data[0] & 0x02:
         return None
     size = 4 - (data[0] >> 2 & 3) if data[0] & 0x01 else 4
-    return int.from_bytes(data[4 : 4 + size], "little")
+    return data[4 : 4 + size]
 
 
-def _content(index: int, data: bytes) -> str:
+def content_text(content: bytes, key: Key, known: KnownNode) -> str:
+    """Content of an SDO transfer, by the type of its object."""
+    variable = None if known.dictionary is None else known.dictionary.get_variable(*key)
+    if variable is not None and variable.data_type in datatypes.DATA_TYPES:
+        text = content.split(b"\0")[0].decode("ascii", errors="replace")
+        return repr(text) if text.isprintable() else content.hex(" ")
+    if not 0 < len(content) <= 8:
+        return content.hex(" ")
+    bits = int.from_bytes(content, "little")
+    value = number_of(bits, 8 * len(content), *key, known.dictionary)
+    words = _in_words(key[0], value, known.mode)
+    return words or (f"{value} ({bits:X}h)" if isinstance(value, int) else f"{value:.9g}")
+
+
+def _content(data: bytes, key: Key, known: KnownNode) -> str:
     """Content of a transfer, or its length where the content follows in segments."""
-    value = _expedited(data)
-    if value is None:
+    content = expedited(data)
+    if content is None:
         return f"{int.from_bytes(data[4:8], 'little')} bytes"
-    return _value(index, value) if index in (0x6040, 0x6041) else f"{value} ({value:X}h)"
+    return content_text(content, key, known)
 
 
-def _request(data: bytes, dictionary: Any) -> str:
+def _request(data: bytes, known: KnownNode) -> str:
     command = data[0] >> 5
     if command in (0, 3):
         return f"segment {data[1:].hex(' ')}" if command == 0 else "next segment"
-    index, name = _place(data, dictionary)
-    if command == 2:
-        return f"read {name}"
+    key = place_of(data)
+    name = _named(*key, known.dictionary)
     if command == 4:
         return f"abort {name}: {_abort(data)}"
-    return f"write {name} = {_content(index, data)}"
+    if command == 1:
+        return f"write {name} = {_content(data, key, known)}"
+    return f"{_TRANSFERS.get(command, f'command {command} of')} {name}"
 
 
-def _reply(data: bytes, dictionary: Any) -> str:
+def _reply(data: bytes, known: KnownNode) -> str:
     command = data[0] >> 5
     if command in (0, 1):
         return f"segment {data[1:].hex(' ')}" if command == 0 else "segment taken"
-    index, name = _place(data, dictionary)
+    key = place_of(data)
+    name = _named(*key, known.dictionary)
     if command == 4:
         return f"{name} refused: {_abort(data)}"
     if command == 3:
         return f"{name} written"
-    return f"{name} is {_content(index, data)}"
+    if command == 2:
+        return f"{name} is {_content(data, key, known)}"
+    return f"{_TRANSFERS.get(command, f'command {command} of')} {name}"
 
 
 def _abort(data: bytes) -> str:

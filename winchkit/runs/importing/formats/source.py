@@ -54,13 +54,13 @@ def _read(path: str | Path) -> Table:
 
 def _of_text(name: str, data: bytes) -> Table:
     """JSON, or rows of text."""
-    from winchkit.runs.importing.formats.can_trace import TRACE, TRACED, is_can_trace
+    from winchkit.can_trace import TRACE, is_trace
     from winchkit.runs.importing.formats.json_file import is_json, read_json
     from winchkit.runs.importing.formats.motion_capture import read_capture
     from winchkit.runs.importing.formats.text import read_text_table
 
     _refuse_known(name, data)
-    if is_can_trace(data[:TRACED].decode("latin-1").splitlines()):
+    if is_trace(data):
         raise RunError(Fault(TRACE, name))
     table = read_json(name, data) if is_json(data) else read_capture(name, data)
     return table or read_text_table(name, data)

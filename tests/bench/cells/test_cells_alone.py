@@ -1,0 +1,112 @@
+"""A bench file of load cells only: no profile, no drive, no limits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from served import Served
+from winchkit.cli import main
+from winchkit.errors import FileError, UsageError
+from winchkit.runs import read_run
+from winchkit.schema.read import read_bench, read_tares
+
+
+@pytest.fixture
+def cell() -> Iterator[Served]:
+    with Served("laumas-tlb") as served:
+        yield served
+
+
+@pytest.fixture
+def bench(cell: Served, tmp_path: Path) -> Path:
+    """The bench of one cell, without what a drive needs."""
+    host, port = cell.line.address
+    path = tmp_path / "cells.toml"
+    path.write_text(
+        f'schema = 1\nkind = "bench"\n[bus.cells]\nkind = "modbus-tcp"\nhost = "{host}"\n'
+        f'port = {port}\n[winch.A]\ncell = {{ device = "laumas-tlb", bus = "cells", unit = 1 }}\n'
+    )
+    return path
+
+
+def run(*words: object, code: int = 0) -> Result:
+    result = CliRunner().invoke(main, [*map(str, words)])
+    assert result.exit_code == code, result.output
+    return result
+
+
+def test_it_is_read_and_tared(bench: Path) -> None:
+    assert "ok (bench 'cells')" in run("check", bench).output
+    assert "laumas-tlb" in run("cell", "info", "-b", bench).output
+    run("cell", "tare", "-b", bench)
+    assert read_tares(bench.with_name("cells.tares.toml")).tare["A.cell"].value == pytest.approx(
+        100, abs=2
+    )
+    run("cell", "tare", "--clear", "-b", bench)
+    told = run("tare", "A", "-b", bench).output
+    assert abs(float(told.split("reads ")[1].split(" N")[0])) < 2
+
+
+@pytest.mark.parametrize("suffix", [".mcap", ".csv"])
+def test_its_log_is_a_run_of_the_cell(bench: Path, suffix: str) -> None:
+    file = bench.with_name(f"rest{suffix}")
+    run("log", "-b", bench, "-o", file, "--for", "1s")
+    found = read_run(file)
+    assert set(found) == {"tension", "tension_gross"}
+    assert found["tension"].mean() == pytest.approx(100, abs=2)
+    assert len(found) > 20
+    assert "/drive" not in run("log", "info", file).output
+    assert "noise" in run("cell", "diagnose", "--run", file).output
+    for command in ("compare", "diagnose"):
+        assert "motor_angle" in run(command, file, "-p", "bench-spiral", code=3).output
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("jog", "--pay-out", "10mm"),
+        ("monitor",),
+        ("stop",),
+        ("reset",),
+        ("commission",),
+        ("log", "--jsonl", "--for", "1s"),
+        ("serve", "--no-browser"),
+    ],
+)
+def test_what_needs_a_drive_is_refused_with_what_there_is(
+    bench: Path, words: tuple[str, ...]
+) -> None:
+    told = run(*words, "-b", bench, code=2).output
+    assert "instruments" in told
+
+
+@pytest.mark.parametrize(
+    ("winches", "said"),
+    [
+        ("[winch.A]\n", "has neither an instrument"),
+        ('[winch.A]\ncell = { device = "laumas-tlb", bus = "x", unit = 1 }\n', "no [bus.x]"),
+        ("[winch.A]\nCELL\nbrake = true\n", "unknown key"),
+        ('[winch.A]\nCELL\n[winch.B]\nprofile = "bench-spiral"\n', "missing"),
+        ("[cells.A]\nCELL\n", "unknown key"),
+    ],
+)
+def test_half_a_winch_is_a_fault_with_its_line(tmp_path: Path, winches: str, said: str) -> None:
+    path = tmp_path / "bench.toml"
+    cell = 'cell = { device = "laumas-tlb", bus = "c", unit = 1 }'
+    head = 'schema = 1\nkind = "bench"\n[bus.c]\nkind = "modbus-tcp"\nhost = "h"\nport = 502\n'
+    path.write_text(head + winches.replace("CELL", cell))
+    with pytest.raises(FileError) as refused:
+        read_bench(path)
+    told = [fault for fault in refused.value.faults if said in fault.message]
+    assert told
+    assert told[0].line is not None
+    assert told[0].line >= 7
+
+
+def test_a_bench_of_cells_has_no_winch_to_name(bench: Path) -> None:
+    with pytest.raises(UsageError, match="only the instruments of A"):
+        read_bench(bench).winch_named("A")

@@ -1,0 +1,88 @@
+"""Log of a bench of instruments only: no drive, no control loop."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from winchkit.bench.cells.desk import CellDesk
+from winchkit.bench.recording.provenance import origin
+from winchkit.bench.recording.recorder import Recorder, counters_of
+from winchkit.bench.remote.cell_session import own_cells
+from winchkit.drivers.reading import Sensor
+from winchkit.errors import UsageError
+from winchkit.runs.recording.rotation import Rotation
+from winchkit.schema.bench import BenchSpec
+
+
+class CellStation:
+    """Operations of a station that a log needs, on the instruments of a bench."""
+
+    def __init__(self, desk: CellDesk) -> None:
+        """Take open instruments."""
+        self._desk = desk
+        self._recorder: Recorder | None = None
+
+    def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
+        """Begin a log; as that of a bench, with a source for each instrument and no drives."""
+        for name in self._desk.sensors:
+            self._desk.first_reading(name)
+        about = {"bench": self._desk.spec.name, "cells": json.dumps(list(self._desk.spec.cells))}
+        self._recorder = Recorder(
+            path,
+            self._sensors,
+            self._desk.clock,
+            {**about, **origin(self._desk.spec)},
+            rotation=None if rotate is None else Rotation.parse(rotate),
+            replace=replace,
+            has_drives=False,
+        )
+
+    def log_rows(self) -> int:
+        """Rows so far; raises what has ended the log."""
+        if self._recorder is None:
+            return 0
+        self._recorder.check()
+        return self._recorder.rows
+
+    def status(self) -> dict[str, Any]:
+        """The counts; there is no cycle of a control loop."""
+        return {"cycle": 0, "counters": self.counters()}
+
+    def end_log(self) -> int:
+        """End the log and return its rows."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is None:
+            return 0
+        recorder.close()
+        return recorder.rows
+
+    def counters(self) -> dict[str, dict[str, Any]]:
+        """Counts so far, by instrument (``A.cell``) and of the log itself."""
+        return counters_of(self._sensors) if self._recorder is None else self._recorder.counters()
+
+    @property
+    def _sensors(self) -> dict[str, dict[str, Sensor]]:
+        found: dict[str, dict[str, Sensor]] = {}
+        for name, sensor in self._desk.sensors.items():
+            winch, _, role = name.rpartition(".")
+            found.setdefault(winch, {})[role] = sensor
+        return found
+
+
+@contextmanager
+def at_cell_station(spec: BenchSpec) -> Iterator[CellStation]:
+    """The instruments of a bench without winches, opened here.
+
+    Raises NotPermitted where another process owns it, FileError, ConnectionLost, UsageError.
+    """
+    if not spec.cells:
+        raise UsageError(f"bench '{spec.name}' has winches; attach to it")
+    with own_cells(spec, "log") as desk:
+        station = CellStation(desk)
+        try:
+            yield station
+        finally:
+            station.end_log()
