@@ -19,7 +19,7 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.control.loop import Callback
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase
 from winchkit.errors import MotionError, NotPermitted, UsageError
-from winchkit.robot import Pose
+from winchkit.robot import Found, Pose, Robot
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.platform import Platform
 from winchkit.schema.bench import BenchSpec
@@ -220,6 +220,25 @@ def test_cables_that_fit_no_pose_are_refused(bench: Bench) -> None:
     with pytest.raises(NotPermitted, match="fit no pose: cable"):
         _ = bench.robot.pose
     bench.winch["2"].move_by(pay_out=0.09)
+
+
+def test_lengths_that_fit_two_poses_move_nothing(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = Robot.poses_at
+
+    def twofold(robot: Robot, *given: Any, **options: Any) -> Found:
+        found = plain(robot, *given, **options)
+        second = Pose(found.pose.position + np.array([0.05, 0.0, 0.0]), found.pose.rotation)
+        return replace(found, other=second)
+
+    platform = bench.robot
+    goal = platform.moved({"x": 0.02}, relative=True)
+    monkeypatch.setattr(platform, "_last", None)
+    monkeypatch.setattr(Robot, "poses_at", twofold)
+    with pytest.raises(NotPermitted, match="fit two poses of the platform that the cables can"):
+        platform.move(goal)
+    assert bench.snapshot.at_rest
 
 
 def test_a_bench_without_robot_has_no_platform(opened: Bench) -> None:

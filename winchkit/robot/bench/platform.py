@@ -19,6 +19,7 @@ from winchkit.bench.control.snapshot import Direction
 from winchkit.bench.control.tension_control import greatest_stiffness
 from winchkit.bench.host import WinchHost
 from winchkit.errors import NotPermitted, UsageError
+from winchkit.model.rotation import rotation_vector
 from winchkit.robot.bench.motion import CableMotion, PathTime
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.planner import Planner, coordinates_of, moved
@@ -26,6 +27,7 @@ from winchkit.robot.bench.quick_stop import quick_stop_ramps
 from winchkit.robot.bench.tension_trim import CableTrim, ForceTrim, TrimSetting
 from winchkit.robot.bench.trajectory import PlatformTrajectory
 from winchkit.robot.forces.force_distribution import null_space, quadratic
+from winchkit.robot.geometry.forward import AGREEMENT, Found, distance
 from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.robot_bench import RobotWiring
@@ -33,11 +35,13 @@ from winchkit.schema.robot_bench import RobotWiring
 if TYPE_CHECKING:
     from winchkit.bench.winch import Winch
 
-_AGREE = 0.02
-"""Largest difference between a cable length by its drum and by the geometry at the pose that fits
-all cables best, m: a larger one is a wrong reference, a slipped or a slack cable."""
+_NEAR = 0.1
+"""Distance and rotation from the pose that was found last, m and rad, up to which the next one is
+computed from it without a search (rule of thumb: a platform does not turn to another solution of
+its lengths within so little)."""
 _TRIM_TRAVEL = 0.01
-"""Of each cable in a correction of the forces, m: half of the difference above."""
+"""Of each cable in a correction of the forces, m: half of the difference of the lengths above which
+they fit no pose."""
 _TRIM_SPEED, _TRIM_TIME = 0.005, 5.0
 """m/s and s."""
 
@@ -55,6 +59,7 @@ class Platform:
         """Take the winches of the robot's lines by name."""
         self.robot = robot
         self._bench = bench
+        self._last: Pose | None = None
         self._winches = [winches[name] for name in robot.names]
         self.planner = Planner(
             robot, wiring, {one.name: one.wiring.limits for one in self._winches}
@@ -86,26 +91,50 @@ class Platform:
 
     @property
     def pose(self) -> Pose:
-        """Pose by the motor angles, one; raises NotPermitted where they fit no pose."""
-        angles = self._angles()
-        found = self.robot.poses_at(angles)
-        if found.converged[0]:
-            found = self.robot.poses_at(angles, found.pose, self._forces(found.pose))
-        if not found.converged[0]:
-            raise NotPermitted(
-                f"no pose of the platform has the motor angles of robot "
-                f"'{self.robot.profile.name}'; home the winches: `winchkit home WINCH --here "
-                "LENGTH`"
-            )
-        worst = int(np.argmax(np.abs(found.residual[0])))
-        size = abs(float(found.residual[0][worst]))
-        if size > _AGREE:
-            raise NotPermitted(
+        """Pose by the motor angles, one.
+
+        Raises NotPermitted where they fit no pose, or two that the cables can hold.
+        """
+        angles, last = self._angles(), self._last
+        found = None
+        if last is not None:
+            found = self.robot.poses_at(angles, last, tolerance=np.inf, search=np.inf)
+        if found is None or last is None or not distance(found.pose, last)[0] <= _NEAR:
+            found = self.robot.poses_at(angles, tolerance=np.inf, search=-1.0)
+            self._require_one(found)
+        if np.isfinite(found.pose.position).all():
+            forces = self._forces(found.pose)
+            found = self.robot.poses_at(angles, found.pose, forces, search=np.inf)
+        self._last = found.pose if found.converged[0] else None
+        if self._last is not None:
+            return self._last
+        words = f"no pose of the platform has the motor angles of robot '{self.robot.profile.name}'"
+        size = np.abs(found.residual[0])
+        if np.isfinite(size).all():
+            worst = int(np.argmax(size))
+            words = (
                 f"the cables fit no pose: cable {self.robot.names[worst]} differs by "
-                f"{size * 1e3:.0f} mm from the pose that fits all best (limit {_AGREE * 1e3:.0f} "
-                "mm); home the winches, and look for a slack cable"
+                f"{size[worst] * 1e3:.0f} mm from the pose that fits all best (limit "
+                f"{AGREEMENT * 1e3:.0f} mm)"
             )
-        return found.pose
+        raise NotPermitted(
+            f"{words}; home the winches, and look for a slack cable: `winchkit home WINCH --here "
+            "LENGTH`"
+        )
+
+    def _require_one(self, found: Found) -> None:
+        """Raise NotPermitted where the lengths fit a second pose that the cables can hold, too."""
+        if not np.isfinite(found.other.position).all() or not self._forces(found.other).any():
+            return
+        one, two = (
+            f"x, y, z {', '.join(f'{x:.3f}' for x in pose.position[0])} m with a rotation of "
+            f"{np.degrees(np.linalg.norm(rotation_vector(pose.rotation)[0])):.0f} deg"
+            for pose in (found.pose, found.other)
+        )
+        raise NotPermitted(
+            f"the cable lengths fit two poses of the platform that the cables can hold: {one}, or "
+            f"{two}; move single winches until it is nearer to its home pose"
+        )
 
     def coordinates(self) -> dict[str, float]:
         """The pose as x, y, z (m), roll, pitch and yaw (rad)."""

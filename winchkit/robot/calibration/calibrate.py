@@ -8,10 +8,11 @@ constraint equations of :mod:`winchkit.robot.geometry.constraints`. The CABTIVE 
 et al., Eq. 5 and 6) solves the forward kinematics of every pose inside each evaluation of its cost;
 here the pose is an unknown beside the parameters, so that all cable equations count.
 
-The cost is ½ Σ ρ(r/σ) + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
+The cost is ½ Σ (r/σ)² + ½ Σ ((x − x₀)/σ_prior)² over all equations and parameters. The standard
 deviations σ by kind of measurement are variance components
 (:mod:`winchkit.robot.identification.variance_components`): fit and estimate alternate until σ
-changes by less than 3 %, at most eight times. A robust loss ρ is used after the first fit.
+changes by less than 3 %, at most eight times. Poses with gross errors
+(:mod:`winchkit.robot.calibration.outliers`) are left out, and all is fitted again without them.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from winchkit.robot.calibration.identifiability import (
 )
 from winchkit.robot.calibration.instruments import declared_instruments
 from winchkit.robot.calibration.options import Options, ProgressCallback
-from winchkit.robot.calibration.outliers import gross_errors, unexplained
+from winchkit.robot.calibration.outliers import far_off, gross_errors, left_out_poses, unexplained
 from winchkit.robot.calibration.parameters import (
     EFFECTS,
     Estimated,
@@ -49,7 +50,7 @@ from winchkit.robot.calibration.parameters import (
 )
 from winchkit.robot.calibration.prediction import PoseErrors, cable_errors, errors_at, rms
 from winchkit.robot.calibration.ratios import Ratios, ratios_of
-from winchkit.robot.calibration.selection import Fitted, fitted_with_instruments
+from winchkit.robot.calibration.selection import Fitted, first_model, fitted_with_instruments
 from winchkit.robot.calibration.statistics import calibration_statistics
 from winchkit.robot.files.poses import Measured
 from winchkit.robot.geometry.robot import Robot
@@ -59,6 +60,9 @@ from winchkit.tabular import Columns, Tabular
 _HELD_OUT_EVERY = 10
 """Every tenth pose: the fit loses 5 % of its accuracy, and 100 poses leave ten for the held-out
 error."""
+_CLEANINGS = 4
+"""Fits without the poses that were found wrong before (rule of thumb: one settles it; a second
+where the tracker's numbers change with them)."""
 _NAMES = {"closure": "lengths by the drums", "position": "positions"}
 _LARGEST_ERROR = 0.05
 """Held-out position error as a share of the largest distance of two exit points, above which a
@@ -95,6 +99,8 @@ class Calibrated(Plotted, Tabular):
     """Numbers of instruments that the poses require and that the file does not declare unknown."""
     unexplained: tuple[str, ...] = ()
     """Instruments at the lines whose readings do not follow the geometry, in words."""
+    gross_errors: tuple[str, ...] = ()
+    """Run and row of the poses that were left out of the fit and of the held-out error."""
 
     @property
     def refusal(self) -> str:
@@ -141,7 +147,7 @@ class Calibrated(Plotted, Tabular):
     @property
     def statistics(self) -> FitStatistics:
         """χ² with its degrees of freedom, values and correlations."""
-        return calibration_statistics(self.equations, self.solution, self.weights, self.estimates)
+        return calibration_statistics(self.equations, self.solution, self.estimates)
 
     def fit_report(self) -> str:
         """Return the report of the fit, in the layout of lmfit's.
@@ -182,7 +188,7 @@ def calibrate(
     validation : Measured, optional
         Poses for the held-out error; by default every tenth of ``fit``, which is then not fitted.
     options : Options, optional
-        Effects, loss and known standard deviations.
+        Effects and known standard deviations.
     progress : callable, optional
         Called with a line of progress.
 
@@ -207,23 +213,36 @@ def calibrate(
     begin = perf_counter()
     equations = equations_of(robot, fit, options)
     refuse_unfit(equations)
-    declared, chosen = fitted_with_instruments(equations, options, progress)
+    first, weights = first_model(equations, options)
+    wrong = gross_errors(first, first.parameters.nominal, weights)
+    for _ in range(_CLEANINGS):
+        declared, chosen = fitted_with_instruments(equations.of(~wrong), options, progress)
+        own = _at(chosen.equations, fit, options)
+        before, wrong = wrong, gross_errors(own, chosen.solution.state.values, chosen.weights)
+        if np.array_equal(before, wrong):
+            break
     equations, solution, weights = chosen.equations, chosen.solution, chosen.weights
     observed = observability(equations, solution, weights)
     ratios = ratios_of(equations, solution)
     seconds = perf_counter() - begin
 
-    def held_out(own: Equations) -> Equations:
-        return replace(own, measured=validation, forces=_forces(validation, options))
-
     start = declared
     nominal, values = start.parameters.nominal, solution.state.values
-    before = errors_at(held_out(start), nominal)
+    missed = far_off(errors_at(_at(equations, validation, options), values).distance)
+    judged = validation[~missed]
+
+    def held_out(own: Equations) -> Equations:
+        return _at(own, judged, options)
+
+    errors_before = errors_at(held_out(start), nominal)
     after = errors_at(held_out(equations), values)
     lengths = (float("nan"), float("nan"))
-    if "position" not in equations.kinds and len(validation):
-        own, first = held_out(equations), equations.parameters.nominal
-        lengths = rms(cable_errors(own, first, weights)), rms(cable_errors(own, values, weights))
+    if "position" not in equations.kinds and len(judged):
+        there, initial = held_out(equations), equations.parameters.nominal
+        lengths = (
+            rms(cable_errors(there, initial, weights)),
+            rms(cable_errors(there, values, weights)),
+        )
     return Calibrated(
         equations=equations,
         solution=solution,
@@ -231,7 +250,7 @@ def calibrate(
         estimates=_estimates(equations.parameters, solution, observed),
         fit_before=errors_at(start, nominal),
         fit_after=errors_at(equations, values),
-        validation_before=before,
+        validation_before=errors_before,
         validation_after=after,
         observed=observed,
         candidates=candidates(
@@ -239,14 +258,17 @@ def calibrate(
         ),
         seconds=seconds,
         warnings=(
+            *left_out_poses(fit.place[wrong], "the fit"),
+            *left_out_poses(validation.place[missed], "the held-out error"),
             *_instrument_notes(declared, chosen),
             *_warnings(equations, solution, weights, observed, after.unfound),
-            *_worse_rotation(before, after),
+            *_worse_rotation(errors_before, after),
             *ratios.words,
         ),
         validation_lengths=lengths,
         ratios=ratios,
         unexplained=tuple(unexplained(equations, solution)),
+        gross_errors=(*fit.place[wrong].tolist(), *validation.place[missed].tolist()),
         found_instruments=chosen.free
         - (declared.instruments.free if declared.instruments else frozenset()),
     )
@@ -297,6 +319,11 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
         None if instruments.is_trivial else instruments,
         tuple(options.effects),
     )
+
+
+def _at(own: Equations, measured: Measured, options: Options) -> Equations:
+    """The equations of other poses."""
+    return replace(own, measured=measured, forces=_forces(measured, options))
 
 
 def _forces(measured: Measured, options: Options) -> CableForces:
@@ -407,8 +434,6 @@ def _warnings(
 ) -> tuple[str, ...]:
     out = [*equations.measured.notes, *_left_out(equations)]
     out += outside_bounds(equations.parameters)
-    # A robust fit has already done what would be advised.
-    out += gross_errors(equations, solution) if weights.loss == "least-squares" else []
     if unfound:
         out.append(
             f"{unfound} held-out poses were not found from their motor angles: a tension is "

@@ -16,6 +16,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.robot.calibration.cable_forces import CableForces
@@ -62,6 +63,12 @@ class Equations:
     """Of the measured poses; None where they are in the base frame, of the platform's origin."""
     effects: tuple[str, ...] = ()
     """Effects beside those of the robot's profile."""
+
+    def of(self, poses: NDArray[np.bool_]) -> Equations:
+        """The equations of some of the poses, (p,)."""
+        measured = self.measured[poses]
+        forces = replace(self.forces, tension=measured.tension)
+        return replace(self, measured=measured, forces=forces)
 
     @cached_property
     def winding(self) -> Winding:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from winchkit.robot.identification.bundle_adjustment import Loss
-
 ProgressCallback = Callable[[str], None]
 
 
@@ -16,7 +14,6 @@ class Options:
 
     effects: tuple[str, ...] = ()
     """Effects of the catalogue that are fitted beside the geometry."""
-    loss: Loss = "least-squares"
     sigma: Mapping[str, float] | None = None
     """Standard deviations by kind of equation, SI; those that are not given are estimated."""
     middle_force: float | None = None

@@ -7,24 +7,32 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.robot.calibration.equations import Equations
-from winchkit.robot.identification.bundle_adjustment import Solution
+from winchkit.robot.calibration.prediction import start_of
+from winchkit.robot.calibration.variance_components import NOISE
+from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.identification.bundle_adjustment import (
+    Solution,
+    State,
+    Weights,
+    linearise,
+    place,
+    solve,
+)
 
-_WORDS = {
-    "closure": "motor angles",
-    "position": "positions",
-    "rotation": "rotations",
-    "swivel": "swivel angles",
-    "cable_length": "cable lengths",
-}
 _LIMIT = 10.0
-"""Limit in robust standard deviations; the largest of ten thousand normal values is near four."""
+"""Misfit of a pose in that of the usual pose from which on it is a gross error; the largest of ten
+thousand poses with normal errors is near three."""
+_SUSPECT = 3.0
+"""The same for a fit to which wrong poses may have contributed, from which on they are looked for.
+"""
+_WORDS = {"swivel": "swivel angles", "cable_length": "cable lengths"}
 _NORMAL = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
-_MOST_SHARE = 0.1
-"""Readings beyond the limit that are more than a tenth are a wrong standard deviation or law, no
-gross errors (rule of thumb)."""
-_LISTED = 5
-"""Poses in the warning; the rest are counted."""
+_TRIMMED = 2 / 3
+"""Share of the poses that are fitted until it is known which are wrong: up to a third may be."""
+_ROUNDS = 10
+"""Fits of that share; each lowers the sum of its misfits, and three to five end it (rule of thumb).
+"""
 _SHARE = 0.5
 """Share of an instrument's variance that the fit has to explain: half."""
 _CAUSES = {
@@ -34,28 +42,84 @@ _CAUSES = {
 }
 
 
-def gross_errors(equations: Equations, solution: Solution) -> list[str]:
-    """One sentence per kind of measurement with gross errors.
+def gross_errors(equations: Equations, values: Array, weights: Weights) -> NDArray[np.bool_]:
+    """Poses with a reading far from what the others predict, (p,).
+
+    ``values`` (q,), ``weights``: of a fit to which wrong poses may have contributed. More than a
+    third of the poses are none: then the model is wrong, or the standard deviations.
 
     Notes
     -----
-    The scale is 1.4826 times the median of the absolute residuals, which a few gross errors do not
-    change. Above a share of 10 % the model is wrong and not the measurement: then no sentence.
+    Least trimmed squares: the fit of the two thirds of the poses that fit best, repeated with the
+    poses that fit it best until these stay the same (concentration). The misfit of a pose is the
+    root of the mean square of its residuals at the pose that fits them best, in standard deviations
+    of their prediction by the others; those of the readings are the median absolute residuals of
+    each kind. Which reading of a pose is wrong is not asked.
+
+    References
+    ----------
+    P. J. Rousseeuw and K. Van Driessen, *Computing LTS Regression for Large Data Sets*, 2006.
     """
-    out = []
-    for rows in equations.rows(solution.state):
-        if rows.kind not in _WORDS:
-            continue
-        outside, known = _outside(rows.residual)
-        if 0 < np.count_nonzero(outside) <= _MOST_SHARE * known:
-            listed = equations.measured.place[np.any(outside, axis=1)].tolist()
-            more = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
-            out.append(
-                f"gross errors in the {_WORDS[rows.kind]} of {', '.join(listed[:_LISTED])}{more}? "
-                "they are more than ten times as far off as is usual: measure them again, leave "
-                "them out, or use --loss cauchy"
-            )
-    return out
+    state = place(equations, State(values, start_of(equations, values)), weights)
+    weights = _robust_weights(equations, state)
+    state = place(equations, state, weights)
+    information = linearise(equations, state, weights).information
+    misfit = _misfit(equations, state, weights, information)
+    kept = np.ones(len(misfit), dtype=bool)
+    for _ in range(_ROUNDS if np.any(misfit > _SUSPECT * max(np.median(misfit), 1.0)) else 0):
+        before, kept = kept, misfit <= np.quantile(misfit, _TRIMMED)
+        if np.array_equal(before, kept):
+            break
+        pose = Pose(state.pose.position[kept], state.pose.rotation[kept])
+        fit = solve(equations.of(kept), State(state.values, pose), weights)
+        state = place(equations, State(fit.state.values, state.pose), weights)
+        weights = _robust_weights(equations, state)
+        state = place(equations, state, weights)
+        misfit = _misfit(equations, state, weights, fit.linear.information)
+    wrong = misfit > _LIMIT * max(np.median(misfit), 1.0)
+    return np.asarray(wrong & (np.mean(wrong) <= 1 - _TRIMMED))
+
+
+def far_off(distance: Array) -> NDArray[np.bool_]:
+    """Held-out poses whose measured position is far from the predicted one, (p,).
+
+    ``distance`` (p,): NaN where not known. As in the fit, more than a third are none.
+    """
+    known = distance[np.isfinite(distance)]
+    usual = float(np.median(known)) if len(known) else np.inf
+    wrong = distance > _LIMIT * max(usual, NOISE["position"].least)
+    return np.asarray(wrong & (np.count_nonzero(wrong) <= (1 - _TRIMMED) * len(known)))
+
+
+def left_out_poses(places: NDArray[np.str_], of: str) -> list[str]:
+    """The warning that poses were left out of the fit or of the held-out error."""
+    if not len(places):
+        return []
+    return [
+        f"gross errors: {', '.join(places.tolist())}: more than ten times as far off as is usual, "
+        f"left out of {of}; measure them again, or remove them"
+    ]
+
+
+def _robust_weights(equations: Equations, state: State) -> Weights:
+    """Standard deviations by the median absolute residual of each kind."""
+    sigma = {}
+    for kind, constraint in equations.constraints(state):
+        size = np.abs(constraint.residual)
+        known = size[np.isfinite(size)]
+        usual = _NORMAL * float(np.median(known)) if len(known) else 0.0
+        sigma[kind] = max(usual, NOISE[kind].least)
+    return Weights(sigma)
+
+
+def _misfit(equations: Equations, state: State, weights: Weights, information: Array) -> Array:
+    """Misfit of each pose, (p,), with parameters known as of an information matrix."""
+    linear = linearise(equations, state, weights)
+    free, residual = linear.pose_free, linear.stack.residual
+    spread = np.linalg.inv(information + np.eye(len(information)))
+    covariance = np.eye(residual.shape[1]) + free @ spread @ np.swapaxes(free, 1, 2)
+    square = np.sum(residual * np.linalg.solve(covariance, residual[..., None])[..., 0], axis=1)
+    return np.asarray(np.sqrt(square / np.maximum(linear.stack.known.sum(axis=1), 1)))
 
 
 def unexplained(equations: Equations, solution: Solution) -> list[str]:
@@ -95,13 +159,3 @@ def _about_mean(values: Array) -> float:
     count = np.maximum(known.sum(axis=0), 1)
     mean = np.where(known, values, 0.0).sum(axis=0) / count
     return float(np.sum(np.where(known, values - mean, 0.0) ** 2))
-
-
-def _outside(residual: Array) -> tuple[NDArray[np.bool_], int]:
-    """Mask of gross residuals (p, k), and the number of residuals."""
-    size = np.abs(residual)
-    known = np.isfinite(size)
-    if not np.any(known):
-        return known, 0
-    usual = _NORMAL * float(np.median(size[known]))
-    return known & (size > _LIMIT * usual) & (usual > 0), int(np.count_nonzero(known))

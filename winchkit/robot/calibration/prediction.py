@@ -88,9 +88,10 @@ def predicted_poses(equations: Equations, values: Array, start: Pose | None = No
     for _ in range(_ROUNDS if strained else 1):
         if (strain := equations.strain(values, start)) is not None:
             given = (slack + strain.value * dead) / (1 - strain.value)
-        found = forward(geometry, given, start, platform)
+        # Nominal numbers may be wrong by more than a robot in use: the pose that fits best.
+        found = forward(geometry, given, start, platform, tolerance=np.inf, search="outlying")
         # A search that did not converge starts again from home.
-        start = _where(found.converged.astype(bool), found.pose, equations)
+        start = _where(found.converged, found.pose, equations)
     return found.pose
 
 

@@ -61,6 +61,7 @@ def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[s
             "named": list(found.ratios.named),
             "alternatives": [list(lines) for lines in found.ratios.alternatives],
         },
+        "gross_errors": list(found.gross_errors),
         "refused": found.refusal or None,
         "warnings": list(found.warnings),
         "converged": found.solution.converged,

@@ -174,13 +174,26 @@ def fitted_with_instruments(
     return declared, _with_ratios(best, options, progress)
 
 
+def first_model(equations: Equations, options: Options) -> tuple[Equations, Weights]:
+    """The declared model at the values from which its fit starts, and its standard deviations."""
+    predicted = predicted_poses(equations, equations.parameters.nominal, equations.robot.home)
+    declared = _declared(equations, predicted)
+    return _start(declared, options)[0], Weights(_sigma(equations, options))
+
+
+def _declared(equations: Equations, predicted: Pose) -> Equations:
+    """The model that the file declares, its tracker registered."""
+    own = _instruments(equations)
+    return _registered(equations, own, own.free, predicted) if own.free else equations
+
+
 def _fitted_with_tracker(
     equations: Equations, options: Options, progress: ProgressCallback
 ) -> tuple[Equations, Fitted]:
     """Fit the declared model, or the one with the tracker that the poses require."""
     own = _instruments(equations)
     predicted = predicted_poses(equations, equations.parameters.nominal, equations.robot.home)
-    declared = _registered(equations, own, own.free, predicted) if own.free else equations
+    declared = _declared(equations, predicted)
     if "position" not in equations.kinds:
         return declared, _fitted(declared, options, progress)
     wider = [
@@ -389,8 +402,8 @@ def _fitted(
         weights = Weights({**_sigma(equations, options), **from_fit.weights.sigma})
     solution = solve(equations, state, weights, _reporter(progress, "fit"))
     for _ in range(_NOISE_ROUNDS):
-        found = replace(re_estimated_weights(solution, weights, given), loss=options.loss)
-        if found.loss == weights.loss and _settled(found.sigma, weights.sigma):
+        found = re_estimated_weights(solution, weights, given)
+        if _settled(found.sigma, weights.sigma):
             break
         weights = found
         solution = solve(equations, solution.state, weights, _reporter(progress, "refit"))

@@ -14,7 +14,7 @@ import numpy as np
 from winchkit.fit_statistics import FitStatistics, FittedParameter, correlations_of
 from winchkit.robot.calibration.equations import Equations
 from winchkit.robot.calibration.parameters import Estimated
-from winchkit.robot.identification.bundle_adjustment import Solution, Weights
+from winchkit.robot.identification.bundle_adjustment import Solution
 
 _95 = 1.959964
 """Standard deviations: 97.5 % quantile of the normal distribution, for 95 % two-sided."""
@@ -23,7 +23,6 @@ _95 = 1.959964
 def calibration_statistics(
     equations: Equations,
     solution: Solution,
-    weights: Weights,
     estimates: Mapping[str, Estimated],
 ) -> FitStatistics:
     """Statistics of a fit of poses and parameters.
@@ -50,7 +49,7 @@ def calibration_statistics(
     return FitStatistics(
         correlations=correlations_of(names, covariance),
         condition=float(np.sqrt(size[-1] / size[0])),
-        method=f"maximum a posteriori (Levenberg-Marquardt), loss {weights.loss}; standard "
+        method="maximum a posteriori (Levenberg-Marquardt); standard "
         "deviations of the measurements from the residuals",
         data=f"{len(known)} poses; equations: {kinds}; {count} priors",
         n_observations=len(residual) + count,

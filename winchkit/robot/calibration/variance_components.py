@@ -62,4 +62,4 @@ def re_estimated_weights(
             least_redundancy=_LEAST_REDUNDANCY,
             least=NOISE[kind].least,
         ).sigma
-    return Weights(sigma, weights.loss)
+    return Weights(sigma)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 
@@ -34,9 +34,6 @@ if TYPE_CHECKING:
     from winchkit.robot.calibration.pose_design import NextPose
     from winchkit.robot.cli.pose_series import PoseSeries
 
-Loss = Literal["least-squares", "huber", "cauchy"]
-
-_LOSSES: tuple[Loss, ...] = ("least-squares", "huber", "cauchy")
 _NOISE_DIMENSIONS = {
     "closure": "length",
     "position": "length",
@@ -134,7 +131,6 @@ _NOISE_DIMENSIONS = {
     "--noise", "noise", multiple=True, metavar="KIND=VALUE",
     help="A known standard deviation, e.g. position='0.02 mm'; else estimated.",
 )  # fmt: skip
-@click.option("--loss", type=click.Choice(_LOSSES), default="least-squares", show_default=True)
 @click.option(
     "--middle-force",
     metavar="FORCE",
@@ -162,7 +158,6 @@ def command(
     output: str,
     effects: Sequence[str],
     noise: Sequence[str],
-    loss: str,
     middle_force: str | None,
     following: int,
     fit_report: bool,
@@ -185,7 +180,7 @@ def command(
     from winchkit.robot.calibration.pose_design import next_poses
 
     source = find("profiles", robot)
-    options = _options(effects, noise, loss, middle_force)
+    options = _options(effects, noise, middle_force)
     if bool(runs) + bool(bench) + bool(sim) != 1:
         raise UsageError(
             "give the RUNs to fit, or --bench to drive to poses and measure them, or --sim for a "
@@ -261,14 +256,12 @@ def _source(robot: str, runs: Sequence[str]) -> str:
     return f"profile {robot}; {names}; winchkit {version('winchkit')}"
 
 
-def _options(
-    effects: Sequence[str], noise: Sequence[str], loss: str, middle_force: str | None
-) -> Options:
+def _options(effects: Sequence[str], noise: Sequence[str], middle_force: str | None) -> Options:
     from winchkit.cli.core.quantities import optional
     from winchkit.robot.calibration.options import Options
 
     middle = optional(middle_force, "force")
-    return Options(tuple(effects), _loss(loss), _noise(noise), middle)
+    return Options(tuple(effects), _noise(noise), middle)
 
 
 def _calibrated(
@@ -300,10 +293,6 @@ def _tell(found: Calibrated, ahead: Sequence[NextPose], as_json: bool) -> None:
     for warning in found.warnings:
         click.echo(f"{warning} (warning)", err=True)
     echo_json(calibration_json(found, ahead))
-
-
-def _loss(name: str) -> Loss:
-    return next(loss for loss in _LOSSES if loss == name)
 
 
 def _noise(given: Sequence[str]) -> Mapping[str, float]:

@@ -159,7 +159,13 @@ def _predicted(dataset: RobotDataset, robot: Robot) -> Pose:
     if len(robot.names) < PLATFORM_DOF and not robot.platform.mass > 0:
         nothing = np.full((len(measured), 3), np.nan)
         return Pose(nothing, np.full((len(measured), 3, 3), np.nan))
-    return robot.poses_at(measured.motor_angle, tension=tension, temperature=warm).pose
+    return robot.poses_at(
+        measured.motor_angle,
+        tension=tension,
+        temperature=warm,
+        tolerance=np.inf,
+        search="outlying",
+    ).pose
 
 
 def _error(tracker: Tracker, pose: Pose, seen: Array) -> float:

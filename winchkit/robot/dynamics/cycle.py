@@ -13,6 +13,7 @@ import numpy as np
 
 from winchkit.errors import UsageError
 from winchkit.robot.dynamics.kernels import PLAIN, RobotKernels
+from winchkit.robot.geometry.forward import AGREEMENT
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot, cables_of
 
@@ -100,6 +101,9 @@ class RobotCycle:
     def pose_at(self, lengths: Any) -> Any | None:
         """Forward kinematics from the last pose.
 
+        The time is bounded, so that nothing is searched from other starts: begin at
+        :meth:`start_from` the pose of ``robot.poses_at``, also after None.
+
         Parameters
         ----------
         lengths : (n,) sequence
@@ -108,8 +112,9 @@ class RobotCycle:
         Returns
         -------
         (12,) sequence or None
-            As of :func:`flat_pose`; None where the iteration does not converge, which keeps the
-            last pose.
+            As of :func:`flat_pose`; None where the iteration ends at no pose that meets every
+            length to 20 mm, or to 10 nm after a step of more than 0.1 m or rad. The last pose is
+            then kept.
 
         Raises
         ------
@@ -122,7 +127,8 @@ class RobotCycle:
                 "winchkit.robot.geometry.forward"
             )
         pose = self._pose.copy()
-        if self._find(self._lines, lengths, pose, self._work, _TOLERANCE, _STEPS) < 0:
+        lines, work = self._lines, self._work
+        if self._find(lines, lengths, pose, work, _TOLERANCE, AGREEMENT, _STEPS) < 0:
             return None
         self._pose = pose
         return pose

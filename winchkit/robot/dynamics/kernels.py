@@ -32,7 +32,8 @@ class RobotKernels:
     motors: Function
     """Lines, pose, strains → fills lengths (n) and motor angles (n)."""
     find: Function
-    """Lines, lengths, pose, work, tolerance, most steps → moves the pose; steps taken, or −1."""
+    """Lines, lengths, pose, work, last step, residual, most steps → moves the pose; steps taken, or
+    −1."""
     forces: Function
     """Lines, pose, initial forces, wrench, work → fills forces (n); false where singular."""
     wrench: Function
@@ -115,7 +116,7 @@ def _warm_up(kernels: RobotKernels) -> None:
     kernels.wrench(kernels.array([0.0] * 10), pose, some, some, kernels.array([0.0] * 6))
     rates = kernels.array([0.0] * 6)
     kernels.winches(lines, work[0], some, some, some, some, 1.0, rates, out, out)
-    kernels.find(lines, out, pose, work, 1e-9, 1)
+    kernels.find(lines, out, pose, work, 1e-9, 1.0, 1)
 
 
 def fastest() -> RobotKernels:

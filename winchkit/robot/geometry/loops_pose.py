@@ -14,6 +14,11 @@ _LONGEST = 0.5
 """m and rad: over a longer step the linear form of the lengths does not hold in a robot of some
 metres (rule of thumb)."""
 
+_NEAR, _EXACT = 0.1, 1e-8
+"""Step, m and rad, above which the iteration began far from the pose and may end in a local minimum
+of the residuals (rule of thumb: a platform moves millimetres in a cycle), and residual of a
+solution, m: a hundred times what is left by rounding."""
+
 
 def normal(rows: Any, values: Any, width: int, system: Any) -> None:
     """GᵀG, its lower half by rows, then Gᵀ v, with one of the ``values`` every ``width``.
@@ -156,12 +161,18 @@ def straighten(pose: Any) -> None:
 def find_loop(
     cables: Function, normal: Function, solve: Function, turn: Function, straighten: Function
 ) -> Function:
-    """Loop of Gauss and Newton's method; moves the given pose, returns its steps, or −1."""
+    """Loop of Gauss and Newton's method; moves the given pose.
+
+    Returns the number of steps; −1 where they are more than ``most``, or where a length differs by
+    more than ``met`` before a last step below ``tolerance``. From far away all lengths have to be
+    met exactly.
+    """
 
     def find(  # noqa: PLR0917 - numba takes no keywords
-        lines: Any, given: Any, pose: Any, work: Any, tolerance: float, most: int
+        lines: Any, given: Any, pose: Any, work: Any, tolerance: float, met: float, most: int
     ) -> int:
         rows, system = work
+        limit, last = met, tolerance
         for step in range(1, most + 1):
             cables(lines, pose, rows)
             for i in range(len(lines)):
@@ -172,11 +183,16 @@ def find_loop(
             moved = 0.0
             for k in range(36, 42):
                 moved += system[k] * system[k]
+            if moved > _NEAR * _NEAR:
+                limit = last = _EXACT
             if moved > _LONGEST * _LONGEST:
                 for k in range(36, 42):
                     system[k] *= _LONGEST / sqrt(moved)
             turn(pose, system)
-            if moved <= tolerance * tolerance:
+            if moved <= last * last:
+                for i in range(len(lines)):
+                    if not abs(rows[7 * i]) <= limit:
+                        return -1
                 straighten(pose)
                 return step
         return -1

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from winchkit.errors import UsageError
 from winchkit.model.drum import Archimedean, Drum, Grooved, Spiral, Squared, drum_of
 from winchkit.model.line import Line
 from winchkit.model.stages import ROBOT_STAGES, At, LinePlace, Modifier, Stage
-from winchkit.robot.geometry.forward import Found, forward
+from winchkit.robot.geometry.forward import AGREEMENT, RESOLUTION, Found, forward
 from winchkit.robot.geometry.kinematics import (
     Geometry,
     Pose,
@@ -206,6 +207,9 @@ class Robot:
         start: Pose | None = None,
         tension: Array | float = 0.0,
         temperature: Array | float = 20.0,
+        *,
+        tolerance: float = AGREEMENT,
+        search: float | Literal["outlying"] = RESOLUTION,
     ) -> Found:
         """Forward kinematics of motor angles (p, n), rad, from ``start``, else from home.
 
@@ -219,6 +223,8 @@ class Robot:
             Cable forces, N.
         temperature : float, (n,) or (p, n) array
             Of the cables, degrees Celsius.
+        tolerance, search : float
+            As of :func:`winchkit.robot.geometry.forward.forward`.
 
         Returns
         -------
@@ -226,7 +232,14 @@ class Robot:
             Poses, and which of them have converged.
         """
         given = self.lengths_at(motor_angles, tension, temperature)
-        return forward(self.geometry, given, start or self.home, self.platform)
+        return forward(
+            self.geometry,
+            given,
+            start or self.home,
+            self.platform,
+            tolerance=tolerance,
+            search=search,
+        )
 
 
 def robot_of(

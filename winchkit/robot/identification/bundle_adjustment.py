@@ -1,4 +1,4 @@
-"""Levenberg-Marquardt fit of all poses and parameters, with priors, bounds and robust loss.
+"""Levenberg-Marquardt fit of all poses and parameters, with priors and bounds.
 
 With whitened residuals r, their derivatives A by pose (p blocks of 6 columns) and B by parameters
 in standard deviations of their priors, the normal equations are
@@ -13,15 +13,14 @@ the number of parameters per pose.
 
 References
 ----------
-B. Triggs et al., *Bundle Adjustment – A Modern Synthesis*, 2000. P. J. Huber, *Robust Statistics*,
-1981 (weights of the losses as iteratively reweighted least squares).
+B. Triggs et al., *Bundle Adjustment – A Modern Synthesis*, 2000.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,12 +35,9 @@ from winchkit.robot.geometry.pose_estimation import (
 )
 
 Mask = NDArray[np.bool_]
-Loss = Literal["least-squares", "huber", "cauchy"]
 Progress = Callable[[int, float], None]
 """Called with a step's number and the cost after it."""
 
-_HUBER, _CAUCHY = 1.345, 2.385
-"""Scales of the losses in standard deviations, of 95 % efficiency for normal residuals."""
 _STEPS = 60
 """Rule of thumb: about ten from a start within the priors, and each rejected step counts too."""
 _DONE = 1e-3
@@ -109,15 +105,14 @@ class Equations(Protocol):
 
 @dataclass(frozen=True)
 class Weights:
-    """Standard deviation of each kind of equation, and the loss."""
+    """Standard deviation of each kind of equation."""
 
     sigma: Mapping[str, float]
-    loss: Loss = "least-squares"
 
 
 @dataclass(frozen=True)
 class Stack:
-    """Equations of all kinds beside each other, whitened and weighted by the loss."""
+    """Equations of all kinds beside each other, whitened."""
 
     kinds: dict[str, slice]
     known: Mask
@@ -249,21 +244,13 @@ def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
     known = np.isfinite(residual) & np.all(np.isfinite(by_pose), axis=2)
     if not np.all(known):
         residual[~known], by_pose[~known], by_values[~known] = 0.0, 0.0, 0.0
-    loss, weight = _loss(residual, weights.loss)
     prior = np.divide(
         state.values - equations.parameters.nominal,
         scale,
         out=np.zeros_like(scale),
         where=scale > 0,
     )
-    cost = 0.5 * (float(np.sum(loss)) + float(prior @ prior))
-    if weights.loss != "least-squares":
-        root = np.sqrt(weight)
-        residual, by_pose, by_values = (
-            residual * root,
-            by_pose * root[..., None],
-            by_values * root[..., None],
-        )
+    cost = 0.5 * (float(np.sum(residual**2)) + float(prior @ prior))
     return _reduced(cost, prior, Stack(kinds, known, residual, by_pose, by_values))
 
 
@@ -322,20 +309,6 @@ def _bounded_step(
     values = state.values + scale * change
     values[held < 0], values[held > 0] = low[held < 0], high[held > 0]
     return values, held
-
-
-def _loss(residual: Array, loss: Loss) -> tuple[Array, Array]:
-    """ρ(r) and the weight ρ'(r)/2r of whitened residuals."""
-    square = residual**2
-    if loss == "huber":
-        size = np.abs(residual)
-        far = size > _HUBER
-        weight = np.where(far, _HUBER / np.where(far, size, 1.0), 1.0)
-        return np.where(far, 2 * _HUBER * size - _HUBER**2, square), weight
-    if loss == "cauchy":
-        ratio = square / _CAUCHY**2
-        return _CAUCHY**2 * np.log1p(ratio), 1 / (1 + ratio)
-    return square, np.ones_like(square)
 
 
 def leverage(linear: Linear) -> Array:

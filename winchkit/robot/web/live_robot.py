@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from winchkit.robot.bench.wiring import robot_of_bench
+from winchkit.robot.geometry.forward import RESOLUTION
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.web.robot import pose_picture
 from winchkit.schema.bench import BenchSpec
 
-_AGREE = 0.02
-"""Largest difference between a cable length by its drum and by the geometry, m, of
-``winchkit.robot.bench.platform``."""
+_PAUSE = 20
+"""Pictures after a search in vain until the next one: a search takes up to 0.1 s of the process
+that also controls, and the page asks several times a second."""
 
 
 class LiveRobot:
@@ -25,6 +26,7 @@ class LiveRobot:
         assert robot is not None, "the caller has looked"
         self._robot = robot
         self._last: Pose | None = None
+        self._pause = 0
 
     def picture(self, status: Mapping[str, Any]) -> dict[str, Any] | None:
         """Pose and cables at a status; None where a motor angle is not known or fits no pose.
@@ -39,9 +41,13 @@ class LiveRobot:
         if not np.isfinite(angles).all():
             return None
         forces = tension if np.isfinite(tension).all() else 0.0
-        found = self._robot.poses_at(angles[None, :], self._last, forces)
-        if not found.converged[0] or np.max(np.abs(found.residual[0])) > _AGREE:
+        search = self._last is None and self._pause == 0
+        found = self._robot.poses_at(
+            angles[None, :], self._last, forces, search=RESOLUTION if search else np.inf
+        )
+        if not found.converged[0] or (self._last is None and not search):
             self._last = None
+            self._pause = _PAUSE if search else max(self._pause - 1, 0)
             return None
         self._last = found.pose
         source = "measured" if np.isfinite(tension).all() else "none"

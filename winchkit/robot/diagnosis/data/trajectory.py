@@ -131,7 +131,8 @@ def trajectory_of(samples: Samples, profile: RobotProfile) -> tuple[Measured, Tr
             continue
         time = averaged(samples.time[:, None], kept)[:, 0]
         angle = averaged(_bridged(rows.motor_angle), kept)
-        found = robot.poses_at(angle)
+        # The profile may be wrong by more than a robot in use: the pose that fits best.
+        found = robot.poses_at(angle, tolerance=np.inf, search="outlying")
         missed = len(kept) - int(np.count_nonzero(found.converged))
         if missed:
             message = (
