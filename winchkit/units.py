@@ -39,6 +39,8 @@ UNITS: dict[str, dict[str, float]] = {
     "rotational stiffness": {"N m/rad": 1.0, "mN m/rad": 1e-3, "N m/deg": 1 / _DEG},
     "force per torque": {"N/(N m)": 1.0},
     "torque per current": {"N m/A": 1.0, "mN m/A": 1e-3},
+    "force per current": {"N/A": 1.0, "mN/A": 1e-3},
+    "angular frequency": {"rad/m": 1.0, "rad/mm": 1e3},
     "force per temperature": {"N/K": 1.0, "mN/K": 1e-3},
     "expansion": {"1/K": 1.0, "1/degC": 1.0},
     "torque constant": {"N m/A": 1.0, "mN m/A": 1e-3},

@@ -22,8 +22,8 @@ folder = Path(os.environ["WINCHKIT_EMPS"])
 # ## The raw file
 #
 # The authors' file has the time `t`, the position `qm` in m, and the voltage `vir` of the
-# amplifier; `gtau` is its force per volt. The axis is linear: with a radius of 1 m its position in
-# m is an angle in rad, and its force in N a torque in N m. A table with units becomes a run.
+# amplifier; `gtau` is its force per volt. A table with units becomes a run of a linear axis, with a
+# position and a force.
 
 # %%
 if (folder / "DATA_EMPS.mat").is_file():
@@ -33,13 +33,15 @@ if (folder / "DATA_EMPS.mat").is_file():
         if name[0] != "_"
     }
     table = pd.DataFrame(
-        {"time": raw["t"], "motor_angle": raw["qm"], "motor_torque": raw["vir"] * raw["gtau"]}
-    )
-    run = run_of(
-        table, units={"time": "s", "motor_angle": "rad", "motor_torque": "N m"}, name="emps"
+        {"time": raw["t"], "position": raw["qm"], "force": raw["vir"] * raw["gtau"]}
     )
 else:
-    run = read_run(folder / "train.csv")
+    # There the same numbers are called an angle and a torque.
+    own = read_run(folder / "train.csv")
+    table = pd.DataFrame(
+        {"time": own.time, "position": own["motor_angle"], "force": own["motor_torque"]}
+    )
+run = run_of(table, units={"time": "s", "position": "m", "force": "N"}, name="emps")
 run
 
 # %%
@@ -58,21 +60,16 @@ source.write_text(
     """\
 schema = 1
 kind = "axis"
+motion = "linear"
 name = "emps"
-
-[gearbox]
-ratio = 1
-
-[reference]
-motor_angle = "0 rad"
 
 [[effect]]
 id = "rotor-inertia"
-inertia = "95.11 kg m^2"
+mass = "95.11 kg"
 
 [[effect]]
 id = "motor-viscous"
-viscosity = "203.5 N m s"
+viscosity = "203.5 N s/m"
 """
 )
 profile = read_profile(source)
@@ -114,11 +111,11 @@ after = compare([run], read_profile(better))
 after
 
 # %%
-friction = addition.added[1]["torque"]
+friction = addition.added[1]["force"]
 print(f"Coulomb friction {friction.value:.1f} ± {friction.std:.1f} N; published: 20.4 N")
 
 # %%
 named = {effect for step in answer.diagnosis.steps for effect in step.effects}
 assert named & {"motor-coulomb", "motor-stribeck"}
 assert abs(friction.value / 20.4 - 1) < 0.15
-assert after.outputs["motor_torque"].rms < 0.6 * comparison.outputs["motor_torque"].rms
+assert after.outputs["force"].rms < 0.6 * comparison.outputs["force"].rms

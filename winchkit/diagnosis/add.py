@@ -8,6 +8,7 @@ from typing import Any
 
 from winchkit.arguments import require_types
 from winchkit.diagnosis.data.dataset import Dataset, prepare
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.exclusion import without_impacts
@@ -28,6 +29,7 @@ from winchkit.diagnosis.verdict.profile_values import file_model
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.empirical import EMPIRICAL, placed, variable_of
+from winchkit.effects.linear_axis import catalogue_of
 from winchkit.effects.term import Term
 from winchkit.effects.transition import with_transitions
 from winchkit.errors import UsageError
@@ -177,6 +179,7 @@ def fitted_addition_to(
     effect_id: str, dataset: Dataset, catalogue: Catalogue
 ) -> FittedWinchAddition:
     """The same as :func:`fitted_addition` on a prepared data set, as that of a diagnosis."""
+    catalogue = catalogue_of(dataset.profile, catalogue)
     effect = catalogue[effect_id]
     if not effect.repeatable and any(t.id == effect.id for t in dataset.profile.effect):
         return _refitted(effect_id, dataset, catalogue)
@@ -209,8 +212,9 @@ def fitted_addition_to(
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     outputs = output_fits(engine, before, (best.fit, best.noise))
     terms = tuple(estimates(engine.regression, best.fit, spread))
+    addition = Addition(outputs, terms, _notes(engine, best))
     return FittedWinchAddition(
-        engine.regression, Addition(outputs, terms, _notes(engine, best)), before[0], best.fit
+        engine.regression, in_units_of(dataset.profile, addition), before[0], best.fit
     )
 
 
@@ -234,6 +238,7 @@ def _refitted(effect_id: str, dataset: Dataset, catalogue: Catalogue) -> FittedW
         key=lambda pair: pair[0].effect.id == effect_id,
     )
     addition = Addition(outputs, tuple(terms), _notes(engine, best))
+    addition = in_units_of(dataset.profile, addition)
     return FittedWinchAddition(engine.regression, addition, before, best.fit)
 
 
@@ -337,8 +342,9 @@ def remove(
     if (by_wing := of_wing("remove", profile, band)) is not None:
         found: Removal = by_wing(effect_id, runs, profile, catalogue)
         return found
-    profile, catalogue = require_winch(profile), catalogue or load_catalogue()
+    profile = require_winch(profile)
     dataset = prepare(runs, profile, band, decimate=True, catalogue=catalogue)
+    catalogue = catalogue_of(profile, catalogue or load_catalogue())
 
     def fitted_on(runs: Dataset) -> tuple[TimeSeriesSelection, Fit, Noise]:
         engine = selection_engine(runs, catalogue)
@@ -357,7 +363,7 @@ def remove(
     outputs = output_fits(engine, (initial_model, noise), (best.fit, noise))
     spread = spread_of(engine.regression, best.fit, best.noise, engine.regression.blocks)
     left = tuple(estimates(engine.regression, best.fit, spread))
-    return Removal(effect_id, outputs, left, _notes(engine, best))
+    return in_units_of(profile, Removal(effect_id, outputs, left, _notes(engine, best)))
 
 
 def _notes(engine: TimeSeriesSelection, best: Reweighted) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.data.spectrum import WHOLE_TRANSITION
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
 from winchkit.diagnosis.regression.base import Regression
 from winchkit.diagnosis.regression.gls import evaluated
@@ -150,7 +151,7 @@ def compared(
         caveats=dataset.caveats,
         traces=traces_of(regression, residual),
     )
-    return WinchCompared(regression, comparison, residual)
+    return WinchCompared(regression, in_units_of(profile, comparison), residual)
 
 
 def initial_residual(catalogue: Catalogue, regression: TimeSeriesRegression) -> Array:

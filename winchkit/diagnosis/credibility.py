@@ -50,6 +50,8 @@ def short_travel(regression: Regression, fit: Fit, index: int) -> str | None:
     effect = fit.hypothesis.terms[index].effect
     if not isinstance(regression, TimeSeriesRegression) or effect.variable != "drum_angle":
         return None
+    if regression.dataset.profile.is_linear:  # a position has no turn
+        return None
     travel = max(float(np.ptp(motion.drum_angle)) for motion in regression.motions)
     if travel >= _LEAST_TRAVEL:
         return None

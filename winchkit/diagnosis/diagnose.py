@@ -11,6 +11,7 @@ from winchkit.diagnosis.data.sanity import caveats
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
@@ -61,6 +62,7 @@ from winchkit.diagnosis.verdict.laws import with_first_members
 from winchkit.diagnosis.verdict.open_law import better_curve, predictable_share
 from winchkit.diagnosis.verdict.profile_values import file_model, refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.linear_axis import catalogue_of
 from winchkit.effects.term import Term
 from winchkit.rendering import Plotted
 from winchkit.runs.run import Run
@@ -237,6 +239,7 @@ def diagnose_prepared(
 ) -> WinchAnswer:
     """The same as :func:`diagnose` on a prepared data set."""
     progress("computing the signatures of the candidates", 0.1)
+    catalogue = catalogue_of(dataset.profile, catalogue)
     engine = selection_engine(dataset, catalogue)
     if caveats(dataset.sanity) and not as_recorded:
         return _unsearched(engine)
@@ -253,7 +256,7 @@ def diagnose_prepared(
 
 def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> WinchAnswer:
     """Errors of the profile and scores of the candidates, without a verdict."""
-    before = start.initial_model, start.initial_noise
+    before, dataset = (start.initial_model, start.initial_noise), engine.regression.dataset
     diagnosis = Diagnosis(
         verdict="unknown",
         outputs=output_fits(engine, before, before),
@@ -263,15 +266,15 @@ def _known_at_interrupt(engine: TimeSeriesSelection, start: SelectionResult) -> 
         unexplained_share=float("nan"),
         where=(),
         next_runs=(),
-        notes=engine.regression.dataset.notes,
-        sanity=engine.regression.dataset.sanity,
-        used_share=engine.regression.dataset.used_share,
-        removed=engine.regression.dataset.removed,
-        caveats=engine.regression.dataset.caveats,
+        notes=dataset.notes,
+        sanity=dataset.sanity,
+        used_share=dataset.used_share,
+        removed=dataset.removed,
+        caveats=dataset.caveats,
         interrupted=True,
         traces=_traces(engine, start, named=False),
     )
-    return WinchAnswer(engine, start, diagnosis)
+    return WinchAnswer(engine, start, in_units_of(dataset.profile, diagnosis))
 
 
 def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
@@ -294,7 +297,7 @@ def _unsearched(engine: TimeSeriesSelection) -> WinchAnswer:
         caveats=dataset.caveats,
         traces=_traces(engine, result, named=False),
     )
-    return WinchAnswer(engine, result, diagnosis)
+    return WinchAnswer(engine, result, in_units_of(dataset.profile, diagnosis))
 
 
 def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothesis) -> WinchAnswer:
@@ -366,7 +369,7 @@ def _answer(engine: TimeSeriesSelection, result: SelectionResult, file: Hypothes
         traces=_traces(engine, found, named=bool(steps)),
         run_offsets=run_offsets(regression, final, spread),
     )
-    return WinchAnswer(engine, found, diagnosis, sets, pairs)
+    return WinchAnswer(engine, found, in_units_of(dataset.profile, diagnosis), sets, pairs)
 
 
 def _steps(

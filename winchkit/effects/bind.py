@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.linear_axis import catalogue_of
 from winchkit.effects.term import Term, modifiers_of
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.line import Line
@@ -78,6 +79,7 @@ def check_profile(profile: WinchProfile, catalogue: Catalogue | None = None) -> 
 
 
 def _bind(profile: WinchProfile, catalogue: Catalogue) -> tuple[list[Term], list[Fault]]:
+    catalogue = catalogue_of(profile, catalogue)
     terms = [_shorthand(catalogue[effect_id], values) for effect_id, values in _short(profile)]
     faults: list[Fault] = []
     for table in profile.effect:

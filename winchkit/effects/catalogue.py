@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache, cached_property
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -34,10 +34,14 @@ class Catalogue:
     """
 
     def __init__(
-        self, effects: Iterable[Effect], of_wings: Callable[[], Sequence[Effect]] = tuple
+        self,
+        effects: Iterable[Effect],
+        of_wings: Callable[[], Sequence[Effect]] = tuple,
+        empirical: Mapping[str, Effect] = EMPIRICAL,
     ) -> None:
         self._of_winches = {effect.id: effect for effect in effects}
         self._of_wings = of_wings
+        self._empirical = empirical
 
     @cached_property
     def _by_id(self) -> dict[str, Effect]:
@@ -59,10 +63,15 @@ class Catalogue:
         return len(self._by_id)
 
     def __contains__(self, effect_id: object) -> bool:
-        return effect_id in {**self._of_winches, **EMPIRICAL} or effect_id in self._by_id
+        return effect_id in {**self._of_winches, **self._empirical} or effect_id in self._by_id
+
+    def mapped(self, change: Callable[[Effect], Effect]) -> Catalogue:
+        """The effects of winches, each changed; the empirical ones too."""
+        empirical = {effect_id: change(effect) for effect_id, effect in self._empirical.items()}
+        return Catalogue(map(change, self.of_winches()), empirical=empirical)
 
     def __getitem__(self, effect_id: str) -> Effect:
-        found = self._of_winches.get(effect_id) or EMPIRICAL.get(effect_id)
+        found = self._of_winches.get(effect_id) or self._empirical.get(effect_id)
         found = found or self._by_id.get(effect_id)
         if found is None:
             raise UsageError(

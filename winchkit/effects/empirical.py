@@ -15,6 +15,7 @@ from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Need, Output, Parameter, Values, order_per_turn
 from winchkit.model.stages import At, Stage
 from winchkit.model.variables import ANGLES, COMPOUND, VARIABLE_UNITS, VARIABLES
+from winchkit.schema.linear_axis import rotary_name
 
 KNOTS = 9
 """Knots of a curve over one variable; twice as many over two variables."""
@@ -38,10 +39,11 @@ _NEEDS: Mapping[str, tuple[Need, ...]] = {
 def empirical_id(output: str, variable: str) -> str:
     """Id of the curve of an output over a variable.
 
-    ``output``: ``cable_length``, ``tension`` or ``motor_torque``. Returns:
+    ``output``: ``cable_length``, ``tension`` or ``motor_torque``; also the names on a linear axis.
+    Returns:
     ``empirical-OUTPUT-VARIABLE`` with hyphens.
     """
-    return f"empirical-{output}-{variable}".replace("_", "-")
+    return f"empirical-{rotary_name(output)}-{rotary_name(variable)}".replace("_", "-")
 
 
 def variable_of(effect: Effect) -> str:

@@ -15,6 +15,7 @@ __all__ = [
     "OUTPUTS",
     "OUTPUT_UNITS",
     "PARTS",
+    "RESULT_UNITS",
     "ROBOT_STAGES",
     "At",
     "LinePlace",
@@ -29,6 +30,8 @@ __all__ = [
 OUTPUT_UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 """Outputs of a winch model, in the order of reports, with their SI units."""
 OUTPUTS = tuple(OUTPUT_UNITS)
+RESULT_UNITS = {**OUTPUT_UNITS, "force": "N"}
+"""The same of results, in which a linear axis has a force in place of the motor torque."""
 
 
 class Stage(IntEnum):

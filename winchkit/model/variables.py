@@ -56,6 +56,7 @@ rest: friction at one position of the stroke is a curve over it.
 VARIABLE_UNITS: Mapping[str, str] = {
     "drum_angle": "rad",
     "motor_angle": "rad",
+    "position": "m",
     "speed": "m/s",
     "direction": "1",
     "cable_length": "m",

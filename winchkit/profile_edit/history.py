@@ -9,12 +9,12 @@ from typing import Any
 
 from winchkit.arguments import require_type
 from winchkit.errors import FileError
-from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.model.stages import RESULT_UNITS
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import LedgerEntry, WinchProfile
 from winchkit.units import dimension_of, parse
 
-LADDER_UNITS: Mapping[str, str] = {**OUTPUT_UNITS, "platform_position": "m"}
+LADDER_UNITS: Mapping[str, str] = {**RESULT_UNITS, "platform_position": "m"}
 """Outputs of winches and robots, in the order of reports, with their SI units."""
 
 

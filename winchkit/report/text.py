@@ -10,6 +10,7 @@ from winchkit import wings
 from winchkit.diagnosis.data.sanity import ALARMING
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Comparison, Diagnosis, OutputFit, RunOffset
 from winchkit.effects.card import sparkline
@@ -103,7 +104,10 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
     lines = [line for block in blocks if block for line in (*block, "")][:-1]
     if len(lines) > _MOST_LINES and not verbose:
         lines = [*lines[: _MOST_LINES - 1], "… more with --verbose"]
-    return "\n".join(lines)
+    text = "\n".join(lines)
+    if not isinstance(answer, WinchAnswer):
+        return text
+    return in_units_of(answer.engine.regression.dataset.profile, text)
 
 
 def _limits(answer: Answer) -> list[str]:

@@ -98,7 +98,8 @@ def _header_faults(recording: Recording, names: list[str]) -> Iterator[Fault]:
     # Of a cell alone, a run of readings without motion: its health, or its static calibration.
     kinds = {name.rpartition(".")[2] for name in names}
     is_misspelt = any(near_miss(name) == "motor_angle" for name in kinds)
-    if "motor_angle" not in kinds and (is_misspelt or kinds.isdisjoint({"tension", "load"})):
+    moves = not kinds.isdisjoint({"motor_angle", "position"})
+    if not moves and (is_misspelt or kinds.isdisjoint({"tension", "load"})):
         yield _missing("motor_angle [rad]", names, recording)
     rows, needed = recording.rows, 0 if recording.is_part else 1 if is_poses else 2
     if rows < needed:

@@ -29,8 +29,11 @@ CHANNEL_DIMENSIONS: dict[str, str] = {
     "cable_length_gross": "length",
     "temperature": "temperature",
     "swivel": "angle",
+    "position": "length",
+    "velocity": "speed",
+    "force": "force",
 }
-"""Dimension of every channel of a winch that the model uses."""
+"""Dimension of every channel that the model uses, of a winch or of a linear axis."""
 
 
 _GAP = 2.5

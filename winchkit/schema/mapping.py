@@ -29,6 +29,7 @@ _OF_A_WINCH = {
     **dict.fromkeys(("tension", "tension_gross", "load", "load_gross"), "force"),
     **{"cable_length": "length", "cable_length_gross": "length"},
     **{"temperature": "temperature", "swivel": "angle"},
+    **{"position": "length", "velocity": "speed", "force": "force"},
 }
 CHANNELS: dict[str, str] = {
     "time": "time",
@@ -130,6 +131,8 @@ class MappedLog(Table):
     """Rate of the rows where the file has no times, or none to be used."""
     axis: str = ""
     """Column that names the axis of each row; empty where a row is of all axes."""
+    kind: str = ""
+    """Column that names the kind of each row, where rows have different quantities."""
 
     def rules(self) -> Iterator[Rule]:
         """Every channel has one column."""

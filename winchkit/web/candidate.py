@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.diagnosis.results import Estimate
@@ -37,26 +38,30 @@ def candidate_card(state: State, effect_id: str) -> dict[str, Any]:
     equal = next((step.effects for step in answer.diagnosis.steps if effect_id in step.effects), ())
     out = card(answer, item.candidate.effect, values, [e for e in equal if e != effect_id])
     drawn = _most_changed(state, item.candidate.effect.outputs, change)
+    profile = engine.regression.dataset.profile
     if drawn is not None:
-        output, own_change = drawn
+        output, own_change = in_units_of(profile, drawn)
         curves = state.curves[output]
         found = curves.main_variable(own_change) or state.order_of(output)
         variable, periods = found or (next(iter(curves.shares)), None)
         out["signature"] = curves.signature(own_change, variable, periods)
         out["signature"]["variable"] = variable
-    return out
+    return in_units_of(profile, out)
 
 
 def _most_changed(state: State, outputs: Sequence[str], change: Array) -> tuple[str, Array] | None:
     """Output that a candidate changes most against its noise, and the change in time."""
-    traces = traces_of(state.diagnosed.engine.regression, change)
+    regression = state.diagnosed.engine.regression
+    traces = traces_of(regression, change)
     best: tuple[float, str, Array] | None = None
     for name in outputs:
         parts = [trace.residual for trace in traces if trace.output == name]
         if not parts:
             continue
         own = np.concatenate(parts)
-        size = float(np.sqrt(np.nanmean(own**2))) / (state.curves[name].noise or 1.0)
+        size = float(np.sqrt(np.nanmean(own**2))) / (
+            state.curves[in_units_of(regression.dataset.profile, name)].noise or 1.0
+        )
         if best is None or size > best[0]:
             best = size, name, own
     return None if best is None else best[1:]

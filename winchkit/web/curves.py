@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Recording
 from winchkit.diagnosis.data.harmonics import half_of_samples_per_turn, strongest_harmonic
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import (
     Attribution,
@@ -24,7 +25,7 @@ from winchkit.diagnosis.residuals.attribution import (
     variables_of,
 )
 from winchkit.diagnosis.residuals.traces import traces_of
-from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.model.stages import RESULT_UNITS
 from winchkit.model.variables import ANGLES
 from winchkit.plain_json import significant
 from winchkit.quantity_text import Scale, scale_for
@@ -74,7 +75,7 @@ class OutputCurves:
     @property
     def scale(self) -> Scale:
         """Unit of the residual."""
-        return scale_for(3 * self.sizes[1], OUTPUT_UNITS[self.output])
+        return scale_for(3 * self.sizes[1], RESULT_UNITS[self.output])
 
     def in_units_of(self, other: OutputCurves) -> OutputCurves:
         """The same curves in the units that suit the larger of the two."""
@@ -92,7 +93,7 @@ class OutputCurves:
         drawn = lines if self.is_compared else lines[:1]
         shown = decimated(drawn, max(points, 16) // (2 * len(drawn)))
         x, reduced = self.time[part][shown], [values[shown] for values in lines]
-        whole = scale_for(self.sizes[0], OUTPUT_UNITS[self.output])
+        whole = scale_for(self.sizes[0], RESULT_UNITS[self.output])
         measured, predicted = (values / whole.worth for values in reduced[:2])
         return {
             "output": self.output,
@@ -214,7 +215,7 @@ def curves_of(
     ``residual`` (rows,). ``noise``: rms of the noise by output, SI. Returns: by output, in the
     order of the data set.
     """
-    recordings = regression.dataset.recordings
+    recordings, profile = regression.dataset.recordings, regression.dataset.profile
     traces = traces_of(regression, residual)
     out: dict[str, OutputCurves] = {}
     for output in regression.dataset.outputs:
@@ -228,16 +229,17 @@ def curves_of(
         error = np.concatenate([trace.residual for trace in own])
         good, kept = np.isfinite(error), kept_rows(regression, output)
         shares = {name: binned_share(variables[name][good], error[good], kept) for name in names}
-        out[output] = OutputCurves(
-            output,
+        name = in_units_of(profile, output)
+        out[name] = OutputCurves(
+            name,
             np.concatenate([at + trace.time for at, trace in zip(starts, own, strict=True)]),
             measured,
             np.concatenate([trace.predicted for trace in own]),
             error,
             tuple((at, _label(run)) for at, run in zip(starts, runs, strict=True)),
-            noise.get(output),
-            variables,
-            dict(sorted(shares.items(), key=lambda item: -item[1])),
+            noise.get(name),
+            in_units_of(profile, variables),
+            in_units_of(profile, dict(sorted(shares.items(), key=lambda item: -item[1]))),
             (_largest(measured), float(np.sqrt(np.mean(error[good] ** 2))) if good.any() else 0.0),
         )
     return out
@@ -246,7 +248,7 @@ def curves_of(
 def recorded_curves(runs: Sequence[Run]) -> dict[str, OutputCurves]:
     """Outputs of runs as they were recorded, before they are compared."""
     out: dict[str, OutputCurves] = {}
-    for output in OUTPUT_UNITS:
+    for output in RESULT_UNITS:
         own = [run for run in runs if output in run and len(run.time) > 1]
         if not own:
             continue

@@ -106,9 +106,7 @@ def imported(path: Path, answers: Mapping[str, Any]) -> Run:
 
 def _answers(given: Mapping[str, Any]) -> Answers:
     columns: Sequence[str] = given.get("columns", ())
-    answers = Answers(
-        columns=tuple(read_column(str(text)) for text in columns), axis=given.get("axis")
-    )
+    answers = Answers(columns=tuple(read_column(str(text)) for text in columns))
     values = {
         key: read_constant(key, str(given[key]))
         for key in CONSTANTS

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.steps import place_text
 from winchkit.errors import UsageError
 from winchkit.model.variables import ANGLES
@@ -197,6 +198,7 @@ class State:
             known = None if other is None else other.answer
             beside = None if known is None else known.diagnosis
             words = refitted(self.said) if self.refitted else verdict(self.answer.diagnosis)
+            words = in_units_of(self.answer.engine.regression.dataset.profile, words)
             out["diagnosis"] = words | {
                 "ladder": ladder(self.answer, self.rungs, beside),
                 "next": [

@@ -371,7 +371,7 @@ def test_on_a_terminal_the_axes_of_a_long_table_are_separated(tmp_path: Path) ->
     path.write_text("\n".join(["time [s],winch,position [deg],torque [N m]", *rows]) + "\n")
     _on_terminal(
         ["import", str(path), "-o", str(tmp_path / "runs")],
-        [("which column 'winch' names (A, B)", "y\n")],
+        [("which column 'winch' names (A, B)", "1\n")],
     )
     run = read_run(tmp_path / "runs" / "log.csv")
     assert run["A.motor_angle"] == pytest.approx(m.angle)

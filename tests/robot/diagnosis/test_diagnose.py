@@ -6,11 +6,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
 from robot_poses.cases import CASES
-from robot_poses.hidden import Case, profile_text, record
+from robot_poses.hidden import BASE, Case, profile_text, record
+from robot_poses.truth import HOME, turn
 from winchkit.cli import main
 from winchkit.schema.read import read_robot
 
@@ -240,3 +242,25 @@ def test_bad_input_is_reported_with_the_reason(tmp_path: Path) -> None:
     assert unknown.exit_code == 2
     assert "motion" in unknown.output
     assert isinstance(BY_NAME["none"], Case)
+
+
+@pytest.mark.parametrize("interval", [1.0, 12.0])
+def test_poses_along_a_path_with_a_time_of_each_are_poses(interval: float, tmp_path: Path) -> None:
+    """Neighbouring poses that differ little look like samples of a motion, 44 of them."""
+    truth, rng = BASE, np.random.default_rng(7)
+    header = ["time [s]", *(f"{i + 1}.motor_angle [rad]" for i in range(8))]
+    header += [f"platform_{name} [m]" for name in "xyz"]
+    rows = []
+    for number in range(44):
+        a = number / 7
+        place = (HOME[0] + 0.07 * np.cos(a), HOME[1] + 0.07 * np.sin(a), HOME[2] + 0.002 * number)
+        angles = [truth.motor_angle(i, place, turn(0, 0, 0), 0.0) for i in range(8)]
+        seen = np.array(place) + rng.normal(0, 1e-4, 3)
+        rows.append([number * interval, *angles, *seen])
+    profile, run = tmp_path / "robot.toml", tmp_path / "poses.csv"
+    profile.write_text(profile_text())
+    lines = [",".join(f"{value:.9f}" for value in row) for row in rows]
+    run.write_text("\n".join([",".join(header), *lines]) + "\n")
+    found = answered("compare", run, "--profile", profile)
+    assert found["outputs"]["platform_position"]["samples"] == 44 * 3
+    assert found["outputs"]["platform_position"]["rms"] < 5e-4

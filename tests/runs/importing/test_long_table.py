@@ -7,11 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from winchkit.arrays import Array
+from winchkit.cli import main
 from winchkit.errors import RunError
+from winchkit.runs import read_run
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.guess import guess_columns
@@ -51,7 +54,7 @@ def test_the_column_of_the_axis_is_asked_for_and_separates_the_rows(
 ) -> None:
     table = read_table(written(tmp_path / "a.csv", long_rows(names), HEAD))
     (question,) = guess_columns(table).questions
-    assert question.options == ('--axis "axis"', '--axis ""')
+    assert question.options == ('--axis "axis"', '--kind "axis"', '--axis ""')
     assert f"names ({', '.join(names)})" in question.text
     found = guess_columns(table, Answers(axis="axis"))
     assert found.questions == ()
@@ -128,3 +131,49 @@ def test_an_empty_answer_leaves_the_rows_as_they_are(tmp_path: Path) -> None:
     found = guess_columns(table, Answers(axis="", columns=(read_column("motor_torque="),)))
     assert found.axis == ""
     assert found.questions == ()
+
+
+def kinds_file(path: Path) -> Path:
+    """Rows of two kinds: an angle and its velocity in one, a torque 2 ms later in the other."""
+    time = np.arange(0.0, 12.0, 0.02)
+    rows = [
+        f"{t:.4f},1,{np.sin(t):.9f},{np.cos(t):.9f}\n{t + 0.002:.4f},2,{0.2 * (t + 0.002):.9f},"
+        for t in time
+    ]
+    path.write_text("\n".join(["time [s],id,v1,v2", *rows]) + "\n")
+    return path
+
+
+def test_rows_of_two_kinds_are_asked_for_and_have_columns_of_their_own(tmp_path: Path) -> None:
+    path = kinds_file(tmp_path / "log.csv")
+    table = read_table(path)
+    (question,) = guess_columns(table).questions
+    assert question.options == ('--kind "id"', '--axis "id"', '--axis ""')
+    columns = ("motor_angle=1 v1 [rad]", "motor_velocity=v2 [rad/s]", "motor_torque=2 v1 [N m]")
+    answers = Answers(kind="id", columns=tuple(map(read_column, columns)))
+    found = guess_columns(table, answers)
+    assert not found.questions
+    run = run_of(streams_of(found), {})
+    # The torque is the clock: without the 2 ms between the kinds the angle would be 2e-3 rad off.
+    assert run["motor_angle"] == pytest.approx(np.sin(run["motor_torque"] / 0.2), abs=1e-4)
+    mapped = run_of(streams_of(guess_by(read_table(path), mapping_of("m", [("log", found)]))), {})
+    assert np.array_equal(mapped["motor_torque"], run["motor_torque"])
+
+
+def test_the_axes_of_one_file_are_joined_to_columns_of_another(tmp_path: Path) -> None:
+    """The second file has no column of the axis, and spells the winches in small letters."""
+    call, time = CliRunner(), np.arange(0.0, 20.0, 0.01)
+    first, second = tmp_path / "drives.csv", tmp_path / "cells.csv"
+    rows = [
+        f"{t:.4f},{name},{np.sin(0.7 * t + n) * 30:.6f},{np.cos(0.7 * t + n):.6f}"
+        for t in time
+        for n, name in enumerate("AB")
+    ]
+    first.write_text("\n".join(["time [s],axis,position [rad],torque [N m]", *rows]) + "\n")
+    force = [f"{t:.4f},{50 * np.cos(0.7 * t):.5f},{50 * np.cos(0.7 * t + 1):.5f}" for t in time]
+    second.write_text("\n".join(["time [s],a tension [N],b tension [N]", *force]) + "\n")
+    paths = [str(first), str(second), "-o", str(tmp_path / "runs"), "--axis", "axis", "--join"]
+    assert call.invoke(main, ["import", *paths, "--lag", "0 s", "-y"]).exit_code == 0
+    run = read_run(tmp_path / "runs" / "drives.csv")
+    for name in "AB":
+        assert run[f"{name}.tension"] == pytest.approx(50 * run[f"{name}.motor_torque"], abs=0.02)

@@ -156,7 +156,7 @@ def test_a_strain_is_no_length(tmp_path: Path) -> None:
     rows = [f"{k * STEP:g},{k / 90:.4f},{k / 3:.3f},{k / 9000:.6f}" for k in range(COUNT)]
     guess = guessed(tmp_path / "pull.csv", head + "\n".join(rows) + "\n")
     assert not guess.questions
-    assert by_source(guess)["Extension"].channel == "cable_length"
+    assert by_source(guess)["Extension"].channel == "position"
     assert not by_source(guess)["Strain (Extension)"].channel
 
 

@@ -59,9 +59,6 @@ def _with_value(question: Question, answers: Answers) -> Answers:
     if question.key in STORAGE:
         return with_options(answers, [_picked(question.options)])
     example = re.sub(r'^--\S+ |"', "", question.options[0])
-    if question.key == "axis":
-        is_long = click.confirm("  separate the axes?", default=True, err=True)
-        return replace(answers, axis=example if is_long else "")
     value = _until(f"  {question.key.replace('_', ' ')} (e.g. {example})", question.key)
     return replace(answers, **{question.key: value})
 

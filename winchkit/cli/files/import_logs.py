@@ -36,6 +36,7 @@ _CELL_ALONE = (
     "diagnose --run`; import the file together with the one that has the angle, or name it by "
     '--column "motor_angle=COLUMN [deg]", for a run of a winch'
 )
+_ANGLES = {"motor_angle", "position"}
 _NO_ANGLE = (
     "no column is the motor angle or velocity, without which there is no run: name it by --column "
     '"motor_angle=COLUMN [deg]", or import the file together with the one that has it'
@@ -120,6 +121,11 @@ class _Written(Quantity):
     help="Column that names the axis, where each row is of one axis; '' where it is not.",
 )
 @click.option(
+    "--kind",
+    metavar="COLUMN",
+    help="Column that names the kind of each row, where rows have different quantities.",
+)
+@click.option(
     "--unsigned",
     multiple=True,
     metavar="COLUMN",
@@ -141,6 +147,11 @@ class _Written(Quantity):
     "--orientation",
     type=click.Choice(("vector", "angles", "wxyz", "xyzw")),
     help="What rx, ry, rz are (rotation vector or fixed angles), or the order of q0 to q3.",
+)
+@click.option(
+    "--motion",
+    type=click.Choice(("rotary", "linear")),
+    help="Whether the axis has an angle and a torque, or a position and a force.",
 )
 @click.option("--body", metavar="NAME", help="Body or marker of a tracker's export.")
 @click.option(
@@ -285,6 +296,8 @@ def _answers(options: Mapping[str, Any]) -> Answers:
         body=options["body"],
         orientation=options["orientation"] or "",
         axis=options["axis"],
+        motion=options["motion"] or "",
+        kind=options["kind"] or "",
         unsigned=tuple(options["unsigned"]),
         signed=tuple(options["signed"]),
         modulo=tuple(map(read_modulo, options["modulo"])),
@@ -364,6 +377,15 @@ def _guesses(
         guesses.append(guess)
     if faults:
         raise RunError(faults)
+    if declared is None and not answers.motion and _have(guesses, {"motor_angle"}):
+        # A length and a force beside a file with the motor angle are those of its cable.
+        rotary = replace(answers, motion="rotary")
+        guesses = [
+            guess_columns(guess.file, answers_of(guess.file, tables, rotary))
+            if _have([guess], {"position"})
+            else guess
+            for guess in guesses
+        ]
     named = {
         "--unsigned": answers.unsigned,
         "--signed": answers.signed,
@@ -402,12 +424,12 @@ def _is_accepted(guesses: Sequence[Guess], yes: bool, as_json: bool) -> bool:
 
 def _are_integrated(guesses: Sequence[Guess]) -> bool:
     """Whether the motor angle is the integral of a velocity: no file has an angle."""
-    return _have(guesses, {"motor_velocity"}) and not _have(guesses, {"motor_angle"})
+    return _have(guesses, {"motor_velocity", "velocity"}) and not _have(guesses, _ANGLES)
 
 
 def _lack_angle(guesses: Sequence[Guess]) -> bool:
     """Whether channels of a run were found in the files, and none that may be the motor angle."""
-    needed = ("motor_angle", "motor_velocity")
+    needed = (*_ANGLES, "motor_velocity", "velocity")
     asked = " ".join(o for guess in guesses for q in guess.questions for o in q.options)
     is_found = any(item.channel not in {"", "time"} for guess in guesses for item in guess.used)
     is_body = "--body" in asked

@@ -33,12 +33,14 @@ from winchkit.diagnosis.data.statics import prepared_statics
 from winchkit.diagnosis.data.transients import transient_mask, uncertain_force_mask
 from winchkit.diagnosis.data.validation import validate_runs, without_constants
 from winchkit.diagnosis.data.zeroing import angles_from_zero, as_noise, is_setting, zeroed_anew
+from winchkit.diagnosis.linear_axis import errors_in_units_of
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import Fault, RunError, UsageError
 from winchkit.model.derivatives import Clock
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import OUTPUT_UNITS, OUTPUTS, At, Signals
 from winchkit.quantity_text import quantity
+from winchkit.runs.linear_axis import rotary_runs
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
 from winchkit.runs.sanity.inspection import inspect_run
@@ -186,6 +188,28 @@ def prepare(
     require_type(profile, WinchProfile, "profile")
     if band is not None and not 0 < band < np.inf:
         raise UsageError(f"band {band} Hz: no low-pass; give a frequency above zero")
+    runs = rotary_runs(runs, is_linear_axis=profile.is_linear)
+    with errors_in_units_of(profile):
+        return _prepared(
+            runs,
+            profile,
+            Filtering(band, kept_cut_offs),
+            decimate=decimate,
+            fast=fast,
+            catalogue=catalogue,
+        )
+
+
+def _prepared(
+    runs: Sequence[Run],
+    profile: WinchProfile,
+    filtering: Filtering,
+    *,
+    decimate: bool,
+    fast: bool,
+    catalogue: Catalogue | None,
+) -> Dataset:
+    """The data set of runs with the channels of the model."""
     runs, at_rest = prepared_statics(with_torques(runs, profile), profile)
     runs, coarse = without_constants(runs)
     notes = [*at_rest, *validate_runs(runs, profile)]
@@ -200,7 +224,7 @@ def prepare(
         notes.append(decimation.words)
     if fast:
         runs = [_of_fast_count(run, decimation.factor if decimation else 1) for run in runs]
-    filtering = Filtering(band, kept_cut_offs, decimation)
+    filtering = replace(filtering, decimation=decimation)
     dataset = assemble(runs, profile, filtering)
     if not dataset.outputs:
         raise RunError([_nothing_predicted(run, profile) for run in runs])

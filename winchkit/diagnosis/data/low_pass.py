@@ -26,10 +26,11 @@ from winchkit.diagnosis.data.spectrum import (
 )
 from winchkit.effects.effect import MOTOR_ORDERS
 from winchkit.model.line import Motion
-from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.model.stages import RESULT_UNITS
 from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
 from winchkit.runs.sanity.finding import Finding
+from winchkit.schema.linear_axis import linear_words
 
 _TORQUE_BAND = 20.0
 """Usual cut-off of the torque, Hz; a tenth of a sampling rate below 200 Hz; convention of robot
@@ -139,13 +140,15 @@ class RemovedBand:
     @property
     def text(self) -> str:
         """One sentence without a full stop."""
-        unit = OUTPUT_UNITS[self.output]
+        unit = RESULT_UNITS[self.output]
         text = f"the low-pass at {self.cut_off:.3g} Hz removes {quantity(self.rms, unit)} rms"
         if not self.above_noise:
             return f"{text}, which is white noise"
         if self.order is not None and self.amplitude is not None:
             own = quantity(self.amplitude, unit)
-            text = f"{text}, of it {own} at {self.order} periods per motor turn"
+            often = f"{self.order} periods per motor turn"
+            often = linear_words(often) if self.output == "force" else often
+            text = f"{text}, of it {own} at {often}"
         return f"{text}: more than white noise; --band HZ sets another cut-off"
 
     @property

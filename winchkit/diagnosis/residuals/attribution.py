@@ -75,8 +75,11 @@ _S = TypeVar("_S", bound=_HasShare)
 def variables_of(recording: Recording) -> dict[str, Array]:
     """Variables that may explain a residual along one run, (n,) each."""
     known = [name for name in VARIABLES if name not in ("load", "tension", "temperature")]
-    if isinstance(recording.raw.at.profile, AxisProfile):
+    profile = recording.raw.at.profile
+    if isinstance(profile, AxisProfile):
         known = ["motor_angle", *(n for n in known if n not in {"motor_angle", *_OF_THE_CABLE})]
+    if profile.is_linear:
+        known.remove("drum_angle")
     out = {name: VARIABLES[name](recording.raw.at) for name in known}
     if recording.raw.load is not None:
         out["load"] = VARIABLES["load"](recording.smooth.at)
@@ -147,7 +150,7 @@ def harmonics(regression: TimeSeriesRegression, residual: Array) -> list[Attribu
             (s, t) for s, t in zip(regression.segments, times, strict=True) if s.output == output
         ]
         error = np.concatenate([t for _, t in own])
-        for name in ANGLES:
+        for name in ANGLES[1:] if regression.dataset.profile.is_linear else ANGLES:
             angles = [VARIABLES[name](regression.dataset.recordings[s.run].raw.at) for s, _ in own]
             orders = half_of_samples_per_turn(angles)
             found = strongest_harmonic(np.concatenate(angles), error, orders)

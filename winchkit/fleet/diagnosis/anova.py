@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.compare import WinchCompared
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.residuals.attribution import (
     BINS,
     chance_share,
@@ -28,6 +29,7 @@ from winchkit.diagnosis.residuals.attribution import (
     ranked,
     variables_of,
 )
+from winchkit.schema.linear_axis import rotary_name
 
 _MOST_SAMPLES = 50_000
 """Samples per winch; shares do not become more exact with more."""
@@ -87,23 +89,29 @@ class SharedError:
 def errors_of(compared: WinchCompared) -> dict[str, WinchErrors]:
     """Errors per output of one winch, decimated to at most about 50,000 samples."""
     regression, out = compared.regression, {}
-    for output, compared_output in compared.comparison.outputs.items():
+    profile = regression.dataset.profile
+    for name, compared_output in compared.comparison.outputs.items():
+        output = rotary_name(name)
         runs = [s.run for s in regression.segments if s.output == output]
         recordings = [regression.dataset.recordings[run] for run in runs]
         valid = [recording.valid[output] for recording in recordings]
         step = max(1, compared_output.samples // _MOST_SAMPLES)
         known = [variables_of(recording) for recording in recordings]
         variables = {
-            name: np.concatenate([run[name][v] for run, v in zip(known, valid, strict=True)])[
+            over: np.concatenate([run[over][v] for run, v in zip(known, valid, strict=True)])[
                 ::step
             ]
-            for name in known[0]
-            if all(name in run for run in known)
+            for over in known[0]
+            if all(over in run for run in known)
         }
         error = regression.compared_samples(compared.residual, output)[::step]
         kept = min(len(error), kept_rows(regression, output))
-        out[output] = WinchErrors(
-            compared_output.unit, compared_output.rms**2, error, variables, kept
+        out[name] = WinchErrors(
+            compared_output.unit,
+            compared_output.rms**2,
+            error,
+            in_units_of(profile, variables),
+            kept,
         )
     return out
 

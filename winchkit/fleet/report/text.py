@@ -9,6 +9,7 @@ from math import isfinite
 
 from winchkit.fleet.diagnosis.history import FleetHistory, FleetParameter, WinchHistory
 from winchkit.fleet.diagnosis.swapped_profiles import Swap
+from winchkit.model.stages import RESULT_UNITS
 from winchkit.quantity_text import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, clause
 
@@ -27,7 +28,6 @@ _DO = {
 }
 """What to do, by the first word of an effect."""
 _US = "%Y-%m-%d"
-_UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def change_text(parameter: FleetParameter, winch: WinchHistory) -> ChangeText:
         ends = f"95 %: {day_text(date.earliest)} to {day_text(date.latest)}"
         since = f"since {day_text(date.date)} ({ends})"
     costs = [
-        f"{quantity(size, _UNITS.get(output, ''))} in the {OUTPUT_NAMES.get(output, output)}"
+        f"{quantity(size, RESULT_UNITS.get(output, ''))} in the {OUTPUT_NAMES.get(output, output)}"
         for output, size in winch.cost.items()
         if size > 0
     ]

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import (
     Attribution,
@@ -19,8 +20,9 @@ from winchkit.diagnosis.residuals.attribution import (
     quantile_edges,
     variables_of,
 )
-from winchkit.model.variables import VARIABLE_UNITS
+from winchkit.model.variables import ANGLES, VARIABLE_UNITS
 from winchkit.report.words.sentence import CLEAR_ORDER
+from winchkit.schema.linear_axis import rotary_name
 
 _FEW = 5
 """Distinct values up to which each is a bin of its own, such as loads."""
@@ -107,7 +109,10 @@ class Curve:
 
 
 def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, Attribution]:
-    """Main variable of each output's residual: a clear order, else the largest share."""
+    """Main variable of each output's residual: a clear order, else the largest share.
+
+    Returns: by the name of the output in results.
+    """
     orders = [f for f in harmonics(regression, residual) if f.share > CLEAR_ORDER]
     trends = [f for f in attributions(regression, residual) if f.share > _WORTH_DRAWING]
     out: dict[str, Attribution] = {}
@@ -115,28 +120,33 @@ def strongest(regression: TimeSeriesRegression, residual: Array) -> dict[str, At
         known = out.get(found.output)
         if known is None or (known.order is not None and found.share > 2 * known.share):
             out[found.output] = found
-    return out
+    return in_units_of(regression.dataset.profile, out)
 
 
 def curve_of(regression: TimeSeriesRegression, residual: Array, over: Attribution) -> Curve:
     """The curve of a residual, (rows,), over a variable."""
     x, error = [], []
     for segment, time in zip(regression.segments, regression.in_time(residual), strict=True):
-        if segment.output == over.output:
+        if segment.output == rotary_name(over.output):
             recording = regression.dataset.recordings[segment.run]
-            good = recording.valid[over.output]
-            x.append(variables_of(recording)[over.variable][good])
+            good = recording.valid[segment.output]
+            x.append(variables_of(recording)[rotary_name(over.variable)][good])
             error.append(time[good])
     values = np.concatenate(x)
-    if over.order is not None:
+    if is_within_turn(over):
         values = np.mod(values, 2 * np.pi)
     edges = bin_edges(values, over, 2 * np.pi)
     centres, (mean,) = bin_means(values, [np.concatenate(error)], edges)
     return Curve(over, centres, mean)
 
 
+def is_within_turn(over: Attribution) -> bool:
+    """Whether a residual is drawn over an angle within its turn; a position has no turn."""
+    return over.order is not None and over.variable in ANGLES
+
+
 def bin_edges(values: Array, over: Attribution, turn: float, bins: int = _BINS) -> Array:
     """Inner edges: equal within a turn, fine enough for the order; else ``bins`` equally filled."""
-    if over.order is None:
+    if over.order is None or not is_within_turn(over):
         return filled_edges(values, bins)
     return np.linspace(0, turn, max(_BINS, _PER_PERIOD * over.order) + 1)[1:-1]

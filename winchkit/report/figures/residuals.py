@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.residuals.attribution import Attribution, variables_of
 from winchkit.diagnosis.residuals.traces import Trace, traces_of
-from winchkit.model.stages import OUTPUT_UNITS
+from winchkit.model.stages import RESULT_UNITS
 from winchkit.quantity_text import Scale, percent, plain, scale_for
 from winchkit.report.figures.axes import reading
 from winchkit.report.figures.figure import (
@@ -27,9 +28,16 @@ from winchkit.report.figures.figure import (
     Series,
 )
 from winchkit.report.figures.layout import density_levels
-from winchkit.report.figures.reduction import bin_edges, bin_means, decimated, strongest
+from winchkit.report.figures.reduction import (
+    bin_edges,
+    bin_means,
+    decimated,
+    is_within_turn,
+    strongest,
+)
 from winchkit.report.words.sentence import capital, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+from winchkit.schema.linear_axis import rotary_name
 from winchkit.units import GRAVITY
 
 _INTERVALS = 300
@@ -112,11 +120,11 @@ def residual_figures(residuals: Residuals) -> tuple[OutputFigures, ...]:
     out = {}
     for output in regression.dataset.outputs:
         curves = _curves(residuals, output)
-        followed = found.get(output)
+        followed = found.get(curves.output)
         over = _over_variable(regression, curves, followed) if followed else None
         time = _over_time(regression, curves, marks)
-        out[output] = OutputFigures(
-            output,
+        out[curves.output] = OutputFigures(
+            curves.output,
             curves.scale,
             replace(time, source=residuals.source),
             replace(over, source=residuals.source) if over else None,
@@ -141,7 +149,9 @@ def run_names(dataset: Dataset) -> list[str]:
 
 
 def _curves(residuals: Residuals, output: str) -> _Curves:
-    regression, noise = residuals.regression, residuals.noise.get(output)
+    regression = residuals.regression
+    name = in_units_of(regression.dataset.profile, output)
+    noise = residuals.noise.get(name)
     runs = tuple(s.run for s in regression.segments if s.output == output)
 
     def traces(rows: Array) -> list[Trace]:
@@ -156,8 +166,8 @@ def _curves(residuals: Residuals, output: str) -> _Curves:
     size = _rms(before)
     if after is not None and isclose(_rms(after), size, rel_tol=_SAME):
         after = None
-    scale = scale_for(3 * size, OUTPUT_UNITS[output])
-    return _Curves(output, scale, runs, measured, before, after, noise, residuals.changed)
+    scale = scale_for(3 * size, RESULT_UNITS[name])
+    return _Curves(name, scale, runs, measured, before, after, noise, residuals.changed)
 
 
 def _rms(parts: Sequence[Array]) -> float:
@@ -183,11 +193,11 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves, labels: Sequen
         shown = "" if labels[run] == label else labels[run]
         label = labels[run]
         marks.append(RunMark(start, recordings[run].name, shown))
-        gaps = _left_out(time, recordings[run].valid[curves.output])
+        gaps = _left_out(time, recordings[run].valid[rotary_name(curves.output)])
         left_out += [(start + low, start + high) for low, high in gaps]
         times.append(start + time[rows])
         kept.append(rows)
-        start += float(time[-1]) + recordings[run].bands[curves.output].rate ** -1
+        start += float(time[-1]) + recordings[run].bands[rotary_name(curves.output)].rate ** -1
 
     def joined(parts: Sequence[Array], worth: float) -> Array:
         every = [parts[at][rows] for at, rows in zip(order, kept, strict=True)]
@@ -195,7 +205,7 @@ def _over_time(regression: TimeSeriesRegression, curves: _Curves, labels: Sequen
 
     x = np.concatenate(times)
     measured = joined(curves.measured, 1.0)
-    size = scale_for(float(np.nanmax(np.abs(measured), initial=0.0)), OUTPUT_UNITS[curves.output])
+    size = scale_for(float(np.nanmax(np.abs(measured), initial=0.0)), RESULT_UNITS[curves.output])
     signals = [Series("measured", "measured", x, measured / size.worth)]
     errors = []
     for tone, name, parts in curves.states:
@@ -244,7 +254,8 @@ def _left_out(time: Array, compared: NDArray[np.bool_]) -> Iterator[tuple[float,
 
 def _filtered(regression: TimeSeriesRegression, curves: _Curves) -> str:
     """``, low-pass 5 Hz`` where the output is filtered before it is compared."""
-    cut_off = regression.dataset.recordings[curves.runs[0]].bands[curves.output].cut_off
+    bands = regression.dataset.recordings[curves.runs[0]].bands
+    cut_off = bands[rotary_name(curves.output)].cut_off
     return "" if cut_off is None else f", low-pass {plain(cut_off, 2)} Hz"
 
 
@@ -254,9 +265,9 @@ def _over_variable(
     """Samples as dots or as a density, and means over bins as lines."""
     recordings = regression.dataset.recordings
     values = np.concatenate(
-        [variables_of(recordings[run])[followed.variable] for run in curves.runs]
+        [variables_of(recordings[run])[rotary_name(followed.variable)] for run in curves.runs]
     )
-    within = followed.order is not None
+    within = is_within_turn(followed)
     how = reading(followed.variable, within_turn=within)
     variable = how.shown(np.mod(values, _TURN) if within else values)
     states = [

@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.results import Step
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
+from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 
 GEOMETRY_NAME = "the whole geometry"
 """Name of the change of a robot's model in which all of its geometry is fitted."""
@@ -118,7 +120,10 @@ class _Ladder:
         """Held-out error of a model, refitted."""
         noise = self.result.noise
         folds = self.engine.folds(self.result.final, noise)
-        return self.engine.held_out_errors(self.engine.refit(model, noise), noise, folds)
+        errors = self.engine.held_out_errors(self.engine.refit(model, noise), noise, folds)
+        if not isinstance(self.engine, TimeSeriesSelection):
+            return errors
+        return in_units_of(self.engine.regression.dataset.profile, errors)
 
 
 def _only(whole: Hypothesis, kept: tuple[int, ...]) -> Hypothesis:

@@ -8,6 +8,7 @@ from winchkit import wings
 from winchkit.diagnosis.add import FittedAddition, FittedWinchAddition
 from winchkit.diagnosis.compare import Compared, WinchCompared
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
+from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.profile_edit.naming import extended_name
 from winchkit.report.figures.figure import Figure
 from winchkit.report.figures.ladder import error_ladder, present
@@ -59,7 +60,8 @@ def report_html(
         open_laws=laws,
         ladder=ladder,
     )
-    return page(title, [*present(ladder), *drawn, *laws, *patterns], content, headed=False)
+    html = page(title, [*present(ladder), *drawn, *laws, *patterns], content, headed=False)
+    return in_units_of(answer.engine.regression.dataset.profile, html)
 
 
 def report_figures(answer: Answer, source: str = "") -> list[Figure]:
@@ -168,7 +170,8 @@ def addition_html(
     ladder = error_ladder(outputs, extended=True, changed=residuals.changed, source=command.source)
     better = better or extended_name(command.profile, fitted.addition.added[0].effect.id)
     content = addition_sections(fitted.addition, cards, command, better, title=title, ladder=ladder)
-    return page(title, [*present(ladder), *drawn], content, headed=False)
+    html = page(title, [*present(ladder), *drawn], content, headed=False)
+    return in_units_of(fitted.regression.dataset.profile, html)
 
 
 def addition_figures(fitted: FittedAddition, source: str = "") -> list[Figure]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import isnan
+from math import isnan, pi
 
 from winchkit.diagnosis.data.sanity import ALARMING
 from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, OutputFit
-from winchkit.quantity_text import percent, scale_for, significant
+from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
 from winchkit.report.words.steps import cause
@@ -140,7 +140,9 @@ def where_text(where: Attribution) -> str:
 
 
 def often_per_turn(angle: str, order: int) -> str:
-    """``5 periods per drum turn``."""
+    """``5 periods per drum turn``; of a linear axis ``a period of 6.46 mm``."""
+    if angle == "position":
+        return f"a period of {quantity(2 * pi / order, 'm')}"
     turn = VARIABLE_NAMES.get(angle, angle).removesuffix(" angle")
     return f"{order} period{'' if order == 1 else 's'} per {turn} turn"
 

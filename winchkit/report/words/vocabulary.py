@@ -20,11 +20,13 @@ OUTPUT_NAMES = {
     "cable_length": "cable length",
     "tension": "tension",
     "motor_torque": "motor torque",
+    "force": "force",
     "platform_position": "platform position",
 }
 VARIABLE_NAMES = {
     "drum_angle": "drum angle",
     "motor_angle": "motor angle",
+    "position": "position",
     "speed": "speed",
     "direction": "direction",
     "cable_length": "free length",

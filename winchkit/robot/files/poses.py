@@ -147,8 +147,9 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
 def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> Samples | None:
     """Rows of logs of a robot in motion.
 
-    Returns: None where the runs are poses: a row each, or logs with at least ten holds that have a
-    quarter of the rows. Raises RunError as :func:`read_poses`.
+    Returns: None where the runs are poses: a row each, also along a path with a time of each, or
+    logs with at least ten holds that have a quarter of the rows. Raises RunError as
+    :func:`read_poses`.
     """
     faults = [fault for run in runs for fault in _faults(run, profile)]
     if faults:
@@ -156,7 +157,8 @@ def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> Samples | Non
     parts, times, count, rest = [], [], 0, 0
     for number, run in enumerate(runs):
         rows, notes = _rows_of(run, profile, number)
-        if not is_log(rows.motor_angle) or run.metadata.get("time") == _NUMBERED:
+        is_numbered = run.metadata.get("time") == _NUMBERED
+        if is_numbered or run.interval > _SLOWEST or not is_log(rows.motor_angle):
             return None
         holds = holds_of(rows.motor_angle) or []
         count, rest = count + len(holds), rest + sum(hold.stop - hold.start for hold in holds)
@@ -168,6 +170,9 @@ def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> Samples | Non
     return Samples(joined(parts), np.concatenate(times))
 
 
+_SLOWEST = 0.5
+"""s: rows further apart are poses at rest, each measured by itself. A robot's moves take seconds;
+of a motion so sampled no acceleration is known."""
 _NUMBERED = "row number"
 """Metadata ``time`` of a run whose file has none."""
 

@@ -34,6 +34,9 @@ _PERMITTED: dict[str, tuple[str, ...]] = {
     "tension": ("force", "mass", BRIDGE, "voltage", COUNTS),
     "load": ("force", "mass", BRIDGE, "voltage", COUNTS),
     "cable_length": ("length", "voltage", COUNTS),
+    "position": ("length", "voltage", COUNTS),
+    "velocity": ("speed",),
+    "force": ("force", "mass", BRIDGE, "voltage", COUNTS),
 }
 """Dimensions that a column of a channel may have, where they are not that of the channel alone.
 
@@ -141,6 +144,8 @@ class Answers:
     """Body or marker of a tracker's export."""
     axis: str | None = None
     """Column that names the axis of each row; empty for a table whose rows are of all axes."""
+    kind: str = ""
+    """Column that names the kind of each row, where rows have different quantities."""
     unsigned: tuple[str, ...] = ()
     """Columns whose numbers have no sign, although they look like signed ones that lost it."""
     signed: tuple[str, ...] = ()
@@ -148,6 +153,9 @@ class Answers:
     orientation: str = ""
     """``vector`` or ``angles`` for ``rx``, ``ry``, ``rz``; ``wxyz`` or ``xyzw`` for ``q0`` to
     ``q3``; empty where the values say it."""
+    motion: str = ""
+    """``linear`` for a position and a force, ``rotary`` for an angle and a torque; empty where the
+    columns say it."""
     modulo: tuple[tuple[str, float], ...] = ()
     """Columns with the number at which they wrap; 0 for one that does not."""
 
@@ -156,8 +164,9 @@ def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answe
     """Answers without the columns that are those of other files.
 
     Returns: a column is that of the files that have its name; where none has, of those that have
-    its number; where none has that either, of all, so that each says so. An answer with the name of
-    a file is of that file only. Raises UsageError for the name of a file that is none of them.
+    its number; where none has that either, of all, so that each says so. A column of the axis or
+    the kind is that of the files that have it. An answer with the name of a file is of that file
+    only. Raises UsageError for the name of a file that is none of them.
     """
     for item in answers.columns:
         if item.file and not any(_is_named(t, item.file) for t in tables):
@@ -172,7 +181,17 @@ def answers_of(table: Table, tables: Sequence[Table], answers: Answers) -> Answe
         having = having or [t for t in tables if t.column(item.source) is not None]
         return not item.source or not having or any(t is table for t in having)
 
-    return replace(answers, columns=tuple(item for item in answers.columns if is_own(item)))
+    own = tuple(item for item in answers.columns if is_own(item))
+    answers = replace(answers, columns=own)
+
+    def is_of_others(by: str | None) -> bool:
+        return bool(by and not table.column(by) and any(t.column(by) for t in tables))
+
+    if is_of_others(answers.axis):
+        answers = replace(answers, axis=None)
+    if is_of_others(answers.kind):
+        answers = replace(answers, kind="")
+    return answers
 
 
 def _is_named(table: Table, name: str) -> bool:
@@ -191,7 +210,7 @@ def read_modulo(text: str) -> tuple[str, float]:
     return name.strip(), value
 
 
-STORAGE = ("signed", "modulo", "orientation")
+STORAGE = ("signed", "modulo", "orientation", "axis")
 """Keys of the questions that an option as it stands answers."""
 
 
@@ -201,7 +220,7 @@ def with_options(answers: Answers, options: Iterable[str]) -> Answers:
     Raises UsageError for another option.
 
     ``options``: ``--signed "speed 3" --signed "speed 5"``, ``--modulo "Position=65536"``,
-    ``--orientation vector``.
+    ``--orientation vector``, ``--axis "joint"``.
     """
     for text in options:
         try:
@@ -217,6 +236,10 @@ def with_options(answers: Answers, options: Iterable[str]) -> Answers:
                 answers = replace(answers, modulo=(*answers.modulo, read_modulo(value)))
             elif option == "--orientation":
                 answers = replace(answers, orientation=value)
+            elif option == "--axis":
+                answers = replace(answers, axis=value)
+            elif option == "--kind":
+                answers = replace(answers, kind=value)
             else:
                 raise UsageError(f"'{text}' is no option that answers a question of a file")
     return answers

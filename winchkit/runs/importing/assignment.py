@@ -67,8 +67,10 @@ class Guess:
     """Rate of the rows in place of time stamps, Hz."""
     axis: str = ""
     """Column that names the axis of each row, of a table in long form."""
+    kind: str = ""
+    """Column that names the kind of each row, of a table whose rows have different quantities."""
     whole: Table | None = None
-    """The table in long form; ``table`` is that of its first axis."""
+    """The table in long form; ``table`` is that of its first axis, or has columns by kind."""
 
     @property
     def file(self) -> Table:

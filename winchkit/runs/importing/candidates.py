@@ -25,12 +25,15 @@ from winchkit.runs.importing.source_stamps import SOURCE_STAMP
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import (
     BRIDGE,
+    COUNT_RATE,
     COUNTS,
+    SHARE,
     SpelledUnit,
     named_unit,
     read_unit,
 )
 from winchkit.runs.importing.winches import FEWEST, choose_channels
+from winchkit.schema.linear_axis import CHANNELS, ROTARY
 from winchkit.schema.mapping import DATE, MATRIX
 
 _BY_DIMENSION = {
@@ -43,15 +46,20 @@ _BY_DIMENSION = {
     "mass": "tension",
     BRIDGE: "tension",
     "length": "cable_length",
+    "speed": "velocity",
     "temperature": "temperature",
     "current": "motor_torque",
 }
+_LINEAR = {**CHANNELS, "cable_length": "position", "tension": "force", "load": "force"}
+"""Channel of a linear axis for what a name or a unit stands for."""
+_TURNING = {"angle", "angular speed", "torque", COUNTS, COUNT_RATE, SHARE}
+"""Dimensions of a motor that turns."""
 _BY_RANK, _BY_UNIT, _BY_ORDER = 3, 4, 5
 """Ranks of candidates after those by a whole name: a component or part of a name, the unit alone,
 the order of the columns."""
 _UNKNOWN = "unknown name"
 _NOT_USED = "set point, error, state, counter, constant or a quantity of another body"
-_SCALAR = {"tension", "load", "motor_torque"}
+_SCALAR = {"tension", "load", "motor_torque", "force"}
 """Channels of a cable or a shaft, which have no components along x, y and z."""
 _UNEVEN = 0.5
 """Range of the steps of a clock over their median."""
@@ -62,15 +70,18 @@ def choose(
     given: Mapping[str, str],
     body: str | None,
     without: Collection[str] = (),
+    *,
     orientation: str = "",
+    motion: str = "",
 ) -> Choice:
     """Choose the columns of all channels.
 
     ``given``: channel by the unique name of a column, as the user gave it; empty for an unused one.
-    ``without``: channels that the file does not have, as the user says. Returns: every column is in
-    ``chosen`` or in ``unused``.
+    ``without``: channels that the file does not have, as the user says. ``motion``: as in
+    :class:`Answers`. Returns: every column is in ``chosen`` or in ``unused``.
     """
     choice = Choice()
+    linear = _is_linear(table, given, motion)
     numbered = _numbered(table, given, orientation, choice)
     vectors = vector_names([item.name for item in table.columns])
     free: list[Candidate] = []
@@ -82,7 +93,7 @@ def choose(
                 Candidate(column, channel, 0, unit, "given")
             )
         else:
-            found = _candidate(column, numbered)
+            found = _candidate(column, numbered, linear=linear)
             if len(column) < min(FEWEST, longest / FEWEST):
                 few = f"{len(column)} values, of a parameter: others have {longest}"
                 found = Candidate(column, "", reason=few)
@@ -142,7 +153,28 @@ def _left_after(
     return [item for item in free if item.channel not in taken]
 
 
-def _candidate(column: Column, numbered: Mapping[str, str]) -> Candidate:
+def _is_linear(table: Table, given: Mapping[str, str], motion: str) -> bool:
+    """Whether a file is of a linear axis: a position in m and a force in N, nothing that turns."""
+    bases = {channel.rpartition(".")[2] for channel in given.values()}
+    if motion or bases & ROTARY.keys():
+        return motion != "rotary"
+    if bases & (CHANNELS.keys() | _LINEAR.keys() | POSE_DIMENSIONS.keys()):
+        return False
+    found = set()
+    for column in table.columns:
+        meaning, unit = meaning_of(column.name, column.labels), read_unit(column.unit)
+        if meaning is None or not meaning.channel or column.texts is not None:
+            continue
+        base, dimension = meaning.channel.rpartition(".")[2], unit.dimension if unit else ""
+        if base in CHANNELS and dimension in _TURNING:
+            return False
+        is_named = base in CHANNELS or (base in _LINEAR and meaning.rank > 1)
+        if is_named and column_dimension(_LINEAR.get(base, "")) == dimension:
+            found.add(_LINEAR[base])
+    return found >= {"position", "force"}
+
+
+def _candidate(column: Column, numbered: Mapping[str, str], *, linear: bool = False) -> Candidate:
     """Channel of one column by its name, its unit, or its values."""
     unit = read_unit(column.unit)
     meaning = meaning_of(column.name, column.labels)
@@ -152,7 +184,10 @@ def _candidate(column: Column, numbered: Mapping[str, str]) -> Candidate:
         return Candidate(column, "", reason="no values")
     if column.name in numbered:
         return Candidate(column, numbered[column.name], 1, unit, f"'{column.name}'")
-    return _by_unit(column, unit) if meaning is None else _by_name(column, meaning, unit)
+    if linear and meaning is not None:
+        meaning = replace(meaning, channel=_LINEAR.get(meaning.channel, meaning.channel))
+    found = _by_unit(column, unit) if meaning is None else _by_name(column, meaning, unit)
+    return replace(found, channel=_LINEAR.get(found.channel, found.channel)) if linear else found
 
 
 def _by_name(column: Column, meaning: Meaning, unit: SpelledUnit | None) -> Candidate:

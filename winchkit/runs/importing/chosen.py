@@ -12,6 +12,7 @@ from winchkit.runs.importing.assignment import Candidate, Confidence, Question
 from winchkit.runs.importing.formats.stamps import read_stamps
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_spelling import COUNTS
+from winchkit.schema.linear_axis import rotary_name
 
 
 @dataclass(eq=False)
@@ -39,6 +40,11 @@ class ChosenColumn:
     def base(self) -> str:
         """Channel without a winch's name."""
         return self.candidate.channel.rpartition(".")[2]
+
+    @property
+    def role(self) -> str:
+        """Channel without a winch's name; of a linear axis that of a rotary one."""
+        return rotary_name(self.base)
 
     @property
     def size(self) -> float:

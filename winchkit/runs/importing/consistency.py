@@ -24,6 +24,8 @@ _OVERLOAD = 10.0
 _TURN = 2 * math.pi
 _ANGLES = {"rad": 1.0, "deg": math.pi / 180, "turn": _TURN}
 _SPEEDS = {"rad/s": 1.0, "deg/s": math.pi / 180, "rpm": _TURN / 60, "turn/s": _TURN}
+_LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
+_LINEAR_SPEEDS = {"m/s": 1.0, "mm/s": 1e-3, "m/min": 1 / 60}
 CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """SI value of each unit of a time."""
 
@@ -93,9 +95,9 @@ USUAL_COUNTS = _usual_counts()
 
 def from_velocity(work: Work) -> None:
     """Units, counts and sense from the ratio of the angle to the integral of the velocity."""
-    for velocity in [item for item in work.columns if item.base == "motor_velocity"]:
-        winch = velocity.candidate.channel.rpartition(".")[0]
-        wanted = f"{winch}.motor_angle" if winch else "motor_angle"
+    for velocity in [item for item in work.columns if item.role == "motor_velocity"]:
+        winch, dot, base = velocity.candidate.channel.rpartition(".")
+        wanted = f"{winch}{dot}{'position' if base == 'velocity' else 'motor_angle'}"
         angle = next((i for i in work.columns if i.candidate.channel == wanted), None)
         clock = clock_of(work, velocity)
         if angle is None or clock is None or len(angle.column) != len(velocity.column):
@@ -157,9 +159,10 @@ def _matches(
     ratio: Ratio, angle: ChosenColumn, velocity: ChosenColumn, clock: ChosenColumn
 ) -> Iterator[tuple[tuple[str, float], tuple[str, float], tuple[str, float]]]:
     """Combinations of units that agree with the ratio."""
-    speeds = _options(velocity, _SPEEDS)
+    is_linear = angle.base == "position"
+    speeds = _options(velocity, _LINEAR_SPEEDS if is_linear else _SPEEDS)
     clocks = _options(clock, CLOCKS)
-    counted = is_counted(angle)
+    counted = is_counted(angle) and not is_linear
     if counted and angle.factor is velocity.factor is None:
         # Counts and counts a second agree for any number of counts in a turn, 360 among them.
         clocks = [stamp for stamp in clocks if not ratio.agrees(stamp[1])]
@@ -171,7 +174,7 @@ def _matches(
                 if counts:
                     yield (f"1/{counts} turn", turn / counts), speed, stamp
                 continue
-            for unit in _options(angle, _ANGLES):
+            for unit in _options(angle, _LENGTHS if is_linear else _ANGLES):
                 if ratio.agrees(abs(speed[1] * stamp[1] / unit[1])):
                     yield unit, speed, stamp
 

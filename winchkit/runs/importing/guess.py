@@ -16,7 +16,7 @@ from winchkit.runs.importing.candidates import choose
 from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of
 from winchkit.runs.importing.consistency import beyond_rating, from_velocity
 from winchkit.runs.importing.formats.arithmetic import is_expression, with_derived
-from winchkit.runs.importing.long_table import axes_of, likely_axis
+from winchkit.runs.importing.long_table import axes_of, by_kind, likely_axis
 from winchkit.runs.importing.orientation import settle_orientation
 from winchkit.runs.importing.questions import ask_columns, ask_units, axis_question
 from winchkit.runs.importing.source_stamps import delays, has_two_clocks, without_stamps
@@ -29,17 +29,28 @@ from winchkit.schema.mapping import DATE
 def guess_columns(table: Table, answers: Answers | None = None) -> Guess:
     """Guess what the columns of a table are."""
     answers = answers or Answers()
+    if answers.kind:
+        kinds = by_kind(table, answers.kind)
+        found = guess_columns(kinds, replace(answers, kind="", axis=answers.axis or ""))
+        return replace(found, kind=answers.kind, whole=table)
     if answers.axis:
         return _of_axes(table, answers, answers.axis)
     if answers.axis is None and (axis := likely_axis(table)) is not None:
         open_yet = [Assignment(item.source, "", item.unit) for item in table.columns]
-        return Guess(table, tuple(open_yet), (axis_question(table, axis.source),))
+        return Guess(table, tuple(open_yet), (axis_question(table, axis),))
     answers = replace(answers, columns=tuple(_whole(item, table) for item in answers.columns))
     table = with_derived(table, [item.source for item in answers.columns])
     given, unknown = _given(table, answers)
     channels = {source: item.channel for source, item in given.items()}
     without = {item.channel for item in answers.columns if not item.source}
-    choice = choose(table, channels, answers.body, without, answers.orientation)
+    choice = choose(
+        table,
+        channels,
+        answers.body,
+        without,
+        orientation=answers.orientation,
+        motion=answers.motion,
+    )
     work = Work(table, answers, questions=[*unknown, *choice.questions], notes=[*choice.notes])
     for candidate in choice.chosen:
         work.columns.append(started(work, candidate, given.get(candidate.column.source)))

@@ -1,4 +1,4 @@
-"""Tables in long form: each row is of one axis, which a column names."""
+"""Tables in long form: each row is of one axis, or of one kind, which a column names."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.table import Column, Table
+from winchkit.runs.importing.table import Column, Table, named_apart
 
 _MOST = 64
 """Axes of one table."""
@@ -29,21 +29,65 @@ def axes_of(table: Table, by: str) -> dict[str, Table]:
     keep their names and numbers. Rows without an axis are left out. Raises RunError for a column
     that is not there, or with too few or too many values.
     """
+    key, rows = _rows_of(table, by, "axis")
+    return {name: _of_rows(table, key, own) for name, own in rows.items()}
+
+
+def by_kind(table: Table, by: str) -> Table:
+    """A table with columns of their own for each kind of row, and times of their own.
+
+    ``table``: the rows of one kind have other quantities in the same columns than those of another.
+    ``by``: name or number of the column that names the kind. Returns: a column that several kinds
+    have gets the name of its kind before its own; columns without a value are left out. Raises
+    RunError as :func:`axes_of`.
+    """
+    key, rows = _rows_of(table, by, "kind")
+    columns = [
+        replace(own, labels=(name, *own.labels), group=name)
+        for name, kept in rows.items()
+        for item in table.columns
+        if item is not key and len(item) == len(key)
+        for own in [item.at(kept)]
+        if own.texts is not None or np.any(np.isfinite(own.values))
+    ]
+    note = f"each row is of one kind, by column '{key.source}': {', '.join(rows)}"
+    return replace(
+        table,
+        columns=named_apart(columns),
+        line_of=lambda _row: None,
+        interval=None,
+        notes=(*table.notes, note),
+    )
+
+
+def has_kinds(table: Table, key: Column) -> bool:
+    """Whether the rows of some value of a column lack a column that those of another have."""
+    names = _names(key)
+    if names is None:
+        return False
+    found = [names == name for name in np.unique(names)]
+    known = [np.isfinite(item.values) for item in table.columns if len(item) == len(key)]
+    return any(
+        any(one[own].any() for own in found) > all(one[own].any() for own in found) for one in known
+    )
+
+
+def _rows_of(table: Table, by: str, what: str) -> tuple[Column, dict[str, NDArray[np.intp]]]:
+    """The column that names the axis or kind of each row, and the rows of each."""
     key = table.column(by)
     if key is None:
         has = ", ".join(repr(column.source) for column in table.columns)
-        message = f"there is no column '{by}' that names the axis; it has {has}"
+        message = f"there is no column '{by}' that names the {what}; it has {has}"
         raise RunError(Fault(message, table.path))
     names = _names(key)
     found = [] if names is None else [name for name in dict.fromkeys(names.tolist()) if name]
     if not 1 < len(found) <= _MOST:
-        raise RunError(
-            Fault(
-                f"column '{by}' has {len(found)} values; one that names the axes has 2 to {_MOST}",
-                table.path,
-            )
+        message = (
+            f"column '{by}' has {len(found)} values; one that names the {what} of each row has 2 "
+            f"to {_MOST}"
         )
-    return {name: _of_rows(table, key, np.flatnonzero(names == name)) for name in found}
+        raise RunError(Fault(message, table.path))
+    return key, {name: np.flatnonzero(names == name) for name in found}
 
 
 def likely_axis(table: Table) -> Column | None:

@@ -12,7 +12,7 @@ from winchkit.errors import Fault, RunError
 from winchkit.runs.files import write_whole
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.arithmetic import with_derived
-from winchkit.runs.importing.long_table import axes_of
+from winchkit.runs.importing.long_table import axes_of, by_kind
 from winchkit.runs.importing.table import Table
 from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedLog
 
@@ -42,8 +42,8 @@ def mapping_of(name: str, guesses: Sequence[tuple[str, Guess]]) -> ImportMapping
             )
             for item in guess.used
         )
-        own = (columns, guess.sample_rate, guess.axis)
-        if own not in [(log.column, log.sample_rate, log.axis) for log in logs]:
+        own = (columns, guess.sample_rate, guess.axis, guess.kind)
+        if own not in [(log.column, log.sample_rate, log.axis, log.kind) for log in logs]:
             logs.append(MappedLog(title, *own))
     return ImportMapping(name, tuple(logs))
 
@@ -71,8 +71,9 @@ def write_mapping(mapping: ImportMapping, path: Path) -> None:
         table["name"] = log.name
         if log.sample_rate is not None:
             table["sample_rate"] = f"{log.sample_rate!r} Hz"
-        if log.axis:
-            table["axis"] = log.axis
+        for key in ("axis", "kind"):
+            if getattr(log, key):
+                table[key] = getattr(log, key)
         columns = tomlkit.aot()
         for item in log.column:
             column = tomlkit.table()
@@ -99,6 +100,8 @@ def guess_by(whole: Table, mapping: ImportMapping) -> Guess:
     one with the name of the file. Raises RunError with the columns that the file lacks, where no
     log fits, and where several logs with the same columns do.
     """
+    if kinds := [log.kind for log in mapping.log if log.kind and whole.column(log.kind)]:
+        whole = by_kind(whole, kinds[0])
     whole = with_derived(whole, [item.source for log in mapping.log for item in log.column])
     for log in _fitting(whole, mapping)[:1]:
         table = next(iter(axes_of(whole, log.axis).values())) if log.axis else whole

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from winchkit.runs.columns import column_dimension
+from winchkit.schema.linear_axis import ROTARY
 
 IGNORED = ""
 """Channel of a set point, an error, a status word: known and not used."""
@@ -241,7 +242,9 @@ def meaning_of(name: str, labels: tuple[str, ...] = ()) -> Meaning | None:
     ``name``: name without unit; the name of a channel of winchkit stands for it. Returns: a column
     that is not used has the channel :data:`IGNORED`.
     """
-    if column_dimension(name) is not None or name == "time":
+    # "position" and "force" are words of any recorder, and no names of channels alone.
+    is_word = name.rpartition(".")[2] in ROTARY
+    if (column_dimension(name) is not None and not is_word) or name == "time":
         return Meaning(name, 0, name)
     words = words_of(name)
     if matrix := _MATRIX.match(words):

@@ -15,6 +15,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
 from winchkit.runs.importing.streams import Stream, Streams
+from winchkit.schema.linear_axis import rotary_name
 
 _MOST = 5
 """Jumps of a recording; more large steps are motions between slow samples."""
@@ -55,7 +56,7 @@ def jumps_of(streams: Streams) -> tuple[Jump, ...]:
         jump
         for stream in streams.streams
         for name, values in stream.channels.items()
-        if name.rpartition(".")[2] == "motor_angle"
+        if rotary_name(name.rpartition(".")[2]) == "motor_angle"
         for jump in _jumps(streams, stream, name, values)
     ]
     return tuple(sorted(found, key=lambda jump: jump.time))
@@ -69,8 +70,10 @@ def _jumps(streams: Streams, stream: Stream, name: str, values: Array) -> Iterat
     intervals, steps = np.diff(time), np.diff(angle)
     usual = float(np.median(intervals))
     rates = steps / np.maximum(intervals, usual)
-    winch, dot, _ = name.rpartition(".")
-    velocity = stream.channels.get(f"{winch}{dot}motor_velocity")
+    winch, dot, base = name.rpartition(".")
+    is_linear = base == "position"
+    velocity = stream.channels.get(f"{winch}{dot}{'velocity' if is_linear else 'motor_velocity'}")
+    unit = "m" if is_linear else "rad"
     beyond = _outstanding(rates, steps)
     modulus = streams.wraps.get(name, np.inf)
     fastest = float(np.max(np.abs(np.delete(rates, beyond)), initial=0.0))
@@ -89,8 +92,8 @@ def _jumps(streams: Streams, stream: Stream, name: str, values: Array) -> Iterat
             f"{name} has a gap of {intervals[index]:.3g} s after {at}, in which its counter may "
             "have wrapped"
             if is_lost
-            else f"{name} jumps by {steps[index]:.4g} rad after {at}, beside steps of at most "
-            f"{largest:.3g} rad: rows were lost, the axis was "
+            else f"{name} jumps by {steps[index]:.4g} {unit} after {at}, beside steps of at most "
+            f"{largest:.3g} {unit}: rows were lost, the axis was "
             "homed or the encoder lost turns"
         )
         yield Jump(name, float(time[index]), float(time[index + 1]), what)

@@ -7,8 +7,8 @@ import math
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.assignment import Choice, Question
 from winchkit.runs.importing.chosen import ChosenColumn, Work, is_counted, is_whole
-from winchkit.runs.importing.long_table import axes_of
-from winchkit.runs.importing.table import Table
+from winchkit.runs.importing.long_table import axes_of, has_kinds
+from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_settling import is_alike
 from winchkit.runs.importing.unit_spelling import BRIDGE, COUNT_RATE, COUNTS, SHARE
 from winchkit.schema.mapping import DATE
@@ -46,11 +46,16 @@ _OTHER_UNITS = {
 """Units of a drive and of an amplifier, for which a constant is asked then."""
 
 
-def axis_question(table: Table, by: str) -> Question:
-    """Question whether a column names the axis of each row."""
+def axis_question(table: Table, key: Column) -> Question:
+    """Question whether a column names the axis or the kind of each row."""
+    by = key.source
     names = ", ".join(list(axes_of(table, by))[:_SHOWN])
-    text = f"each row seems to be of one axis, which column '{by}' names ({names})"
-    return Question(text, (f'--axis "{by}"', '--axis ""'), "axis")
+    words, options = ("axis", "kind"), (f'--axis "{by}"', f'--kind "{by}"')
+    if has_kinds(table, key):
+        words, options = words[::-1], options[::-1]
+    what = f"one {words[0]} or {words[1]}"
+    text = f"each row seems to be of {what}, which column '{by}' names ({names})"
+    return Question(text, (*options, '--axis ""'), "axis")
 
 
 def ask_units(work: Work) -> None:

@@ -19,7 +19,9 @@ from winchkit.runs.importing.formats.source import read_table
 from winchkit.runs.importing.mapping import guess_by, mapping_id
 from winchkit.runs.importing.pieces import jumps_of
 from winchkit.runs.importing.streams import Stream, Streams, merged, streams_of
+from winchkit.runs.linear_axis import is_linear
 from winchkit.runs.run import ANGLE_INTEGRATED, Run
+from winchkit.schema.linear_axis import rotary_name
 from winchkit.schema.mapping import ImportMapping
 from winchkit.schema.read import read_mapping
 from winchkit.units import UNITS
@@ -83,8 +85,8 @@ def _one_line(text: str) -> str:
 
 
 def has_angle(streams: Streams) -> bool:
-    """Whether a file has a motor angle, without which there is no run."""
-    return any(name.rpartition(".")[2] == "motor_angle" for name in streams.channels)
+    """Whether a file has a motor angle or a position, without which there is no run."""
+    return any(rotary_name(name.rpartition(".")[2]) == "motor_angle" for name in streams.channels)
 
 
 def has_cell(streams: Streams) -> bool:
@@ -109,8 +111,9 @@ def with_angle(streams: Streams) -> Streams:
         own = dict(part.channels)
         for name, values in part.channels.items():
             winch, dot, base = name.rpartition(".")
-            if base == "motor_velocity":
-                own[f"{winch}{dot}motor_angle"] = _integral(part.time, values)
+            if rotary_name(base) == "motor_velocity":
+                angle = "position" if base == "velocity" else "motor_angle"
+                own[f"{winch}{dot}{angle}"] = _integral(part.time, values)
                 is_found = True
         parts.append(Stream(part.time, own, part.rows))
     if not is_found:
@@ -139,8 +142,9 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
         faults += {fault.line: fault for fault in found}.values()
     if streams.streams and not has_angle(streams) and not has_cell(streams):
         message = (
-            f"has no motor angle (it has {', '.join(streams.channels)}); import it together with "
-            "the file that has it, which joins the two, or name its column by --column"
+            f"has no motor angle and no position (it has {', '.join(streams.channels)}); import it "
+            "together with the file that has it, which joins the two, or name its column by "
+            "--column"
         )
         faults.append(Fault(message, streams.path))
     if not streams.streams:
@@ -151,7 +155,7 @@ def run_of(streams: Streams, metadata: Mapping[str, str]) -> Run:
     first = float(known[0]) if len(known) else 0.0
     texts = dict(metadata)
     if _INTEGRAL in streams.notes:
-        texts["motor_angle"] = ANGLE_INTEGRATED
+        texts["position" if is_linear(channels) else "motor_angle"] = ANGLE_INTEGRATED
     if streams.is_absolute:
         moment = datetime.fromtimestamp(streams.origin + first, UTC)
         texts["start_time"] = moment.isoformat(timespec="microseconds")

@@ -15,18 +15,13 @@ from winchkit.errors import Fault
 from winchkit.model.rotation import quaternion_of, rotation_by
 from winchkit.runs.align import values_at
 from winchkit.runs.importing.assignment import Assignment, Guess
+from winchkit.runs.importing.clocks.row_order import STILL, rows_in_order
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.stored.numbers import range_of, restored
 from winchkit.runs.importing.table import Column, Table
 from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP, VECTOR
 
-_STILL = 0.01
-"""Share of repeated stamps that are left out; with more of them the clock is too coarse."""
-_FEWEST = 20
-"""Rows below which a time that goes back is no exception."""
-_ALONE = 0.5
-"""Intervals by which the rows beside a single one may differ from two intervals."""
 _PADDED = 0.67
 """Share of rows with a value below which a column has a rate of its own: half the rate or less."""
 _BRIDGED = 2.5
@@ -105,9 +100,8 @@ def streams_of(guess: Guess) -> Streams:
             continue
         clock = _clock_of(clocks, column)
         key = clock.source if clock is not None else f"\0{len(column)}"
-        with np.errstate(over="ignore"):
-            values = restored(column.values, item.stored) * item.factor + item.offset
-        blocks.setdefault(key, {})[item.channel] = values
+        blocks.setdefault(key, {})[item.channel] = column.values
+    assigned = {item.channel: item for item in guess.used}
     is_vector = any(item.stored == VECTOR for item in guess.used)
     streams = []
     for key, channels in blocks.items():
@@ -122,10 +116,13 @@ def streams_of(guess: Guess) -> Streams:
             continue
         else:
             time = time + (first - origin)
-        stream = Stream(time, _with_quaternion(channels, is_vector=is_vector), np.arange(count))
+        stream = Stream(time, channels, np.arange(count))
         stream, early = _in_order(_forward(stream), table.line_of)
         stream, note = _without_copies(stream)
         notes += [*early, *note]
+        # Numbers that wrap are unwrapped in the order of time, without the rows left out.
+        known = {name: _in_si(own, assigned[name]) for name, own in stream.channels.items()}
+        stream = replace(stream, channels=_with_quaternion(known, is_vector=is_vector))
         streams += _by_rate(stream)
     is_absolute = bool(absolute) and len(absolute) == len(read)
     return Streams(
@@ -139,6 +136,12 @@ def streams_of(guess: Guess) -> Streams:
         tuple(notes),
         {item.channel: range_of(item.stored) * abs(item.factor) for item in guess.used},
     )
+
+
+def _in_si(values: Array, item: Assignment) -> Array:
+    """Numbers of a column in SI."""
+    with np.errstate(over="ignore"):
+        return np.asarray(restored(values, item.stored) * item.factor + item.offset)
 
 
 def _of_axes(guess: Guess) -> Streams:
@@ -261,31 +264,14 @@ def _forward(stream: Stream) -> Stream:
 
 
 def _in_order(stream: Stream, line_of: Callable[[int], int | None]) -> tuple[Stream, list[str]]:
-    """Without a few single rows whose stamps are out of order, with a note.
-
-    A row is out of order where the times before and after it are two intervals apart and it is not
-    between them; a clock that is set back shifts all later rows as well.
-    """
-    time = stream.time
-    steps = np.diff(time)
-    if len(steps) < _FEWEST or not np.any(steps < 0) or not np.all(np.isfinite(steps)):
+    """Without a few single rows whose stamps are out of order, with a note."""
+    kept = rows_in_order(stream.time)
+    wrong = np.flatnonzero(~kept)
+    if not len(wrong):
         return stream, []
-    usual = float(np.median(steps))
-    wrong = []
-    for step in np.flatnonzero(steps < 0):
-        for row in (int(step) + 1, int(step)):
-            if 0 < row < len(time) - 1:
-                around = time[row + 1] - time[row - 1]
-                if abs(around / usual - 2) < _ALONE and row not in wrong:
-                    wrong.append(row)
-                    break
-    kept = np.ones(len(time), dtype=bool)
-    kept[wrong] = False
-    if len(wrong) > _STILL * len(time) or np.any(np.diff(time[kept]) < 0):
-        return stream, []
-    lines = [line for row in sorted(wrong) if (line := line_of(int(stream.rows[row])))]
+    lines = [line for row in wrong if (line := line_of(int(stream.rows[row])))]
     where = f" (line {', '.join(map(str, lines))})" if lines else ""
-    count = f"{len(wrong)} of {len(time)} rows"
+    count = f"{len(wrong)} of {len(stream.time)} rows"
     note = f"{count}{where} have a time that is out of order and are left out"
     return _rows_of(stream, kept), [note]
 
@@ -307,7 +293,7 @@ def _without_copies(stream: Stream) -> tuple[Stream, list[str]]:
     still = np.zeros(len(found.time), dtype=bool)
     still[1:] = np.diff(found.time) == 0
     count = int(np.count_nonzero(still))
-    if 0 < count <= _STILL * len(still):
+    if 0 < count <= STILL * len(still):
         notes.append(
             f"{count} of {len(still)} rows have the stamp of the row before them and are left out"
         )

@@ -14,7 +14,8 @@ from winchkit.schema.mapping import DATE
 
 _SIDES = ({"left", "right"}, {"links", "rechts"}, {"gauche", "droite"}, {"front", "rear"})
 _MOVING = ("motor_angle", "motor_velocity", "motor_torque")
-_SINGLE = ("motor_angle", "motor_torque", "tension", "cable_length", "load")
+_LINEAR = ("position", "velocity", "force")
+_SINGLE = ("motor_angle", "motor_torque", "tension", "cable_length", "load", "position", "force")
 """Channels whose column is asked for where several fit equally well; others are left out."""
 FEWEST = 20
 """Values of a column below which that they are equal or increase evenly may be chance."""
@@ -29,7 +30,7 @@ def choose_channels(others: Sequence[Candidate], choice: Choice, without: Collec
     """
     given = [item for item in choice.chosen if item.channel not in {"time", DATE}]
     # A channel without a winch's name that the user gives: the file is of one winch.
-    is_of_one = any(item.channel in (*_SINGLE, *_MOVING) for item in given)
+    is_of_one = any(item.channel in (*_SINGLE, *_MOVING, *_LINEAR) for item in given)
     labels = () if is_of_one else _winch_labels(others, given)
     by_channel: dict[str, list[Candidate]] = {}
     for item in others:
@@ -125,7 +126,8 @@ def _leave_constant(
     flag, a set point, or of another joint.
     """
     for winch in dict.fromkeys(name.rpartition(".")[0] for name in by_channel):
-        own = [f"{winch}.{base}" if winch else base for base in _MOVING]
+        names = _MOVING if not {f"{winch}.position", "position"} & set(by_channel) else _LINEAR
+        own = [f"{winch}.{base}" if winch else base for base in names]
         moving = [item for name in own[:2] for item in by_channel.get(name, ())]
         moving += [item for item in given if item.channel in own[:2]]
         if all(_is_constant(item) for item in moving):
@@ -164,7 +166,7 @@ def _winch_labels(others: Sequence[Candidate], given: Sequence[Candidate]) -> tu
         best += [item for item in given if _base_of(item) == channel]
         if len(best) < 2:
             # Cells of one winch are no winches.
-            if channel == "motor_angle" and best:
+            if channel in {"motor_angle", "position"} and best:
                 return ()
             continue
         sets: dict[tuple[str, ...], list[str]] = {}

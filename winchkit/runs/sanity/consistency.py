@@ -49,6 +49,8 @@ def velocity_consistency(run: Run, winch: str = "") -> Iterator[Finding]:
     """
     prefix = f"{winch}." if winch else ""
     name, angle = f"{prefix}motor_velocity", f"{prefix}motor_angle"
+    if f"{prefix}position" in run and angle not in run:
+        name, angle = f"{prefix}velocity", f"{prefix}position"
     if name not in run or angle not in run or len(run) < _LEAST_SAMPLES:
         return
     velocity, time = run[name], run.time

@@ -1,20 +1,23 @@
-"""Contents of an axis profile: a motor with its gearbox, without drum and cable."""
+"""Contents of an axis profile: a motor with its gearbox, or a linear axis; no drum and cable."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 from winchkit.schema.profiles.winch import (
     CableSpec,
     DrumSpec,
     GearboxSpec,
     GuideSpec,
+    MotorSpec,
     PathSpec,
     PulleySpec,
     ReferenceSpec,
     WinchProfile,
 )
+from winchkit.schema.quantity import Quantity
 from winchkit.schema.table import Rule
 
 _UNIT_DRUM = DrumSpec("grooved", winding_radius=1.0, groove_pitch=0.0)
@@ -36,6 +39,13 @@ class AxisProfile(WinchProfile):
     path: PathSpec = field(default_factory=PathSpec, init=False, compare=False)
     guide: GuideSpec | None = field(default=None, init=False, compare=False)
     pulley: tuple[PulleySpec, ...] = field(default=(), init=False, compare=False)
+    motion: Literal["rotary", "linear"] = "rotary"
+    """Rotary for an angle and a torque, linear for a position and a force."""
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether its runs have a position and a force in place of an angle and a torque."""
+        return self.motion == "linear"
 
     def rules(self) -> Iterator[Rule]:
         """A joint has no cable at its reference, and no turns of it."""
@@ -48,3 +58,29 @@ class AxisProfile(WinchProfile):
                 "gearbox.efficiency",
                 "needs the load of a cable; an axis has none: declare its friction as effects",
             )
+
+
+@dataclass(frozen=True)
+class LinearMotorSpec(MotorSpec):
+    """The motor of a linear axis; the moved mass is the effect ``rotor-inertia``."""
+
+    inertia: None = field(default=None, init=False, compare=False)
+    torque_constant: float | None = field(default=None, init=False, compare=False)
+    force_constant: Annotated[float, Quantity("force per current", 0.0, above=True)] | None = None
+    """Force per current, N/A, for runs that have the current in place of the force."""
+
+    def __post_init__(self) -> None:
+        """The model has the force as a torque at 1 m."""
+        object.__setattr__(self, "torque_constant", self.force_constant)
+
+
+@dataclass(frozen=True, repr=False)
+class LinearAxisProfile(AxisProfile):
+    """A carriage, a cylinder or a damper as declared: an axis with 1 m for 1 rad.
+
+    Its position is that of the instrument, without a gearbox between.
+    """
+
+    motor: LinearMotorSpec = field(default_factory=LinearMotorSpec)
+    gearbox: GearboxSpec = field(default_factory=GearboxSpec, init=False, compare=False)
+    reference: ReferenceSpec = field(default_factory=ReferenceSpec, init=False, compare=False)

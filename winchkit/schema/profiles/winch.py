@@ -192,6 +192,11 @@ class WinchProfile(Plotted, Table):
     ledger: tuple[LedgerEntry, ...] = ()
     description: str = ""
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether it is an axis whose runs have a position and a force."""
+        return False
+
     def rules(self) -> Iterator[Rule]:
         """Layers grow by the cable's diameter by default; a value is given once."""
         drum = self.drum

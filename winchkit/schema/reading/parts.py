@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 from winchkit.catalog import Kind, find
 from winchkit.errors import Fault, FileError
-from winchkit.schema.profiles.axis import AxisProfile
+from winchkit.schema.profiles.axis import AxisProfile, LinearAxisProfile
 from winchkit.schema.profiles.winch import EffectTable, WinchProfile
 from winchkit.schema.reading.lines import Key
 from winchkit.schema.reading.source import Source
@@ -17,6 +17,13 @@ from winchkit.schema.reading.tables import read_table
 
 T = TypeVar("T")
 _PARTS_OF_A_WINCH = "drum", "cable", "path", "guide", "pulley"
+_PARTS_OF_A_ROTARY_AXIS: Mapping[tuple[str, ...], str] = {
+    ("gearbox",): "belongs to a rotary axis; a linear one has its position without a gearbox",
+    ("reference",): "belongs to a rotary axis; positions of a linear one are those of its runs",
+    ("motor", "inertia"): "belongs to a rotary axis; the mass of a linear one is the effect "
+    "rotor-inertia",
+    ("motor", "torque_constant"): "belongs to a rotary axis; a linear one has a force_constant",
+}
 
 
 @dataclass
@@ -78,7 +85,18 @@ class Reading:
         for key in parts:
             self.fault((key,), "belongs to a winch; an axis has no drum and no cable")
         own = {key: value for key, value in raw.items() if key not in parts}
-        return self.table(AxisProfile, self._with_effects(own, self.stem))
+        if own.get("motion") != "linear":
+            return self.table(AxisProfile, self._with_effects(own, self.stem))
+        for rotary, message in _PARTS_OF_A_ROTARY_AXIS.items():
+            part, *names = rotary
+            table = own.get(part)
+            if not names and part in own:
+                self.fault(rotary, message)
+                del own[part]
+            elif names and isinstance(table, Mapping) and names[0] in table:
+                self.fault(rotary, message)
+                own[part] = {name: value for name, value in table.items() if name != names[0]}
+        return self.table(LinearAxisProfile, self._with_effects(own, self.stem))
 
     def _with_effects(self, raw: Mapping[str, Any], name: str, at: Key = ()) -> dict[str, Any]:
         tree = {"name": name, **raw}

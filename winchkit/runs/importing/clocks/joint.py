@@ -43,7 +43,7 @@ def joined(parts: Sequence[Streams], lag: float | None = None) -> tuple[Streams,
     notes, joints = list(first.notes), []
     faults = [fault for part in parts for fault in part.faults]
     for other in parts[1:]:
-        moved, joint = _aligned(first, other, lag)
+        moved, joint = _aligned(first, _as_named(first, other), lag)
         joints.append(joint)
         notes += other.notes
         known = {name for item in streams for name in item.channels}
@@ -63,6 +63,23 @@ def joined(parts: Sequence[Streams], lag: float | None = None) -> tuple[Streams,
         replace(first, streams=tuple(streams), faults=tuple(faults), notes=tuple(notes)),
         tuple(joints),
     )
+
+
+def _as_named(first: Streams, other: Streams) -> Streams:
+    """Another file with the winches named as the first one spells them: ``A`` for ``a``."""
+    labels = {name.rpartition(".")[0] for name in first.channels}
+    spelled = {label.casefold(): label for label in labels if label}
+
+    def named(channel: str) -> str:
+        label, dot, base = channel.rpartition(".")
+        return f"{spelled.get(label.casefold(), label)}{dot}{base}"
+
+    streams = tuple(
+        replace(item, channels={named(name): values for name, values in item.channels.items()})
+        for item in other.streams
+    )
+    wraps = {named(name): size for name, size in other.wraps.items()}
+    return replace(other, streams=streams, wraps=wraps)
 
 
 def _aligned(first: Streams, other: Streams, lag: float | None) -> tuple[Streams, Joint]:

@@ -31,6 +31,10 @@ _PAIRS = (
     ("platform_x", "motor_angle"),
     ("platform_y", "motor_angle"),
     ("platform_z", "motor_angle"),
+    ("position", "position"),
+    ("velocity", "velocity"),
+    ("force", "force"),
+    ("force", "tension"),
 )
 """Channels that follow each other up to a scale, an offset and a small error."""
 

@@ -20,6 +20,8 @@ _SAMPLED = 240
 """Lines by which the separator is found, a third each of the start, middle and end."""
 FEWEST = 2
 """Numbers and stamps of a mixed row."""
+_WHOLE = 0.9
+"""Share of lines that a separator reads without a rest; the others are a header and remarks."""
 _CELL_LINES = 8
 """Line ends that a quoted cell may have."""
 _OPENED = re.compile(r'(?:^|[,;\t|])\s*"[^"]*$')
@@ -133,6 +135,9 @@ def find_dialect(lines: Sequence[str]) -> Dialect | None:
 def _best(sample: Sequence[str], *, is_mixed: bool) -> Dialect | None:
     best: tuple[float, Dialect] | None = None
     for delimiter in _DELIMITERS:
+        # The blank in a stamp separates no cells of a line that another character separates.
+        if delimiter == BLANKS and best is not None and _is_whole(sample, best[1]):
+            continue
         split = [split_line(line, delimiter) for line in sample]
         for decimal in ".,":
             if decimal == delimiter and not any('"' in line for line in sample):
@@ -141,6 +146,17 @@ def _best(sample: Sequence[str], *, is_mixed: bool) -> Dialect | None:
             if candidate is not None and (best is None or candidate[0] > best[0]):
                 best = candidate
     return None if best is None else best[1]
+
+
+def _is_whole(sample: Sequence[str], dialect: Dialect) -> bool:
+    """Whether nine of ten lines have its width, and a value in each cell with a text."""
+    rows = [split_line(line, dialect.delimiter) for line in sample]
+    whole = [
+        cells
+        for cells in rows
+        if len(cells) == dialect.width and len(set(_values(cells, dialect.decimal))) == 1
+    ]
+    return dialect.width > 1 and len(whole) >= _WHOLE * len(rows)
 
 
 def _blocks(lines: Sequence[str]) -> list[str]:

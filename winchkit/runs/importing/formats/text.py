@@ -36,6 +36,9 @@ _COUNTED = 4
 _HEAD = 60
 """Lines in which a header ends."""
 _END_OF_HEADER = "***End_of_Header***"
+_COMPARED = 20
+"""Rows whose last numbers are compared with that of a row without a line end."""
+_LEFT_OUT = "The row is left out"
 _TEXT_SHARE = 0.2
 """Share of texts above which a column is one of text, and not one of numbers with faults."""
 
@@ -276,6 +279,24 @@ def _not_data(cells: Sequence[str], dialect: Dialect, *, is_title: bool, is_last
     return "lines of words between the rows" if is_words else ""
 
 
+def _cut_off(cells: Sequence[str], rows: Sequence[Row], dialect: Dialect) -> str:
+    """Note on a last row without a line end whose last number may lack digits; empty for none.
+
+    It lacks some for certain where the rows before it have more decimals, all as many; whole
+    numbers and numbers of any length say nothing.
+    """
+    before = [row[-1] for _, row in rows[-_COMPARED - 1 : -1] if len(row) == len(cells)]
+    many = [len(text.partition(dialect.decimal)[2]) for text in (*before, cells[-1])]
+    if not before or (many[0] and len(set(many)) == 1):
+        return ""
+    is_short = many[0] > many[-1] and len(set(many[:-1])) == 1
+    return f"the last row has no line end, and its last number {cells[-1]!r} " + (
+        f"has fewer decimals than the rows before: is the file cut off? {_LEFT_OUT}"
+        if is_short
+        else f"may lack digits if the file is cut off there (column {len(cells)})"
+    )
+
+
 def _kept(
     path: str,
     rows: Sequence[Row],
@@ -303,6 +324,10 @@ def _kept(
             cells, remarks = [*cells, *[""] * width][:width], remarks + 1
         is_title = cells[0] in titles and tuple(cells) in header.rows
         if len(cells) == width and not is_title:
+            if line == last and not is_ended and (doubt := _cut_off(cells, rows, dialect)):
+                found.notes.append(doubt)
+                if doubt.endswith(_LEFT_OUT):
+                    continue
             found.add(line, cells)
         elif kind := _not_data(cells, dialect, is_title=is_title, is_last=line == last):
             left_out[kind] += 1

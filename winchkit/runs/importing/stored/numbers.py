@@ -23,6 +23,9 @@ _CLEAR = 0.25
 """Share of the modulus below which the other steps are: of half of it the direction is unknown."""
 _FILLED = 0.7
 """Share of the modulus that numbers fill which pass its end with steps of a quarter at most."""
+_WHOLE, _MANY = 0.95, 0.05
+"""Share of the modulus that numbers fill, and of steps that are jumps, of a motion that is too fast
+for its samples."""
 _ROUNDED = 1e-4
 """Share of the modulus by which rounded numbers may exceed it."""
 
@@ -111,6 +114,10 @@ def wrap_of(values: Array, usual: Collection[float], rare: Collection[float] = (
     ]
     size = float(np.median(sizes))
     best = sorted(fitting, key=lambda modulus: abs(size - modulus))
+    turns = [m for m in usual if _WHOLE * m < span <= m * (1 + _ROUNDED)]
+    if not best and turns and len(at) > _MANY * len(steps):
+        # It fills a turn by jumps: it wraps, so fast that its steps do not say where.
+        return Wrap(min(turns), len(at), is_sure=False)
     if best:
         is_near = len(best) > 1 and abs(size - best[1]) < 3 * abs(size - best[0])
         is_fast = largest > _CLEAR * best[0]

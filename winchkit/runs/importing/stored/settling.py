@@ -6,12 +6,16 @@ import math
 from collections.abc import Collection
 from dataclasses import replace
 
+import numpy as np
+
+from winchkit.arrays import Array
 from winchkit.runs.importing.assignment import Question
-from winchkit.runs.importing.chosen import ChosenColumn, Work, is_whole
+from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of, clock_values, is_whole
+from winchkit.runs.importing.clocks.row_order import longest_stretch, rows_in_order
 from winchkit.runs.importing.consistency import USUAL_COUNTS
 from winchkit.runs.importing.names import words_of
 from winchkit.runs.importing.stored.numbers import restored, wrap_of
-from winchkit.runs.importing.stored.sign_bits import LostSign, lost_sign
+from winchkit.runs.importing.stored.sign_bits import LostSign, lost_sign, sign_by_jumps
 from winchkit.runs.importing.unit_spelling import COUNTS, SHARE
 from winchkit.schema.mapping import DATE, MODULO
 
@@ -35,10 +39,28 @@ def settle_stored(work: Work) -> None:
         elif name not in work.answers.unsigned:
             unit = item.candidate.unit
             is_small = unit is not None and unit.dimension == SHARE
-            if sign := lost_sign(item.column.values, is_small=is_small):
+            values = _in_order(work, item)
+            sign = lost_sign(values, is_small=is_small)
+            if sign is None and item.role in {"motor_velocity", "motor_torque"}:
+                sign = sign_by_jumps(values)
+            if sign is not None:
                 lost.setdefault((_stem(name), sign.stored), []).append((item, sign))
     for items in lost.values():
         _settle_signs(work, items)
+
+
+def _in_order(work: Work, item: ChosenColumn, *, is_whole: bool = True) -> Array:
+    """Values of a column without those of single rows whose time is out of order.
+
+    Not ``is_whole``: those of the longest stretch without a gap, over which a step says nothing.
+    """
+    clock = clock_of(work, item)
+    times = np.zeros(0) if clock is None else clock_values(clock)
+    values = item.column.values
+    if len(times) != len(values):
+        return values
+    kept = rows_in_order(times)
+    return values[kept] if is_whole else values[kept][longest_stretch(times[kept])]
 
 
 def _restore(item: ChosenColumn, stored: str) -> None:
@@ -50,7 +72,7 @@ def _restore(item: ChosenColumn, stored: str) -> None:
 def _settle_wrap(work: Work, item: ChosenColumn) -> bool:
     """Unwrap an angle or a counter by its steps; whether it wraps, for certain or perhaps."""
     usual, rare = _moduli(work, item)
-    wrap = wrap_of(item.column.values, usual, rare) if usual else None
+    wrap = wrap_of(_in_order(work, item, is_whole=False), usual, rare) if usual else None
     if wrap is None:
         return False
     name = item.column.source
@@ -74,7 +96,7 @@ def _settle_wrap(work: Work, item: ChosenColumn) -> bool:
 def _moduli(work: Work, item: ChosenColumn) -> tuple[Collection[float], Collection[float]]:
     """Usual and rare moduli of an angle or a counter; none of another column."""
     unit = item.candidate.unit
-    if item.base not in {"motor_angle", "cable_length", "swivel"}:
+    if item.role not in {"motor_angle", "cable_length", "swivel"}:
         return (), ()
     if unit is not None and unit.dimension == "angle":
         return tuple(share * _TURN / unit.factor for share in (0.5, 1, 2)), ()
@@ -82,7 +104,8 @@ def _moduli(work: Work, item: ChosenColumn) -> tuple[Collection[float], Collecti
         own = work.answers.counts_per_turn
         turns = tuple(own * share for share in (1, 0.5, 2)) if own else ()
         return (*_RANGES, 360.0, *turns), [*map(float, USUAL_COUNTS)]
-    return ((360.0, _TURN, 1.0) if unit is None and item.base != "cable_length" else ()), ()
+    is_angle = item.base in {"motor_angle", "swivel"}
+    return ((360.0, _TURN, 1.0) if unit is None and is_angle else ()), ()
 
 
 def _stem(name: str) -> str:

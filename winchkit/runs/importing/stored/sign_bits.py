@@ -12,13 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.runs.importing.stored.numbers import wrap_of
 from winchkit.schema.mapping import MAGNITUDE, TWOS
 
 _BITS = range(8, 33)
 """Widths of counters: a byte to a double word."""
 _WORDS = (16, 24, 32)
 """Widths of the fields of a bus, which small values of either sign do not reach by chance."""
-_DECIMALS = range(4)
+_DECIMALS = range(7)
 """Decimals that a logger may have given the numbers of a field."""
 _FEWEST = 8
 """Least number of different values on each side of the gap, of a field of any width."""
@@ -64,6 +65,27 @@ def lost_sign(values: Array, *, is_small: bool = False) -> LostSign | None:
         whole = np.round(known * scale)
         if np.allclose(whole, known * scale, rtol=0, atol=1e-6):
             return _of_whole(whole, scale, is_small=is_small)
+    return None
+
+
+def sign_by_jumps(values: Array) -> LostSign | None:
+    """The same of a signal that fills the range of its field, by its jumps from end to end.
+
+    ``values`` (n,): in the order of time, NaN where missing.
+    """
+    known = values[np.isfinite(values)]
+    if not len(known) or np.min(known) < 0:
+        return None
+    scales = (10.0**decimals for decimals in _DECIMALS)
+    scale = next((s for s in scales if np.allclose(np.round(known * s), known * s, atol=1e-6)), 0.0)
+    if not scale:
+        return None
+    for bits in _WORDS:
+        modulus = 2.0**bits / scale
+        wrap = wrap_of(values, (modulus,))
+        if wrap is not None and wrap.modulus == modulus:
+            text = f"{np.min(known):.12g} to {np.max(known):.12g}, with {wrap.count} jumps between"
+            return LostSign(bits, TWOS, modulus, text)
     return None
 
 

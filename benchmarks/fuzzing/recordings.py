@@ -1,0 +1,277 @@
+"""Recordings of a known motion in files whose structure is changed at random.
+
+One axis, rotary or linear, moves by a sum of sines; its file differs in names, units, signs, order
+of columns and rows, encoding, separators, clock, wraps, lost signs, cuts and joins, by a seed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_TURN = 2 * math.pi
+_DEG = _TURN / 360
+_RATED = 2.4
+_COUNTS = 4096
+_NAMES = {
+    "motor_angle": ("Position", "Motor angle", "ActPos", "theta", "Winkel", "encoder"),
+    "motor_velocity": ("Velocity", "speed", "ActVel", "omega", "Drehzahl"),
+    "motor_torque": ("Torque", "Drehmoment", "tau", "ActTorque", "couple"),
+    "position": ("Position", "Displacement", "Weg", "stroke", "pos"),
+    "velocity": ("Velocity", "speed", "Geschwindigkeit"),
+    "force": ("Force", "Kraft", "Axial Force"),
+}
+_UNITS: dict[str, dict[str, float]] = {
+    "motor_angle": {"rad": 1.0, "deg": _DEG, "°": _DEG, "rev": _TURN, "counts": _TURN / _COUNTS},
+    "motor_velocity": {"rad/s": 1.0, "rpm": _TURN / 60, "deg/s": _DEG, "1/min": _TURN / 60},
+    "motor_torque": {"Nm": 1.0, "mNm": 1e-3, "%": _RATED / 100, "lbf in": 4.4482216152605 * 0.0254},
+    "position": {"m": 1.0, "mm": 1e-3, "in": 0.0254},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3},
+    "force": {"N": 1.0, "kN": 1e3, "kip": 4448.2216152605, "lbf": 4.4482216152605},
+}  # fmt: skip
+_CLOCKS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+_ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "cp1252")
+_START = datetime(2025, 3, 4, 11, 59, 50, tzinfo=UTC)
+
+
+@dataclass
+class Recording:
+    """A file with the truth that the test knows of it."""
+
+    path: Path
+    options: tuple[str, ...]
+    """Of ``winchkit import``: what the file does not say."""
+    time: Array
+    """Of the rows as they were sampled, s."""
+    truth: dict[str, Callable[[Array], Array]]
+    """Channel over time, SI."""
+    resolution: dict[str, float]
+    """Of each channel as written, SI."""
+    clock: float
+    """Resolution of the stamps, s."""
+    names: dict[str, str]
+    """Column of each channel."""
+    moduli: dict[str, float] = field(default_factory=dict)
+    """Range of a channel that wraps, SI: its number of turns at the start is not known."""
+    changes: tuple[str, ...] = ()
+    """What was changed, in words."""
+
+
+def recording(seed: int, folder: Path) -> Recording:
+    """The file of a seed."""
+    return _Writer(np.random.default_rng(seed), folder / f"log{seed}").write()
+
+
+class _Writer:
+    def __init__(self, rng: np.random.Generator, stem: Path) -> None:
+        self.rng, self.stem, self.changes = rng, stem, list[str]()
+        self.linear = bool(rng.random() < 0.25)
+        names = ("position", "velocity", "force") if self.linear else (
+            "motor_angle", "motor_velocity", "motor_torque"
+        )  # fmt: skip
+        size = 0.2 if self.linear else float(10 ** rng.uniform(0.3, 2.2))
+        rates = np.sort(rng.uniform(0.3, 4.0, 3))
+        sizes = size * rng.uniform(0.3, 1.0, 3) / rates
+        phases = rng.uniform(0, _TURN, 3)
+        load = 200.0 if self.linear else 1.2
+
+        def angle(t: Array) -> Array:
+            return np.asarray(np.sin(np.outer(t, rates) + phases) @ sizes)
+
+        def rate(t: Array) -> Array:
+            return np.asarray(np.cos(np.outer(t, rates) + phases) @ (sizes * rates))
+
+        def torque(t: Array) -> Array:
+            return np.asarray(load * (0.3 * rate(t) / size + 0.4 * np.tanh(20 * rate(t) / size)))
+
+        self.truth = dict(zip(names, (angle, rate, torque), strict=True))
+        if rng.random() < 0.25:
+            del self.truth[names[1]]
+        count = int(rng.integers(300, 900))
+        self.period = float(rng.choice([0.002, 0.005, 0.01, 0.02]))
+        self.time = np.arange(count) * self.period
+        self.moduli: dict[str, float] = {}
+        self.resolution: dict[str, float] = {}
+        self.names: dict[str, str] = {}
+        self.options: list[str] = []
+
+    def chance(self, share: float, words: str) -> bool:
+        """Whether a change is made; it is noted then."""
+        made = bool(self.rng.random() < share)
+        if made:
+            self.changes.append(words)
+        return made
+
+    def pick(self, items: Sequence[str]) -> str:
+        return str(items[int(self.rng.integers(len(items)))])
+
+    def write(self) -> Recording:
+        """Columns, then the order of the rows, then the file."""
+        stamps, clock = self._stamps()
+        columns = {name: self._column(name) for name in self.truth}
+        rows = self._rows()
+        heads = ["Time" if self.rng.random() < 0.5 else "t", *(h for h, _ in columns.values())]
+        heads[0] += f" [{clock}]" if clock else ""
+        cells = [[stamps[r], *(texts[r] for _, texts in columns.values())] for r in rows]
+        order = [0, *range(1, len(heads))]
+        if self.chance(0.4, "order of columns"):
+            order = list(map(int, self.rng.permutation(len(heads))))
+        if self.chance(0.3, "a column more"):
+            heads.append("Status word")
+            cells = [[*row, str(int(self.rng.integers(3)))] for row in cells]
+            order.append(len(order))
+        heads, cells = [heads[i] for i in order], [[row[i] for i in order] for row in cells]
+        path = self._file(heads, cells)
+        return Recording(
+            path,
+            tuple(self.options),
+            self.time,
+            self.truth,
+            self.resolution,
+            self.clock,
+            self.names,
+            self.moduli,
+            tuple(self.changes),
+        )
+
+    def _column(self, channel: str) -> tuple[str, list[str]]:
+        """Header and cells of a channel."""
+        name, unit = self.pick(_NAMES[channel]), self.pick(list(_UNITS[channel]))
+        si, decimals = _UNITS[channel][unit], int(self.rng.integers(2, 6))
+        values = self.truth[channel](self.time) / si
+        if unit == "counts":
+            decimals = 0
+            self.options += ["--counts-per-turn", str(_COUNTS)]
+        elif unit == "%":
+            self.options += ["--rated-torque", f"{_RATED} N m"]
+        # Numbers as a recorder writes them: at least some hundred steps over the range.
+        decimals = max(decimals, 3 - math.floor(math.log10(float(np.ptp(values)))))
+        decimals = 0 if unit == "counts" else decimals
+        head, sign = f"{name} [{unit}]", 1.0
+        self.names[channel] = name
+        if self.chance(0.15, f"sign of {channel}"):
+            sign = -1.0
+            self.options += ["--column", f"{channel}=-{name}"]
+        values = np.round(sign * values, decimals)
+        self.resolution[channel] = 10.0**-decimals * si
+        base = channel.rpartition("_")[2]
+        if base == "angle" and self.chance(0.2, "wrapped angle"):
+            modulus = {"rad": _TURN, "rev": 1.0, "counts": 65536.0}.get(unit, 360.0)
+            values = np.round(np.mod(values, modulus), decimals)
+            self.moduli[channel] = modulus * si
+        elif base in {"torque", "velocity"} and self.chance(0.1, f"lost sign of {channel}"):
+            scale = 10.0**decimals
+            if float(np.max(np.abs(values))) * scale < 32000:
+                values = np.where(values < 0, values + 65536 / scale, values)
+        return head, [f"{value:.{decimals}f}" for value in values]
+
+    def _stamps(self) -> tuple[list[str], str]:
+        """Stamps as text, and the unit of their header."""
+        time = self.time
+        if self.chance(0.3, "jitter of the clock"):
+            time = time + self.rng.uniform(-0.2, 0.2, len(time)) * self.period
+            self.time = time
+        kind = self.pick(("s", "ms", "us", "iso", "epoch"))
+        self.clock = 1e-6
+        start = float(self.rng.choice([0.0, 12.5, 4711.0]))
+        if kind == "iso":
+            self.changes.append("ISO stamps")
+            moments = [_START + timedelta(seconds=float(t)) for t in time]
+            return [moment.strftime("%Y-%m-%d %H:%M:%S.%f") for moment in moments], ""
+        if kind == "epoch":
+            self.changes.append("seconds since 1970")
+            return [f"{_START.timestamp() + float(t):.6f}" for t in time], "s"
+        decimals = {"s": 6, "ms": 3, "us": 0}[kind]
+        return [f"{(start + float(t)) / _CLOCKS[kind]:.{decimals}f}" for t in time], kind
+
+    def _rows(self) -> list[int]:
+        """Rows in the order of the file."""
+        rows = list(range(len(self.time)))
+        count = len(rows)
+        if self.chance(0.05, "latest row first"):
+            return rows[::-1]
+        if self.chance(0.1, "one row out of order"):
+            at, to = (int(i) for i in self.rng.integers(10, count - 10, 2))
+            rows.insert(to, rows.pop(at))
+        if self.chance(0.04, "rows shuffled"):
+            return list(map(int, self.rng.permutation(count)))
+        if self.chance(0.1, "a row twice"):
+            at = int(self.rng.integers(5, count - 5))
+            rows.insert(at, rows[at])
+        if self.chance(0.12, "rows lost"):
+            at, gap = int(self.rng.integers(50, count - 90)), int(self.rng.integers(1, 60))
+            del rows[at : at + gap]
+        if self.chance(0.04, "a stretch again"):
+            at = int(self.rng.integers(50, count - 90))
+            rows = rows[: at + 40] + rows[at:]
+        return rows
+
+    def _file(self, heads: list[str], cells: list[list[str]]) -> Path:
+        form = self.rng.random()
+        if form < 0.1:
+            return self._json(heads, cells)
+        if form < 0.16:
+            return self._workbook(heads, cells)
+        return self._text(heads, cells)
+
+    def _json(self, heads: list[str], cells: list[list[str]]) -> Path:
+        rows = [
+            {h: c if ":" in c else float(c) for h, c in zip(heads, row, strict=True)}
+            for row in cells
+        ]
+        self.changes.append("JSON")
+        if self.rng.random() < 0.5:
+            path = self.stem.with_suffix(".jsonl")
+            path.write_text("\n".join(map(json.dumps, rows)) + "\n")
+        else:
+            path = self.stem.with_suffix(".json")
+            path.write_text(json.dumps({h: [row[h] for row in rows] for h in heads}))
+        return path
+
+    def _workbook(self, heads: list[str], cells: list[list[str]]) -> Path:
+        from openpyxl import Workbook
+
+        self.changes.append("XLSX")
+        book = Workbook()
+        sheet = book.active
+        assert sheet is not None
+        sheet.append(heads)
+        for row in cells:
+            sheet.append([c if ":" in c else float(c) for c in row])
+        path = self.stem.with_suffix(".xlsx")
+        book.save(path)
+        return path
+
+    def _text(self, heads: list[str], cells: list[list[str]]) -> Path:
+        mark = self.pick((",", ";", "\t", "|"))
+        comma = mark != "," and self.chance(0.4, "decimal comma")
+        if comma:
+            cells = [[c if ":" in c else c.replace(".", ",") for c in row] for row in cells]
+        head = mark.join(heads)
+        lines = [head, *(mark.join(row) for row in cells)]
+        if self.chance(0.2, "lines above the header"):
+            lines = ["Recorder 7", f"Exported{mark}yes", *lines]
+        if self.chance(0.08, "cut off"):
+            kept = int(self.rng.integers(len(lines) // 3, len(lines)))
+            last = lines[kept - 1]
+            lines = [*lines[: kept - 1], last[: int(self.rng.integers(1, len(last) + 1))]]
+            ending = ""
+        else:
+            ending = "\n"
+        if self.chance(0.03, "header again"):
+            at = int(self.rng.integers(100, len(lines)))
+            lines.insert(at, head)
+        ends = self.pick(("\n", "\r\n"))
+        encoding = self.pick(_ENCODINGS)
+        self.changes.append(f"{encoding}, {mark!r}")
+        path = self.stem.with_suffix(".csv")
+        path.write_bytes((ends.join(lines) + ending).encode(encoding))
+        return path

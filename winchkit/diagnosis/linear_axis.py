@@ -1,0 +1,61 @@
+"""Results on a linear axis with its names and units, for every text, table, plot and file.
+
+The model has 1 m for 1 rad; a result that leaves it has ``force`` and ``position`` in place of
+``motor_torque`` and ``motor_angle``, N in place of N m, and the same in its texts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+from winchkit.effects.effect import Effect
+from winchkit.errors import RunError, UsageError
+from winchkit.schema.linear_axis import linear_words
+from winchkit.schema.profiles.winch import WinchProfile
+
+T = TypeVar("T")
+_AS_GIVEN = {"run", "runs", "path", "programme", "profile", "effect", "effects", "code"}
+"""Fields with names of the user and of the catalogue."""
+
+
+def in_units_of(profile: WinchProfile, result: T) -> T:
+    """A result with the names and units of a profile: those of a linear axis where it is one."""
+    return _linear(result) if profile.is_linear else result
+
+
+@contextmanager
+def errors_in_units_of(profile: WinchProfile) -> Iterator[None]:
+    """Raise errors of the model with the names and units of a profile."""
+    try:
+        yield
+    except RunError as error:
+        if not profile.is_linear:
+            raise
+        raise RunError([_linear(fault) for fault in error.faults]) from None
+    except UsageError as error:
+        if not profile.is_linear:
+            raise
+        raise UsageError(linear_words(str(error))) from None
+
+
+def _linear(value: Any) -> Any:
+    if isinstance(value, str):
+        return linear_words(value)
+    if isinstance(value, Effect | WinchProfile):
+        return value
+    if is_dataclass(value) and not isinstance(value, type):
+        new = {
+            item.name: _linear(getattr(value, item.name))
+            for item in fields(value)
+            if item.init and item.name not in _AS_GIVEN
+        }
+        changed = {name: own for name, own in new.items() if own is not getattr(value, name)}
+        return replace(value, **changed) if changed else value
+    if isinstance(value, Mapping):
+        return {_linear(key): _linear(own) for key, own in value.items()}
+    if isinstance(value, list | tuple) and not hasattr(value, "_fields"):
+        return type(value)(_linear(own) for own in value)
+    return value
