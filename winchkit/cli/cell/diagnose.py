@@ -56,7 +56,7 @@ _MEANINGS = {
     help="Examine a recording in place of readings: a run, a log, or a file of another program.",
 )
 @click.option(
-    "--column", metavar="COLUMN", help="Column of the cell in FILE, by its name or number."
+    "-c", "--column", metavar="COLUMN", help="Column of the cell in FILE, by its name or number."
 )
 @click.option(
     "--for",
