@@ -1,8 +1,9 @@
 """Cable robots: many winches that move one platform.
 
-``geometry``, ``forces`` and ``dynamics`` have the model, ``identification`` what ``calibration``
-and ``diagnosis`` share; ``bench`` moves the platform, ``sim`` simulates it; ``effects``, ``files``,
-``report``, ``web`` and ``cli`` are the robot's parts of the packages of these names.
+``geometry``, ``forces`` and ``dynamics`` have the model, ``identification`` and ``mistakes`` (of
+tables) what ``calibration`` and ``diagnosis`` share; ``bench`` moves the platform, ``sim``
+simulates it; ``effects``, ``files``, ``report``, ``web`` and ``cli`` are the robot's parts of the
+packages of these names.
 
     robot = robot_of(read_robot("cabtive"))
     angles = robot.motor_angles(Pose(position, rotation))

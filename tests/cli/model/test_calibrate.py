@@ -152,11 +152,9 @@ def test_one_coordinate_of_the_position_is_used_and_reported(run: Path, tmp_path
 def test_gross_errors_are_named_and_poses_of_another_robot_rejected(
     run: Path, tmp_path: Path
 ) -> None:
-    found = answer("ipanema3", run, "-o", tmp_path / "new.toml", code=1)
-    assert "not calibrated" in found["refused"]
+    told = refused(3, "ipanema3", run, "-o", tmp_path / "new.toml")
+    assert "poses-unlike: motor angles and positions are not those of this robot" in told
     assert not (tmp_path / "new.toml").exists()
-    assert any("poses are of this robot" in text for text in found["warnings"])
-    assert not any("gross" in text for text in found["warnings"])
     lines = run.read_text().splitlines()
     for k in (6, 41):
         cells = lines[k].split(",")
@@ -206,10 +204,10 @@ def test_motors_that_turn_the_other_way_are_suspected(run: Path, tmp_path: Path)
     for cells in turned:
         cells[1:9] = [repr(-float(cell)) for cell in cells[1:9]]
     run.write_text("\n".join([head, *(",".join(cells) for cells in turned)]) + "\n")
-    found = answer("cabtive", run, "-o", tmp_path / "new.toml", code=1)
-    assert "gearbox.direction" in found["refused"]
+    told = refused(3, "cabtive", run, "-o", tmp_path / "new.toml")
+    assert "motor-sign:all: all motor angles have the other sign" in told
+    assert "gearbox.direction" in told
     assert not (tmp_path / "new.toml").exists()
-    assert any("gearbox.direction" in text for text in found["warnings"])
 
 
 def test_a_line_without_values_is_refused(run: Path, tmp_path: Path) -> None:

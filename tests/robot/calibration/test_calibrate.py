@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 
 from calibration_cases import EXACT, held, measured, robot, rows, true_values, with_turns
 from robot_poses.truth import Noise, Truth, csv
-from winchkit.errors import UsageError
+from winchkit.errors import RunError, UsageError
 from winchkit.robot import robot_of, rotation_of, structure_matrix
 from winchkit.robot.calibration.calibrate import Calibrated, calibrate, split
 from winchkit.robot.calibration.options import Options
@@ -211,7 +211,7 @@ def test_too_few_poses_are_refused(count: int) -> None:
 
 def test_positions_in_the_wrong_unit_are_noticed() -> None:
     fit = measured(csv(rows()))
-    with pytest.raises(UsageError, match="in its unit"):
+    with pytest.raises(RunError, match="position-unit:mm: the positions are in millimetres"):
         calibrate(robot(), replace(fit, position=fit.position * 1e3), held())
 
 
@@ -242,8 +242,8 @@ def test_proposed_poses_say_more_than_poses_at_random() -> None:
         assert nnls(structure, -weight)[1] < 1e-9, "cables that pull hold the platform"
 
     def volume(extra: Measured) -> float:
-        options = Options(sigma=found.weights.sigma)
-        again = calibrate(robot(), joined([fit, extra]), out, options)
+        both = joined([fit, extra])
+        again = calibrate(robot(), both, out, Options(sigma=found.weights.sigma))
         return float(np.sum(np.log2(1 + again.observed.information))) / 2
 
     proposed = [pose_row(tuple(p.position), tuple(p.angles)) for p in chosen]

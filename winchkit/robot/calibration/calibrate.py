@@ -17,7 +17,7 @@ changes by less than 3 %, at most eight times. Poses with gross errors
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from time import perf_counter
@@ -55,6 +55,8 @@ from winchkit.robot.calibration.statistics import calibration_statistics
 from winchkit.robot.files.poses import Measured
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.bundle_adjustment import Solution, Weights
+from winchkit.robot.identification.variance_components import START
+from winchkit.robot.mistakes.search import refuse_mistakes
 from winchkit.tabular import Columns, Tabular
 
 _HELD_OUT_EVERY = 10
@@ -101,43 +103,70 @@ class Calibrated(Plotted, Tabular):
     """Instruments at the lines whose readings do not follow the geometry, in words."""
     gross_errors: tuple[str, ...] = ()
     """Run and row of the poses that were left out of the fit and of the held-out error."""
+    instrument_noise: Mapping[str, float] = field(default_factory=lambda: dict(START))
+    """Standard deviations of the instruments by kind: known, else usual ones, SI."""
 
     @property
     def refusal(self) -> str:
         """Reason why the robot is not calibrated, in words; empty where it is."""
+        return next(self._reasons(), "")
+
+    def _reasons(self) -> Iterator[str]:
+        """Reasons why the robot is not calibrated, in words."""
         if self.unexplained:
-            return f"not calibrated: {'; '.join(self.unexplained)}; nothing was written"
-        before, after = rms(self.validation_before.distance), rms(self.validation_after.distance)
-        if after > before:
-            return (
-                f"not calibrated: the held-out position error is {after * 1e3:.4g} mm rms after "
-                f"the fit, larger than {before * 1e3:.4g} mm with the starting profile; nothing "
-                "was written. Check that the poses are of this robot, record more of them, or fit "
-                "a missing effect beside the geometry (--effect)"
+            yield f"not calibrated: {'; '.join(self.unexplained)}; nothing was written"
+        if lost := self._without_value:
+            yield (
+                f"not calibrated: {lost} of {self.equations.count} equations have no value at the "
+                "end of the fit; nothing was written. Check the lines' order, gearbox.direction "
+                "and the units of the motor angles"
             )
+        before, after = rms(self.validation_before.distance), rms(self.validation_after.distance)
+        if after >= before:
+            yield _no_better("position error", before, after)
         first, last = self.validation_lengths
-        if not isfinite(after) and last > first:
-            return (
-                f"not calibrated: the held-out error of the cable lengths is {last * 1e3:.4g} mm "
-                f"rms after the fit, larger than {first * 1e3:.4g} mm with the starting profile; "
-                "nothing was written. Check that the poses are of this robot, record more of them, "
-                "or fit a missing effect beside the geometry (--effect)"
+        if not isfinite(after) and last >= first:
+            yield _no_better("error of the cable lengths", first, last)
+        if not isfinite(after) and not isfinite(last) and not self.validation_after.unfound:
+            yield (
+                "not calibrated: the held-out error is not known, since no pose is held out; "
+                f"nothing was written. Record {_HELD_OUT_EVERY} poses or more, or give others "
+                "with --validate"
             )
         size = self.equations.robot.geometry.size
         if after > _LARGEST_ERROR * size:
-            return (
+            yield (
                 f"not calibrated: the held-out position error is {after * 1e3:.4g} mm rms, in a "
                 f"robot of {size:.3g} m (limit: {_LARGEST_ERROR:.0%} of it); nothing was written. "
                 "Check units and signs of the positions, the lines' order and gearbox.direction"
             )
         count = len(self.validation_after.distance)
         if self.validation_after.unfound > count / 2:
-            return (
+            yield (
                 f"not calibrated: {self.validation_after.unfound} of {count} held-out poses were "
                 "not found from their motor angles; nothing was written. Check the lines' order, "
                 "gearbox.direction, [home] and the motor angles there"
             )
-        return ""
+
+    @property
+    def _without_value(self) -> int:
+        """Number of measurements that the equations do not predict at the end of the fit."""
+        known = int(np.count_nonzero(self.solution.linear.stack.known))
+        return max(0, self.equations.count - known)
+
+    @property
+    def noise_ratio(self) -> float:
+        """Held-out error over the noise of the instruments: of positions, else of lengths.
+
+        The noise is that of ``Options.sigma``, else of usual instruments
+        (:data:`~winchkit.robot.identification.variance_components.START`). A real robot,
+        with cables, pulleys and a frame that no model has, is at 5 to 20. NaN without held-out
+        poses.
+        """
+        place = rms(self.validation_after.distance)
+        if isfinite(place):
+            return place / (3**0.5 * self.instrument_noise["position"])
+        return self.validation_lengths[1] / self.instrument_noise["closure"]
 
     @property
     def values(self) -> Array:
@@ -162,6 +191,16 @@ class Calibrated(Plotted, Tabular):
 
     def _columns(self) -> Columns:
         return self.statistics._columns()
+
+
+def _no_better(what: str, before: float, after: float) -> str:
+    """Refusal of a fit whose held-out error did not fall, m."""
+    return (
+        f"not calibrated: the held-out {what} is {after * 1e3:.4g} mm rms after the fit, not "
+        f"smaller than {before * 1e3:.4g} mm with the starting profile; nothing was written. Check "
+        "that the poses are of this robot, record more of them, or fit a missing effect beside the "
+        "geometry (--effect)"
+    )
 
 
 def split(measured: Measured) -> tuple[Measured, Measured]:
@@ -201,20 +240,27 @@ def calibrate(
     ------
     UsageError
         Where the poses have no redundancy, or a measurement is missing that an effect needs.
+    RunError
+        With the mistakes in the tables of poses (:mod:`winchkit.robot.mistakes`).
     """
     require_type(robot, Robot, "robot")
     require_type(fit, Measured, "fit")
     if validation is not None:
         require_type(validation, Measured, "validation")
     options = options or Options()
+    equations = equations_of(robot, fit, options)
+    # Before poses are held out, since rows that are shifted have neighbours.
+    for poses in (fit,) if validation is None else (fit, validation):
+        refuse_mistakes(robot, poses)
     if validation is None:
         fit, validation = split(fit)
+        equations = equations_of(robot, fit, options)
     effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
     begin = perf_counter()
-    equations = equations_of(robot, fit, options)
     refuse_unfit(equations)
     first, weights = first_model(equations, options)
     wrong = gross_errors(first, first.parameters.nominal, weights)
+    given = equations
     for _ in range(_CLEANINGS):
         declared, chosen = fitted_with_instruments(equations.of(~wrong), options, progress)
         own = _at(chosen.equations, fit, options)
@@ -261,6 +307,7 @@ def calibrate(
             *left_out_poses(fit.place[wrong], "the fit"),
             *left_out_poses(validation.place[missed], "the held-out error"),
             *_instrument_notes(declared, chosen),
+            *_home_notes(given, equations, values),
             *_warnings(equations, solution, weights, observed, after.unfound),
             *_worse_rotation(errors_before, after),
             *ratios.words,
@@ -269,6 +316,7 @@ def calibrate(
         ratios=ratios,
         unexplained=tuple(unexplained(equations, solution)),
         gross_errors=(*fit.place[wrong].tolist(), *validation.place[missed].tolist()),
+        instrument_noise={**START, **(options.sigma or {})},
         found_instruments=chosen.free
         - (declared.instruments.free if declared.instruments else frozenset()),
     )
@@ -396,6 +444,18 @@ def _instrument_notes(declared: Equations, chosen: Fitted) -> list[str]:
             "a bias of roll and pitch is the same as the IMU's mounting: reported as the mounting"
         )
     return out
+
+
+def _home_notes(given: Equations, fitted: Equations, values: Array) -> list[str]:
+    """Cable lengths at home that were fitted although no effect asks for them."""
+    index = fitted.parameters.block.get("home_length")
+    if index is None or "home_length" in given.parameters.block:
+        return []
+    return [
+        "the poses require other cable lengths at home than [home] gives, by up to "
+        f"{float(np.max(np.abs(values[index]))) * 1e3:.3g} mm: fitted beside the geometry. Measure "
+        "the home pose anew, or declare the effect home-length"
+    ]
 
 
 def _worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:

@@ -101,6 +101,13 @@ class Equations:
         return (*kinds, *(["balance"] if self.has_balance else []))
 
     @property
+    def count(self) -> int:
+        """Number of measured values of motors, positions, rotations, swivels and lengths."""
+        m = self.measured
+        every = (m.motor_angle, m.position, m.angles, m.swivel, m.cable_length)
+        return sum(int(np.count_nonzero(np.isfinite(values))) for values in every)
+
+    @property
     def hangs(self) -> bool:
         """Whether measured cable forces and a known weight determine the pose of the platform."""
         few = len(self.robot.names) < PLATFORM_DOF and self.robot.platform.mass > 0

@@ -215,16 +215,7 @@ twice that distance are in another unit or frame."""
 def refuse_unfit(equations: Equations) -> None:
     """Raise UsageError for poses that are too few, too many, without redundancy or out of reach."""
     measured, many = equations.measured, len(equations.measured)
-    known = sum(
-        int(np.count_nonzero(np.isfinite(values)))
-        for values in (
-            measured.motor_angle,
-            measured.position,
-            measured.angles,
-            measured.swivel,
-            measured.cable_length,
-        )
-    )
+    known = equations.count
     lines = measured.motor_angle.shape[1]
     if many > _MOST:
         raise UsageError(

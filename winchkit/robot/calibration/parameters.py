@@ -20,7 +20,7 @@ from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotPr
 from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse
 
-_HOME = "home-length"
+HOME_LENGTH = "home-length"
 
 
 def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
@@ -35,7 +35,7 @@ def own_effects(profile: RobotProfile) -> dict[str, dict[str, float]]:
         if table.id in LAWS and "line" not in table.values:
             units = {p.name: p.unit for p in LAWS[table.id]}
             given: Mapping[str, Any] = table.values
-        elif table.id == _HOME:
+        elif table.id == HOME_LENGTH:
             units = {line.name: "m" for line in profile.line}
             lengths = table.values.get("length")
             if not isinstance(lengths, Mapping):

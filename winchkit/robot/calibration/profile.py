@@ -15,6 +15,7 @@ import tomlkit
 from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.catalog import find
+from winchkit.errors import UsageError
 from winchkit.model.rotation import angles_of, rotation_by, rotation_of
 from winchkit.profile_edit.document import effect_tables, read_document, write_document
 from winchkit.robot.calibration.calibrate import Calibrated
@@ -59,8 +60,12 @@ def write_calibrated(source: Path, found: Calibrated, out: Path, where: Provenan
     ------
     FileError
         Where a file cannot be read or written.
+    UsageError
+        With ``found.refusal`` where the robot is not calibrated.
     """
     require_type(found, Calibrated, "found")
+    if found.refusal:
+        raise UsageError(found.refusal)
     document = read_document(source)
     for line in document["line"]:
         _line(line, source, found)

@@ -39,6 +39,12 @@ _TOLERANCE = 1e-3
 thumb: 0.06 mm of a radius of 60 mm, the class h8 of its diameter)."""
 _LEAST_SHARE = 5e-3
 """Least change that is named: five tolerances."""
+_USUAL = 2.0
+"""Standard deviations of the winding radii in the robot's file within which all changes are what it
+states: then no line is named that does not stand out of their scatter (rule of thumb)."""
+_OUTLYING, _NORMAL = 5.0, 1.4826
+"""Robust standard deviations by which a line stands out, and a standard deviation over the median
+absolute deviation of a normal distribution."""
 _DELTA_CHI_SQUARE = 9.0
 """Difference of χ² below which two sets count as equal (probability at most 1/740)."""
 _STEP = 1e-6
@@ -110,6 +116,10 @@ def ratios_of(equations: Equations, solution: Solution) -> Ratios:
     by = np.einsum("pn,pnq->nq", along, by) * scale
     covariance = by @ posterior @ by.T
     chosen, others = _sets(change, covariance)
+    about = np.abs(change - np.median(change))
+    scatter = _NORMAL * _OUTLYING * float(np.median(about))
+    if np.all(np.abs(change) <= _USUAL * _stated(equations)) and np.all(about <= scatter):
+        chosen, others = (), []
     right = [i for i in range(len(names)) if i not in chosen]
     lines = []
     for i, name in enumerate(names):
@@ -126,6 +136,12 @@ def ratios_of(equations: Equations, solution: Solution) -> Ratios:
             )
         )
     return Ratios(tuple(lines), tuple(tuple(names[i] for i in each) for each in others))
+
+
+def _stated(equations: Equations) -> Array:
+    """Standard deviations of the winding radii that the file states, as shares, (n,)."""
+    at = equations.parameters.block["winding_radius"]
+    return np.asarray(equations.parameters.std[at] / equations.parameters.nominal[at])
 
 
 def _wound(equations: Equations, values: Array) -> tuple[Array, Array]:

@@ -35,7 +35,7 @@ from winchkit.robot.calibration.instruments import (
     registered_instruments,
 )
 from winchkit.robot.calibration.options import Options, ProgressCallback
-from winchkit.robot.calibration.parameters import parameters_of
+from winchkit.robot.calibration.parameters import HOME_LENGTH, parameters_of
 from winchkit.robot.calibration.prediction import (
     PoseErrors,
     errors_at,
@@ -55,6 +55,7 @@ from winchkit.robot.identification.bundle_adjustment import (
     place,
     solve,
 )
+from winchkit.robot.mistakes.adjustment import lengths_at_home
 
 _NOISE_ROUNDS = 8
 """Rule of thumb: the components converge linearly; where two of them exchange variance they do not
@@ -82,6 +83,11 @@ _DELTA_CHI_SQUARE = 9.0
 much with probability at most 1/740."""
 _BEYOND_PRIOR = 3.0
 """Standard deviations of its prior beyond which a winding radius imitates another gear ratio."""
+_ODD = 5.0
+"""Ratio of the closures' standard deviation to that of a usual encoder from which the lengths at
+home are tried (rule of thumb: robots have up to this by their cables and pulleys)."""
+_ROUNDS_AT_HOME = 5
+"""Each reduces the error of lengths at home that are 100 mm off by a factor of ten or more."""
 _LEVEL = 1e-6
 """Level of the score test for free numbers of the tracker (rule of thumb)."""
 _PLAINLY = 3.0
@@ -170,6 +176,9 @@ def fitted_with_instruments(
     unknown.
     """
     declared, best = _fitted_with_tracker(equations, options, progress)
+    best = _recentred(best, options, progress)
+    if (at_home := _with_home(equations, best, options, progress)) is not None:
+        declared, best = at_home
     best = _with_more(best, options, progress)
     return declared, _with_ratios(best, options, progress)
 
@@ -185,6 +194,29 @@ def _declared(equations: Equations, predicted: Pose) -> Equations:
     """The model that the file declares, its tracker registered."""
     own = _instruments(equations)
     return _registered(equations, own, own.free, predicted) if own.free else equations
+
+
+def _with_home(
+    equations: Equations, best: Fitted, options: Options, progress: ProgressCallback
+) -> tuple[Equations, Fitted] | None:
+    """The fit with the cable lengths at home free, where it explains the poses clearly better.
+
+    It is tried before a tracker is blamed that the file does not declare unknown, and where cables
+    and geometry disagree: lengths at home that are some millimetres off look like another frame.
+    """
+    blamed = best.free - _instruments(equations).free
+    odd = best.weights.sigma.get("closure", 0.0) > _ODD * NOISE["closure"].start
+    if "home_length" in equations.parameters.block or not (blamed or odd):
+        return None
+    trial = replace(equations, effects=(*equations.effects, HOME_LENGTH))
+    trial = with_instruments(trial, _instruments(equations))
+    declared, found = _fitted_with_tracker(trial, options, progress)
+    found = _recentred(found, options, progress)
+    count = int(np.count_nonzero(np.isfinite(found.equations.measured.motor_angle)))
+    price = len(equations.robot.names) * log(count) + _DELTA_CHI_SQUARE
+    if not found.criterion + price < best.criterion:
+        return None
+    return declared, found
 
 
 def _fitted_with_tracker(
@@ -211,7 +243,12 @@ def _fitted_with_tracker(
     def is_near(trial: Equations) -> bool:
         return not _nominal_error(trial, predicted) > limit
 
-    first = _fitted(declared, options, progress) if is_near(declared) else None
+    first = None
+    if "home_length" in equations.parameters.block:
+        # They may be far off at the start, which no registration says.
+        first = _fitted(_starting_at_home(declared, own), options, progress)
+    elif is_near(declared):
+        first = _fitted(declared, options, progress)
     best = first
     for trials in wider:
         if best is not None and not any(_shows_more(best, trial) for trial in trials):
@@ -233,6 +270,34 @@ def _fitted_with_tracker(
     if best is None:
         return declared, _fitted(declared, options, progress)
     return declared, best if best is first else _mounted(best, predicted, options, progress)
+
+
+def _starting_at_home(equations: Equations, own: Instruments) -> Equations:
+    """The equations with lengths at home by an adjustment, where the tracker's frame is known and
+    they are beyond their prior."""
+    if "frame" in own.free:
+        return equations
+    index = equations.parameters.block["home_length"]
+    found = lengths_at_home(equations.robot, equations.measured, _LEAST_MISFIT)
+    beyond = np.abs(found) > _BEYOND_PRIOR * equations.parameters.std[index]
+    if not np.any(beyond):
+        return equations
+    return replace(equations, parameters=equations.parameters.starting("home_length", found))
+
+
+def _recentred(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:
+    """The fit with the priors of the lengths at home about their estimates, where these left them.
+
+    A prior for a platform in its fixture says nothing of one that stood elsewhere.
+    """
+    own = best.equations.parameters.block.get("home_length")
+    for _ in range(_ROUNDS_AT_HOME if own is not None else 0):
+        if np.all(np.abs(best.solution.linear.prior[own]) <= _BEYOND_PRIOR):
+            break
+        values = best.solution.state.values[own]
+        parameters = best.equations.parameters.starting("home_length", values)
+        best = _fitted(replace(best.equations, parameters=parameters), options, progress)
+    return best
 
 
 def _with_more(best: Fitted, options: Options, progress: ProgressCallback) -> Fitted:

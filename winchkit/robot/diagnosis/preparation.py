@@ -40,6 +40,8 @@ from winchkit.robot.diagnosis.variance_components import (
     repeated_differences,
 )
 from winchkit.robot.effects.bind import robot_terms
+from winchkit.robot.geometry.robot import robot_of
+from winchkit.robot.mistakes.search import refuse_mistakes
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
@@ -272,9 +274,12 @@ def prepare_selection(
 ) -> Preparation:
     """Read poses, estimate their noise and collect the candidates.
 
-    Raises RunError with every fault of every run; FileError for effects that do not bind.
+    Raises RunError with every fault of every run, and with the mistakes in its poses; FileError for
+    effects that do not bind.
     """
     dataset = prepare_poses(runs, profile)
+    if not dataset.moves:
+        refuse_mistakes(robot_of(profile), dataset.measured)
     own = robot_terms(profile, catalogue, moving=dataset.moves)
     registration = registration_of(dataset, own, catalogue)
     dataset, own = registration.dataset, (*own, *registration.terms)

@@ -109,8 +109,13 @@ class Winding:
         return np.hypot(radius, self.lead) * self.turned + growth * self.gain + self.rest
 
     def by_radius(self, radius: Array) -> Array:
-        """Derivative of :meth:`wound` by each line's winding radius, (p, n)."""
-        return radius / np.hypot(radius, self.lead) * self.turned
+        """Derivative of :meth:`wound` by each line's winding radius, (p, n).
+
+        At a radius of zero on a drum without grooves: its limit from above.
+        """
+        turn = np.hypot(radius, self.lead)
+        share = np.divide(radius, turn, out=np.ones_like(turn), where=turn > 0)
+        return np.asarray(share * self.turned)
 
 
 @dataclass(frozen=True)

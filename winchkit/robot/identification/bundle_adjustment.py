@@ -13,7 +13,8 @@ the number of parameters per pose.
 
 References
 ----------
-B. Triggs et al., *Bundle Adjustment – A Modern Synthesis*, 2000.
+B. Triggs et al., *Bundle Adjustment – A Modern Synthesis*, 2000. P. J. Huber, *Robust Statistics*,
+1981 (weights of the loss as iteratively reweighted least squares).
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ Mask = NDArray[np.bool_]
 Progress = Callable[[int, float], None]
 """Called with a step's number and the cost after it."""
 
+HUBER = 1.345
+"""Scale of Huber's loss in standard deviations, of 95 % efficiency for normal residuals."""
 _STEPS = 60
 """Rule of thumb: about ten from a start within the priors, and each rejected step counts too."""
 _DONE = 1e-3
@@ -105,14 +108,16 @@ class Equations(Protocol):
 
 @dataclass(frozen=True)
 class Weights:
-    """Standard deviation of each kind of equation."""
+    """Standard deviation of each kind of equation, and whether Huber's loss takes the squares'
+    place."""
 
     sigma: Mapping[str, float]
+    robust: bool = False
 
 
 @dataclass(frozen=True)
 class Stack:
-    """Equations of all kinds beside each other, whitened."""
+    """Equations of all kinds beside each other, whitened, and weighted by the loss."""
 
     kinds: dict[str, slice]
     known: Mask
@@ -188,7 +193,8 @@ def solve(
     """Fit poses and parameters by Levenberg and Marquardt's method with bounds.
 
     Returns: the state after the last step that reduced the cost. ``converged`` is false after 60
-    steps or where no step reduces the cost.
+    steps or where no step reduces the cost. A step to where an equation has no finite value, so
+    that its measurement would no longer count, is rejected.
 
     Notes
     -----
@@ -206,7 +212,7 @@ def solve(
         trial = moved(state, values, _pose_steps(slow, change))
         found = linearise(equations, trial, weights)
         gain = linear.cost - found.cost
-        if not gain >= -_DONE:
+        if not gain >= -_DONE or np.any(linear.stack.known & ~found.stack.known):
             if damping > _MOST_DAMPED:
                 return Solution(state, linear, held, count, converged=False)
             damping = max(10 * damping, 1e-3)
@@ -227,7 +233,8 @@ def moved(state: State, values: Array, step: Array) -> State:
 def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
     """Whiten the equations at a state and reduce them to the parameters.
 
-    Equations without a measurement get a residual and derivatives of zero.
+    Equations without a measurement, or without a finite value, get a residual and derivatives of
+    zero.
     """
     scale = equations.parameters.std
     kinds, parts, at = {}, [], 0
@@ -242,6 +249,7 @@ def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
         if rows.by_values is not None:
             np.multiply(rows.by_values, w * scale, out=by_values[:, kinds[rows.kind]])
     known = np.isfinite(residual) & np.all(np.isfinite(by_pose), axis=2)
+    known &= np.all(np.isfinite(by_values), axis=2)
     if not np.all(known):
         residual[~known], by_pose[~known], by_values[~known] = 0.0, 0.0, 0.0
     prior = np.divide(
@@ -250,7 +258,14 @@ def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
         out=np.zeros_like(scale),
         where=scale > 0,
     )
-    cost = 0.5 * (float(np.sum(residual**2)) + float(prior @ prior))
+    loss = residual**2
+    if weights.robust:
+        size = np.abs(residual)
+        loss = np.where(size > HUBER, 2 * HUBER * size - HUBER**2, loss)
+        root = np.sqrt(HUBER / np.maximum(size, HUBER))
+        residual, by_pose = residual * root, by_pose * root[..., None]
+        by_values = by_values * root[..., None]
+    cost = 0.5 * (float(np.sum(loss)) + float(prior @ prior))
     return _reduced(cost, prior, Stack(kinds, known, residual, by_pose, by_values))
 
 

@@ -168,8 +168,6 @@ class RobotWork:
     def profile_text(self) -> tuple[str, str]:
         """File name and text of the calibrated profile; raises UsageError where there is none."""
         found = self._found()
-        if found.refusal:
-            raise UsageError(found.refusal)
         out = self.folder / extended_name(self._state.source, "calibrated")
         names = [path.name for path in self._state.files]
         source = find("profiles", self._state.source)

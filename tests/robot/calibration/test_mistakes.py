@@ -1,0 +1,98 @@
+"""Mistakes in tables of poses, made by a generator that shares no code with winchkit's geometry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import robot_mistakes
+from robot_poses.mistaken import KINDS, Scene, mistake_of, profile_text, recorded
+from winchkit.errors import RunError
+from winchkit.robot import robot_of
+from winchkit.robot.files.poses import Measured, read_poses
+from winchkit.robot.mistakes.search import mistakes_in, refuse_mistakes
+from winchkit.runs import read_run
+from winchkit.schema.read import read_robot
+
+LINES = 8
+SCENE = Scene("winding-device-8", True, True, 60, 1e-4, 5e-3, 11)
+"""A robot of 6 m with points 5 mm off, and a tracker of 0.1 mm."""
+
+
+def written(folder: Path, text: str, scene: Scene = SCENE) -> tuple[Path, Path]:
+    run, profile = folder / "poses.csv", folder / "robot.toml"
+    run.write_text(text)
+    profile.write_text(profile_text(scene.robot, known_frame=scene.known_frame))
+    return run, profile
+
+
+def found(folder: Path, text: str) -> list[str]:
+    """Codes of the mistakes in a table."""
+    run, path = written(folder, text)
+    profile = read_robot(path)
+    return [n.code for n in mistakes_in(robot_of(profile), read_poses([read_run(run)], profile))]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_of_mistake_is_named_alone(kind: str, tmp_path: Path) -> None:
+    mistake = mistake_of(kind, 5, LINES)
+    codes = found(tmp_path, mistake.apply(recorded(SCENE)).csv())
+    assert len(codes) == 1
+    assert mistake.codes & set(codes[0].split(" | "))
+
+
+@pytest.mark.slow
+def test_two_mistakes_are_named_together(tmp_path: Path) -> None:
+    first, second = mistake_of("swap", 3, LINES), mistake_of("shift", 4, LINES)
+    (code,) = found(tmp_path, second.apply(first.apply(recorded(SCENE))).csv())
+    assert code.split(" + ") == [*first.codes, *second.codes]
+
+
+def test_what_a_calibration_is_for_is_no_mistake(tmp_path: Path) -> None:
+    for scene in (SCENE, replace(SCENE, geometry=0.015, tracker=5e-4, seed=12)):
+        assert found(tmp_path, recorded(scene).csv()) == []
+
+
+@pytest.mark.slow
+def test_rows_that_do_not_belong_together_are_refused(tmp_path: Path) -> None:
+    table = recorded(SCENE)
+    order = np.random.default_rng(1).permutation(SCENE.poses)
+    shuffled = replace(table, position=table.position[order], oriented=False)
+    assert found(tmp_path, shuffled.csv()) == ["poses-unlike"]
+
+
+def test_the_sentence_says_where_what_and_what_to_do(tmp_path: Path) -> None:
+    table = recorded(SCENE)
+    run, path = written(tmp_path, replace(table, motor=-table.motor, oriented=False).csv())
+    profile = read_robot(path)
+    measured: Measured = read_poses([read_run(run)], profile)
+    with pytest.raises(RunError) as told:
+        refuse_mistakes(robot_of(profile), measured)
+    text = str(told.value)
+    assert text.startswith(f"{run}: motor-sign:all: all motor angles have the other sign: ")
+    assert "mm as they are" in text
+    assert "gearbox.direction" in text
+
+
+@pytest.mark.slow
+def test_the_benchmark_judges_what_it_draws() -> None:
+    """A small run of benchmarks/robot_mistakes.py, through the command."""
+    told = robot_mistakes.summary(robot_mistakes.run(2, 1, 8))
+    assert (told["named"], told["false_alarms"], told["internal_errors"]) == (2, 0, 0)
+
+
+def test_the_judge_compares_the_motor_angles_and_not_the_words() -> None:
+    swap, sign = mistake_of("swap", 3, LINES), mistake_of("sign", 3, LINES)
+    (columns,), (line,) = swap.codes, sign.codes
+    first, second = columns.partition(":")[2].split("-")
+    same = {first: second, second: first}
+    name = line.partition(":")[2]
+    other = f"motor-sign:{same.get(name, name)}"
+    made = [swap, sign]
+    assert robot_mistakes.is_named(made, [[[line, columns]]], LINES)
+    assert robot_mistakes.is_named(made, [[[columns, other]]], LINES)
+    assert not robot_mistakes.is_named(made, [[[columns]]], LINES)
+    assert not robot_mistakes.is_named(made, [[["poses-unlike"]]], LINES)
