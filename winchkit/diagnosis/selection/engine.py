@@ -143,16 +143,9 @@ class SelectionEngine(ABC):
 
     @abstractmethod
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
-        """Noise estimate beside a fitted model.
+        """Noise estimate beside a fitted model; ``states``: how many unknowns, the last, are initial.
 
-        Parameters
-        ----------
-        residual
-            Measured minus predicted, shape (n_rows,).
-        jacobian
-            Derivative of the prediction by the unknowns, shape (n_rows, n_unknowns).
-        states
-            Number of initial states, which are the last unknowns.
+        ``residual`` (n_rows,). ``jacobian`` (n_rows, n_unknowns).
         """
 
     @abstractmethod
@@ -252,17 +245,8 @@ class SelectionEngine(ABC):
     def fit_with_noise(self, start: Hypothesis, noise: Noise | None = None) -> tuple[Fit, Noise]:
         """Fit a hypothesis and estimate the noise from its residual.
 
-        Parameters
-        ----------
-        start
-            Hypothesis at its starting values.
-        noise
-            First noise estimate; by default that of the residual at the starting values.
-
-        Returns
-        -------
-        fit, noise
-            The fit under the second noise estimate, and that estimate.
+        ``noise``: first estimate; by default that of the residual at the starting values. Returns:
+        the fit under the second estimate, and that estimate.
         """
         states = sum(len(own) for own in start.starts)
         if noise is None:
@@ -337,23 +321,9 @@ class SelectionEngine(ABC):
 
         Of a series law one coefficient after another is added as long as the criterion decreases.
         A candidate that was fitted beside the same effects before, under another noise estimate,
-        starts from the values found then.
-
-        Parameters
-        ----------
-        present
-            Fit of the present model.
-        item
-            Score of the candidate, with its starting amplitudes.
-        noise
-            Noise variance.
-        all_starts
-            Whether to search from all starting values in any case.
-        target
-            χ² that the trial has to reach: its fit is abandoned where that is out of reach.
-        aim
-            Smaller χ² that decides on a trial which reaches the target: the fit ends where that is
-            out of reach; None for none.
+        starts from the values found then, unless ``all_starts`` are wanted. Its fit is abandoned
+        where the χ² ``target`` is out of reach, and ends where the smaller ``aim`` is, which decides
+        on a trial that reaches the target.
         """
         goal = None if target is None else Target(target, present.chi_square)
         self.on_trial(item.candidate.effect.id)
@@ -471,16 +441,8 @@ class SelectionEngine(ABC):
     def refit(self, hypothesis: Hypothesis, noise: Noise, aim: float = np.inf) -> Fit:
         """Fit a hypothesis under a given noise; the last results are kept.
 
-        It starts from the values found for the same effects before, where these fit better.
-
-        Parameters
-        ----------
-        hypothesis
-            Effects at their starting values.
-        noise
-            Noise variance.
-        aim
-            χ² that decides on the fit, which ends where that is out of reach.
+        It starts from the values found for the same effects before, where these fit better, and
+        ends where the χ² ``aim`` that decides on it is out of reach.
         """
         for known, under, aimed, fitted in self._refits:
             if under is noise and known == hypothesis and aimed >= aim:
