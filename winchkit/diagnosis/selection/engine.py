@@ -143,9 +143,10 @@ class SelectionEngine(ABC):
 
     @abstractmethod
     def noise(self, residual: Array, jacobian: Array, states: int = 0) -> Noise:
-        """Noise estimate beside a fitted model; ``states``: how many unknowns, the last, are initial.
+        """Noise estimate beside a fitted model.
 
-        ``residual`` (n_rows,). ``jacobian`` (n_rows, n_unknowns).
+        ``residual`` (n_rows,). ``jacobian`` (n_rows, n_unknowns). ``states``: number of initial
+        states, which are the last unknowns.
         """
 
     @abstractmethod
@@ -322,8 +323,8 @@ class SelectionEngine(ABC):
         Of a series law one coefficient after another is added as long as the criterion decreases.
         A candidate that was fitted beside the same effects before, under another noise estimate,
         starts from the values found then, unless ``all_starts`` are wanted. Its fit is abandoned
-        where the χ² ``target`` is out of reach, and ends where the smaller ``aim`` is, which decides
-        on a trial that reaches the target.
+        where the χ² ``target`` is out of reach, and ends where the smaller ``aim`` is, which
+        decides on a trial that reaches the target.
         """
         goal = None if target is None else Target(target, present.chi_square)
         self.on_trial(item.candidate.effect.id)
