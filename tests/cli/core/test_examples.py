@@ -26,11 +26,36 @@ ON_BENCH = ("jog", "move", "home", "run", "stop", "reset", "monitor", "log")
 ON_DRIVE = ("scan", "info", "config", "lss")
 ON_CELL = ("cell",)
 BENCHES = (*ON_BENCH, *ON_DRIVE, *ON_CELL, "tare")
-WITHOUT_BENCH = ("log info", "log recover", "log replay", "log export", "cell calibrate")
+WITHOUT_BENCH = (
+    "log info",
+    "log recover",
+    "log replay",
+    "log export",
+    "log decode",
+    "cell calibrate",
+)
 HAS_LIBRARY = all(find_spec(name) for name in ("pyarrow", "duckdb"))
 INPUT = "quit\n"
 """What is typed: it ends ``sim serve``."""
 POINTS = "load [kg],indicated [N]\n0,0.1\n5,49.3\n10,98.4\n5,49.2\n0,0.2\n"
+CELL = "t [s],F [N]\n" + "".join(f"{0.01 * n:.2f},{98 + n % 5}\n" for n in range(400))
+CANDUMP = "(1.000000) can0 701#7F\n(1.100000) can0 581#4B41600037060000\n"
+TRC = """;$FILEVERSION=1.1
+;$STARTTIME=45000.5
+;
+   1)     100.0  Rx     0581  8  4B 41 60 00 37 06 00 00
+"""
+EDS = """[DeviceInfo]
+VendorName=x
+[MandatoryObjects]
+SupportedObjects=1
+1=0x1000
+[1000]
+ParameterName=Device type
+ObjectType=0x7
+DataType=0x0007
+AccessType=ro
+"""
 LOGGER = "t [s],pos [deg],torque [N m],F [N]\n" + "".join(
     f"{0.02 * n:.2f},{3.6 * n:.1f},{0.3 + 0.01 * (n % 7):.2f},{98 + n % 5}\n" for n in range(400)
 )
@@ -80,6 +105,10 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copy(ROOT / "examples" / name, folder)
     (folder / "logger.csv").write_text(LOGGER, encoding="utf-8")
     (folder / "points.csv").write_text(POINTS, encoding="utf-8")
+    (folder / "cell.csv").write_text(CELL, encoding="utf-8")
+    (folder / "candump.log").write_text(CANDUMP, encoding="utf-8")
+    (folder / "bus.trc").write_text(TRC, encoding="utf-8")
+    (folder / "drive.eds").write_text(EDS, encoding="utf-8")
     (folder / "poses.csv").write_text(csv(rows(50, 3)), encoding="utf-8")
     (folder / "more.csv").write_text(csv(rows(10, 99, noise=EXACT)), encoding="utf-8")
     with chdir(folder), served(folder, "A"):

@@ -124,7 +124,7 @@ def thinned(run: Run, step: int) -> Run:
 
 
 def test_a_slow_logger_does_not_lower_the_cut_off_of_a_fast_one() -> None:
-    """At 50 Hz order 12 is seen beside its mirror images: the fast run tells which it is."""
+    """At 50 Hz order 12 is seen beside its mirror images: the fast run shows which it is."""
     runs = [fast_motor(1, 3e-3), thinned(fast_motor(2, 3e-3, seconds=8.0), 10)]
     data = prepare(runs, AxisProfile(name="motor"))
     fast, slow = (recording.bands["motor_torque"].cut_off for recording in data.recordings)

@@ -17,7 +17,7 @@ from winchkit.diagnosis.design.discrimination import information_of, next_runs, 
 from winchkit.diagnosis.design.plan import inseparable
 from winchkit.diagnosis.design.plan import offers as plan_offers
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES, range_of_runs
-from winchkit.diagnosis.plan import Plan
+from winchkit.diagnosis.plan import WinchPlan
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.results import Detectable, NextRun
 from winchkit.diagnosis.search import selection_engine
@@ -168,7 +168,7 @@ def test_the_plan_says_what_no_motion_separates() -> None:
     assert inseparable(found, pairs) == [(radius, ratio)]
     # The best is the one that separates the other pair.
     assert found[0].powers[1] > 0.9
-    plan = Plan(grooved, range_of_runs(grooved), tuple(pairs), tuple(found))
+    plan = WinchPlan(tuple(pairs), grooved, range_of_runs(grooved), tuple(found))
     lines = _silent(plan, widened=False)
     assert lines[0].startswith("drum-radius / gear-ratio: no such motion within")
     assert lines[0].endswith(CATALOGUE["drum-radius"].told_apart)
@@ -260,7 +260,7 @@ def test_a_size_that_is_said_to_show_is_found() -> None:
             made(100 + 2 * case + seed, GROOVED, [term("motor-coulomb", torque=size)], ride=RIDE)
             for seed in range(2)
         ]
-        engine = selection_engine(prepare(runs, GROOVED), [CATALOGUE["motor-coulomb"]])
+        engine = selection_engine(prepare(runs, GROOVED), CATALOGUE, [CATALOGUE["motor-coulomb"]])
         present, noise = engine.fit_with_noise(engine.initial_model)
         found += engine.scores(present, noise)[0].net_gain > 0
     assert found >= 8

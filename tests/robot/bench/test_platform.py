@@ -19,6 +19,7 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.control.loop import Callback
 from winchkit.bench.control.snapshot import BenchSnapshot, Phase
 from winchkit.errors import MotionError, NotPermitted, UsageError
+from winchkit.model.rotation import rotation_by
 from winchkit.robot import Found, Pose, Robot
 from winchkit.robot.bench.path import Waypoint
 from winchkit.robot.bench.platform import Platform
@@ -229,8 +230,8 @@ def test_lengths_that_fit_two_poses_move_nothing(
 
     def twofold(robot: Robot, *given: Any, **options: Any) -> Found:
         found = plain(robot, *given, **options)
-        second = Pose(found.pose.position + np.array([0.05, 0.0, 0.0]), found.pose.rotation)
-        return replace(found, other=second)
+        turned = rotation_by(np.array([[0.5, 0.0, 0.0]])) @ found.pose.rotation
+        return replace(found, pose=Pose(found.pose.position, turned), other=found.pose)
 
     platform = bench.robot
     goal = platform.moved({"x": 0.02}, relative=True)

@@ -1,4 +1,4 @@
-"""Runs of imported recordings: their joints and pieces, their files, and what is told of them."""
+"""Runs of imported recordings: their joints and pieces, their files, and their findings."""
 
 from __future__ import annotations
 

@@ -39,6 +39,9 @@ _NEAR = 0.1
 """Distance and rotation from the pose that was found last, m and rad, up to which the next one is
 computed from it without a search (rule of thumb: a platform does not turn to another solution of
 its lengths within so little)."""
+_UPRIGHT = 0.35
+"""Rotation from home, rad, up to which the pose found by an iteration from home is the platform's:
+from within a spacing of the lattice of starts 99 % end in the solution."""
 _TRIM_TRAVEL = 0.01
 """Of each cable in a correction of the forces, m: half of the difference of the lengths above which
 they fit no pose."""
@@ -95,11 +98,9 @@ class Platform:
 
         Raises NotPermitted where they fit no pose, or two that the cables can hold.
         """
-        angles, last = self._angles(), self._last
-        found = None
-        if last is not None:
-            found = self.robot.poses_at(angles, last, tolerance=np.inf, search=np.inf)
-        if found is None or last is None or not distance(found.pose, last)[0] <= _NEAR:
+        angles, start = self._angles(), self._last or self.robot.home
+        found = self.robot.poses_at(angles, start, tolerance=np.inf, search=np.inf)
+        if not self._continues(found):
             found = self.robot.poses_at(angles, tolerance=np.inf, search=-1.0)
             self._require_one(found)
         if np.isfinite(found.pose.position).all():
@@ -121,6 +122,13 @@ class Platform:
             f"{words}; home the winches, and look for a slack cable: `winchkit home WINCH --here "
             "LENGTH`"
         )
+
+    def _continues(self, found: Found) -> bool:
+        """Whether an iteration from the last pose, or from home, ended in the same solution."""
+        if self._last is not None:
+            return bool(distance(found.pose, self._last)[0] <= _NEAR)
+        turned = distance(Pose(self.robot.home.position, found.pose.rotation), self.robot.home)
+        return bool(turned[0] <= _UPRIGHT and np.all(np.abs(found.residual[0]) <= AGREEMENT))
 
     def _require_one(self, found: Found) -> None:
         """Raise NotPermitted where the lengths fit a second pose that the cables can hold, too."""

@@ -72,6 +72,9 @@ thumb: right ones are below a fifth of it, mistaken ones above)."""
 _UNLIKE, _LEAST_ANGLE = 0.3, 0.01
 """Median angle as a share of the platform's turns, and in rad, above which rotations are not of
 these poses (rules of thumb)."""
+_ANGLE_NOISE = 3e-3
+"""Median angle, rad, up to which rotations are those of the poses: twice the noise of camera
+trackers (0.1 deg); a convention that changes no more is none of these mistakes."""
 _SETTLING = Iteration(damping=1e-6, relative_damping=1e-6, tolerance=1e-5, steps=25)
 
 
@@ -327,6 +330,8 @@ class _Search:
             return _Trial(mistakes, min(_angle(pose.rotation, shown, f) for f in own))
 
         plain, every = compared(()), rotation_mistakes()
+        if plain.error <= _ANGLE_NOISE:
+            return
         best_set = [plain]
         units = [m for m in every if m.code.startswith("rotation-unit")]
         others = [m for m in every if m not in units]
