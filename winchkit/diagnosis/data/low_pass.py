@@ -99,27 +99,30 @@ def cut_offs_of(
     Runs of one sampling rate have the same. The acceleration of a known weight by differences of
     samples is too small at high frequencies: 1 % of the power may lie above the cut-off there.
     """
-    compared = [
-        Compared(
+    compared = {
+        index: Compared(
             motion.at.motor_angle,
             run["motor_torque"],
             np.where(still, 0.0, run["motor_torque"] - own["motor_torque"]),
             1 / run.interval,
         )
+        for index, (run, own, still, motion) in enumerate(
+            zip(runs, nominal, stands, motions, strict=True)
+        )
         if "motor_torque" in run
-        else None
-        for run, own, still, motion in zip(runs, nominal, stands, motions, strict=True)
-    ]
+    }
     speed = max(float(np.max(np.abs(motion.at.motor_rate))) for motion in motions)
     weighed = any(motion.load_mass is not None for motion in motions)
-    lost = weighed * LOST_POWER
-
-    def cut_off(run: Compared) -> float:
-        alike = (other for other in compared if other is not None)
-        own = [one for one in alike if 1 / _SAME_RATE < one.rate / run.rate < _SAME_RATE]
-        return torque_cut_off(own, speed, lost)
-
-    return [None if run is None else cut_off(run) for run in compared]
+    out: list[float | None] = [None] * len(runs)
+    found: dict[tuple[int, ...], float] = {}
+    for index, run in compared.items():
+        ratios = {other: one.rate / run.rate for other, one in compared.items()}
+        alike = tuple(o for o, ratio in ratios.items() if 1 / _SAME_RATE < ratio < _SAME_RATE)
+        if alike not in found:
+            own_runs = [compared[other] for other in alike]
+            found[alike] = torque_cut_off(own_runs, speed, weighed * LOST_POWER)
+        out[index] = found[alike]
+    return out
 
 
 @dataclass(frozen=True)
