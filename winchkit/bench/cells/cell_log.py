@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from winchkit.bench.cells.desk import CellDesk
+from winchkit.bench.recording.owned_log import OwnedLog
 from winchkit.bench.recording.provenance import origin
 from winchkit.bench.recording.recorder import Recorder, counters_of
 from winchkit.bench.remote.cell_session import own_cells
@@ -17,13 +18,12 @@ from winchkit.runs.recording.rotation import Rotation
 from winchkit.schema.bench import BenchSpec
 
 
-class CellStation:
+class CellStation(OwnedLog):
     """Operations of a station that a log needs, on the instruments of a bench."""
 
     def __init__(self, desk: CellDesk) -> None:
         """Take open instruments."""
         self._desk = desk
-        self._recorder: Recorder | None = None
 
     def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
         """Begin a log; as that of a bench, with a source for each instrument and no drives."""
@@ -40,24 +40,9 @@ class CellStation:
             has_drives=False,
         )
 
-    def log_rows(self) -> int:
-        """Rows so far; raises what has ended the log."""
-        if self._recorder is None:
-            return 0
-        self._recorder.check()
-        return self._recorder.rows
-
     def status(self) -> dict[str, Any]:
         """The counts; there is no cycle of a control loop."""
         return {"cycle": 0, "counters": self.counters()}
-
-    def end_log(self) -> int:
-        """End the log and return its rows."""
-        recorder, self._recorder = self._recorder, None
-        if recorder is None:
-            return 0
-        recorder.close()
-        return recorder.rows
 
     def counters(self) -> dict[str, dict[str, Any]]:
         """Counts so far, by instrument (``A.cell``) and of the log itself."""

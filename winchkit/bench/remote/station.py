@@ -13,7 +13,8 @@ from winchkit.bench.control.dead_man import DEAD_MAN, LIFE_SIGN, DeadMan, remain
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.snapshot import to_dict
 from winchkit.bench.direction import no_positional, paid_out
-from winchkit.bench.recording.recorder import Recorder, counters_of
+from winchkit.bench.recording.owned_log import OwnedLog
+from winchkit.bench.recording.recorder import counters_of
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.programme_run import ProgrammeRun
 from winchkit.bench.winch import Winch
@@ -187,14 +188,13 @@ class Station(Protocol):
         """Stop what was started here, finish the log."""
 
 
-class LocalStation:
+class LocalStation(OwnedLog):
     """A station in the process that owns the bench."""
 
     def __init__(self, bench: Bench, client: Client | None = None) -> None:
         """A place for ``client``; without one for an unnamed station of this process."""
         self.client = client or Client(client_name("station"))
         self._bench = bench
-        self._recorder: Recorder | None = None
         self._homing: Generator[None] | None = None
         self._led = DeadMan(float("-inf"))
         """Permission of the homing to go on to its next motion."""
@@ -394,21 +394,6 @@ class LocalStation:
         """Start a log, ending the one before."""
         self.end_log()
         self._recorder = self._bench.log(path, rotate=rotate, replace=replace)
-
-    def log_rows(self) -> int:
-        """Rows written so far; raises the error that has ended the writing."""
-        if self._recorder is None:
-            return 0
-        self._recorder.check()
-        return self._recorder.rows
-
-    def end_log(self) -> int:
-        """Finish the log."""
-        recorder, self._recorder = self._recorder, None
-        if recorder is None:
-            return 0
-        recorder.close()
-        return recorder.rows
 
     def read_object(self, winch: str, index: int, sub: int) -> str | None:
         """Bytes of an object of a winch's drive in hexadecimal; None where it has none."""

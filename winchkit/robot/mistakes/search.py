@@ -88,6 +88,17 @@ class _Trial:
 
 
 @dataclass(frozen=True)
+class _Adjusted(_Trial):
+    """A trial with the geometry free."""
+
+    table: Measured
+    """Without the mistakes."""
+    pose: Pose
+    turned: Array
+    """Turn of the tracker's frame, (3, 3)."""
+
+
+@dataclass(frozen=True)
 class Named:
     """Mistakes of a table; each of the sets gives the same data."""
 
@@ -175,7 +186,7 @@ class _Search:
                 yield Named(((UNKNOWN,),), plain.error, 0.0, "m", self.place)
         yield from self._of_rotations(best[0])
 
-    def _best(self, plain: _Trial, usual: float) -> list[_Trial]:
+    def _best(self, plain: _Adjusted, usual: float) -> list[_Adjusted]:
         """Trials that explain the table best, by the fewest mistakes; ``plain`` where none does."""
         best = [plain]
         for count in (1, 2) if plain.error > _POOR * self.motion else (1,):
@@ -288,12 +299,8 @@ class _Search:
             return (*units, axes_mistake(axes))
         return (*units, MIRRORED)
 
-    def _adjusted(self, mistakes: tuple[Mistake, ...]) -> _Trial:
-        """A trial with the geometry free."""
-        return _Trial(mistakes, self._adjustment(mistakes)[0])
-
-    def _adjustment(self, mistakes: tuple[Mistake, ...]) -> tuple[float, Measured, Pose, Array]:
-        """Misfit, m, the mended table, its poses and the turn of the tracker's frame."""
+    def _adjusted(self, mistakes: tuple[Mistake, ...]) -> _Adjusted:
+        """A trial with the geometry free; its error is the misfit, m."""
         table = mended(self.measured, mistakes)
         if len(table) > _MOST:
             kept = np.zeros(len(table), dtype=bool)
@@ -303,28 +310,29 @@ class _Search:
         start = Pose(pose.position[0], pose.rotation[0])
         tracker = declared_tracker(self.robot.profile)
         if not np.all(np.isfinite(closure)):
-            return float("inf"), table, start, rotation_by(tracker.turn)
+            return _Adjusted(mistakes, float("inf"), table, start, rotation_by(tracker.turn))
         tracker = registered(tracker, start, table.position, table.angles, {"frame"})
         equations = Adjustment(self.robot, table, tracker)
         sigma = _SIGMA * self.motion
         solution = adjusted(equations, start, sigma)
         turned = rotation_by(equations.tracker_at(solution.state.values).turn)
-        return misfit(equations, solution, sigma), table, solution.state.pose, turned
+        error = misfit(equations, solution, sigma)
+        return _Adjusted(mistakes, error, table, solution.state.pose, turned)
 
-    def _of_rotations(self, best: _Trial) -> Iterator[Named]:
+    def _of_rotations(self, best: _Adjusted) -> Iterator[Named]:
         """Mistakes of the rotations beside the poses of the adjusted table."""
         if not np.all(np.isfinite(self.measured.angles)):
             return
-        error, table, pose, turned = self._adjustment(best.mistakes)
-        if not error <= _WRONG * self.motion:
+        if not best.error <= _WRONG * self.motion:
             return
+        pose, turned = best.pose, best.turned
         frames, codes = [turned, np.eye(3)], [m.code for m in best.mistakes]
         if "position-axes" in codes:
             # Rotations in a left-handed frame P are P R Pᵀ, which is (−P) R (−P)ᵀ.
             frames.append(-best.mistakes[codes.index("position-axes")].axes @ turned)
 
         def compared(mistakes: tuple[Mistake, ...]) -> _Trial:
-            shown = rotation_of(*mended(table, mistakes).angles.T)
+            shown = rotation_of(*mended(best.table, mistakes).angles.T)
             free = [_frame_of(pose.rotation, shown)] if "mirrored" in codes else []
             own = [*frames, *free]
             return _Trial(mistakes, min(_angle(pose.rotation, shown, f) for f in own))
