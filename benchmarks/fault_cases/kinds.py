@@ -298,7 +298,7 @@ _LYING_DRIVE = (
     Kind(
         "duplicate node",
         _slave("two nodes with one number"),
-        (*_WIRES, "second master", "mode", *_MEASURED),
+        (*_WIRES, "second master", "mode", "position", *_MEASURED),
         least=_COMMUNICATION,
         real_time=False,
         independent=True,

@@ -91,3 +91,29 @@ def test_a_table_with_half_of_its_poses_wrong_is_refused() -> None:
     fit, _ = spoilt(measured(csv(rows(90, SEED))), 45, 0.02)
     with pytest.raises(RunError, match="poses-unlike"):
         calibrate(robot(), fit, held())
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["known frame", "unknown frame"])
+def test_a_table_that_is_given_twice_counts_once(known: bool) -> None:
+    table, own = csv(rows(30, SEED)), robot()
+    if not known:
+        unknown = InstrumentSpec(tracker=TrackerSpec(frame="unknown"))
+        own = robot_of(replace(own.profile, instrument=unknown))
+    twice = measured(table, table)
+    assert len(twice) == 30
+    assert "30 of 60 poses are copies" in " ".join(twice.notes)
+    once, found = (calibrate(own, poses, held()) for poses in (measured(table), twice))
+    np.testing.assert_array_equal(once.values, found.values)
+    assert any("copies of other rows" in text for text in found.warnings)
+
+
+def test_a_pose_that_is_fitted_is_not_held_out() -> None:
+    fit = measured(csv(rows(40, SEED)))
+    with pytest.raises(RunError, match="every pose for the held-out error is among those to fit"):
+        calibrate(robot(), fit, fit)
+    first = np.arange(len(fit)) < 20
+    found = calibrate(robot(), fit[first], fit)
+    assert len(found.validation_after.distance) == 20
+    assert "20 of 40 poses are among those to fit, equal in every number; not held out" in (
+        found.warnings
+    )

@@ -60,12 +60,13 @@ def elastic_rows(count: int, seed: int, noise: Noise | None = None) -> tuple[Row
     return tuple(poses(ELASTIC, count, seed, noise=noise, tension=pull))
 
 
-def measured(text: str) -> Measured:
-    """A run's text as the poses that are read from it."""
+def measured(*texts: str) -> Measured:
+    """Runs' texts as the poses that are read from them."""
     with TemporaryDirectory() as folder:
-        path = Path(folder) / "poses.csv"
-        path.write_text(text)
-        return read_poses([read_run(path)], robot().profile)
+        paths = [Path(folder) / f"poses-{number}.csv" for number in range(len(texts))]
+        for path, text in zip(paths, texts, strict=True):
+            path.write_text(text)
+        return read_poses([read_run(path) for path in paths], robot().profile)
 
 
 def held() -> Measured:

@@ -2,7 +2,8 @@
 
 It is kept beside the bench file (``bench.toml`` -> ``bench.position.json``). The entry of a winch
 is open from the command to enable its drive until that is disabled, at rest; it is closed before
-the bench lets the drive go. An entry that was not closed is of a process that ended in motion.
+the bench lets the drive go. An entry that was not closed is of a process that ended in motion, or
+whose drive did not say, when the bench was closed, that it is disabled.
 """
 
 from __future__ import annotations
@@ -16,6 +17,11 @@ from winchkit.bench.control.snapshot import Trip
 from winchkit.bench.records.record_file import RecordFile
 from winchkit.drivers.can.cia402.motor_position import KeptPosition
 
+_KILLED = (
+    "the process that moved it ended in motion: it was killed, or its computer failed; its record "
+    "was not closed"
+)
+_UNDECIDED = "its drive did not say, when the bench was closed, that it is disabled"
 _MOVE_ON = "look at the winches, make the file and its folder writable, then reset"
 
 
@@ -34,11 +40,11 @@ class PositionFile:
         if not self.path:
             return ()
         try:
-            data = self._file.open(_record({}))
+            data = self._file.open(_record({}, ended=True))
         except OSError as error:
             return (self._unusable(error.strerror or str(error)),)
         try:
-            since, self.found = _parse(data)
+            since, ended, self.found = _parse(data)
         except (ValueError, KeyError, TypeError):
             # As after a power failure while it was written: no position is trusted.
             return (self._unusable("it holds no record of positions"),)
@@ -46,9 +52,8 @@ class PositionFile:
             Trip(
                 "owner",
                 name,
-                "the process that moved it ended in motion: it was killed, or its computer failed "
-                f"(its record of {since} was not closed); look at the winch and its load, then "
-                "reset",
+                f"{_UNDECIDED if ended else _KILLED} (record of {since}); look at the winch and "
+                "its load, then reset",
                 latches=True,
             )
             for name, kept in self.found.items()
@@ -80,7 +85,7 @@ class PositionFile:
         # A winch that has not answered yet keeps its entry.
         self.found |= positions
         try:
-            write(_record(self.found))
+            write(_record(self.found, ended=closing))
         except OSError as error:
             return self._unusable(error.strerror or str(error))
         return None
@@ -90,7 +95,7 @@ class PositionFile:
         return Trip("position record", "", message, latches=True)
 
 
-def _record(positions: Mapping[str, KeptPosition]) -> str:
+def _record(positions: Mapping[str, KeptPosition], *, ended: bool) -> str:
     rows = {
         name: {
             "count": kept.count,
@@ -104,15 +109,19 @@ def _record(positions: Mapping[str, KeptPosition]) -> str:
         for name, kept in positions.items()
     }
     now = datetime.now(UTC).isoformat(timespec="milliseconds")
-    return json.dumps({"schema": 1, "time": now, "winch": rows})
+    return json.dumps({"schema": 1, "time": now, "ended": ended, "winch": rows})
 
 
-def _parse(data: bytes) -> tuple[str, dict[str, KeptPosition]]:
-    """Time and positions of a record; raises ValueError, KeyError, TypeError for anything else."""
+def _parse(data: bytes) -> tuple[str, bool, dict[str, KeptPosition]]:
+    """Time of a record, whether its bench was closed, and its positions.
+
+    Raises ValueError, KeyError, TypeError for anything else.
+    """
     record = json.loads(data)
     if record["schema"] != 1:
         raise ValueError("unknown schema")
-    return str(record["time"]), {name: _kept(row) for name, row in record["winch"].items()}
+    positions = {name: _kept(row) for name, row in record["winch"].items()}
+    return str(record["time"]), record["ended"] is True, positions
 
 
 def _kept(row: Mapping[str, Any]) -> KeptPosition:

@@ -26,7 +26,7 @@ import numpy as np
 
 from winchkit.arguments import require_type
 from winchkit.arrays import Array
-from winchkit.errors import UsageError
+from winchkit.errors import RunError, UsageError
 from winchkit.fit_statistics import FitStatistics
 from winchkit.rendering import Plotted
 from winchkit.robot.calibration.cable_forces import CableForces
@@ -52,7 +52,7 @@ from winchkit.robot.calibration.prediction import PoseErrors, cable_errors, erro
 from winchkit.robot.calibration.ratios import Ratios, ratios_of
 from winchkit.robot.calibration.selection import Fitted, first_model, fitted_with_instruments
 from winchkit.robot.calibration.statistics import calibration_statistics
-from winchkit.robot.files.poses import Measured
+from winchkit.robot.files.poses import Measured, copies, of_poses
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.bundle_adjustment import Solution, Weights
 from winchkit.robot.identification.variance_components import START
@@ -209,6 +209,21 @@ def split(measured: Measured) -> tuple[Measured, Measured]:
     return measured[~held], measured[held]
 
 
+def _unlike(validation: Measured, fit: Measured) -> tuple[Measured, tuple[str, ...]]:
+    """Poses for the held-out error that are not among those to fit, and how many are.
+
+    Raises RunError where all are.
+    """
+    again = copies(validation, fit)
+    if len(validation) and again.all():
+        raise RunError(
+            "every pose for the held-out error is among those to fit, equal in every number; give "
+            "other ones, or none: then every tenth is held out"
+        )
+    note = f"{of_poses(again)} among those to fit, equal in every number; not held out"
+    return validation[~again], (note,) if again.any() else ()
+
+
 def calibrate(
     robot: Robot,
     fit: Measured,
@@ -252,7 +267,10 @@ def calibrate(
     # Before poses are held out, since rows that are shifted have neighbours.
     for poses in (fit,) if validation is None else (fit, validation):
         refuse_mistakes(robot, poses)
-    if validation is None:
+    unheld: tuple[str, ...] = ()
+    if validation is not None:
+        validation, unheld = _unlike(validation, fit)
+    else:
         fit, validation = split(fit)
         equations = equations_of(robot, fit, options)
     effects = tuple(dict.fromkeys((*options.effects, *own_effects(robot.profile))))
@@ -310,6 +328,7 @@ def calibrate(
             *_home_notes(given, equations, values),
             *_warnings(equations, solution, weights, observed, after.unfound),
             *_worse_rotation(errors_before, after),
+            *unheld,
             *ratios.words,
         ),
         validation_lengths=lengths,

@@ -106,7 +106,7 @@ def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
     ):
         if not np.any(np.isfinite(values)):
             free -= names
-    sessions = tuple(dict.fromkeys(measured.sessions))
+    sessions = tuple(dict.fromkeys(measured.sessions[run] for run in np.unique(measured.run)))
     return Instruments(frozenset(free), sessions, (tracker,) * len(sessions))
 
 

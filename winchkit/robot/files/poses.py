@@ -10,7 +10,7 @@ rows of logs with few holds.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -141,7 +141,39 @@ def read_poses(runs: Sequence[Run], profile: RobotProfile) -> Measured:
                 place,
             )
         )
-    return poses
+    again = copies(poses)
+    if not again.any():
+        return poses
+    note = f"{of_poses(again)} copies of other rows, equal in every number; left out"
+    return replace(poses[~again], notes=(*poses.notes, note))
+
+
+def copies(poses: Measured, of: Measured | None = None) -> NDArray[np.bool_]:
+    """Rows that equal an earlier one, or one of other poses, in every number, (p,).
+
+    Two measurements of one pose differ by their noise: a copy measures nothing, and as a held-out
+    pose it would be one that was fitted.
+    """
+    seen = set() if of is None else set(_numbers(of))
+    out = np.zeros(len(poses), dtype=bool)
+    for row, numbers in enumerate(_numbers(poses)):
+        out[row] = numbers in seen
+        if of is None:
+            seen.add(numbers)
+    return out
+
+
+def _numbers(poses: Measured) -> Iterator[bytes]:
+    """All numbers of each pose."""
+    table = [getattr(poses, name) for name in _ARRAYS if name not in {"run", "place"}]
+    for row in np.hstack(table):
+        yield np.asarray(row + 0.0).tobytes()
+
+
+def of_poses(mask: NDArray[np.bool_]) -> str:
+    """Number of poses of a mask, with their verb."""
+    count = int(mask.sum())
+    return f"{count} of {len(mask)} poses {'is' if count == 1 else 'are'}"
 
 
 def read_trajectory(runs: Sequence[Run], profile: RobotProfile) -> Samples | None:

@@ -284,7 +284,10 @@ class Cia402Axis:
     @property
     def position_jump(self) -> str:
         """Change of 6064h that no motion explains, in words; empty without one."""
-        return self._position.jump
+        jump, twice = self._position.jump, self.health.late
+        if jump and twice:
+            jump += f" ({twice} answers came beside another one: two nodes may have this number)"
+        return jump
 
     @property
     def position_disagreement(self) -> str:
