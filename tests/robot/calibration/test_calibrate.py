@@ -176,7 +176,7 @@ def test_a_hanging_platform_of_four_cables_is_calibrated_too() -> None:
         for name in ("motor_angle", "swivel", "cable_length", "tension")
     }
     fit = replace(full, **cut)
-    found = calibrate(robot_of(profile), fit, fit)
+    found = calibrate(robot_of(profile), fit)
     truth = true_values()
     off = [(e.value - truth[name]) / e.std for name, e in found.estimates.items()]
     assert len(off) == 33

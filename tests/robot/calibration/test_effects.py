@@ -63,7 +63,7 @@ def test_laws_that_bend_fit_a_straight_cable_too(
 def test_cables_that_do_not_stretch_are_found_not_to() -> None:
     pulled = [replace(row, tension=tuple(30.0 + i for i in range(8))) for row in rows()]
     fit = measured(csv(pulled, tension=True))
-    found = calibrate(robot(), fit, fit, Options(("cable-elongation-linear",)))
+    found = calibrate(robot(), fit, options=Options(("cable-elongation-linear",)))
     stiffness = found.estimates["cable-elongation-linear.axial_stiffness"]
     assert stiffness.value > 1e5 or np.isinf(stiffness.value)
 

@@ -72,7 +72,7 @@ def test_a_calibration_estimates_the_same_geometry(dataset: RobotDataset) -> Non
     priors = priors_of_geometry(dataset, load_catalogue(), fitted=False)
     found = adjusted(dataset, (), SIGMA, priors)
     poses = measured(text(30))
-    calibrated = calibrate(robot_of(profile), poses, poses, Options(sigma=SIGMA)).estimates
+    calibrated = calibrate(robot_of(profile), poses, options=Options(sigma=SIGMA)).estimates
     differences = []
     for item in found.geometry:
         own = calibrated[name_of(item)]
