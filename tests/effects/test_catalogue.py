@@ -66,6 +66,7 @@ INTERFACE: dict[str, dict[str, tuple[str, float | str]]] = {
     "cell-creep": {"fraction": ("1", 0), "time_constant": ("s", SHAPE)},
     "torque-constant": {"gain_error": ("1", 0)},
     "gear-efficiency": {"efficiency": ("1", 1), "transition": ("m/s", 0)},
+    "gear-dahl": {"efficiency": ("1", 1), "distance": ("rad", SHAPE)},
     "motor-coulomb": {"torque": ("N m", 0), "transition": ("rad/s", 0)},
     "motor-coulomb-asymmetry": {"offset": ("N m", 0)},
     "motor-viscous": {"viscosity": ("N m s", 0)},

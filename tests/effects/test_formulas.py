@@ -347,6 +347,7 @@ CASES: dict[str, Case] = {
     ),
 }
 OWN_TESTS = {
+    "gear-dahl",
     "pulley-dahl",
     "motor-dahl",
     "length-time-offset",

@@ -77,6 +77,27 @@ def test_presliding_of_the_motor_follows_its_differential_equation() -> None:
     assert np.allclose(added, solved.y[0], atol=1e-5)
 
 
+def test_presliding_of_a_gear_follows_its_differential_equation() -> None:
+    profile = profile_with("grooved")
+    time = np.linspace(0, 4, 2001)
+    load = 300.0 + 80.0 * np.sin(3.0 * time)
+    signals = Signals(time, 2.0 * np.sin(2.0 * time), load=load)
+    line = Line(profile)
+    values = {"efficiency": 0.8, "distance": 0.7, "start": -0.4}
+    motion = line.motion(signals)
+    found = predict(profile, motion, CATALOGUE["gear-dahl"], values)["motor_torque"]
+    length = line.predict(motion)["cable_length"]
+    way = np.sign(length[0] - length[100])  # The motor turns forward at first.
+
+    def rate(t: float, state: np.ndarray) -> list[float]:
+        moving = way * 4.0 * cos(2.0 * t)
+        return [moving * (1 - np.sign(moving) * float(state[0])) / 0.7]
+
+    solved = solve_ivp(rate, (0, 4), [-0.4], t_eval=time, rtol=1e-9, atol=1e-9, max_step=0.005)
+    expected = line.predict(motion)["motor_torque"] * 0.8 ** -solved.y[0]
+    assert np.allclose(found, expected, rtol=2e-5)
+
+
 def test_an_instrument_that_is_late_shows_the_length_of_a_moment_ago() -> None:
     profile = profile_with("grooved")
     time = np.linspace(0, 10, 501)

@@ -15,7 +15,7 @@ import numpy as np
 from winchkit.diagnosis.credibility import oversized, short_travel
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.regression.conditioning import collinearity, value_covariance
-from winchkit.diagnosis.regression.cross_validation import held_out
+from winchkit.diagnosis.regression.cross_validation import excess, held_out
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, estimates, spread_of
@@ -25,7 +25,6 @@ from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.diagnosis.selection.stepwise import SelectionResult
 from winchkit.diagnosis.verdict.combination import combination_of_set, combination_of_term
 from winchkit.diagnosis.verdict.curve_fits import Curve
-from winchkit.diagnosis.verdict.decision import excess
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.plausibility import implausible
 

@@ -80,7 +80,7 @@ _LAWS = {
         "stribeck": "pulley-stribeck",
         "viscous": "pulley-viscous",
     },
-    "gear": {"coulomb": "gear-efficiency", "mean": "torque-constant"},
+    "gear": {"coulomb": "gear-efficiency", "dahl": "gear-dahl", "mean": "torque-constant"},
 }
 _RIGHT = {
     "sharp": ("coulomb", "capstan"),

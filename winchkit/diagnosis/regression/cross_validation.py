@@ -12,6 +12,7 @@ Wilcoxon, F. (1945). Individual comparisons by ranking methods. Biometrics Bulle
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -32,6 +33,8 @@ exceeds 2 %; eight instead of six is a rule of thumb."""
 _MOST_EXACT = 50
 """Differences up to which the signed-rank distribution is exact; numerical: at 50 the normal
 approximation is within 10⁻³ of it."""
+AT_NOISE = 1.1
+"""Largest ratio of an error to its noise at which nothing is missing: 20 % of its power."""
 _RIDGE = 1e-12
 """Ridge on scaled normal equations of an extrapolation; numerical."""
 
@@ -113,6 +116,18 @@ def held_out_rms(regression: Regression, fit: Fit, noise: Noise, folds: Folds) -
     for segment, part in zip(regression.segments, parts, strict=True):
         squares[segment.output] += float(part @ part)
     return {o: float(np.sqrt(total / regression.n_samples(o))) for o, total in squares.items()}
+
+
+def excess(errors: Mapping[str, float], noise: Mapping[str, float | None]) -> float:
+    """Sum over the outputs of the mean square of an error beyond the noise, in units of the noise.
+
+    Outputs whose noise is unknown do not count.
+    """
+    return sum(
+        max(0.0, (error / known) ** 2 - 1.0)
+        for output, error in errors.items()
+        if (known := noise[output])
+    )
 
 
 def signed_rank_p_value(before: Array, after: Array) -> float:

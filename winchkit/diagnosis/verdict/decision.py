@@ -19,7 +19,12 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
-from winchkit.diagnosis.regression.cross_validation import held_out_rms, held_out_samples
+from winchkit.diagnosis.regression.cross_validation import (
+    AT_NOISE,
+    excess,
+    held_out_rms,
+    held_out_samples,
+)
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
@@ -28,8 +33,6 @@ from winchkit.diagnosis.results import OutputFit, Verdict
 from winchkit.diagnosis.selection.engine import SelectionEngine
 from winchkit.model.stages import OUTPUT_UNITS
 
-AT_NOISE = 1.1
-"""Largest ratio of an error to its noise at which nothing is missing: 20 % of its power."""
 _EXPLAINED, MOSTLY = 0.1, 0.5
 """Largest share that remains of an explained and of a partly explained excess. Of 127 new cases
 the truth leaves at most 0.075, and 0.16 where it is very weak; another effect 0.25 and more."""
@@ -77,18 +80,6 @@ def verdict_of(
 def is_at_noise(output: OutputFit) -> bool:
     """Whether the final model's held-out error is as small as the noise, in ratio ``AT_NOISE``."""
     return output.noise_rms is not None and output.heldout_rms_after <= AT_NOISE * output.noise_rms
-
-
-def excess(errors: Mapping[str, float], noise: Mapping[str, float | None]) -> float:
-    """Sum over the outputs of the mean square of an error beyond the noise, in units of the noise.
-
-    Outputs whose noise is unknown do not count.
-    """
-    return sum(
-        max(0.0, (error / known) ** 2 - 1.0)
-        for output, error in errors.items()
-        if (known := noise[output])
-    )
 
 
 def remaining_share(outputs: Mapping[str, OutputFit]) -> float:

@@ -20,13 +20,12 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.diagnosis.regression.base import Folds
-from winchkit.diagnosis.regression.cross_validation import held_out_rms
+from winchkit.diagnosis.regression.cross_validation import AT_NOISE, excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit, fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
 from winchkit.diagnosis.verdict.curve_fits import Curve, PartialRegression, ranked_curves
-from winchkit.diagnosis.verdict.decision import AT_NOISE, excess
 from winchkit.diagnosis.verdict.spline_alternatives import PLACES, curves
 
 MARGIN = 0.1

@@ -33,7 +33,8 @@ EFFECT = Effect(
     formula="τ/η winding in, τ η paying out, smooth between",
     source="Cable-winding device, Eq. 10: 0.68 over six bearings and a belt",
     looks_like="A step of the torque error with the direction, in proportion to the load.",
-    confused_with=("torque-constant", "motor-coulomb", "pulley-coulomb"),
+    confused_with=("torque-constant", "motor-coulomb", "pulley-coulomb", "gear-dahl"),
     told_apart="Two loads in both directions.",
+    family="gear friction",
     needs=("cable_force", "gearing"),
 )

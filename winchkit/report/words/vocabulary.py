@@ -84,6 +84,7 @@ _CLAUSES = {
     "friction-growth": "the Coulomb friction of the motor side changes with time",
     "frame-compliance": "the frame is compliant",
     "gear-backlash": "the gearbox has backlash",
+    "gear-dahl": "the gearbox has presliding friction in proportion to the load (Dahl)",
     "gear-efficiency": "the gearbox loses torque by friction",
     "gear-ratio": "the gear ratio is wrong",
     "gear-transmission-error": "the gearbox has a periodic transmission error",

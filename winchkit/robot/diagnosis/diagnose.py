@@ -15,6 +15,7 @@ from typing import ClassVar
 
 from winchkit.diagnosis.design.detectability import DetectionThreshold, detectable
 from winchkit.diagnosis.diagnose import Answer
+from winchkit.diagnosis.regression.cross_validation import AT_NOISE
 from winchkit.diagnosis.regression.gls import fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
 from winchkit.diagnosis.residuals.attribution import MOST_PLACES, Attribution
@@ -39,11 +40,7 @@ from winchkit.diagnosis.steps import (
     steps_of,
     with_standing,
 )
-from winchkit.diagnosis.verdict.decision import (
-    AT_NOISE,
-    remaining_share,
-    verdict_of,
-)
+from winchkit.diagnosis.verdict.decision import remaining_share, verdict_of
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
 from winchkit.diagnosis.verdict.laws import simplified, with_first_members

@@ -1,0 +1,69 @@
+"""gear-dahl: friction of the teeth in proportion to the load that builds up after a reversal."""
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.presliding import START
+from winchkit.model.friction import dahl
+from winchkit.model.stages import At, Stage
+
+
+def apply(torque: Array, at: At, values: Values) -> Array:
+    """Torque τ η^(−z) with the state z, from −1 paying out to 1 winding in."""
+    if values["efficiency"] == 1.0:
+        return torque
+    wound_in = at.wound_angle * at.profile.gearbox.ratio
+    state = dahl(wound_in, np.ones_like(torque), 1 / values["distance"], start=values["start"])
+    return np.asarray(torque * values["efficiency"] ** -state)
+
+
+def carry(after: Array, before: Array, at: At, values: Values) -> float:
+    """State z at the last sample, the ``start`` of the next ones."""
+    if values["efficiency"] == 1.0 or before[-1] == 0.0:
+        return 0.0
+    return float(-np.log(after[-1] / before[-1]) / np.log(values["efficiency"]))
+
+
+EFFECT = Effect(
+    id="gear-dahl",
+    stage=Stage.GEARBOX,
+    parameters=(
+        Parameter(
+            "efficiency",
+            "1",
+            null=1.0,
+            typical=0.9,
+            low=0.05,
+            high=1.0,
+            plausible=Plausible(0.2, 1.0, "a worm gear has 0.3"),
+        ),
+        Parameter(
+            "distance",
+            "rad",
+            null=0.1,
+            typical=0.1,
+            low=1e-6,
+            high=6.3,
+            role="shape",
+            grid=(0.001, 0.004, 0.016, 0.064),
+            along="motor_angle",
+            plausible=Plausible(0.0, 6.3, "teeth slide within a motor turn"),
+        ),
+        START,
+    ),
+    apply=apply,
+    outputs=("motor_torque",),
+    reduces_to=("gear-efficiency",),
+    what="Teeth deform elastically before they slide, under friction in proportion to the load.",
+    formula="τ η^(−z), dz/dθ = (1 − s z)/δ winding in, δ the distance; start: z at the start",
+    source="Dahl 1968; efficiency as of the cable-winding device, Eq. 10",
+    looks_like="The step of a gear's efficiency, which builds up over an angle after a reversal.",
+    confused_with=("gear-efficiency", "motor-dahl", "torque-lag"),
+    told_apart="Two loads; reversals at two speeds: a lag ends after a time.",
+    family="gear friction",
+    contains=("gear-efficiency",),
+    needs=("cable_force", "gearing"),
+    memory=True,
+    carry=carry,
+)
