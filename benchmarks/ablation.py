@@ -1,19 +1,20 @@
 """Ablation of the diagnosis: each rule off by itself, the same cases diagnosed again.
 
 ``python benchmarks/ablation.py --tidy 40 --friction 24 --garbage 8 --profiles 8 --loggers 24
---seed 1``: for each rule of the table below the cases that are lost and won without it, and the
-processor time. A rule without which nothing is lost is a candidate for deletion, once a larger
-campaign agrees. ``--rule NAME`` runs some of them. See benchmarks/README.md.
+--seed 1``: for each rule of the table below the number of cases in which it changes anything, and
+of (at most twelve of) these the ones that are lost and won without it. A rule that never acts, or
+without which nothing is lost, is a candidate for deletion, once a larger campaign agrees.
+``--rule NAME`` judges some of them. See benchmarks/README.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import pkgutil
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -131,6 +132,40 @@ def without(rule: str) -> Iterator[None]:
         yield
 
 
+@contextmanager
+def watched() -> Iterator[set[str]]:
+    """The whole diagnosis; gives the rules that have changed anything in it."""
+    acted: set[str] = set()
+
+    def watch(rule: str, own: Any, replacement: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*args: Any, **kwargs: Any) -> Any:
+            found = own(*args, **kwargs)
+            if rule not in acted and not _same(found, replacement(*args, **kwargs)):
+                acted.add(rule)
+            return found
+
+        return call
+
+    with ExitStack() as stack:
+        for rule, targets in RULES.items():
+            for target, replacement in targets.items():
+                place = f"{HOUSE}.{target}"
+                own = pkgutil.resolve_name(place)
+                stack.enter_context(mock.patch(place, watch(rule, own, replacement)))
+        yield acted
+
+
+def _same(found: Any, other: Any) -> bool:
+    """Whether a rule's result is that without the rule."""
+    if isinstance(found, np.ndarray):
+        return np.array_equal(found, other, equal_nan=found.dtype.kind == "f")
+    if isinstance(found, tuple | list):
+        return len(found) == len(other) and all(map(_same, found, other))
+    if isinstance(found, Reweighted):
+        return found.final is other.final
+    return found is other or (isinstance(found, str | int | float | dict) and found == other)
+
+
 @dataclass(frozen=True)
 class Item:
     """A case that was made, and how its answer is judged."""
@@ -179,17 +214,12 @@ def _logger(case: Any) -> tuple[bool, str]:
     return score.ok, score.line
 
 
-def judged(cases: Sequence[Item], rule: str) -> tuple[dict[str, tuple[bool, str]], float]:
-    """Answers to all cases without a rule, and the processor time, s."""
-    begun = time.process_time()
-    with without(rule):
-        out = {}
-        for item in cases:
-            try:
-                out[item.name] = item.judged()
-            except Exception as error:  # noqa: BLE001 - a crash is a lost case
-                out[item.name] = False, f"{type(error).__name__}: {error}"
-    return out, time.process_time() - begun
+def judged(item: Item) -> tuple[bool, str]:
+    """Whether a case is answered right, and the answer."""
+    try:
+        return item.judged()
+    except Exception as error:  # noqa: BLE001 - a crash is a lost case
+        return False, f"{type(error).__name__}: {error}"
 
 
 def main() -> None:
@@ -198,26 +228,38 @@ def main() -> None:
     for kind in ("tidy", "friction", "garbage", "profiles", "loggers"):
         parser.add_argument(f"--{kind}", type=int, default=4)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--most", type=int, default=12, help="cases that a rule is judged by")
     parser.add_argument("--rule", action="append", choices=RULES)
     args = parser.parse_args()
+    rules = args.rule or list(RULES)
     with tempfile.TemporaryDirectory() as folder:
-        cases = list(items(args, Path(folder)))
-        whole, seconds = judged(cases, "")
+        whole: dict[str, tuple[bool, str]] = {}
+        acted: dict[str, list[Item]] = {rule: [] for rule in rules}
+        for item in items(args, Path(folder)):
+            with watched() as there:
+                whole[item.name] = judged(item)
+            for rule in there & set(rules):
+                acted[rule].append(item)
+            if not whole[item.name][0]:
+                print(f"wrong with all rules: {item.name}: {whole[item.name][1]}", flush=True)
         right = sum(ok for ok, _ in whole.values())
-        print(f"all rules: {right} of {len(cases)} right, {seconds:.0f} s", flush=True)
-        for name, (ok, said) in whole.items():
-            if not ok:
-                print(f"  wrong with all rules: {name}: {said}", flush=True)
-        for rule in args.rule or RULES:
-            less, took = judged(cases, rule)
-            lost = [name for name in whole if whole[name][0] and not less[name][0]]
-            won = [name for name in whole if less[name][0] and not whole[name][0]]
+        print(f"all rules: {right} of {len(whole)} right", flush=True)
+        for rule in rules:
+            words = []
+            cases = acted[rule][:: max(1, -(-len(acted[rule]) // args.most))]
+            for item in cases:
+                with without(rule):
+                    ok, said = judged(item)
+                if ok != whole[item.name][0]:
+                    words.append(f"  {'won' if ok else 'lost'} {item.name}: {said}")
+            lost = sum(word.startswith("  lost") for word in words)
             print(
-                f"{rule:36} lost {len(lost)} won {len(won)} time {took / seconds:.2f}", flush=True
+                f"{rule:36} acts in {len(acted[rule])}, of {len(cases)}: lost {lost}, "
+                f"won {len(words) - lost}",
+                *words,
+                sep="\n",
+                flush=True,
             )
-            for sign, names in (("lost", lost), ("won", won)):
-                for name in names:
-                    print(f"  {sign} {name}: {less[name][1]}", flush=True)
 
 
 if __name__ == "__main__":
