@@ -1,6 +1,6 @@
 """Judges a case from the truth: stopped in time, nothing moved again, tension, cause, log.
 
-Two bounds are those of two faults together:
+Three bounds are those of two faults together:
 
 - A bound that ends while the computer stands still is that of the drives' own watchdogs:
   nothing else can stop them in that time.
@@ -8,6 +8,8 @@ Two bounds are those of two faults together:
   before that stop was due and lasts, is stopped by what this second fault leaves (SDO, or its own
   watchdog after withheld heartbeats). That takes the bound of a communication fault, counted from
   the onset of the second fault.
+
+- What only a cell's readings show, while another fault withholds them, is stopped by their age.
 
 A cause must be named by a trip. One exception: a condition latches where it forbids a motion under
 way (docs/safety.md). A motion that came to its own end between the fault and the moment at which
@@ -27,6 +29,8 @@ from fault_cases.kinds import KINDS, READING_DELAY, STIFFNESS, Kind
 from fault_cases.play import Record
 from fault_cases.world import LIMITS, Sample
 
+_REPLY = 0.2
+"""Time-out of a request to a cell, s: that of the bench files."""
 _STALLS = {"computer stalls 0.1 s": 0.1, "computer stalls 0.5 s": 0.5}
 """s."""
 _MOVES = 0.004
@@ -104,7 +108,7 @@ def _must_stop(record: Record) -> tuple[float, float] | None:
             continue
         start = _crossing(record, planned, kind, onset)
         if start is not None:
-            found.append((start, _bound(record, start, kind.bound)))
+            found.append((start, _bound(record, kind, start)))
     return min(found, key=sum, default=None)
 
 
@@ -130,12 +134,18 @@ def _bound_of(record: Record, name: str, start: float, bound: float) -> float:
     return bound
 
 
-def _bound(record: Record, start: float, bound: float) -> float:
-    """A bound that ends while the computer stands still is that of the drives' own watchdogs."""
+def _bound(record: Record, kind: Kind, start: float) -> float:
+    """Bound of a fault that began at ``start``, with that of another one which delays its stop."""
+    bound = kind.bound
     for planned, onset in record.onsets:
+        other = KINDS[planned.kind]
         stall = _STALLS.get(planned.kind, 0.0)
         if onset < start + bound < onset + stall:
             bound = max(bound, onset + KINDS["computer stalls 0.5 s"].bound - start)
+        # The request whose answer it spoilt has yet to time out.
+        unread = onset + _span(record, planned, onset) + _REPLY
+        if kind.part == other.blocks == "cell" and onset < start + bound < unread:
+            bound = max(bound, onset + other.bound - start)
     return bound
 
 

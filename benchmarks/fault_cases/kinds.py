@@ -47,7 +47,7 @@ class Kind:
     """Whether it can be made in real time."""
     lasts: bool = False
     """Whether it goes on until it is mended, whatever span is drawn."""
-    blocks: Literal["", "drive", "bus"] = ""
+    blocks: Literal["", "drive", "bus", "cell"] = ""
     """Which drives do not receive a stop in the usual way while it lasts."""
     at_rest: bool = False
     """Whether it comes after the key was released, to a winch at rest."""
@@ -370,6 +370,7 @@ _ROWS = (
         ("cell stale",),
         _CELL_AGE + READING_DELAY,
         least=0.5,
+        blocks="cell",
         part="cell",
     ),
     Kind(
@@ -378,6 +379,7 @@ _ROWS = (
         ("cell stale",),
         _CELL_AGE + READING_DELAY,
         least=0.5,
+        blocks="cell",
         part="cell",
     ),
     Kind(
@@ -394,6 +396,7 @@ _ROWS = (
         _CELL_AGE + READING_DELAY,
         least=0.5,
         real_time=False,
+        blocks="cell",
         part="line",
     ),
     Kind(
@@ -403,6 +406,7 @@ _ROWS = (
         _CELL_AGE + READING_DELAY,
         least=0.5,
         real_time=False,
+        blocks="cell",
         part="line",
     ),
     Kind(
@@ -412,6 +416,7 @@ _ROWS = (
         _CELL_AGE + READING_DELAY,
         least=0.5,
         real_time=False,
+        blocks="cell",
         part="line",
     ),
     Kind(
