@@ -145,6 +145,7 @@ class Line:
             tension=zero if tension is None else tension,
             temperature=missing if signals.temperature is None else signals.temperature,
             motor_torque=zero if signals.motor_torque is None else signals.motor_torque,
+            predicted_torque=signals.predicted_torque,
         )
         drum_tension = signals.tension if load is None else None
         return Motion(at, clock, load, drum_tension, mass, discretization, load_std=load_std)
@@ -242,7 +243,9 @@ class Line:
 
     def indicated_torque(self, at: At, kinematics: WinchKinematics, drum_side: Array) -> Array:
         """Reported torque by virtual work: cable force times derivative of wound length, N m."""
-        torque: Array = drum_side * kinematics.arm
+        torque = drum_side * kinematics.arm
+        if at.predicted_torque is not None:
+            torque = at.predicted_torque
         for stage in (Stage.GEARBOX, Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL):
             torque = self._through(stage, torque, at)
         return torque

@@ -141,6 +141,8 @@ class Signals:
     temperature: Array | None = None
     motor_velocity: Array | None = None
     motor_torque: Array | None = None
+    predicted_torque: Array | None = None
+    """Of another model, in place of the torque of the cable, N m."""
     rate_noise: float | None = None
     """Standard deviation of the noise of the motor's rate, rad/s; None: that of its derivatives."""
     clock: Clock | None = None
@@ -173,6 +175,8 @@ class At:
     """degrees Celsius; NaN where not measured."""
     motor_torque: Array
     """The drive's reading, else zero, N m."""
+    predicted_torque: Array | None = None
+    """At the motor by another model, in place of the torque of the cable, N m."""
     pulley: int = -1
     wrap: float = 0.0
 

@@ -20,6 +20,7 @@ CHANNEL_DIMENSIONS: dict[str, str] = {
     "motor_angle": "angle",
     "motor_velocity": "angular speed",
     "motor_torque": "torque",
+    "predicted_torque": "torque",
     "motor_current": "current",
     "tension": "force",
     "tension_gross": "force",
@@ -32,6 +33,7 @@ CHANNEL_DIMENSIONS: dict[str, str] = {
     "position": "length",
     "velocity": "speed",
     "force": "force",
+    "predicted_force": "force",
 }
 """Dimension of every channel that the model uses, of a winch or of a linear axis."""
 

@@ -16,6 +16,7 @@ CHANNELS: Mapping[str, str] = {
     "motor_angle": "position",
     "motor_velocity": "velocity",
     "motor_torque": "force",
+    "predicted_torque": "predicted_force",
 }
 """Channel of a linear axis by that of a rotary one."""
 ROTARY: Mapping[str, str] = {linear: rotary for rotary, linear in CHANNELS.items()}

@@ -464,6 +464,7 @@ def _signals(run: Run, profile: WinchProfile, clock: Clock | None = None) -> Sig
         temperature=bridged_channel(run, "temperature"),
         motor_velocity=bridged_channel(run, "motor_velocity"),
         motor_torque=bridged_channel(run, "motor_torque"),
+        predicted_torque=bridged_channel(run, "predicted_torque"),
         clock=clock,
     )
 
@@ -491,6 +492,8 @@ def _valid(
         compared &= np.isfinite(run["load"])
     if output == "cable_length":
         return compared
+    if output == "motor_torque" and "predicted_torque" in run:
+        compared &= np.isfinite(run["predicted_torque"])
     if motion.clock.spline is None:
         # No acceleration at the ends of a run and beside gaps: differences reach beyond them.
         compared &= away_from(~np.isfinite(run["motor_angle"]), 1 + motion.clock.reach)

@@ -35,7 +35,7 @@ _TAPS = 10
 """Taps of the anti-alias filter per decimation factor; screened."""
 _BETA = 7.857
 """Shape of the Kaiser window for 80 dB stop-band attenuation."""
-_CHANNELS = ("motor_angle", "motor_torque", "tension", "load", "cable_length")
+_CHANNELS = ("motor_angle", "motor_torque", "predicted_torque", "tension", "load", "cable_length")
 
 
 @dataclass(frozen=True)

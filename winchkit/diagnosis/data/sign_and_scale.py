@@ -323,6 +323,8 @@ def _passivity(runs: Sequence[Run], profile: WinchProfile) -> Iterator[Finding]:
 
 def _has_no_load(run: Run, profile: WinchProfile) -> bool:
     motion = Line(profile).motion(_signals(run, profile))
+    if motion.at.predicted_torque is not None:
+        return False
     if motion.load is None:
         return motion.drum_tension is None
     return not np.any(motion.load)
@@ -330,13 +332,13 @@ def _has_no_load(run: Run, profile: WinchProfile) -> bool:
 
 def _signals(run: Run, profile: WinchProfile) -> Signals:
     has_cable = not isinstance(profile, AxisProfile)
-
     return Signals(
         time=run.time,
         motor_angle=bridged(run["motor_angle"]),
         load=bridged_channel(run, "load") if has_cable else None,
         load_mass=run.load_mass if has_cable else None,
         tension=bridged_channel(run, "tension") if has_cable else None,
+        predicted_torque=bridged_channel(run, "predicted_torque"),
     )
 
 

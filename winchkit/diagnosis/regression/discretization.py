@@ -114,6 +114,9 @@ def _fine_motion(recording: Recording, line: Line) -> Motion | None:
         tension=between(smooth.at.tension + _force_correction(recording, line)),
         temperature=np.interp(there, here, smooth.at.temperature),
         motor_torque=np.interp(there, here, smooth.at.motor_torque),
+        predicted_torque=None
+        if smooth.at.predicted_torque is None
+        else between(smooth.at.predicted_torque),
     )
     load = None if smooth.load is None else at.tension
     drum_side = None if smooth.drum_tension is None else between(smooth.drum_tension)

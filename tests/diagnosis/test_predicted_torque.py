@@ -1,0 +1,72 @@
+"""Runs with the torque that another model predicts: what that model lacks is diagnosed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from model_files import invoke
+from winchkit import compare, diagnose, read_profile, read_run
+
+JOINT = 'schema = 1\nkind = "axis"\nname = "joint"\n'
+HEADER = "time [s],motor_angle [rad],motor_torque [N m],predicted_torque [N m]"
+NOISE = 0.05
+
+
+def arm(folder: Path, *, sign: float = 1.0, gap: bool = False) -> tuple[Path, Path]:
+    """A joint of a rigid body with load-dependent friction, and its author's frictionless model."""
+    rng, time = np.random.default_rng(4), np.arange(0, 40, 0.01)
+    angle = 1.2 * np.sin(0.9 * time) + 0.4 * np.sin(2.3 * time)
+    rate = 1.08 * np.cos(0.9 * time) + 0.92 * np.cos(2.3 * time)
+    acceleration = -0.972 * np.sin(0.9 * time) - 2.116 * np.sin(2.3 * time)
+    model = 1.9 * acceleration + 22 * np.sin(angle + 0.3) + 3 * np.sin(2 * angle)
+    torque = model + (1.2 + 0.12 * np.abs(model)) * np.tanh(rate / 2e-3)
+    torque += NOISE * rng.standard_normal(len(time))
+    if gap:
+        model = np.where((time > 10) & (time < 11), np.nan, model)
+    run, profile = folder / "arm.csv", folder / "joint.toml"
+    table = np.column_stack([time, angle, torque, sign * model])
+    np.savetxt(run, table, delimiter=",", header=HEADER, comments="", fmt="%.6f")
+    profile.write_text(JOINT)
+    return run, profile
+
+
+@pytest.mark.parametrize("gap", [False, True])
+def test_friction_that_a_model_lacks_is_named_with_its_values(tmp_path: Path, gap: bool) -> None:
+    run, profile = arm(tmp_path, gap=gap)
+    found = diagnose([read_run(run)], read_profile(profile)).diagnosis
+    assert found.verdict == "explained"
+    values = {step.effects[0]: step.parameters[step.effects[0]] for step in found.steps}
+    assert set(values) == {"friction-of-load", "motor-coulomb"}
+    share, coulomb = values["friction-of-load"]["share"], values["motor-coulomb"]["torque"]
+    assert share.value == pytest.approx(0.12, abs=4 * share.std)
+    assert coulomb.value == pytest.approx(1.2, abs=4 * coulomb.std)
+    assert found.outputs["motor_torque"].heldout_rms_after < 1.5 * NOISE
+
+
+def test_the_error_is_that_of_the_model_alone(tmp_path: Path) -> None:
+    run, profile = arm(tmp_path)
+    read = read_run(run)
+    error = read["motor_torque"] - read["predicted_torque"]
+    found = compare([read], read_profile(profile)).outputs["motor_torque"]
+    assert found.rms == pytest.approx(float(np.sqrt(np.mean(error**2))), rel=0.01)
+
+
+def test_a_model_with_the_other_sign_is_said(tmp_path: Path) -> None:
+    run, profile = arm(tmp_path, sign=-1.0)
+    result = invoke("diagnose", run, "-p", profile)
+    assert "sign\nlooks inverted" in result.stdout
+    assert "friction" not in result.stdout
+
+
+def test_an_import_names_the_column_of_the_model(tmp_path: Path) -> None:
+    run, profile = arm(tmp_path)
+    foreign = tmp_path / "foreign.csv"
+    foreign.write_text(run.read_text().replace("predicted_torque", "tau_model"))
+    out = tmp_path / "imported"
+    column = "predicted_torque=tau_model"
+    assert invoke("import", foreign, "--column", column, "--yes", "-o", out).exit_code == 0
+    result = invoke("diagnose", out / "foreign.csv", "-p", profile)
+    assert "friction in proportion to the\nload" in result.stdout
