@@ -59,6 +59,13 @@ def test_right_profiles_are_called_swapped_in_at_most_one_of_100(scale: float) -
     assert np.mean([bool(swaps) for swaps in found]) <= 0.01 + 3 * np.sqrt(0.01 / 500)
 
 
+def test_a_mistyped_profile_is_no_exchange() -> None:
+    # The profile of A has a wrong number; A is nearer to that of B, and B not far from that of A.
+    identified = {"A": np.array([0.105]), "B": np.array([0.115]), "C": np.array([0.15])}
+    profiles = {**identified, "A": np.array([0.13])}
+    assert swapped_profiles(identified, dict.fromkeys("ABC", np.array([[1e-6]])), profiles) == ()
+
+
 def test_the_p_value_of_two_winches_is_the_closed_form() -> None:
     identified = {"A": np.array([2.0]), "B": np.array([0.0])}
     profiles = {"A": np.array([0.0]), "B": np.array([2.0])}

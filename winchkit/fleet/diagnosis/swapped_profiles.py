@@ -15,7 +15,7 @@ from math import inf, perm
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
-from scipy.special import stdtr
+from scipy.special import fdtrc, stdtr
 
 from winchkit.arrays import Array
 from winchkit.effects.bind import terms_of
@@ -27,6 +27,10 @@ from winchkit.schema.profiles.winch import WinchProfile
 
 _LEVEL = 0.01
 """Level of the test of exchanged profiles; convention."""
+_FITS = 0.001
+"""Level of the test that a winch fits a profile; convention."""
+_MOST_DOF = 1e9
+"""Degrees of freedom of a known covariance; numerical."""
 _RADIUS, _RATIO = "drum-radius", "gear-ratio"
 
 
@@ -62,7 +66,9 @@ def swapped_profiles(
     and join the cycles of those that were exchanged. For a cycle, the decrease D of the first sum
     against the declared profiles is N(−d², 4 d²) if these are right, d² the sum of the squared
     distances δᵀ C⁻¹ δ between each declared profile and the assigned one:
-    p = Φ(−(D + d²)/(2 d)), with the distribution function of t for estimated covariances.
+    p = Φ(−(D + d²)/(2 d)), with the distribution function of t for estimated covariances. Every
+    winch of a cycle must fit its new profile: one whose profile is mistyped fits that of another
+    winch, which does not fit the mistyped one.
     """
     names = list(identified)
     inverses = [np.asarray(np.linalg.inv(covariances[n]), dtype=np.float64) for n in names]
@@ -83,6 +89,8 @@ def swapped_profiles(
         if len(cycle) == 1:
             continue
         pairs = [(i, int(assigned[i])) for i in cycle]
+        if not all(_fits(cost[i, j], len(profiles[names[i]]), dof) for i, j in pairs):
+            continue
         decrease = float(sum(cost[i, i] - cost[i, j] for i, j in pairs))
         distance = sum(
             _square(profiles[names[i]] - profiles[names[j]], inverses[i]) for i, j in pairs
@@ -137,6 +145,11 @@ def swapped_by_radius(
         {n: np.array([x]) for n, x in zip(names, declared, strict=True)},
         between.dof,
     )
+
+
+def _fits(square: float, parameters: int, dof: float) -> bool:
+    """Whether a winch's squared distance from a profile is that of its uncertainty."""
+    return bool(fdtrc(parameters, min(dof, _MOST_DOF), square / parameters) > _FITS)
 
 
 def _square(difference: Array, inverse: Array) -> float:
