@@ -158,11 +158,13 @@ def watched() -> Iterator[set[str]]:
 def _same(found: Any, other: Any) -> bool:
     """Whether a rule's result is that without the rule."""
     if isinstance(found, np.ndarray):
-        return np.array_equal(found, other, equal_nan=found.dtype.kind == "f")
+        known = isinstance(other, np.ndarray)
+        return known and np.array_equal(found, other, equal_nan=found.dtype.kind == "f")
     if isinstance(found, tuple | list):
-        return len(found) == len(other) and all(map(_same, found, other))
+        alike = isinstance(other, tuple | list) and len(found) == len(other)
+        return alike and all(map(_same, found, other))
     if isinstance(found, Reweighted):
-        return found.final is other.final
+        return isinstance(other, Reweighted) and found.fit is other.fit
     return found is other or (isinstance(found, str | int | float | dict) and found == other)
 
 

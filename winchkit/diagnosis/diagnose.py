@@ -13,6 +13,7 @@ from winchkit.diagnosis.design.discrimination import next_runs
 from winchkit.diagnosis.design.excitation import missing_excitation
 from winchkit.diagnosis.linear_axis import in_units_of
 from winchkit.diagnosis.profiles import Profile, of_wing, require_winch
+from winchkit.diagnosis.regression.cross_validation import excess
 from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.diagnosis.regression.intervals import Spread, spread_of
 from winchkit.diagnosis.regression.run_offsets import run_offsets
@@ -38,9 +39,13 @@ from winchkit.diagnosis.selection.stepwise import (
     initial_result,
 )
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.selection.transitions import with_fitted_transitions
+from winchkit.diagnosis.selection.transitions import (
+    with_fitted_transitions,
+    with_rounded_reversals,
+)
 from winchkit.diagnosis.selection.weighting import reweighted
 from winchkit.diagnosis.steps import (
+    CERTAIN,
     Standing,
     candidates_of,
     is_small,
@@ -58,7 +63,7 @@ from winchkit.diagnosis.verdict.decision import (
 )
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet, equivalence_set, pairs_of
 from winchkit.diagnosis.verdict.fit_statistics import fit_statistics
-from winchkit.diagnosis.verdict.laws import with_first_members
+from winchkit.diagnosis.verdict.laws import with_first_members, with_simpler_law
 from winchkit.diagnosis.verdict.open_law import better_curve, predictable_share
 from winchkit.diagnosis.verdict.profile_values import file_model, refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
@@ -395,7 +400,13 @@ def _steps(
         errors = engine.held_out_errors(without, noise, folds)
         standing = standing_of(errors, outputs, sorted(own))
         trusted = bool(known.deciding & own) and not known.refuted & own
-        standings.append(replace(standing, certain=standing.certain and trusted and mostly))
+        standings.append(
+            replace(
+                standing,
+                certain=standing.certain and trusted and mostly,
+                rounded=_rounded_law(engine, result, first + place, outputs, standing),
+            )
+        )
     for place, step in enumerate(steps_of(engine, result, sets, engine.regression.dataset, spread)):
         beside = [one for one, there in zip(standings, acts, strict=True) if there & acts[place]]
         yield with_standing(
@@ -407,6 +418,33 @@ def _steps(
             curve=better_curve(engine, final, noise, first + place),
             small=is_small(standings[place], beside),
         )
+
+
+def _rounded_law(
+    engine: TimeSeriesSelection,
+    result: SelectionResult,
+    index: int,
+    outputs: Mapping[str, OutputFit],
+    standing: Standing,
+) -> str:
+    """Simpler friction with a rounded reversal that explains a presliding one to a tenth, or none.
+
+    How a reversal looks is a nuisance: a drive's filter rounds it as well.
+    """
+    effect = result.final.hypothesis.terms[index].effect
+    if not (effect.memory and effect.reduces_to):
+        return ""
+    noise, folds = result.noise, engine.folds(result.final, result.noise)
+    simpler = with_rounded_reversals(
+        engine, with_simpler_law(engine, result.final, noise, index), noise
+    )
+    size = {name: output.noise_rms for name, output in outputs.items()}
+    after = {name: output.heldout_rms_after for name, output in outputs.items()}
+    lost = excess(engine.held_out_errors(simpler, noise, folds), size) - excess(after, size)
+    if lost >= CERTAIN * standing.explained:
+        return ""
+    names = [term.effect.id for term in simpler.hypothesis.terms]
+    return next((name for name in effect.reduces_to if name in names), "")
 
 
 def _traces(

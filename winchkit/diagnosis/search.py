@@ -22,7 +22,11 @@ from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.diagnosis.selection.acceptance import predicts_better
 from winchkit.diagnosis.selection.stepwise import SelectionResult, stepwise_selection
 from winchkit.diagnosis.selection.time_series import TimeSeriesSelection
-from winchkit.diagnosis.selection.transitions import scanned_transitions, with_fitted_transitions
+from winchkit.diagnosis.selection.transitions import (
+    scanned_transitions,
+    with_fitted_transitions,
+    with_rounded_reversals,
+)
 from winchkit.diagnosis.verdict.laws import simplified
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
@@ -149,9 +153,10 @@ def _simplified(engine: TimeSeriesSelection, result: SelectionResult) -> Selecti
     """The result with its simplest laws, the transitions of friction fitted before and after."""
 
     def settled(fitted: Fit) -> Fit:
-        return with_fitted_transitions(engine, fitted, result.noise)
+        return with_rounded_reversals(engine, fitted, result.noise)
 
-    final, noise = simplified(engine, settled(result.final), result.noise, settled)
+    fitted = with_fitted_transitions(engine, result.final, result.noise)
+    final, noise = simplified(engine, fitted, result.noise, settled)
     return replace(result, final=with_fitted_transitions(engine, final, noise), noise=noise)
 
 

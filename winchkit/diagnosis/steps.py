@@ -28,7 +28,7 @@ from winchkit.diagnosis.verdict.curve_fits import Curve
 from winchkit.diagnosis.verdict.equivalence import EquivalenceSet
 from winchkit.diagnosis.verdict.plausibility import implausible
 
-_CERTAIN = 0.1
+CERTAIN = 0.1
 """Share of what a step explains that may be left unexplained in its outputs where it is certain:
 the tenth of the verdict ``explained``."""
 _MOST_ALTERNATIVES = 3
@@ -93,6 +93,8 @@ class Standing:
     """Whether less is left in its outputs than a tenth of what it explains."""
     explained: float = 0.0
     """Excess that only this step explains."""
+    rounded: str = ""
+    """Simpler law with a rounded reversal that explains all but a tenth of it; empty without."""
 
 
 def is_small(standing: Standing, others: Iterable[Standing]) -> bool:
@@ -100,7 +102,7 @@ def is_small(standing: Standing, others: Iterable[Standing]) -> bool:
 
     A law is known to a tenth of what it explains: the rest of a larger one may be this step.
     """
-    return any(standing.explained < _CERTAIN * other.explained for other in others)
+    return any(standing.explained < CERTAIN * other.explained for other in others)
 
 
 def standing_of(
@@ -114,7 +116,7 @@ def standing_of(
     there = [name for name in own if name in outputs]
     left = excess({name: after[name] for name in there}, noise)
     share = float(np.clip(explained / whole, 0.0, 1.0)) if whole > 0.0 else float("nan")
-    return Standing(share, left <= _CERTAIN * explained, explained)
+    return Standing(share, left <= CERTAIN * explained, explained)
 
 
 def with_standing(
@@ -135,6 +137,9 @@ def with_standing(
     if not standing.certain:
         what = "more is left in its outputs than a tenth of what it explains"
         doubts.append(Doubt("remaining", what))
+    if standing.rounded:
+        what = f"{standing.rounded} with a reversal rounded over a speed explains nine tenths of it"
+        doubts.append(Doubt("reversal", what))
     if small:
         what = "another step explains ten times as much there: it may be a deviation of that law"
         doubts.append(Doubt("small", what))
@@ -150,7 +155,7 @@ def with_standing(
 
 
 _SERIOUS = frozenset(
-    {"implausible", "collinear", "undetermined", "small", "oversized", "short-travel"}
+    {"implausible", "collinear", "undetermined", "small", "oversized", "short-travel", "reversal"}
 )
 """Doubts with which no step is certain."""
 

@@ -116,6 +116,16 @@ def with_fitted_transitions(engine: TimeSeriesSelection, final: Fit, noise: Nois
     return present
 
 
+def with_rounded_reversals(engine: TimeSeriesSelection, final: Fit, noise: Noise) -> Fit:
+    """The model whose friction has the transitions that predict best; the given one without any."""
+    hypothesis = final.hypothesis
+    for unit, size in scanned_transitions(engine, final, noise).items():
+        hypothesis = _at(hypothesis, _frictions(hypothesis, unit), size)
+    if hypothesis is final.hypothesis:
+        return final
+    return with_fitted_transitions(engine, engine.refit(hypothesis, noise), noise)
+
+
 def _highest_rates(engine: TimeSeriesSelection) -> dict[str, float]:
     """Highest rate of the motor and of the cable, by unit."""
     motions = engine.regression.motions

@@ -49,7 +49,7 @@ def _with_simpler_laws(
         term = present.hypothesis.terms[index]
         if not term.effect.reduces_to:
             continue
-        simpler = settled(_replaced(engine, present, noise, index))
+        simpler = settled(with_simpler_law(engine, present, noise, index))
         spread = spread_of(engine.regression, present, noise, engine.regression.blocks)
         values = estimates(engine.regression, present, spread)[index][1]
         if (
@@ -88,7 +88,7 @@ def _is_determined(parameter: Parameter, estimate: Estimate, profile: WinchProfi
     return estimate.std < min(size, high - size)
 
 
-def _replaced(engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> Fit:
+def with_simpler_law(engine: SelectionEngine, present: Fit, noise: Noise, index: int) -> Fit:
     """The model with the best of the simpler laws of a term in its place, or without it."""
     effect = present.hypothesis.terms[index].effect
     base = engine.refit(present.hypothesis.without(index), noise)
