@@ -19,7 +19,7 @@ from itertools import dropwhile
 
 import numpy as np
 
-from winchkit.diagnosis.regression.cross_validation import AT_NOISE, excess, held_out_rms
+from winchkit.diagnosis.regression.cross_validation import excess, held_out_rms
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.lack_of_fit import LackOfFitTest
 from winchkit.diagnosis.regression.noise import Noise
@@ -43,8 +43,6 @@ _PAIRS = 3
 """Pairs that are fitted; computing cost, rule of thumb."""
 _LACK_OF_FIT_LEVEL = 0.02
 """Level of the lack-of-fit test after Bonferroni; convention."""
-_FORM_OF_A_LAW = 0.01
-"""Share of an excess that the form of a law may leave; rule of thumb."""
 _SCORE_LEVEL = 0.99
 """Quantile of the simulated null maximum; convention."""
 
@@ -142,7 +140,6 @@ def _forward_selection(
     engine: SelectionEngine, present: Fit, noise: Noise, scores: list[Score], threshold: float
 ) -> tuple[Fit, Noise, tuple[Fit, ...]]:
     """Model with all accepted effects, its noise, and the fits of the first candidates."""
-    initial = present
     tried: tuple[Fit, ...] = ()
     seen: set[tuple[str, ...]] = set()
     while present.labels not in seen:
@@ -162,23 +159,10 @@ def _forward_selection(
         engine.update_signatures(larger.hypothesis)
         present, noise = engine.fit_with_noise(larger.hypothesis, noise)
         present, noise = _exchange_and_eliminate(engine, present, noise)
-        if engine.on_step(present, noise) or _is_whole(engine, initial, present, noise):
+        if engine.on_step(present, noise):
             break
         scores = engine.scores(present, noise)
     return present, noise, tried
-
-
-def _is_whole(engine: SelectionEngine, initial: Fit, present: Fit, noise: Noise) -> bool:
-    """Whether what the additions leave is the form of their laws, and not a further effect.
-
-    Every held-out error is at the noise, and their excess below a share of what was explained.
-    """
-    regression, folds = engine.regression, engine.folds(present, noise)
-    after = held_out_rms(regression, present, noise, folds)
-    if any(error > AT_NOISE * noise.rms[output] for output, error in after.items()):
-        return False
-    before = held_out_rms(regression, initial, noise, folds)
-    return excess(after, noise.rms) < _FORM_OF_A_LAW * excess(before, noise.rms)
 
 
 def _threshold(engine: SelectionEngine, present: Fit, noise: Noise) -> float:
