@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -12,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from campaign.answers import keep, kept
 from campaign.case import Plan
 from campaign.several import EXTENTS, Several, make_several
 
@@ -96,6 +93,20 @@ class SeveralScore:
         """Whether every winch's answer is as the truth is."""
         return not self.alarms and not self.wrong and self.found == self.there
 
+    @property
+    def line(self) -> str:
+        """The case in a line."""
+        told = "ok  " if self.ok and self.shared_right else "FAIL"
+        truth = sorted({effect for effects in self.truth.values() for effect in effects})
+        steps = {w: [list(s) for s in steps] for w, steps in self.steps.items() if steps}
+        other = {w: v for w, v in self.verdicts.items() if v in {"partly", "unknown"}}
+        shared = [(s["effects"], "".join(s["winches"])) for s in self.shared]
+        return (
+            f"{told} {self.seed} {self.extent} {self.snr:g} {','.join(truth)} in "
+            f"{''.join(self.there)} -> {steps} {other} shared {shared} alike {self.alike} "
+            f"{self.seconds:.1f} s | {self.scene}"
+        )
+
 
 def answer_several(case: Several) -> SeveralScore:
     """Diagnose every winch of a case from its files."""
@@ -125,33 +136,11 @@ def answer_several(case: Several) -> SeveralScore:
 
 
 def run_several(
-    seed: int,
-    plans: Sequence[tuple[str, Plan]],
-    winches: int,
-    folder: Path | None = None,
-    log: Path | None = None,
-) -> list[SeveralScore]:
-    """Scores in the order of the plans (extent and size); progress on stderr.
-
-    Each score is a line of ``log``; cases whose score is there already are not run again.
-    """
-    known, out = kept(log, SeveralScore.read), []
-    for index, (extent, plan) in enumerate(plans):
-        number = seed * 100_000 + index
-        if number in known:
-            out.append(known[number])
-            continue
-        with tempfile.TemporaryDirectory() as temporary:
-            place = folder / f"case-{number}" if folder else Path(temporary)
-            case = make_several(number, extent, plan, winches, place)
-            if case is None:
-                print(f"none {number} cannot be made: {plan}", file=sys.stderr)
-                continue
-            got = answer_several(case)
-        out.append(got)
-        keep(got, log)
-        print(_line(got), file=sys.stderr, flush=True)
-    return out
+    winches: int, seed: int, plan: tuple[str, Plan], folder: Path
+) -> SeveralScore | None:
+    """Make one case of an extent and size, and diagnose it; None where no case can be made."""
+    case = make_several(seed, *plan, winches, folder)
+    return None if case is None else answer_several(case)
 
 
 def several_summary(scores: Sequence[SeveralScore]) -> dict[str, Any]:
@@ -181,15 +170,3 @@ def _figures(group: Sequence[SeveralScore]) -> dict[str, Any]:
         "alike": sum(s.alike for s in group) / len(group),
         "seconds": float(np.mean([s.seconds for s in group])),
     }
-
-
-def _line(got: SeveralScore) -> str:
-    told = "ok  " if got.ok and got.shared_right else "FAIL"
-    truth = sorted({effect for effects in got.truth.values() for effect in effects})
-    steps = {w: [list(s) for s in steps] for w, steps in got.steps.items() if steps}
-    other = {w: v for w, v in got.verdicts.items() if v in {"partly", "unknown"}}
-    shared = [(s["effects"], "".join(s["winches"])) for s in got.shared]
-    return (
-        f"{told} {got.seed} {got.extent} {got.snr:g} {','.join(truth)} in {''.join(got.there)} -> "
-        f"{steps} {other} shared {shared} alike {got.alike} {got.seconds:.1f} s | {got.scene}"
-    )

@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from winchkit.bench.remote import client, requests
+from winchkit.bench.remote import client, operations
 from winchkit.bench.remote.client import RemoteStation
 
-CLIENT = {client.__file__, requests.__file__}
+CLIENT = {client.__file__, operations.__file__}
 
 
 class Owner(threading.Thread):

@@ -9,8 +9,7 @@ from typing import Protocol, runtime_checkable
 
 from winchkit.bench.cells.instruments import device_of, refs_of
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.publisher import InstrumentReadings, Publisher
+from winchkit.drivers.publisher import HostScale, InstrumentReadings, Publisher
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import NoReply, NotPermitted, UsageError, suggest

@@ -17,6 +17,7 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.control.dead_man import LIFE_SIGN, remaining
 from winchkit.bench.ownership import digest_of, listen, log_path
 from winchkit.bench.remote.identity import Client, LifeSign
+from winchkit.bench.remote.operations import OPERATIONS
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import (
     ConnectionLost,
@@ -29,54 +30,6 @@ from winchkit.errors import (
 
 _LOGGER = logging.getLogger(__name__)
 
-OPERATIONS = (
-    "names",
-    "status",
-    "jog",
-    "refresh",
-    "release",
-    "step",
-    "move",
-    "move_pose",
-    "pose",
-    "hold_tension",
-    "take_over",
-    "moving",
-    "home",
-    "homing",
-    "stop",
-    "reset",
-    "tare",
-    "start_log",
-    "log_rows",
-    "end_log",
-    "counters",
-    "trip_history",
-    "frames",
-    "start_programme",
-    "programme",
-    "answer_programme",
-    "end_programme",
-    "read_object",
-    "scanned",
-    "cell",
-)
-"""Methods of a station that may be called from outside."""
-
-_BEGINS = frozenset(
-    {
-        "jog",
-        "refresh",
-        "step",
-        "move",
-        "move_pose",
-        "hold_tension",
-        "home",
-        "start_programme",
-        "answer_programme",
-    }
-)
-"""Those that begin or extend a motion: refused where they have been on their way for too long."""
 _MAX_LINE = 65_536
 """Bytes: the longest request, a programme by name with its options, has some hundreds; a longer one
 is no client."""
@@ -109,15 +62,24 @@ class _Request:
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise UsageError(f"a request that cannot be read: {error}") from None
 
-    def permitted(self) -> dict[str, Any]:
-        """Its named arguments, a hold shortened by the age; raises NotPermitted where it is old."""
-        if self.operation not in _BEGINS:
-            return self.named
-        hold = self.named.get("hold")
-        if isinstance(hold, bool) or not isinstance(hold, float | int) or not 0 < hold <= 1:
-            remaining(LIFE_SIGN, self.age)  # and the station says what is wrong with the hold
-            return self.named
-        return {**self.named, "hold": remaining(hold, self.age)}
+    def bound(self, call: Callable[..., Any]) -> inspect.BoundArguments:
+        """Its arguments for ``call``, a hold shortened by the age.
+
+        Raises UsageError for arguments that do not fit, NotPermitted where it begins a motion and
+        is old.
+        """
+        try:
+            asked = inspect.signature(call).bind(*self.arguments, **self.named)
+        except TypeError as error:
+            raise UsageError(f"{self.operation}: a request that cannot be read: {error}") from None
+        if OPERATIONS.get(self.operation):
+            asked.apply_defaults()
+            hold = asked.arguments.get("hold")
+            if isinstance(hold, bool) or not isinstance(hold, float | int) or not 0 < hold <= 1:
+                remaining(LIFE_SIGN, self.age)  # and the station says what is wrong with the hold
+            else:
+                asked.arguments["hold"] = remaining(hold, self.age)
+        return asked
 
 
 @dataclass(eq=False)
@@ -237,11 +199,8 @@ class StationServer:
         if operation not in own and operation not in OPERATIONS:
             raise UsageError(f"no operation '{operation}'")
         call = own.get(operation) or getattr(seat.station, operation)
-        try:
-            inspect.signature(call).bind(*request.arguments, **request.named)
-        except TypeError as error:
-            raise UsageError(f"{operation}: a request that cannot be read: {error}") from None
-        return call(*request.arguments, **request.permitted())
+        asked = request.bound(call)
+        return call(*asked.args, **asked.kwargs)
 
     def _introduce(self, seat: _Seat, name: str, observer: bool) -> dict[str, Any]:
         """Take a client's name; returns who owns the bench, and whether it is handed over."""

@@ -20,7 +20,6 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 from winchkit.drivers.clock import MonotonicClock
-from winchkit.drivers.instrument_process.lines import Line, line_of
 from winchkit.drivers.instrument_process.messages import (
     COUNTS,
     Kind,
@@ -31,6 +30,7 @@ from winchkit.drivers.instrument_process.messages import (
     message,
     reading_message,
 )
+from winchkit.drivers.instrument_process.process import Line, line_of
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.publisher import Publisher, Sampled
 from winchkit.drivers.reading import Quality, Reading, Sensor
