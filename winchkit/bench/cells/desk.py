@@ -25,7 +25,7 @@ _BATCHES = 10
 % (1/√(2·9))."""
 _FEWEST, _ENOUGH = 2, 20
 """Readings: two have a standard deviation; 20 have a mean with a quarter of their noise."""
-_PATIENCE = 5.0
+_TIMEOUT = 5.0
 """So long it waits for enough readings of a slow instrument, s."""
 
 
@@ -176,13 +176,13 @@ class CellDesk:
         sensor.listeners.append(taken.append)
         try:
             self.clock.sleep(duration)
-            while len(taken) < _ENOUGH and self.clock.now() < end + _PATIENCE:
+            while len(taken) < _ENOUGH and self.clock.now() < end + _TIMEOUT:
                 self.clock.sleep(_POLL)
         finally:
             sensor.listeners.remove(taken.append)
         if len(taken) < _FEWEST:
             raise sensor.problem or NoReply(
-                f"{sensor.name}: {len(taken)} readings within {duration + _PATIENCE:g} s"
+                f"{sensor.name}: {len(taken)} readings within {duration + _TIMEOUT:g} s"
             )
         return taken
 

@@ -29,21 +29,21 @@ _CELL_TIME = 20.0
 
 def attach(
     spec: BenchSpec,
-    patience: float = _ANSWER_TIME,
+    timeout: float = _ANSWER_TIME,
     *,
     name: str = "",
     observer: bool = False,
 ) -> RemoteStation | None:
     """A station at the bench's owner; None when no process owns it.
 
-    ``patience`` (s) is how long it waits for an answer, ``name`` what others see of this client;
+    ``timeout`` (s) is how long it waits for an answer, ``name`` what others see of this client;
     an ``observer`` never keeps another program from owning the bench. Raises ConnectionLost when
     the owner does not take it.
     """
     connection = connect_to_owner(spec)
     if connection is None:
         return None
-    return RemoteStation(connection, patience, name=name, observer=observer)
+    return RemoteStation(connection, timeout, name=name, observer=observer)
 
 
 class RemoteStation(Station):
@@ -56,17 +56,17 @@ class RemoteStation(Station):
     def __init__(
         self,
         connection: socket.socket,
-        patience: float = _ANSWER_TIME,
+        timeout: float = _ANSWER_TIME,
         *,
         name: str = "",
         observer: bool = False,
     ) -> None:
         """Take a place at the owner; raises ConnectionLost where it accepts no client."""
-        self._requests = Requests(connection, patience)
+        self._requests = Requests(connection, timeout)
         try:
             reply = self._requests.call("introduce", name or client_name(), observer)
         except BaseException:
-            self._requests.hang_up()
+            self._requests.close()
             raise
         self.owner = str(reply["owner"])
         """Name of the process that owns the bench."""
@@ -91,11 +91,11 @@ class RemoteStation(Station):
         return MonotonicClock()
 
     def _request(self, operation: str, *arguments: Any, **named: Any) -> Any:
-        patience = None
+        timeout = None
         if operation == "cell":
             watched = sum(item for item in arguments if isinstance(item, float))
-            patience = _CELL_TIME + 3 * watched
-        return self._requests.call(operation, *arguments, patience=patience, **named)
+            timeout = _CELL_TIME + 3 * watched
+        return self._requests.call(operation, *arguments, timeout=timeout, **named)
 
     def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
         """Bytes of an object of a drive.
@@ -135,7 +135,7 @@ class RemoteStation(Station):
         except OwnerGone:
             pass  # it stops everything when it ends
         finally:
-            self._requests.hang_up()
+            self._requests.close()
 
 
 class RemoteCells:
@@ -156,12 +156,12 @@ class OwnerGone(ConnectionLost):
 class Requests:
     """One request after another over a socket, each with the answer of its number.
 
-    ``patience``: time to wait for an answer, s.
+    ``timeout``: time to wait for an answer, s.
     """
 
-    def __init__(self, connection: socket.socket, patience: float) -> None:
-        connection.settimeout(patience)
-        self._patience = patience
+    def __init__(self, connection: socket.socket, timeout: float) -> None:
+        connection.settimeout(timeout)
+        self._timeout = timeout
         self._connection = connection
         self._stream = connection.makefile("rwb")
         self._lock = threading.Lock()
@@ -173,14 +173,14 @@ class Requests:
         self,
         operation: str,
         *arguments: Any,
-        patience: float | None = None,
+        timeout: float | None = None,
         since: float | None = None,
         **named: Any,
     ) -> Any:
         """The owner's answer to an operation.
 
         Raises the owner's error, OwnerGone, or UsageError for an argument that cannot be sent;
-        another ``patience`` (s) holds for this call. The owner refuses to move anything where too
+        another ``timeout`` (s) holds for this call. The owner refuses to move anything where too
         much time has passed since the call, or ``since`` an earlier time (s on the steady clock of
         this computer).
         """
@@ -188,13 +188,13 @@ class Requests:
         with self._lock:
             if self.gone:
                 raise OwnerGone("this station at the bench was left; attach again")
-            self._connection.settimeout(self._patience if patience is None else patience)
+            self._connection.settimeout(self._timeout if timeout is None else timeout)
             answer = self._exchange(operation, sent, arguments, named)
         if "error" in answer:
             raise error_of(answer["error"], answer["message"])
         return answer["ok"]
 
-    def hang_up(self) -> None:
+    def close(self) -> None:
         """Close the connection; twice does no harm."""
         with self._lock:
             self.gone = True

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from winchkit.bench.remote.operations import Station
 
 
-_PATIENCE = 15.0
+_TIMEOUT = 15.0
 """For an owner that opens, closes or hands over the bench, s."""
 _POLL = 0.05
 """s: not noticed by an operator."""
@@ -135,7 +135,7 @@ def _sought(
     Two commands that come at once start two processes; one of them owns the bench, and both
     commands attach to it.
     """
-    deadline = time.monotonic() + _PATIENCE
+    deadline = time.monotonic() + _TIMEOUT
     while True:
         late = time.monotonic() > deadline
         problem: WinchkitError | None
@@ -154,7 +154,7 @@ def _sought(
                 raise problem
         if late:
             raise problem or ConnectionLost(
-                f"bench '{spec.name}': its owner has accepted no client for {_PATIENCE:g} s"
+                f"bench '{spec.name}': its owner has accepted no client for {_TIMEOUT:g} s"
             )
         time.sleep(_POLL)
 

@@ -22,9 +22,9 @@ from typing import Any
 
 from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.drivers.instrument_process.messages import (
+    InstrumentState,
     Kind,
     Messages,
-    State,
     json_message,
     message,
     raw_reading_of,
@@ -261,7 +261,7 @@ class InstrumentProcess:
             self._instruments[said.instrument].publisher.publish(*said[1:])
         elif kind is Kind.STATE:
             number, *state = json.loads(content)
-            self._instruments[number].show(State(*state))
+            self._instruments[number].show(InstrumentState(*state))
         elif kind is Kind.REPLY:
             number, value, words = json.loads(content)
             with self._lock:
