@@ -24,8 +24,8 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-from soak import CYCLE, WINCHES, DeviceClock, Watch, bench_file, received
 
+from soak import CYCLE, WINCHES, DeviceClock, Watch, bench_file, received
 from soak_devices import serve
 from winchkit.bench import hardware
 from winchkit.bench.bench import Bench

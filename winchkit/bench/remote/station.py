@@ -39,15 +39,12 @@ class LocalStation(OwnedLog, Station):
 
     @property
     def clock(self) -> Clock:
-        """Clock of the bench, on which a client waits."""
         return self._bench.clock
 
     def names(self) -> list[str]:
-        """Winches there are."""
         return list(self._bench.winch)
 
     def status(self) -> dict[str, Any]:
-        """Newest snapshot as JSON has it."""
         buses = {name: asdict(item) for name, item in self._bench.bus_health.items()}
         for item in buses.values():
             item["state"] = item["state"].value
@@ -78,7 +75,6 @@ class LocalStation(OwnedLog, Station):
         hold: float = DEAD_MAN,
         since: float | None = None,
     ) -> None:
-        """Begin to move for ``hold`` seconds."""
         hold = hold if since is None else remaining(hold, self.clock.now() - since)
         with self._acting():
             self._bench.named(winch).jog(*unnamed, pay_out=pay_out, wind_in=wind_in, hold=hold)
@@ -91,12 +87,10 @@ class LocalStation(OwnedLog, Station):
         wind_in: float | None = None,
         hold: float = DEAD_MAN,
     ) -> None:
-        """Keep what is held going for ``hold`` seconds more."""
         with self._acting():
             self._bench.named(winch).refresh(*unnamed, pay_out=pay_out, wind_in=wind_in, hold=hold)
 
     def release(self, winch: str | None) -> None:
-        """End what is held by a ramp now."""
         with self._acting():
             self._bench.named(winch).release()
 
@@ -109,7 +103,6 @@ class LocalStation(OwnedLog, Station):
         speed: float | None = None,
         since: float | None = None,
     ) -> None:
-        """Start to pay out or wind in a length of cable."""
         no_positional("step", "m", unnamed)
         if since is not None:
             remaining(LIFE_SIGN, self.clock.now() - since)
@@ -128,7 +121,6 @@ class LocalStation(OwnedLog, Station):
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> None:
-        """Start a move to a cable length, or by a length paid out or wound in."""
         no_positional("move", "m", unnamed)
         if (to is None) == (pay_out is None and wind_in is None):
             raise UsageError(
@@ -150,31 +142,26 @@ class LocalStation(OwnedLog, Station):
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> None:
-        """Start to move the platform of the robot on a line."""
         platform = self._bench.robot
         goal = platform.moved(change, relative=relative)
         with self._acting():
             platform.move(goal, speed, acceleration, wait=False)
 
     def pose(self) -> dict[str, float]:
-        """Pose of the platform by the motor angles."""
         return self._bench.robot.coordinates()
 
     def hold_tension(
         self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
     ) -> None:
-        """Begin to keep the tension of a winch for ``hold`` seconds."""
         with self._acting():
             self._bench.named(winch).hold_tension(tension, hold=hold, **bounds)
 
     def take_over(self, winch: str | None) -> None:
-        """Command a winch that another client commands."""
         with self._acting():
             for item in self._chosen(winch):
                 self._bench.commanders.take_over(item.name)
 
     def moving(self, winch: str | None) -> bool:
-        """Whether a motion is under way."""
         chosen = self._chosen(winch)
         with self._acting():
             for item in chosen:
@@ -188,7 +175,6 @@ class LocalStation(OwnedLog, Station):
     def home(
         self, winch: str | None, method: int | None, at: float | None, speed: float | None
     ) -> None:
-        """Start to home a winch."""
         asked = HomingRequest(method, at, speed)
         with self._acting():
             self._homing = self._bench.homing(self._bench.named(winch).name, asked)
@@ -196,7 +182,6 @@ class LocalStation(OwnedLog, Station):
         self._led = DeadMan(self.clock.now() + LIFE_SIGN)
 
     def homing(self) -> bool:
-        """Whether the homing is under way, and lead it on."""
         if self._homing is None:
             return False
         with self._acting():
@@ -214,42 +199,34 @@ class LocalStation(OwnedLog, Station):
         return False
 
     def stop(self) -> None:
-        """Quick-stop every winch."""
         with self._acting():
             self._bench.stop_now()
 
     def reset(self) -> list[str]:
-        """Clear trips and faults; returns the cleared ones, in words."""
         with self._acting():
             return self._bench.reset()
 
     def tare(self, winch: str | None) -> float:
-        """Tare a load cell."""
         return self._bench.named(winch).tare()
 
     def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
-        """Start a log, ending the one before."""
         self.end_log()
         self._recorder = self._bench.log(path, rotate=rotate, replace=replace)
 
     def read_object(self, winch: str | None, index: int, sub: int) -> str | None:
-        """Bytes of an object of a winch's drive in hexadecimal; None where it has none."""
         name = self._bench.named(winch).name
         data = self._bench.axes[name].objects.upload_if_there(index, sub)
         return None if data is None else data.hex()
 
     def scanned(self) -> list[dict[str, Any]]:
-        """Who is on the buses, as JSON has it."""
         return [asdict(item) for item in self._bench.scan()]
 
     def counters(self) -> dict[str, dict[str, Any]]:
-        """Counts by instrument, and for the log."""
         if self._recorder is not None:
             return self._recorder.counters()
         return counters_of({name: winch.sensors for name, winch in self._bench.winch.items()})
 
     def trip_history(self) -> dict[str, Any] | None:
-        """The cycles around the trip that is not reset yet, as JSON has them."""
         return self._bench.trip_history.to_dict(self._bench.snapshot)
 
     def begin_no_more(self) -> None:
@@ -258,7 +235,6 @@ class LocalStation(OwnedLog, Station):
             self._programme.begin_no_more()
 
     def frames(self) -> dict[str, dict[str, Any]]:
-        """Frames of each CAN bus, collected while it is called."""
         return {
             name: {
                 "newest": [[count, *_frame(item)] for count, item in tap.newest],
@@ -270,7 +246,6 @@ class LocalStation(OwnedLog, Station):
     def start_programme(
         self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
     ) -> None:
-        """Execute a programme file."""
         if self._programme is not None and not self._programme.ended:
             raise UsageError("a programme of this client is under way; end it first")
         self._programme = ProgrammeRun(
@@ -278,22 +253,18 @@ class LocalStation(OwnedLog, Station):
         )
 
     def programme(self) -> dict[str, Any] | None:
-        """Where this station's programme is, as JSON has it; None where it started none."""
         return None if self._programme is None else self._programme.state()
 
     def answer_programme(self) -> None:
-        """Answer the programme's request as done."""
         if self._programme is None:
             raise UsageError("no programme is under way")
         self._programme.answer()
 
     def end_programme(self) -> None:
-        """End this station's programme by a ramp; returns at rest."""
         if self._programme is not None:
             self._programme.end()
 
     def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-        """Something with an instrument by name."""
         return do(self._bench.cells, task, name, *arguments)
 
     def close(self) -> None:
