@@ -26,8 +26,7 @@ from campaign.logger_score import LoggerScore, logger_summary, logger_table
 from campaign.loggers import FAULTS
 from campaign.run import run_case
 from campaign.score import Score, summary, table
-from campaign.several import EXTENTS
-from campaign.several_score import SeveralScore, run_several, several_summary
+from campaign.several_score import EXTENTS, SeveralScore, run_several, several_summary
 from campaign.sizes import CATALOGUE, OUTSIDE
 
 KINDS = ("none", "single", "pair", "triple", "outside", "norepeat")

@@ -12,8 +12,7 @@ from scipy.stats import binomtest
 
 from campaign.answers import keep, kept, scores_of
 from campaign.bench import Bench, draw_bench
-from campaign.identifiable import RATIO, identity
-from campaign.likelihood import gram, least_along, without
+from campaign.identifiable import RATIO, gram, identity, least_along, without
 from campaign.logger_case import LoggerPlan, answer, make_logger_case
 from campaign.logger_score import LoggerScore, clopper_pearson, logger_summary
 from campaign.loggers import FAULTS, MISREAD, Fault, fault_of
