@@ -10,9 +10,6 @@ import argparse
 import sys
 import time
 from collections import Counter
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 from cell_campaign.case import Outcome, Plan, modbus_devices, play
 from summaries import print_summary

@@ -13,20 +13,20 @@ import json
 import os
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).parent))
 
+from campaign.answers import scores_of
 from campaign.case import Plan
-from campaign.logger_case import LoggerPlan, run_logger_cases
-from campaign.logger_score import logger_summary, logger_table
+from campaign.logger_case import LoggerPlan, run_logger_case
+from campaign.logger_score import LoggerScore, logger_summary, logger_table
 from campaign.loggers import FAULTS
-from campaign.run import run_cases
-from campaign.score import summary, table
-from campaign.several import EXTENTS
-from campaign.several_score import run_several, several_summary
+from campaign.run import run_case
+from campaign.score import Score, summary, table
+from campaign.several_score import EXTENTS, SeveralScore, run_several, several_summary
 from campaign.sizes import CATALOGUE, OUTSIDE
 
 KINDS = ("none", "single", "pair", "triple", "outside", "norepeat")
@@ -84,8 +84,9 @@ def main() -> None:
     parser.add_argument("--log", type=Path, help="file that gets every score as a line of JSON")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
+    how = {"jobs": args.jobs, "folder": args.keep, "log": args.log}
     if args.loggers:
-        scores = run_logger_cases(args.seed, logger_plans(args), args.jobs, args.keep, args.log)
+        scores = scores_of(run_logger_case, args.seed, logger_plans(args), LoggerScore.read, **how)
         show(logger_summary(scores), logger_table, args.json)
         return
     kinds = EXTENTS if args.winches > 1 else KINDS
@@ -100,10 +101,11 @@ def main() -> None:
     )
     if args.winches > 1:
         extents = [(plan.kind, plan) for plan in todo]
-        several = run_several(args.seed, extents, args.winches, args.keep, args.log)
+        run = partial(run_several, args.winches)
+        several = scores_of(run, args.seed, extents, SeveralScore.read, **how)
         result = several_summary(several)
     else:
-        result = summary(run_cases(args.seed, todo, args.jobs, args.keep, args.log))
+        result = summary(scores_of(run_case, args.seed, todo, Score.read, **how))
     show(result, table, args.json)
 
 

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import argparse
 import os
-import sys
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).parent))
 
-from campaign.family.relation_run import run_relations
 from campaign.family.relation_score import relation_table
-from campaign.family.run import CASES, Job, read_lines, run_job, run_jobs
+from campaign.family.run import CASES, Job, read_lines, run_job, run_jobs, run_relations
 from campaign.family.score import changes, failures, table
 
 METAMORPHIC = "metamorphic"

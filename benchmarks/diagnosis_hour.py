@@ -21,7 +21,6 @@ from pathlib import Path
 from time import perf_counter, process_time
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
 from scipy.signal import oaconvolve

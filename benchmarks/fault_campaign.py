@@ -21,10 +21,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 from fault_cases.case import Case, cases
 from fault_cases.judge import Verdict, judge

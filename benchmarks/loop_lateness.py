@@ -16,7 +16,6 @@ import json
 import multiprocessing
 import os
 import resource
-import sys
 import tempfile
 import time
 from contextlib import ExitStack
@@ -25,8 +24,6 @@ from typing import Any
 from unittest.mock import patch
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 from soak import CYCLE, WINCHES, DeviceClock, Watch, bench_file, received
 from soak_devices import serve

@@ -31,8 +31,6 @@ from functools import partial
 from pathlib import Path
 from statistics import median
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 from process_commands import COMMAND_FAULTS, Commands, NotMoving, log_problems
 
 SUPPORT = Path(__file__).parents[1] / "tests" / "support"

@@ -21,8 +21,6 @@ from tempfile import TemporaryDirectory
 from time import process_time
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 from click.testing import CliRunner
 
 from robot_poses.cases import CASES

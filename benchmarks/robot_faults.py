@@ -26,8 +26,6 @@ from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 from fault_cases.kinds import KINDS
 from fault_cases.world import World
 from winchkit import find, open_bench, read_simbench

@@ -22,8 +22,6 @@ from tempfile import TemporaryDirectory
 from time import process_time
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parent))
-
 import numpy as np
 from click.testing import CliRunner
 

@@ -15,7 +15,6 @@ import json
 import math
 import multiprocessing
 import os
-import sys
 import tempfile
 import threading
 import time
@@ -26,8 +25,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 from soak_devices import Wire, serve
 from winchkit.bench.bench import Bench

@@ -57,8 +57,8 @@ def _stops() -> Iterator[str]:
     yield "| way | sends | the next one is used at |"
     yield "|---|---|---|"
     for row in STOP_TABLE:
-        wait = f"; not before {row.patience * 1e3:g} ms" if row.patience else ""
-        yield _row(row.rung.name, row.sends, row.not_heard + wait)
+        wait = f"; not before {row.timeout * 1e3:g} ms" if row.timeout else ""
+        yield _row(row.method.name, row.sends, row.not_heard + wait)
 
 
 def _row(*cells: str) -> str:

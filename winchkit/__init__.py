@@ -24,7 +24,7 @@ if TYPE_CHECKING:
         cell_tare,
         cell_zero,
     )
-    from winchkit.bench.commissioning.calls import commission
+    from winchkit.bench.commissioning.procedure import commission
     from winchkit.bench.control.snapshot import BenchSnapshot
     from winchkit.bench.drives.calls import (
         bus_load,
@@ -201,7 +201,7 @@ _NAMES = {
         "cell_tare",
         "cell_zero",
     ),
-    "winchkit.bench.commissioning.calls": ("commission",),
+    "winchkit.bench.commissioning.procedure": ("commission",),
     "winchkit.bench.control.snapshot": ("BenchSnapshot",),
     "winchkit.bench.drives.calls": (
         "bus_load",

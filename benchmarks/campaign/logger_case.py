@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
-from campaign.answers import keep, kept
 from campaign.bench import Bench, draw_bench
 from campaign.case import ATTEMPTS, Plan, size_effects
 from campaign.identifiable import Identity, identity
@@ -142,39 +137,7 @@ def answer(case: LoggerCase) -> LoggerScore:
     )
 
 
-def _one(job: tuple[int, LoggerPlan, str | None]) -> LoggerScore | None:
-    seed, plan, keep = job
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(keep) / f"case-{seed}" if keep else Path(folder)
-        case = make_logger_case(seed, plan, place)
-        return None if case is None else answer(case)
-
-
-def run_logger_cases(
-    seed: int, plans: Sequence[LoggerPlan], jobs: int, folder: Path | None, log: Path | None = None
-) -> list[LoggerScore]:
-    """Scores in the order of the plans; progress on stderr.
-
-    Each score is a line of ``log``; cases whose score is there already are not run again.
-    """
-    known = kept(log, LoggerScore.read)
-    work = [(seed * 100_000 + i, p, str(folder) if folder else None) for i, p in enumerate(plans)]
-    left = [job for job in work if job[0] not in known]
-    for job, got in zip(left, _answers(left, jobs), strict=True):
-        if got is None:
-            print(f"none {job[0]} cannot be made: {job[1]}", file=sys.stderr)
-            continue
-        known[got.seed] = got
-        keep(got, log)
-        print(got.line, file=sys.stderr, flush=True)
-    return [known[job[0]] for job in work if job[0] in known]
-
-
-def _answers(
-    jobs: Sequence[tuple[int, LoggerPlan, str | None]], processes: int
-) -> Iterator[LoggerScore | None]:
-    if processes == 1:
-        yield from map(_one, jobs)
-        return
-    with ProcessPoolExecutor(processes) as pool:
-        yield from pool.map(_one, jobs)
+def run_logger_case(seed: int, plan: LoggerPlan, folder: Path) -> LoggerScore | None:
+    """Make one case and diagnose its files; None where no case can be made."""
+    case = make_logger_case(seed, plan, folder)
+    return None if case is None else answer(case)

@@ -87,6 +87,15 @@ class Score:
             return not self.wrong_single_names
         return self.found == len(self.truth) and not self.wrong_single_names
 
+    @property
+    def line(self) -> str:
+        """The case in a line."""
+        return (
+            f"{'ok  ' if self.ok else 'FAIL'} {self.seed} {self.kind} {self.snr:g} "
+            f"{','.join(self.truth)} -> {self.verdict} {[list(s) for s in self.steps]} "
+            f"share {self.share:.3f} p {self.p_value:.2g} {self.seconds:.1f} s | {self.scene}"
+        )
+
 
 def score(case: Case, answer: dict[str, Any], p_value: float, seconds: float) -> Score:
     """Compare an answer (as JSON) with what the case hides."""

@@ -2,19 +2,66 @@
 
 from __future__ import annotations
 
-import sys
-import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
 
-from campaign.answers import keep, kept
-from campaign.case import Plan
-from campaign.several import EXTENTS, Several, make_several
+from campaign.bench import draw_bench, draw_beside
+from campaign.case import ATTEMPTS, Plan, draw_effects, size_effects
+from campaign.record import record_several
+from campaign.truth import Hidden
+from campaign.winch import write_profile
+
+EXTENTS = ("none", "one", "all")
+
+
+@dataclass(frozen=True)
+class Several:
+    """A case on disk and what is true of it."""
+
+    seed: int
+    extent: str
+    """In how many winches: one of :data:`EXTENTS`."""
+    snr: float
+    """In the one winch, or in the first of all; others move in their own way."""
+    hidden: Mapping[str, Hidden]
+    """Per winch; empty where it hides nothing."""
+    runs: tuple[Path, ...]
+    profile: Path
+    scene: str
+
+
+def make_several(seed: int, extent: str, plan: Plan, winches: int, folder: Path) -> Several | None:
+    """Draw a case of winches of one make, every run recorded twice, and write it.
+
+    None where no winch drawn can have the wanted effect at the wanted size.
+    """
+    single = Plan("none" if extent == "none" else "single", plan.snr, plan.effects, plan.small)
+    for attempt in range(ATTEMPTS):
+        random = np.random.default_rng([seed, attempt])
+        bench = draw_bench(random, repeats=True, small=plan.small)
+        names = draw_effects(random, single, bench) if extent != "none" else ()
+        values = None if names is None else size_effects(random, single, bench, names)
+        if values is None:
+            continue
+        letters = ascii_uppercase[:winches]
+        # The size was chosen for the first winch drawn: it is the one that hides something.
+        one = str(random.choice(list(letters)))
+        benches = {w: bench if w == one else draw_beside(random, bench) for w in letters}
+        there = {"none": "", "one": one, "all": letters}[extent]
+        hidden: dict[str, Hidden] = {w: values if w in there else {} for w in letters}
+        folder.mkdir(parents=True, exist_ok=True)
+        profile = folder / "winch.toml"
+        write_profile(bench.winch, profile)
+        runs = record_several(random, benches, hidden, folder)
+        scene = f"{winches} winches, {one} first: {bench.words}"
+        return Several(seed, extent, plan.snr, hidden, runs, profile, scene)
+    return None
 
 
 @dataclass(frozen=True)
@@ -96,6 +143,20 @@ class SeveralScore:
         """Whether every winch's answer is as the truth is."""
         return not self.alarms and not self.wrong and self.found == self.there
 
+    @property
+    def line(self) -> str:
+        """The case in a line."""
+        told = "ok  " if self.ok and self.shared_right else "FAIL"
+        truth = sorted({effect for effects in self.truth.values() for effect in effects})
+        steps = {w: [list(s) for s in steps] for w, steps in self.steps.items() if steps}
+        other = {w: v for w, v in self.verdicts.items() if v in {"partly", "unknown"}}
+        shared = [(s["effects"], "".join(s["winches"])) for s in self.shared]
+        return (
+            f"{told} {self.seed} {self.extent} {self.snr:g} {','.join(truth)} in "
+            f"{''.join(self.there)} -> {steps} {other} shared {shared} alike {self.alike} "
+            f"{self.seconds:.1f} s | {self.scene}"
+        )
+
 
 def answer_several(case: Several) -> SeveralScore:
     """Diagnose every winch of a case from its files."""
@@ -125,33 +186,11 @@ def answer_several(case: Several) -> SeveralScore:
 
 
 def run_several(
-    seed: int,
-    plans: Sequence[tuple[str, Plan]],
-    winches: int,
-    folder: Path | None = None,
-    log: Path | None = None,
-) -> list[SeveralScore]:
-    """Scores in the order of the plans (extent and size); progress on stderr.
-
-    Each score is a line of ``log``; cases whose score is there already are not run again.
-    """
-    known, out = kept(log, SeveralScore.read), []
-    for index, (extent, plan) in enumerate(plans):
-        number = seed * 100_000 + index
-        if number in known:
-            out.append(known[number])
-            continue
-        with tempfile.TemporaryDirectory() as temporary:
-            place = folder / f"case-{number}" if folder else Path(temporary)
-            case = make_several(number, extent, plan, winches, place)
-            if case is None:
-                print(f"none {number} cannot be made: {plan}", file=sys.stderr)
-                continue
-            got = answer_several(case)
-        out.append(got)
-        keep(got, log)
-        print(_line(got), file=sys.stderr, flush=True)
-    return out
+    winches: int, seed: int, plan: tuple[str, Plan], folder: Path
+) -> SeveralScore | None:
+    """Make one case of an extent and size, and diagnose it; None where no case can be made."""
+    case = make_several(seed, *plan, winches, folder)
+    return None if case is None else answer_several(case)
 
 
 def several_summary(scores: Sequence[SeveralScore]) -> dict[str, Any]:
@@ -181,15 +220,3 @@ def _figures(group: Sequence[SeveralScore]) -> dict[str, Any]:
         "alike": sum(s.alike for s in group) / len(group),
         "seconds": float(np.mean([s.seconds for s in group])),
     }
-
-
-def _line(got: SeveralScore) -> str:
-    told = "ok  " if got.ok and got.shared_right else "FAIL"
-    truth = sorted({effect for effects in got.truth.values() for effect in effects})
-    steps = {w: [list(s) for s in steps] for w, steps in got.steps.items() if steps}
-    other = {w: v for w, v in got.verdicts.items() if v in {"partly", "unknown"}}
-    shared = [(s["effects"], "".join(s["winches"])) for s in got.shared]
-    return (
-        f"{told} {got.seed} {got.extent} {got.snr:g} {','.join(truth)} in {''.join(got.there)} -> "
-        f"{steps} {other} shared {shared} alike {got.alike} {got.seconds:.1f} s | {got.scene}"
-    )

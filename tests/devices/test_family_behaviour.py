@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from winchkit import catalog
-from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.drivers.can.canopen.node import read_eds
 from winchkit.schema.devices.device import DeviceSpec
 from winchkit.schema.devices.servo import ServoSpec
 from winchkit.schema.read import read_device

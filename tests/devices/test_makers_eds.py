@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from winchkit import catalog
 from winchkit.cli.files.check import command
 from winchkit.drivers.can.canopen.declared import declared, unmappable
-from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.drivers.can.canopen.node import read_eds
 from winchkit.drivers.can.canopen.pdo import parse_object
 from winchkit.schema.read import read_device
 

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from campaign import logger_case
-from campaign.answers import keep, kept
+from campaign.answers import keep, kept, scores_of
 from campaign.bench import Bench, draw_bench
-from campaign.identifiable import RATIO, identity
-from campaign.likelihood import gram, least_along, without
-from campaign.logger_case import LoggerPlan, answer, make_logger_case, run_logger_cases
+from campaign.identifiable import RATIO, gram, identity, least_along, without
+from campaign.logger_case import LoggerPlan, answer, make_logger_case
 from campaign.logger_score import LoggerScore, clopper_pearson, logger_summary
 from campaign.loggers import FAULTS, MISREAD, Fault, fault_of
 from campaign.record import AR, Recording, recordings
@@ -247,19 +245,16 @@ def test_an_answer_is_right_or_wrong() -> None:
     assert scored(1, **{**turned, **refused}).ok
 
 
-def test_a_campaign_goes_on_where_its_log_ends(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_campaign_goes_on_where_its_log_ends(tmp_path: Path) -> None:
     path = tmp_path / "log"
     path.write_text(json.dumps(asdict(scored(700_000))) + "\n")
     asked = []
 
-    def one(job: tuple[int, LoggerPlan, str | None]) -> LoggerScore:
-        asked.append(job[0])
-        return scored(job[0])
+    def one(seed: int, _plan: LoggerPlan, _folder: Path) -> LoggerScore:
+        asked.append(seed)
+        return scored(seed)
 
-    monkeypatch.setattr(logger_case, "_one", one)
-    got = run_logger_cases(7, [LoggerPlan(3.0)] * 3, 1, None, path)
+    got = scores_of(one, 7, [LoggerPlan(3.0)] * 3, LoggerScore.read, log=path)
     assert asked == [700_001, 700_002]
     assert got == [scored(700_000 + k) for k in range(3)]
     figures = logger_summary(got)["figures"]

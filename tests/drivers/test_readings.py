@@ -10,9 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from winchkit.drivers.counters import Tally
-from winchkit.drivers.frozen_counts import FrozenDetector
-from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.publisher import Publisher, Sampled
+from winchkit.drivers.publisher import FrozenDetector, HostScale, Publisher, Sampled
 from winchkit.drivers.reading import Quality, Reading
 
 GOOD = Quality.GOOD

@@ -8,7 +8,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING, Protocol
 
 from winchkit.bench.cells.desk import CellDesk
-from winchkit.bench.commissioning.validity import require_commissioned, trust_record
+from winchkit.bench.commissioning.record import require_commissioned, trust_record
 from winchkit.bench.common_move import begin_together, wait_together
 from winchkit.bench.connection import BenchConnection
 from winchkit.bench.control.dead_man import LIFE_SIGN
@@ -23,10 +23,9 @@ from winchkit.bench.lifecycle import (
     reset,
 )
 from winchkit.bench.ownership import Ownership, unless_stopped
-from winchkit.bench.remote.commander import Commanders, NotCommander, NotReleased
+from winchkit.bench.remote.commander import Commanders, LifeSigns, NotCommander, NotReleased
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import Client, client_name
-from winchkit.bench.remote.life_sign import LifeSigns
 from winchkit.bench.robot import no_robot
 from winchkit.bench.winch import Winch
 from winchkit.drivers.clock import Clock

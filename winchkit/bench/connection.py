@@ -45,20 +45,7 @@ class BenchConnection(ABC):
 
     A subclass commands it: it calls :meth:`_start` when it is ready for cycles, and
     :meth:`_close_logs` at the end of :meth:`close`. ``_stack`` closes what was opened, in reverse
-    order.
-
-    Parameters
-    ----------
-    spec
-        What the bench file declares.
-    clock
-        Clock of the control loop.
-    ownership
-        Of the bench, by this process; released at the close.
-    separate
-        Whether a process of its own reads the instruments that are not on CAN.
-    tell
-        Takes lines on a set-up of drives that takes long; by default standard error.
+    order. ``separate``: a process of its own reads the instruments that are not on CAN.
     """
 
     def __init__(

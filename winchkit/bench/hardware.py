@@ -13,7 +13,6 @@ from datetime import UTC, datetime
 
 from winchkit import catalog
 from winchkit.bench.cells.instruments import can_buses, device_of, instruments
-from winchkit.bench.commissioning.hardware import tell_hardware
 from winchkit.bench.control.cable import CableMap
 from winchkit.bench.control.controller import Controller
 from winchkit.bench.control.frozen_cell import FrozenCell, HangingLoad
@@ -22,7 +21,7 @@ from winchkit.bench.control.observation import Supervised
 from winchkit.bench.control.snapshot import Direction, Phase, Trip
 from winchkit.bench.control.supervisor import Supervisor
 from winchkit.bench.control.winch_state import WinchParts
-from winchkit.bench.drives.set_up_progress import SetUpProgress, Tell, to_stderr
+from winchkit.bench.drives.set_up_progress import SetUpProgress, Tell, tell_hardware, to_stderr
 from winchkit.bench.records.latch import LatchFile
 from winchkit.bench.records.position_file import PositionFile
 from winchkit.bench.robot import WiredRobot, robot_of_bench

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 
 from winchkit.bench.control.loop import ControlLoop
 from winchkit.bench.control.snapshot import Direction, Phase
@@ -144,6 +145,31 @@ _UNHEARD = (
 """Trips after which a drive may have lost its set-up."""
 
 
+@dataclass(frozen=True)
+class _Found:
+    """What a reset finds, before it waits for anything."""
+
+    unheard: frozenset[str]
+    """Winches with a trip of :data:`_UNHEARD`; "" among them for one of the whole bench."""
+    lost: frozenset[str]
+    """Winches whose drives say that they have lost their set-up."""
+    reopened: frozenset[str]
+    """Winches whose bus went down and was opened again."""
+    silent: bool
+    """Whether the host sends no heartbeat."""
+
+
+_SET_UP_ANEW: Mapping[str, Callable[[_Found, str], bool]] = {
+    "it was not heard": lambda found, name: name in found.unheard,
+    "the bench was not heard, and it has lost its set-up": lambda found, name: (
+        "" in found.unheard and name in found.lost
+    ),
+    "its bus was opened again": lambda found, name: name in found.reopened,
+    "it missed the heartbeat; its watchdog is proved anew": lambda found, _name: found.silent,
+}
+"""Cases in which a drive is set up anew by a reset, besides that it restarts meanwhile."""
+
+
 def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
     """Clear trips and drive faults, open buses that went down, set lost drives up again.
 
@@ -164,27 +190,25 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
         # What somebody else commands during the reset keeps it from succeeding.
         axis.forget_second_master()
         axis.forget_position_jump()
-    troubled = {trip.winch for trip in (*seen.tripped, *seen.blocked) if trip.kind in _UNHEARD}
-    if "" in troubled:
-        troubled = {name for name in axes if axes[name].lost_set_up} | troubled - {""}
-    troubled |= _on_reopened(wired, spec)
-    silent = not loop.beating
-    if silent:
-        # Every drive has missed the heartbeat, and its watchdog is proved anew.
-        troubled = set(axes)
-    troubled |= _disturbed(troubled, axes)
+    found = _Found(
+        unheard=frozenset(t.winch for t in (*seen.tripped, *seen.blocked) if t.kind in _UNHEARD),
+        lost=frozenset(name for name, axis in axes.items() if axis.lost_set_up),
+        reopened=_on_reopened(wired, spec),
+        silent=not loop.beating,
+    )
+    lost = _with_disturbed(
+        (name for name in axes if any(case(found, name) for case in _SET_UP_ANEW.values())), axes
+    )
     # The last feedback of a drive without its mapping stays: only commissioning reads anew. So it
     # is with a drive that turns out meanwhile to have restarted.
     await_rest(
         loop,
-        [name for name in axes if name not in troubled],
+        [name for name in axes if name not in lost],
         clock,
         unless=lambda name: axes[name].lost_set_up,
     )
-    troubled |= {name for name in axes if axes[name].lost_set_up}
-    troubled |= _disturbed(troubled, axes)
-    lost = [name for name in axes if name in troubled]
-    if not (loop.beating or silent):
+    lost = _with_disturbed([*lost, *(name for name in axes if axes[name].lost_set_up)], axes)
+    if not (loop.beating or found.silent):
         raise LimitTripped(
             "a drive did not obey the stop that the reset waited for, and the host's heartbeat "
             "ended; look at the drives, then reset again"
@@ -236,14 +260,17 @@ def _set_up(lost: Sequence[str], wired: Wired, clock: Clock) -> None:
         loop.listening = True
 
 
-def _disturbed(troubled: set[str], axes: Mapping[str, Cia402Axis]) -> set[str]:
-    """All drives where the proof of one of these is a silence towards all of them, else none."""
-    return set(axes) if any(axes[name].host.disturbs for name in troubled) else set()
+def _with_disturbed(lost: Iterable[str], axes: Mapping[str, Cia402Axis]) -> list[str]:
+    """These drives, or all where the proof of one of them is a silence towards all."""
+    own = set(lost)
+    if any(axes[name].host.disturbs for name in own):
+        return list(axes)
+    return [name for name in axes if name in own]
 
 
-def _on_reopened(wired: Wired, spec: BenchSpec) -> set[str]:
+def _on_reopened(wired: Wired, spec: BenchSpec) -> frozenset[str]:
     """Open buses that went down again; returns the winches on them."""
     down = {name for name, bus in wired.buses.items() if bus.fault}
     for name in down:
         wired.buses[name].reopen()
-    return {name for name, winch in spec.winch.items() if winch.servo.bus in down}
+    return frozenset(name for name, winch in spec.winch.items() if winch.servo.bus in down)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from winchkit.arguments import number, positive
-from winchkit.bench.cells.device_tare import await_device_tare
-from winchkit.bench.cells.tares import host_tare
+from winchkit.bench.cells.tares import await_device_tare, host_tare
 from winchkit.bench.control.dead_man import DEAD_MAN, DeadMan
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.motion import Jog, MotionSource, Move, StartGate, Trim

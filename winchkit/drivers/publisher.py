@@ -4,13 +4,127 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.counters import Counters, Tally
-from winchkit.drivers.frozen_counts import FrozenDetector
-from winchkit.drivers.host_scale import HostScale
 from winchkit.drivers.reading import Quality, Reading
+
+
+@dataclass(frozen=True, slots=True)
+class HostScale:
+    """True value from the indicated one: c0 + c1 x + c2 x^2 ..., less the tare. SI.
+
+    Zero and tare of the device are in the device, independent of both.
+    """
+
+    coefficients: tuple[float, ...] = (0.0, 1.0)
+    tare: float = 0.0
+
+    def calibrated(self, indicated: float) -> float:
+        """True value for an indicated one."""
+        value = 0.0
+        for coefficient in reversed(self.coefficients):
+            value = value * indicated + coefficient
+        return value
+
+    def indicated(self, calibrated: float) -> float:
+        """Indication of the device for a true value; the inverse of :meth:`calibrated`.
+
+        Of the two a parabola has, the one on its rising side is meant.
+        """
+        c0, c1, *rest = self.coefficients
+        c2 = rest[0] if rest else 0.0
+        root = math.sqrt(max(0.0, c1 * c1 - 4 * c2 * (c0 - calibrated)))
+        return 2 * (calibrated - c0) / (c1 + root)
+
+    def apply(self, value: float, gross: float) -> tuple[float, float]:
+        """Net and gross value from the net and gross value that the device indicates.
+
+        Where the device itself has a tare, its net value is the difference of two calibrated
+        ones: a calibration that is not a straight line through zero belongs to gross values.
+        """
+        calibrated = self.calibrated(gross)
+        taken_off = self.calibrated(gross - value) if value != gross else 0.0
+        return calibrated - taken_off - self.tare, calibrated
+
+
+_BLOCK = 40
+"""Trials in a block. With a noise of one step a block alike throughout has a chance of 4e-16."""
+_BLOCKS = 10
+"""Noisy blocks, 400 trials, before constant counts are judged: an instrument that is quiet at times
+shows it in them (rule of thumb)."""
+_NOISE = 1.0
+"""Steps of the counts; below it a value in the middle of a step may stand for ever.
+
+A step is the smallest change that was ever seen: of an indicator with a division of 10 it is 10.
+"""
+
+
+@dataclass(slots=True)
+class _CountStatistics:
+    """Statistics of the counts in one state, at rest or moving."""
+
+    noisy: int = 0
+    """Number of blocks, all of them noisy."""
+    quiet: bool = False
+    """Whether a block was ever constant and ended by itself."""
+    step: float = math.inf
+    """Smallest change of the counts."""
+    squares: float = 0.0
+    trials: float = 0.0
+
+    def add(self, change: float, run: float) -> None:
+        """Take a change of the counts after ``run`` equal trials."""
+        self.step = min(self.step, abs(change))
+        self.quiet |= run >= _BLOCK
+        self.squares += change * change / 2
+        self.trials += run
+        if self.trials < _BLOCK:
+            return
+        if self.squares < (_NOISE * self.step) ** 2 * self.trials:
+            self.quiet = True
+        else:
+            self.noisy += 1
+        self.squares = self.trials = 0.0
+
+    def too_long(self, run: float) -> bool:
+        """Whether so many equal trials are too many for a live instrument."""
+        return not self.quiet and self.noisy >= _BLOCKS and run >= _BLOCK
+
+
+@dataclass(slots=True)
+class FrozenDetector:
+    """Detector of frozen counts; takes every count of one instrument.
+
+    Constant counts alone are no evidence: a good cell at rest shows the same number for minutes.
+    They are evidence where this instrument, in this state (at rest or moving), has never been
+    constant for so long before.
+    """
+
+    _states: dict[bool, _CountStatistics] = field(
+        default_factory=lambda: {True: _CountStatistics(), False: _CountStatistics()}
+    )
+    _last: float | None = None
+    _run: float = 0.0
+    _moving: bool = False
+
+    def frozen(self, counts: float, conversions: float, moving: bool) -> bool:
+        """Whether the counts are frozen, with the next ones, ``conversions`` after those before.
+
+        Several readings of one conversion count as one trial, conversions that were not read not
+        at all.
+        """
+        trial = min(1.0, conversions)
+        if moving != self._moving:
+            self._moving, self._run = moving, 0.0
+        if self._last is None or counts != self._last:
+            if self._last is not None:
+                self._states[moving].add(counts - self._last, self._run + trial)
+            self._last, self._run = counts, 0.0
+            return False
+        self._run += trial
+        return self._states[moving].too_long(self._run)
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,10 +14,10 @@ from winchkit.diagnosis.residuals.traces import traces_of
 from winchkit.diagnosis.results import Estimate
 from winchkit.errors import UsageError
 from winchkit.web.ladder import card
-from winchkit.web.state import State
+from winchkit.web.state import PageState
 
 
-def candidate_card(state: State, effect_id: str) -> dict[str, Any]:
+def candidate_card(state: PageState, effect_id: str) -> dict[str, Any]:
     """Card of a candidate of a diagnosis, with its signature.
 
     Raises UsageError without a diagnosis, and for an effect that is no candidate.
@@ -49,7 +49,9 @@ def candidate_card(state: State, effect_id: str) -> dict[str, Any]:
     return in_units_of(profile, out)
 
 
-def _most_changed(state: State, outputs: Sequence[str], change: Array) -> tuple[str, Array] | None:
+def _most_changed(
+    state: PageState, outputs: Sequence[str], change: Array
+) -> tuple[str, Array] | None:
     """Output that a candidate changes most against its noise, and the change in time."""
     regression = state.diagnosed.engine.regression
     traces = traces_of(regression, change)

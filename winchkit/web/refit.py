@@ -17,10 +17,12 @@ from winchkit.quantity_text import quantity
 from winchkit.report.words.vocabulary import OUTPUT_NAMES
 from winchkit.web.curves import curves_of
 from winchkit.web.ladder import Rung
-from winchkit.web.state import State, Version
+from winchkit.web.state import PageState, Version
 
 
-def refit(state: State, effect: str, dataset: Dataset, catalogue: Catalogue, folder: Path) -> State:
+def refit(
+    state: PageState, effect: str, dataset: Dataset, catalogue: Catalogue, folder: Path
+) -> PageState:
     """State with an effect in the profile, its refitted errors and curves, not yet diagnosed.
 
     Raises UsageError without a diagnosis, and for an unknown effect.

@@ -11,7 +11,7 @@ from pathlib import Path
 from winchkit.catalog import find
 from winchkit.errors import ConnectionLost
 
-_PATIENCE = 30.0
+_TIMEOUT = 30.0
 """For a simulated bench to start, s."""
 _ENDING = 0.5
 """For a simulated bench to end, s; after that it ends by itself."""
@@ -40,7 +40,7 @@ class simulated_bench:
         assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
-            self._process.wait(_PATIENCE)
+            self._process.wait(_TIMEOUT)
             raise ConnectionLost(
                 f"the simulated bench '{self.name}' did not start; "
                 f"'winchkit sim serve {self.name}' says why"

@@ -85,7 +85,7 @@ class Version:
 
 
 @dataclass(frozen=True)
-class State:
+class PageState:
     """State of the page; replaced as a whole."""
 
     runs: tuple[LoadedRun, ...] = ()
@@ -109,7 +109,7 @@ class State:
     """What a simulated bench hides; None for measured runs."""
     faults: tuple[str, ...] = ()
     """Why files were not loaded, or the last request was refused."""
-    beside: State | None = None
+    beside: PageState | None = None
     """Another profile or other runs, shown beside these."""
 
     @property
@@ -178,7 +178,7 @@ class State:
         other = self.beside
         return self._side(other) | {"beside": None if other is None else other._side(self)}
 
-    def _side(self, other: State | None) -> dict[str, Any]:
+    def _side(self, other: PageState | None) -> dict[str, Any]:
         out: dict[str, Any] = {
             "runs": [item.to_json() for item in self.runs],
             "profile": None,

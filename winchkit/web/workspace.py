@@ -32,7 +32,7 @@ from winchkit.web.curves import OutputCurves, curves_of, recorded_curves
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
 from winchkit.web.foreign import imported
 from winchkit.web.refit import refit
-from winchkit.web.state import Judgement, LoadedRun, State, Version
+from winchkit.web.state import Judgement, LoadedRun, PageState, Version
 
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
@@ -86,7 +86,7 @@ class Workspace:
         self.effects = tuple(effects)
         self.changed = changed
         self.catalogue: Catalogue = load_catalogue(effects)
-        self._state = State()
+        self._state = PageState()
         self._work: _Work | None = None
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="workspace")
         self._cards: dict[str, dict[str, Any]] = {}
@@ -95,7 +95,7 @@ class Workspace:
         """Latest verdict on each run."""
 
     @property
-    def state(self) -> State:
+    def state(self) -> PageState:
         """The present state."""
         return self._state
 
@@ -172,7 +172,7 @@ class Workspace:
         busy = None if work is None else {"what": work.what, "share": work.share}
         return self._state.to_json() | {"busy": busy}
 
-    def side(self, beside: bool = False) -> State:
+    def side(self, beside: bool = False) -> PageState:
         """The present state or that beside it; raises UsageError without one."""
         if not beside:
             return self._state
@@ -404,7 +404,7 @@ class Workspace:
     def _compare(self, profile: int | str, names: Sequence[str]) -> None:
         state = self._state
         runs = tuple(replace(item, used=item.name in names) for item in state.runs)
-        side = State(runs, state.source, state.versions, winch=state.winch)
+        side = PageState(runs, state.source, state.versions, winch=state.winch)
         if isinstance(profile, str):
             path = find("profiles", profile)
             read_profile(path)
@@ -425,7 +425,7 @@ class Workspace:
         self._set(beside=replace(side, answer=known[0], curves=known[1]))
 
     @staticmethod
-    def _known(state: State, side: State) -> Diagnosed | None:
+    def _known(state: PageState, side: PageState) -> Diagnosed | None:
         """Diagnosis of a side that is the present state, or that before the last addition."""
         if [i.path for i in side.used] != [i.path for i in state.used]:
             return None

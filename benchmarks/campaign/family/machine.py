@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from campaign.bench import programme
 from campaign.family.friction import Shape, draw_shape, sense
-from campaign.motion import programme
 from campaign.truth import TURN, G, Shown, bearing_friction, wound_cable
 from campaign.winch import Winch, draw_winch, turns_for
 from winchkit.arrays import Array

@@ -13,8 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from campaign.family.base import Base
-from campaign.files import write_run
-from campaign.record import Recording
+from campaign.record import Recording, write_run
 from campaign.winch import Winch, write_profile
 from winchkit.arrays import Array
 

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from slave import Reactions, Slave, State
 from slave_bench import ANSWERS, SlaveBench, served, write_bench
 from winchkit.bench.bench import Bench
-from winchkit.bench.commissioning import validity
+from winchkit.bench.commissioning import record
 from winchkit.bench.commissioning.dialogue import AnswerFile
 from winchkit.bench.commissioning.procedure import commission_bench
 from winchkit.bench.commissioning.record import Record
@@ -31,7 +31,7 @@ def commissioned(bench: SlaveBench, say: Callable[[str], None] = lambda _text: N
 @pytest.fixture
 def real(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the virtual bus count as a real one."""
-    monkeypatch.setattr(validity, "_SIMULATED", ())
+    monkeypatch.setattr(record, "_SIMULATED", ())
 
 
 def test_motion_waits_for_the_record_and_ends_with_a_changed_drive(

@@ -19,10 +19,12 @@ from winchkit.bench.commissioning.record import (
     Record,
     WinchRecord,
     hash_of,
+    is_simulated,
+    items_of,
     read_record,
+    stale_items,
     write_record,
 )
-from winchkit.bench.commissioning.validity import is_simulated, items_of, stale_items
 from winchkit.errors import FileError, NotPermitted
 from winchkit.schema.bench import BenchSpec, BusSpec
 from winchkit.schema.read import read_bench

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from recording.kill import kill_once
+from recorder_kill import kill_once
 
 MOMENTS = random.Random(7)
 LOSS = {"mcap": 0.3, "csv": 0.3}

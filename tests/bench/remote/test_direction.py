@@ -13,7 +13,8 @@ import pytest
 from slave.rig import Rig
 from winchkit.bench.bench import Bench
 from winchkit.bench.remote.client import RemoteStation, attach
-from winchkit.bench.remote.station import LocalStation, Station
+from winchkit.bench.remote.operations import Station
+from winchkit.bench.remote.station import LocalStation
 from winchkit.bench.winch import Winch
 from winchkit.errors import UsageError
 

@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from winchkit.bench.remote import client, requests
+from winchkit.bench.remote import client, operations
 from winchkit.bench.remote.client import RemoteStation
 
-CLIENT = {client.__file__, requests.__file__}
+CLIENT = {client.__file__, operations.__file__}
 
 
 class Owner(threading.Thread):
@@ -83,7 +83,7 @@ def test_leaving_waits_for_rest_wherever_the_call_before_was_interrupted() -> No
         ours, theirs = socket.socketpair()
         owner = Owner(theirs)
         owner.start()
-        station = RemoteStation(ours, patience=5.0)
+        station = RemoteStation(ours, timeout=5.0)
         with interrupted(points) as interrupts:
             try:
                 station.jog("A", wind_in=0.1)
@@ -101,7 +101,7 @@ def test_leaving_waits_for_rest_wherever_the_call_before_was_interrupted() -> No
 def test_the_rest_of_an_answer_whose_beginning_was_lost_is_passed_over(cut: int) -> None:
     ours, theirs = socket.socketpair()
     Owner(theirs).start()
-    station = RemoteStation(ours, patience=5.0)
+    station = RemoteStation(ours, timeout=5.0)
     whole = json.dumps({"id": 17, "ok": {"A": 1.5}}).encode() + b"\n"
     theirs.sendall(whole[cut:])
     station.jog("A", wind_in=0.1)

@@ -1,7 +1,7 @@
-"""Each rung of the stop table is used when it is due, and only then; without it a test fails.
+"""Each method of the stop table is used when it is due, and only then; without it a test fails.
 
 A winch that pays out under a held key gets a quick stop while its drive does not receive what the
-rungs before say. Which rung stopped it is read from the bus.
+method before say. Which method stopped it is read from the bus.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from slave.oracle import ESCALATED
 from slave.rig import Rig
 from slave.wire import GENERIC
 from winchkit.bench.control import stop_escalation
-from winchkit.bench.control.stop_escalation import STOP_TABLE, Rung
+from winchkit.bench.control.stop_escalation import STOP_TABLE, StopMethod
 from winchkit.errors import WinchkitError
 
 _RAMP, _LAG = 628.0, 0.03
@@ -50,26 +50,26 @@ def _is_beat(frame: Frame) -> bool:
 class Case:
     """What is not heard, and what has to be seen on the bus in the half second after the stop."""
 
-    rung: Rung
+    method: StopMethod
     unheard: tuple[str, ...]
     says: tuple[tuple[Callable[[Frame], bool], bool], ...]
     """Kinds of frames, and whether they come."""
 
 
 CASES = (
-    Case(Rung.PDO, (), ((_is_sdo_stop, False), (_is_nmt_stop, False), (_is_beat, True))),
+    Case(StopMethod.PDO, (), ((_is_sdo_stop, False), (_is_nmt_stop, False), (_is_beat, True))),
     Case(
-        Rung.SDO,
+        StopMethod.SDO,
         ("rpdo unheard",),
         ((_is_sdo_stop, True), (_is_nmt_stop, False), (_is_beat, True)),
     ),
     Case(
-        Rung.NMT,
+        StopMethod.NMT,
         ("rpdo unheard", "sdo refused"),
         ((_is_sdo_stop, True), (_is_nmt_stop, True), (_is_beat, True)),
     ),
     Case(
-        Rung.SILENCE,
+        StopMethod.SILENCE,
         ("rpdo unheard", "sdo unheard", "nmt unheard"),
         ((_is_sdo_stop, True), (_is_beat, False)),
     ),
@@ -77,11 +77,11 @@ CASES = (
 
 
 def stopped(folder: Path, case: Case) -> None:
-    """A quick stop in this case: in time, and by this rung."""
+    """A quick stop in this case: in time, and by this method."""
     rig = Rig(folder)
     slave = rig.slaves[0]
     with rig.opened() as bench:
-        if case.rung is Rung.NMT:
+        if case.method is StopMethod.NMT:
             # As after a commissioning that has seen the drive leave operation enabled on it.
             bench.axes["A"].take_commissioning(seen_stopping=True, stops_on_nmt=True)
         key = jogging(rig, bench)
@@ -98,29 +98,29 @@ def stopped(folder: Path, case: Case) -> None:
         slave.mend_all()
         rig.wait(0.5)
     # Silence takes the consumer time of 2.5 heartbeats, from the last of them.
-    within = _WITHIN + (0.125 if case.rung is Rung.SILENCE else 0.0)
+    within = _WITHIN + (0.125 if case.method is StopMethod.SILENCE else 0.0)
     assert seen.left <= within, f"left after {seen.left:.3f} s"
     assert seen.rest <= within + seen.speed / _RAMP + _LAG
     assert said == list(case.says)
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.rung.name)
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.method.name)
 def test_a_rung_stops_the_drive_that_receives_none_before(tmp_path: Path, case: Case) -> None:
     stopped(tmp_path, case)
 
 
-@pytest.mark.parametrize("case", CASES, ids=lambda case: case.rung.name)
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.method.name)
 def test_a_rung_that_is_switched_off_makes_a_test_fail(
     tmp_path: Path, case: Case, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    table = tuple(row for row in STOP_TABLE if row.rung is not case.rung)
+    table = tuple(row for row in STOP_TABLE if row.method is not case.method)
     monkeypatch.setattr(stop_escalation, "STOP_TABLE", table)
     with pytest.raises(AssertionError):
         stopped(tmp_path, case)
 
 
 def test_every_rung_has_a_case() -> None:
-    assert {case.rung for case in CASES} == {row.rung for row in STOP_TABLE} == set(Rung)
+    assert {case.method for case in CASES} == {row.method for row in STOP_TABLE} == set(StopMethod)
 
 
 def test_a_reset_during_a_motion_withholds_no_way_to_stop(tmp_path: Path) -> None:

@@ -19,8 +19,12 @@ from busiest_thread import busiest_thread
 from modbus_peer import Peer
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
-from winchkit.drivers.instrument_process.lines import InstrumentSpec, LineSpec, line_of
-from winchkit.drivers.instrument_process.process import InstrumentProcess
+from winchkit.drivers.instrument_process.process import (
+    InstrumentProcess,
+    InstrumentSpec,
+    LineSpec,
+    line_of,
+)
 from winchkit.drivers.instrument_process.separate import SeparateInstrument
 from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import ConnectionLost

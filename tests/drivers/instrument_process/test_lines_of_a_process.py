@@ -18,9 +18,13 @@ import pytest
 from modbus_peer import Peer
 from winchkit import catalog
 from winchkit.drivers.clock import MonotonicClock
-from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.instrument_process.lines import InstrumentSpec, LineSpec, line_of
-from winchkit.drivers.instrument_process.process import InstrumentProcess
+from winchkit.drivers.instrument_process.process import (
+    InstrumentProcess,
+    InstrumentSpec,
+    LineSpec,
+    line_of,
+)
+from winchkit.drivers.publisher import HostScale
 from winchkit.drivers.reading import Quality, Reading
 from winchkit.drivers.slow import SlowDevices
 from winchkit.errors import ConnectionLost, DeviceRefused, NoReply, NotPermitted

@@ -9,10 +9,9 @@ import pytest
 
 from served import spec_of
 from winchkit import catalog
-from winchkit.drivers.modbus.decoder import Decoder
+from winchkit.drivers.modbus.decoder import Decoder, words_of
 from winchkit.drivers.modbus.frames import AnswerGate, crc16
 from winchkit.drivers.modbus.tcp_frames import TcpAnswerGate
-from winchkit.drivers.modbus.words import words_of
 from winchkit.drivers.reading import Quality
 from winchkit.schema.read import read_device
 

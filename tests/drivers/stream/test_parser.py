@@ -17,7 +17,7 @@ from winchkit.drivers.stream.framing import BinaryFraming, TextFraming
 from winchkit.drivers.stream.matcher import Matcher, fits
 from winchkit.drivers.stream.parser import Item, StreamParser
 from winchkit.schema.template import parts_of
-from winchkit.sim.instruments.stream_frames import Speech, State
+from winchkit.sim.instruments.stream_frames import IndicatorState, Speech
 
 PARSED = {name: device(name) for name in DEVICES}
 TEXT = tuple(name for name in DEVICES if name != "hbm-aed-binary")
@@ -27,8 +27,8 @@ FIXED = ("hbm-aed-ascii", "flintec-ldu", "and-ad-4406", "mettler-mt-sics", "sart
 """Devices whose digits stand at fixed places."""
 
 
-def state(number: float) -> State:
-    return State(number, number, 0.0, tared=False, overload=False, broken=False, address=1)
+def state(number: float) -> IndicatorState:
+    return IndicatorState(number, number, 0.0, tared=False, overload=False, broken=False, address=1)
 
 
 def said(name: str, number: float) -> bytes:

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from campaign.case import Plan
-from campaign.several import make_several
-from campaign.several_score import SeveralScore, answer_several, several_summary
+from campaign.several_score import SeveralScore, answer_several, make_several, several_summary
 
 WINCHES = 2
 

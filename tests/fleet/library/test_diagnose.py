@@ -307,7 +307,7 @@ def test_an_interruption_while_workers_start_comes_when_they_have_started() -> N
 @pytest.mark.slow
 def test_a_scheduler_without_workers_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "_PATIENCE", 0.5)
+    monkeypatch.setattr(cluster, "_TIMEOUT", 0.5)
     with (
         distributed.LocalCluster(n_workers=0, dashboard_address="127.0.0.1:0") as idle,
         pytest.raises(ConnectionLost, match="has no workers"),
@@ -320,7 +320,7 @@ def test_a_cluster_that_has_lost_all_workers_ends_the_diagnosis(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr(cluster, "_PATIENCE", 2.0)
+    monkeypatch.setattr(cluster, "_TIMEOUT", 2.0)
     due = tasks(12, "a")
     found: list[Outcome] = []
 

@@ -10,7 +10,7 @@ import pytest
 
 from eds_text import GOOD, written
 from winchkit import catalog
-from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.drivers.can.canopen.node import read_eds
 from winchkit.errors import FileError
 from winchkit.schema.eds.eds import read_eds_text
 from winchkit.sim.drive.object_dictionary import read_eds as read_for_simulation

@@ -9,8 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from eds_text import GOOD, written
-from winchkit.drivers.can.canopen.eds import read_eds
-from winchkit.drivers.can.canopen.node import variables
+from winchkit.drivers.can.canopen.node import read_eds, variables
 from winchkit.errors import FileError
 from winchkit.sim.drive.object_dictionary import read_eds as read_for_simulation
 

@@ -8,10 +8,10 @@ from stream_rig import stream
 from winchkit.errors import FileError, UsageError
 from winchkit.schema.devices.stream import StreamSpec
 from winchkit.sim.instruments.stream import StreamInstrument, shown_by
-from winchkit.sim.instruments.stream_frames import NumberStyle, Speech, State, style_of
+from winchkit.sim.instruments.stream_frames import IndicatorState, NumberStyle, Speech, style_of
 
 
-def state(number: float, **more: object) -> State:
+def state(number: float, **more: object) -> IndicatorState:
     given: dict[str, object] = {
         "net": number,
         "gross": number,
@@ -22,7 +22,7 @@ def state(number: float, **more: object) -> State:
         "address": 1,
         **more,
     }
-    return State(**given)  # type: ignore[arg-type]
+    return IndicatorState(**given)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from winchkit.sim.live.real_time import serve
+from winchkit.sim.live.buses import serve
 
 
 class LatePort:

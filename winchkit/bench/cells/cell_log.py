@@ -8,9 +8,8 @@ from contextlib import contextmanager
 from typing import Any
 
 from winchkit.bench.cells.desk import CellDesk
-from winchkit.bench.recording.owned_log import OwnedLog
 from winchkit.bench.recording.provenance import origin
-from winchkit.bench.recording.recorder import Recorder, counters_of
+from winchkit.bench.recording.recorder import OwnedLog, Recorder, counters_of
 from winchkit.bench.remote.cell_session import own_cells
 from winchkit.drivers.reading import Sensor
 from winchkit.errors import UsageError

@@ -9,8 +9,7 @@ from typing import Protocol, runtime_checkable
 
 from winchkit.bench.cells.instruments import device_of, refs_of
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.publisher import InstrumentReadings, Publisher
+from winchkit.drivers.publisher import HostScale, InstrumentReadings, Publisher
 from winchkit.drivers.reading import Reading, Sensor
 from winchkit.drivers.slow import SlowDevices, SlowLine
 from winchkit.errors import NoReply, NotPermitted, UsageError, suggest
@@ -26,7 +25,7 @@ _BATCHES = 10
 % (1/√(2·9))."""
 _FEWEST, _ENOUGH = 2, 20
 """Readings: two have a standard deviation; 20 have a mean with a quarter of their noise."""
-_PATIENCE = 5.0
+_TIMEOUT = 5.0
 """So long it waits for enough readings of a slow instrument, s."""
 
 
@@ -177,13 +176,13 @@ class CellDesk:
         sensor.listeners.append(taken.append)
         try:
             self.clock.sleep(duration)
-            while len(taken) < _ENOUGH and self.clock.now() < end + _PATIENCE:
+            while len(taken) < _ENOUGH and self.clock.now() < end + _TIMEOUT:
                 self.clock.sleep(_POLL)
         finally:
             sensor.listeners.remove(taken.append)
         if len(taken) < _FEWEST:
             raise sensor.problem or NoReply(
-                f"{sensor.name}: {len(taken)} readings within {duration + _PATIENCE:g} s"
+                f"{sensor.name}: {len(taken)} readings within {duration + _TIMEOUT:g} s"
             )
         return taken
 

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 from winchkit import catalog
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.host_scale import HostScale
-from winchkit.drivers.instrument_process.lines import InstrumentSpec, LineSpec, line_of
-from winchkit.drivers.publisher import Publisher
+from winchkit.drivers.instrument_process.process import InstrumentSpec, LineSpec, line_of
+from winchkit.drivers.publisher import HostScale, Publisher
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.slow import SlowLine
 from winchkit.errors import Fault, FileError

@@ -10,7 +10,9 @@ from typing import Any
 from winchkit.bench.cells.desk import CellDesk, steady
 from winchkit.bench.cells.instruments import tares_of
 from winchkit.calibration.cell.files import tares_toml, write_text
-from winchkit.errors import NotPermitted, UsageError
+from winchkit.drivers.clock import Clock
+from winchkit.drivers.reading import Sensor
+from winchkit.errors import NoReply, NotPermitted, UsageError
 from winchkit.schema.calibration import HostTare, TareBook, tare_book_path
 
 _CHECK = 0.3
@@ -144,3 +146,32 @@ def _apply(desk: CellDesk, name: str, value: float) -> None:
 def _refuse_temperature(name: str) -> None:
     if name.endswith(".temperature"):
         raise UsageError(f"{name} is a thermometer; taring it makes no sense")
+
+
+_POLL = 0.01
+"""s: a reading of the fastest usual cell."""
+_WITHIN = 2.0
+"""s: an indicator waits for a stable load, usually 1 s, before it takes a tare."""
+_SETTLING = 3
+"""Readings that were requested after the command, before one counts."""
+
+
+def await_device_tare(clock: Clock, winch: str, cell: Sensor) -> float:
+    """Wait for readings after the tare and make sure that the device took it; the tension, N.
+
+    Raises NoReply where it does not confirm.
+    """
+    sent, seen, deadline = clock.now(), 0, clock.now() + _WITHIN
+    last = sent
+    while clock.now() < deadline:
+        clock.sleep(_POLL)
+        reading = cell.latest
+        if reading is None or reading.t_request <= last:
+            continue
+        last, seen = reading.t_request, seen + 1
+        if seen >= _SETTLING and cell.tared is not False and reading.quality.usable:
+            return reading.value
+    raise NoReply(
+        f"winch {winch}: {cell.name} did not confirm the tare within {_WITHIN:g} s; "
+        "check that the reading is stable and within the device's tare range"
+    )

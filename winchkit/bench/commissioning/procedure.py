@@ -8,14 +8,24 @@ from __future__ import annotations
 
 import math
 import platform
+import sys
 from collections.abc import Mapping
 from contextlib import ExitStack
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
+from winchkit.arguments import path_of
 from winchkit.bench.bench import Bench
 from winchkit.bench.cells.instruments import device_of, eds_of
-from winchkit.bench.commissioning.dialogue import YES_OR_NO, Dialogue, agreed, confirm
+from winchkit.bench.commissioning.dialogue import (
+    YES_OR_NO,
+    AnswerFile,
+    Dialogue,
+    TypedAnswers,
+    agreed,
+    confirm,
+)
 from winchkit.bench.commissioning.motions import Motions
 from winchkit.bench.commissioning.record import (
     Confirmation,
@@ -24,18 +34,19 @@ from winchkit.bench.commissioning.record import (
     HostLossRecord,
     Record,
     WinchRecord,
+    drive_record,
     hash_of,
     write_record,
 )
 from winchkit.bench.commissioning.trial import Trial, Trials
-from winchkit.bench.commissioning.validity import drive_record
 from winchkit.bench.remote.handover import own
 from winchkit.bench.remote.identity import client_name
 from winchkit.bench.remote.server import StationServer
 from winchkit.drivers.can.canopen.identity import Identity
-from winchkit.drivers.clock import Clock
+from winchkit.drivers.clock import Clock, MonotonicClock
 from winchkit.errors import NotPermitted
 from winchkit.schema.bench import BenchSpec, WinchWiring
+from winchkit.schema.read import read_bench
 from winchkit.version import __version__
 
 _COMMAND = "commission"
@@ -355,3 +366,39 @@ def _software() -> Mapping[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+def commission(bench: str | Path, answers: str | Path | None = None) -> Record:
+    """Commission a bench: try directions, units, brake, limits and the loss of the host.
+
+    Parameters
+    ----------
+    bench : str or Path
+        Bench file; the record is written beside it.
+    answers : str or Path, optional
+        TOML file of answers; by default questions go to stderr and answers are read from stdin.
+
+    Returns
+    -------
+    Record
+        Tests, confirmations, and the person who confirmed them.
+
+    Raises
+    ------
+    FileError
+        For an invalid bench file or file of answers.
+    NotPermitted
+        For an item that was not confirmed or did not stop.
+    ConnectionLost
+        Where a bus or device does not answer.
+    """
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr)  # noqa: T201 - questions to a person
+
+    dialogue: Dialogue = (
+        TypedAnswers(say, sys.stdin.readline)
+        if answers is None
+        else AnswerFile(path_of(answers, "answers"), say)
+    )
+    return commission_bench(read_bench(path_of(bench, "bench")), dialogue, MonotonicClock())

@@ -39,9 +39,9 @@ _SETTLE_TIME = 0.3
 """s: oscillation at rest after enabling has decayed before a trial."""
 _MOVE_TIME = 0.8
 """s: a ramp and several heartbeats at constant speed before the host falls silent."""
-_PATIENCE = 0.5
+_TIMEOUT = 0.5
 """For the drive beyond its limit, s."""
-_HARDWARE_PATIENCE = 5.0
+_HARDWARE_TIMEOUT = 5.0
 """s: a safety relay with a delay of category 1 stop (up to some seconds)."""
 _NMT_TIME = 0.15
 """s: three heartbeats of 50 ms, after which the drive shows its reaction."""
@@ -130,10 +130,10 @@ class Trials:
                 self._require_room(name, axis, speed)
             self._run(axis, speed, _MOVE_TIME if speed else _SETTLE_TIME, name)
             start, angle = self._clock.now(), _angle(axis)
-            limit, patience = axis.host.mechanism.limit, _patience(axis.host.mechanism)
+            limit, timeout = axis.host.mechanism.limit, _timeout(axis.host.mechanism)
             # Where any frame is a life sign the drive is not asked before its time is over.
-            blind = limit + _PATIENCE / 2 if axis.host.mechanism.silence is Silence.ALL else 0.0
-            state, after = self._left(axis, start, blind, patience)
+            blind = limit + _TIMEOUT / 2 if axis.host.mechanism.silence is Silence.ALL else 0.0
+            state, after = self._left(axis, start, blind, timeout)
             stopped = _has_left(state)
             if stopped:
                 self._await_rest(axis)
@@ -250,13 +250,13 @@ class Trials:
         """Raise NotPermitted where winding in at ``speed`` may pass the lower length limit.
 
         Where the length is not known, the operator has seen to it. The way: the move, the drive's
-        time limit without a host (for hardware that stops it the patience of the trial), and the
+        time limit without a host (for hardware that stops it the timeout of the trial), and the
         ramp v²/(2a).
         """
         limits = self.spec.winch[name].limits
         if limits.length is None or axis.position_doubt:
             return
-        moving = _MOVE_TIME + _patience(axis.host.mechanism)
+        moving = _MOVE_TIME + _timeout(axis.host.mechanism)
         way = speed * moving + speed**2 / (2 * limits.acceleration)
         cable: CableMap = self._wired.loop.winches[name].cable
         length, low = cable.cable_length(self._hold), limits.length[0]
@@ -290,14 +290,14 @@ class Trials:
                 one.send(RequestedState.DISABLE)
 
     def _left(
-        self, axis: Cia402Axis, start: float, blind: float, patience: float
+        self, axis: Cia402Axis, start: float, blind: float, timeout: float
     ) -> tuple[State, float]:
         """The first state that is known and not operation enabled, and when; or the last one."""
         self._clock.sleep(blind)
         while True:
             state = _asked(axis)
             after = self._clock.now() - start
-            if _has_left(state) or after > patience:
+            if _has_left(state) or after > timeout:
                 return state, after
             self._clock.sleep(_POLL)
 
@@ -326,10 +326,10 @@ class Trials:
         return cable.cable_length(now) - cable.cable_length(angle)
 
 
-def _patience(mechanism: Mechanism) -> float:
+def _timeout(mechanism: Mechanism) -> float:
     """How long a trial waits for a drive to stop once the host is silent, s."""
     nothing = mechanism.silence is Silence.NOTHING
-    return _HARDWARE_PATIENCE if nothing else mechanism.limit + _PATIENCE
+    return _HARDWARE_TIMEOUT if nothing else mechanism.limit + _TIMEOUT
 
 
 def _has_left(state: State) -> bool:

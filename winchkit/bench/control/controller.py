@@ -19,7 +19,7 @@ from winchkit.bench.control.motion import (
     commanded_and_moved,
 )
 from winchkit.bench.control.snapshot import Phase
-from winchkit.bench.control.stop_escalation import Rung, StopEscalation, StopEvidence
+from winchkit.bench.control.stop_escalation import StopEscalation, StopEvidence, StopMethod
 from winchkit.drivers.can.canopen.nmt import NmtState
 from winchkit.drivers.can.cia402.feedback import AxisFeedback
 from winchkit.drivers.can.cia402.state_machine import ENABLE_OPERATION, RequestedState, State
@@ -153,7 +153,7 @@ class Controller:
     @property
     def silent(self) -> bool:
         """Whether nothing is left to stop this drive but its own host-loss reaction."""
-        return self.escalation.rung is Rung.SILENCE
+        return self.escalation.method is StopMethod.SILENCE
 
     @property
     def pending(self) -> bool:
@@ -421,7 +421,7 @@ class Controller:
     def _stop(self, now: float, feedback: AxisFeedback) -> None:
         self._word = self.axis.send(RequestedState.DISABLE)
         sampled = feedback.sync > self._stop_sync
-        if self.escalation.rung is not None:
+        if self.escalation.method is not None:
             self._escalate(now, feedback)
         elif (sampled and feedback.state is State.OPERATION_ENABLED) or self._enabled_unseen(
             now, feedback
@@ -442,13 +442,13 @@ class Controller:
         left = fresh and _has_left(feedback.state)
         by_sdo = axis.sdo_state
         left = left or (by_sdo is not None and _has_left(by_sdo))
-        if self.escalation.rung is Rung.NMT:
+        if self.escalation.method is StopMethod.NMT:
             left = left or not heard_by_sdo(axis.nmt_text)
         answers = heard_by_sdo(axis.nmt_text) and not axis.sdo_refused
-        rung = self.escalation.step(now, StopEvidence(left, axis.operational, answers))
-        if rung is Rung.SDO:
+        method = self.escalation.step(now, StopEvidence(left, axis.operational, answers))
+        if method is StopMethod.SDO:
             axis.stop_by_sdo()
-        elif rung is Rung.NMT:
+        elif method is StopMethod.NMT:
             axis.stop_by_nmt()
 
     def _reset(self, now: float, feedback: AxisFeedback) -> None:

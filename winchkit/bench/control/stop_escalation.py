@@ -1,6 +1,6 @@
 """Stop methods of a drive in their order: the next is used where one shows no reaction.
 
-A pure state machine, asked once a cycle while a winch is being stopped. Every rung can only take
+A pure state machine, asked once a cycle while a winch is being stopped. Every method can only take
 energy away: quick stop (02h) and NMT stop lead down from every power state (CiA 402-2, table of
 transitions), and silence leaves the drive to the reaction that commissioning proved.
 """
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 
-class Rung(IntEnum):
+class StopMethod(IntEnum):
     """A stop method."""
 
     PDO = 0
@@ -21,43 +21,43 @@ class Rung(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class StopRung:
+class StopRow:
     """A row of the table."""
 
-    rung: Rung
+    method: StopMethod
     sends: str
     not_heard: str
-    """When the next rung is used."""
+    """When the next method is used."""
     syncs: int
     """Answers to SYNC that must still show operation enabled, or be missing."""
-    patience: float
+    timeout: float
     """At least this long, s: a drive takes its time to act, whatever the cycle."""
 
 
-STOP_TABLE: tuple[StopRung, ...] = (
-    StopRung(
-        Rung.PDO,
+STOP_TABLE: tuple[StopRow, ...] = (
+    StopRow(
+        StopMethod.PDO,
         "RPDO with control word 02h, SYNC",
         "NMT state not operational, or 4 SYNCs answered with operation enabled or not at all",
         4,
         0.012,
     ),
-    StopRung(
-        Rung.SDO,
+    StopRow(
+        StopMethod.SDO,
         "expedited SDO write of 6040h = 02h, then a read of 6041h",
         "abort, no reply, or still operation enabled",
         4,
         0.02,
     ),
-    StopRung(
-        Rung.NMT,
+    StopRow(
+        StopMethod.NMT,
         "NMT stop, to drives that commissioning saw leave operation enabled on it",
         "no heartbeat with state stopped",
         2,
         0.06,
     ),
-    StopRung(
-        Rung.SILENCE,
+    StopRow(
+        StopMethod.SILENCE,
         "nothing: heartbeat, guarding, SYNC and RPDOs cease, as host_loss of the drive says",
         "(the last one)",
         0,
@@ -87,41 +87,41 @@ class StopEscalation:
         self._level = 0
         self._since = 0.0
         self._syncs = 0
-        self.rung: Rung | None = None
-        """The rung in use; None while nothing is being stopped."""
+        self.method: StopMethod | None = None
+        """The method in use; None while nothing is being stopped."""
 
     def begin(self, now: float, *, nmt: bool = False) -> None:
-        """Start with the first rung.
+        """Start with the first method.
 
         With ``nmt`` the drive was seen to leave operation enabled on NMT stop.
         """
-        self._table = tuple(row for row in STOP_TABLE if nmt or row.rung is not Rung.NMT)
+        self._table = tuple(row for row in STOP_TABLE if nmt or row.method is not StopMethod.NMT)
         self._level, self._since, self._syncs = 0, now, 0
-        self.rung = self._table[0].rung
+        self.method = self._table[0].method
 
     def end(self) -> None:
         """The drive has left operation enabled, or nothing is to be stopped any more."""
-        self.rung = None
+        self.method = None
 
-    def step(self, now: float, seen: StopEvidence) -> Rung | None:
-        """The rung to use in this cycle; None once the drive has left operation enabled."""
+    def step(self, now: float, seen: StopEvidence) -> StopMethod | None:
+        """The method to use in this cycle; None once the drive has left operation enabled."""
         if seen.left:
             self.end()
-        if self.rung is None:
+        if self.method is None:
             return None
         self._syncs += 1
         while self._not_heard(now, seen):
             self._level += 1
             self._since, self._syncs = now, 0
-        self.rung = self._table[self._level].rung
-        return self.rung
+        self.method = self._table[self._level].method
+        return self.method
 
     def _not_heard(self, now: float, seen: StopEvidence) -> bool:
         row = self._table[self._level]
-        if row.rung is Rung.SILENCE:
+        if row.method is StopMethod.SILENCE:
             return False
-        if (row.rung is Rung.PDO and not seen.hears_pdos) or (
-            row.rung is Rung.SDO and not seen.hears_sdos
+        if (row.method is StopMethod.PDO and not seen.hears_pdos) or (
+            row.method is StopMethod.SDO and not seen.hears_sdos
         ):
             return True
-        return self._syncs > row.syncs and now - self._since >= row.patience
+        return self._syncs > row.syncs and now - self._since >= row.timeout

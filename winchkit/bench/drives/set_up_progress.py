@@ -1,4 +1,4 @@
-"""Lines on the set-up of drives, while an opening takes long."""
+"""Lines on standard error while a bench opens: set-up of drives, and what only hardware stops."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.clock import Clock
+from winchkit.schema.bench import BenchSpec
 
 Tell = Callable[[str], None]
 _FIRST, _PERIOD = 2.0, 5.0
@@ -50,3 +51,13 @@ class SetUpProgress:
             axis.commission()
         finally:
             axis.objects.on_transfer = None
+
+
+def tell_hardware(spec: BenchSpec) -> None:
+    """Say on stderr which winches those are, and what stops them."""
+    for name, winch in spec.winch.items():
+        if winch.host_loss:
+            sys.stderr.write(
+                f"winch {name}: its drive does not notice when this computer falls silent; what "
+                f"stops the winch then is {winch.host_loss_description}\n"
+            )

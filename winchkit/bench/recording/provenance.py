@@ -13,7 +13,7 @@ from winchkit.regular_file import read_text
 from winchkit.schema.bench import BenchSpec
 
 _LIBRARIES = ("numpy", "canopen", "python-can", "pymodbus", "pyserial", "mcap")
-_PATIENCE = 2.0
+_TIMEOUT = 2.0
 """s: git answers within some ms; a repository on a dead network drive does not delay a log."""
 _ROLES = ("cell", "load", "length", "temperature")
 
@@ -44,7 +44,7 @@ def _git(folder: Path, *words: str) -> str | None:
             capture_output=True,
             text=True,
             check=False,
-            timeout=_PATIENCE,
+            timeout=_TIMEOUT,
         )
     except (OSError, subprocess.TimeoutExpired):
         return None

@@ -22,8 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from winchkit.bench.control.snapshot import BenchSnapshot
-from winchkit.bench.recording.feed import CHANNELS, TARED, Feed
-from winchkit.bench.recording.silences import Silences
+from winchkit.bench.recording.feed import CHANNELS, TARED, Feed, Silences
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.scheduling import event_of, thread_of
@@ -34,6 +33,28 @@ from winchkit.runs.recording.sync import Syncer
 
 if TYPE_CHECKING:
     from winchkit.bench.tracker import Tracker
+
+
+class OwnedLog:
+    """What stations with and without drives do with their log."""
+
+    _recorder: Recorder | None = None
+
+    def log_rows(self) -> int:
+        """Rows written so far; raises the error that has ended the writing."""
+        if self._recorder is None:
+            return 0
+        self._recorder.check()
+        return self._recorder.rows
+
+    def end_log(self) -> int:
+        """End the log and return its rows."""
+        recorder, self._recorder = self._recorder, None
+        if recorder is None:
+            return 0
+        recorder.close()
+        return recorder.rows
+
 
 _LOGGER = logging.getLogger(__name__)
 _PERIOD = {".csv": 0.05}

@@ -1,17 +1,21 @@
-"""A station at a bench that another process owns."""
+"""A station at a bench that another process owns: its requests to the owner, and their answers."""
 
 from __future__ import annotations
 
+import json
 import socket
-from collections.abc import Mapping
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Self
 
-from winchkit.bench.control.dead_man import DEAD_MAN
-from winchkit.bench.direction import no_positional
 from winchkit.bench.ownership import connect_to_owner
 from winchkit.bench.remote.identity import client_name
-from winchkit.bench.remote.requests import OwnerGone, Requests
+from winchkit.bench.remote.operations import Station
 from winchkit.drivers.clock import Clock, MonotonicClock
+from winchkit.errors import ConnectionLost, UsageError, error_of
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
@@ -25,24 +29,24 @@ _CELL_TIME = 20.0
 
 def attach(
     spec: BenchSpec,
-    patience: float = _ANSWER_TIME,
+    timeout: float = _ANSWER_TIME,
     *,
     name: str = "",
     observer: bool = False,
 ) -> RemoteStation | None:
     """A station at the bench's owner; None when no process owns it.
 
-    ``patience`` (s) is how long it waits for an answer, ``name`` what others see of this client;
+    ``timeout`` (s) is how long it waits for an answer, ``name`` what others see of this client;
     an ``observer`` never keeps another program from owning the bench. Raises ConnectionLost when
     the owner does not take it.
     """
     connection = connect_to_owner(spec)
     if connection is None:
         return None
-    return RemoteStation(connection, patience, name=name, observer=observer)
+    return RemoteStation(connection, timeout, name=name, observer=observer)
 
 
-class RemoteStation:
+class RemoteStation(Station):
     """Calls the owner for everything; its errors are raised here. A context manager.
 
     Each call is a sign of life. A move, step or homing that was ordered here ends by a ramp where
@@ -52,17 +56,17 @@ class RemoteStation:
     def __init__(
         self,
         connection: socket.socket,
-        patience: float = _ANSWER_TIME,
+        timeout: float = _ANSWER_TIME,
         *,
         name: str = "",
         observer: bool = False,
     ) -> None:
         """Take a place at the owner; raises ConnectionLost where it accepts no client."""
-        self._requests = Requests(connection, patience)
+        self._requests = Requests(connection, timeout)
         try:
             reply = self._requests.call("introduce", name or client_name(), observer)
         except BaseException:
-            self._requests.hang_up()
+            self._requests.close()
             raise
         self.owner = str(reply["owner"])
         """Name of the process that owns the bench."""
@@ -81,201 +85,17 @@ class RemoteStation:
         """Ask the owner to end for this client's sake; raises NotPermitted where it does not."""
         return str(self._requests.call("hand_over"))
 
-    def take_over(self, winch: str | None) -> None:
-        """Command a winch that another client commands.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch, "all", or None for the only one.
-        """
-        self._requests.call("take_over", winch)
-
     @property
     def clock(self) -> Clock:
         """Steady clock of this computer, which the bench process has too."""
         return MonotonicClock()
 
-    def names(self) -> list[str]:
-        """Winches there are."""
-        return [str(name) for name in self._requests.call("names")]
-
-    def status(self) -> dict[str, Any]:
-        """Newest snapshot as JSON has it."""
-        return dict(self._requests.call("status"))
-
-    def jog(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        hold: float = DEAD_MAN,
-        since: float | None = None,
-    ) -> None:
-        """Begin to move the cable at a speed (m/s, positive), out or in, for ``hold`` seconds.
-
-        :meth:`refresh` within that time keeps it going; one that is under way is not started again.
-
-        Raises UsageError unless exactly one is given, by its name.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        pay_out, wind_in : float
-            Cable speed, m/s, positive; exactly one is given.
-        hold : float
-            Time of motion without a refresh, s, at most 1.
-        since : float, optional
-            When the operator was seen to ask for it, s on :attr:`clock`; by default now. The time
-            of motion counts from then.
-        """
-        no_positional("jog", "m/s", unnamed)
-        self._requests.call("jog", winch, since=since, pay_out=pay_out, wind_in=wind_in, hold=hold)
-
-    def refresh(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        hold: float = DEAD_MAN,
-    ) -> None:
-        """Keep a jog or a held tension going for ``hold`` seconds more, a jog at another speed too.
-
-        Raises MotionError where it has ended, which a refresh never begins again: its time was
-        over (this process was suspended, or too slow), or somebody stopped it.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        pay_out, wind_in : float, optional
-            Another speed of a jog, m/s, positive; at most one is given.
-        hold : float
-            Time of motion without another refresh, s, at most 1.
-        """
-        no_positional("refresh", "m/s", unnamed)
-        self._requests.call("refresh", winch, pay_out=pay_out, wind_in=wind_in, hold=hold)
-
-    def release(self, winch: str | None) -> None:
-        """End a jog or a held tension by a ramp now, instead of when its ``hold`` is over.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        """
-        self._requests.call("release", winch)
-
-    def step(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        speed: float | None = None,
-        since: float | None = None,
-    ) -> None:
-        """Start to pay out or wind in a length (m, positive) of cable.
-
-        Raises UsageError unless exactly one is given, by its name.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        pay_out, wind_in : float
-            Length, m, positive; exactly one is given.
-        speed : float, optional
-            m/s; by default the limit of the winch.
-        since : float, optional
-            When the operator was seen to ask for it, s on :attr:`clock`; by default now.
-        """
-        no_positional("step", "m", unnamed)
-        self._requests.call(
-            "step", winch, since=since, pay_out=pay_out, wind_in=wind_in, speed=speed
-        )
-
-    def move(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        to: float | None = None,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        speed: float | None = None,
-        acceleration: float | None = None,
-    ) -> None:
-        """Start a move to a cable length, or by a length (m, positive) paid out or wound in.
-
-        Raises UsageError unless exactly one is given, by its name.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch, "all", or None for the only one.
-        to : float, optional
-            Cable length, m.
-        pay_out, wind_in : float
-            Length, m, positive; exactly one of the three is given.
-        speed, acceleration : float, optional
-            m/s and m/s²; by default the limits of the winch.
-        """
-        no_positional("move", "m", unnamed)
-        self._requests.call(
-            "move",
-            winch,
-            to=to,
-            pay_out=pay_out,
-            wind_in=wind_in,
-            speed=speed,
-            acceleration=acceleration,
-        )
-
-    def move_pose(
-        self,
-        change: Mapping[str, float],
-        relative: bool,
-        speed: float | None = None,
-        acceleration: float | None = None,
-    ) -> None:
-        """Start to move the platform of the robot on a line.
-
-        Parameters
-        ----------
-        change : mapping of str to float
-            Some of x, y, z (m), roll, pitch, yaw (rad); the others keep their values.
-        relative : bool
-            Whether they are added to those of the present pose.
-        speed, acceleration : float, optional
-            m/s and m/s²; by default the limits of the bench's ``[robot]``.
-        """
-        self._requests.call("move_pose", dict(change), relative, speed, acceleration)
-
-    def pose(self) -> dict[str, float]:
-        """Pose of the platform by the motor angles: x, y, z (m), roll, pitch, yaw (rad)."""
-        return dict(self._requests.call("pose"))
-
-    def hold_tension(
-        self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
-    ) -> None:
-        """Begin to keep the tension of a winch for ``hold`` seconds; :meth:`refresh` goes on.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        tension : float
-            At the platform end, N.
-        hold : float
-            Time without a refresh, s, at most 1.
-        bounds : mapping of str to float
-            ``travel`` of cable either way, m, largest ``speed``, m/s, and upper bound of the
-            ``stiffness``, N/m, as of ``Winch.hold_tension``; each may be left out.
-        """
-        self._requests.call("hold_tension", winch, tension, hold=hold, bounds=dict(bounds))
+    def _request(self, operation: str, *arguments: Any, **named: Any) -> Any:
+        timeout = None
+        if operation == "cell":
+            watched = sum(item for item in arguments if isinstance(item, float))
+            timeout = _CELL_TIME + 3 * watched
+        return self._requests.call(operation, *arguments, timeout=timeout, **named)
 
     def upload(self, winch: str | None, index: int, sub: int) -> bytes | None:
         """Bytes of an object of a drive.
@@ -292,7 +112,7 @@ class RemoteStation:
         bytes or None
             Its value, little-endian; None for an object that the drive lacks.
         """
-        found = self._requests.call("read_object", winch, index, sub)
+        found = self.read_object(winch, index, sub)
         return None if found is None else bytes.fromhex(found)
 
     def scan(self) -> list[Found]:
@@ -301,178 +121,8 @@ class RemoteStation:
         from winchkit.drivers.can.tools.scan import Found
 
         return [
-            Found(**{**item, "identity": Identity(**item["identity"])})
-            for item in self._requests.call("scanned")
+            Found(**{**item, "identity": Identity(**item["identity"])}) for item in self.scanned()
         ]
-
-    def moving(self, winch: str | None) -> bool:
-        """Whether a motion is under way.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch, "all", or None for the only one.
-
-        Returns
-        -------
-        bool
-            Whether a motion is under way; raises what stopped it.
-        """
-        return bool(self._requests.call("moving", winch))
-
-    def home(
-        self, winch: str | None, method: int | None, at: float | None, speed: float | None
-    ) -> None:
-        """Start to home a winch.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-        method : int or None
-            Homing method of CiA 402 (6098h); None moves nothing.
-        at : float or None
-            Cable length at the zero, m.
-        speed : float or None
-            Speed of the search, m/s.
-        """
-        self._requests.call("home", winch, method, at, speed)
-
-    def homing(self) -> bool:
-        """Whether the homing is under way."""
-        return bool(self._requests.call("homing"))
-
-    def stop(self) -> None:
-        """Quick-stop every winch."""
-        self._requests.call("stop")
-
-    def reset(self) -> list[str]:
-        """Clear trips and faults; returns what was cleared, in words."""
-        return [str(item) for item in self._requests.call("reset")]
-
-    def tare(self, winch: str | None) -> float:
-        """Tare a load cell.
-
-        Parameters
-        ----------
-        winch : str or None
-            Winch; None for the only one.
-
-        Returns
-        -------
-        float
-            Tension after it, N.
-        """
-        return float(self._requests.call("tare", winch))
-
-    def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
-        """Log to a file in the owner's process.
-
-        Parameters
-        ----------
-        path : str
-            File, absolute.
-        rotate : str, optional
-            Size or duration of a part.
-        replace : bool
-            Remove an earlier log of that name.
-        """
-        self._requests.call("start_log", path, rotate, replace)
-
-    def log_rows(self) -> int:
-        """Rows written so far."""
-        return int(self._requests.call("log_rows"))
-
-    def end_log(self) -> int:
-        """Finish the log."""
-        return int(self._requests.call("end_log"))
-
-    def counters(self) -> dict[str, dict[str, Any]]:
-        """Counts by instrument, and of the log."""
-        return dict(self._requests.call("counters"))
-
-    def trip_history(self) -> dict[str, Any] | None:
-        """The cycles around the trip that is not reset yet; None without one.
-
-        Returns
-        -------
-        dict or None
-            ``at``: time of the trip, s; ``tripped`` and ``blocked``: message and forbidden
-            direction of each; ``time``: of the cycles, s from the trip; ``winch``: motor
-            angle, velocity and torque, tension, load, length of its instrument, cable length and
-            speed of the drive, and commanded speed by winch, SI; ``events``: time and words.
-        """
-        found = self._requests.call("trip_history")
-        return None if found is None else dict(found)
-
-    def frames(self) -> dict[str, dict[str, Any]]:
-        """Frames of each CAN bus by name, collected from the first call on while it is called.
-
-        Returns
-        -------
-        dict of str to dict
-            ``newest``: number, time (s), identifier and bytes in hexadecimal of each identifier's
-            newest frame; ``last``: time, identifier and bytes of the last 200 frames.
-        """
-        return dict(self._requests.call("frames"))
-
-    def start_programme(
-        self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
-    ) -> None:
-        """Execute a motion programme in the owner's process; it ends where no call comes for 0.5 s.
-
-        Parameters
-        ----------
-        path : str
-            Programme file, absolute.
-        folder : str
-            Of the runs, absolute.
-        suffix : str
-            Format, ``.csv`` or ``.mcap``.
-        replace : bool
-            Write over earlier runs of a programme of this name.
-        """
-        self._requests.call("start_programme", path, folder, suffix, replace)
-
-    def programme(self) -> dict[str, Any] | None:
-        """Where this station's programme is; None where it started none.
-
-        Returns
-        -------
-        dict or None
-            As of ``winchkit.bench.remote.programme_run.ProgrammeRun.state``.
-        """
-        found = self._requests.call("programme")
-        return None if found is None else dict(found)
-
-    def answer_programme(self) -> None:
-        """Answer the programme's request as done; raises UsageError where there is no request."""
-        self._requests.call("answer_programme")
-
-    def end_programme(self) -> None:
-        """End this station's programme by a ramp; returns at rest."""
-        self._requests.call("end_programme")
-
-    def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-        """Something with an instrument, e.g. "zero"; ``arguments`` are times (s), or words.
-
-        Parameters
-        ----------
-        task : str
-            One of ``winchkit.bench.cells.tasks.TASKS``.
-        name : str
-            Instrument, e.g. ``A.cell``.
-        *arguments
-            Of the task.
-
-        Returns
-        -------
-        dict
-            Result of the task, as JSON has it.
-        """
-        watched = sum(item for item in arguments if isinstance(item, float))
-        patience = _CELL_TIME + 3 * watched
-        return dict(self._requests.call("cell", task, name, *arguments, patience=patience))
 
     def close(self) -> None:
         """Leave; returns when what was started here has ended and stands still.
@@ -485,7 +135,7 @@ class RemoteStation:
         except OwnerGone:
             pass  # it stops everything when it ends
         finally:
-            self._requests.hang_up()
+            self._requests.close()
 
 
 class RemoteCells:
@@ -497,3 +147,111 @@ class RemoteCells:
     def do(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
         """One of :data:`~winchkit.bench.cells.tasks.TASKS`, done by the owner."""
         return self._station.cell(task, name, *arguments)
+
+
+class OwnerGone(ConnectionLost):
+    """The process that owned the bench has ended, or does not answer any more."""
+
+
+class Requests:
+    """One request after another over a socket, each with the answer of its number.
+
+    ``timeout``: time to wait for an answer, s.
+    """
+
+    def __init__(self, connection: socket.socket, timeout: float) -> None:
+        connection.settimeout(timeout)
+        self._timeout = timeout
+        self._connection = connection
+        self._stream = connection.makefile("rwb")
+        self._lock = threading.Lock()
+        self._number = 0
+        self.gone = False
+        """Whether the owner has ended or the station was left."""
+
+    def call(
+        self,
+        operation: str,
+        *arguments: Any,
+        timeout: float | None = None,
+        since: float | None = None,
+        **named: Any,
+    ) -> Any:
+        """The owner's answer to an operation.
+
+        Raises the owner's error, OwnerGone, or UsageError for an argument that cannot be sent;
+        another ``timeout`` (s) holds for this call. The owner refuses to move anything where too
+        much time has passed since the call, or ``since`` an earlier time (s on the steady clock of
+        this computer).
+        """
+        sent = time.monotonic() if since is None else since
+        with self._lock:
+            if self.gone:
+                raise OwnerGone("this station at the bench was left; attach again")
+            self._connection.settimeout(self._timeout if timeout is None else timeout)
+            answer = self._exchange(operation, sent, arguments, named)
+        if "error" in answer:
+            raise error_of(answer["error"], answer["message"])
+        return answer["ok"]
+
+    def close(self) -> None:
+        """Close the connection; twice does no harm."""
+        with self._lock:
+            self.gone = True
+            with suppress(OSError):
+                self._stream.close()
+            self._connection.close()
+
+    def _exchange(
+        self, operation: str, sent: float, arguments: Sequence[Any], named: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Send a request, and wait for the answer with its number; raises OwnerGone.
+
+        Ctrl-C may interrupt it at any instruction. The answers to requests that were interrupted,
+        whole or the rest of one, come before the one with the number, and are passed over.
+        """
+        self._number += 1
+        number = self._number
+        request = {
+            "id": number,
+            "op": operation,
+            "sent": sent,
+            "args": arguments,
+            "named": named,
+        }
+        try:
+            line = json.dumps(request, default=_plain).encode() + b"\n"
+        except (TypeError, ValueError) as error:
+            raise UsageError(f"{operation}: an argument cannot be sent: {error}") from None
+        try:
+            self._stream.write(line)
+            self._stream.flush()
+            while line := self._stream.readline():
+                answer = _answer(line)
+                if answer.get("id") == number:
+                    return answer
+        except ConnectionError:
+            pass
+        except (OSError, ValueError) as error:
+            self.gone = True
+            raise OwnerGone(f"the bench's owner does not answer: {error}") from error
+        self.gone = True
+        raise OwnerGone("the process that owned the bench has ended; its drives stop") from None
+
+
+def _plain(value: object) -> float | dict[Any, Any]:
+    """A number or mapping of another library, as JSON has it."""
+    if isinstance(value, Real):
+        return float(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"a {type(value).__name__} is no number and no text")
+
+
+def _answer(line: bytes) -> dict[str, Any]:
+    """An answer of the owner; empty for the rest of one whose beginning was lost."""
+    try:
+        answer = json.loads(line)
+    except ValueError:
+        return {}
+    return answer if isinstance(answer, dict) else {}

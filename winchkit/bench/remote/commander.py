@@ -7,12 +7,13 @@ another client takes it over explicitly. Everybody may stop, at any time.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Protocol
 
-from winchkit.bench.control.dead_man import DEAD_MAN
+from winchkit.bench.control.dead_man import DEAD_MAN, LIFE_SIGN
+from winchkit.bench.control.snapshot import BenchSnapshot
 from winchkit.bench.remote.identity import Client
 from winchkit.drivers.clock import Clock
 from winchkit.errors import MotionError, NotPermitted
@@ -159,3 +160,37 @@ class Commanders:
         self._holders[winch] = client
         self._taken.pop((client, winch), None)
         self._winches[winch].commander = client.name
+
+
+class LifeSigns:
+    """Called once a cycle; ends the motions of clients that have fallen silent."""
+
+    def __init__(
+        self,
+        moved: Callable[[], Iterable[tuple[str, Client]]],
+        end: Callable[[Client, list[str], str], None],
+    ) -> None:
+        """Take ``moved``: winches that go on by themselves, with the client that commands each.
+
+        ``end`` ramps the winches of a client to rest, for a reason in words.
+        """
+        self._moved, self._end = moved, end
+        self._before = float("inf")
+
+    def __call__(self, snapshot: BenchSnapshot) -> None:
+        """Count the silence of every client whose winch moves."""
+        duration, self._before = max(0.0, snapshot.time - self._before), snapshot.time
+        winches: dict[Client, list[str]] = {}
+        for winch, client in self._moved():
+            winches.setdefault(client, []).append(winch)
+        for client, names in winches.items():
+            if client.life is None:
+                continue
+            client.life.pass_by(duration)
+            if client.life.silence > LIFE_SIGN:
+                self._end(
+                    client,
+                    names,
+                    f"{client.name} gave no sign of life for {LIFE_SIGN:g} s (it was suspended, or "
+                    "hangs); its motion was ended by a ramp",
+                )

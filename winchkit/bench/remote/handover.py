@@ -10,7 +10,7 @@ from winchkit.bench.remote.client import RemoteStation
 from winchkit.errors import ConnectionLost, NotPermitted
 from winchkit.schema.bench import BenchSpec
 
-_PATIENCE = 10.0
+_TIMEOUT = 10.0
 """For a bench process to disable its drives and end, s."""
 _CLOSING = 2.0
 """For an owner that accepts no client any more, s."""
@@ -34,7 +34,7 @@ def own(spec: BenchSpec, name: str) -> Ownership:
             if time.monotonic() > deadline:
                 raise
         if not asked and _hand_over(spec, name):
-            asked, deadline = True, time.monotonic() + _PATIENCE
+            asked, deadline = True, time.monotonic() + _TIMEOUT
         time.sleep(_POLL)
 
 

@@ -140,12 +140,12 @@ def _own(bench_file: str, effects: Sequence[str], report: TextIO) -> None:
 
 def _serve(bench: Bench) -> None:
     """Wait until no client needs the bench any more; raises what ended the control loop."""
-    left, patience = time.monotonic(), _FIRST
+    left, timeout = time.monotonic(), _FIRST
     while not bench.stations.handed_to and bench.loop.alive:
         now = time.monotonic()
         if bench.stations.clients:
-            left, patience = now, LINGER
-        elif now - left > patience and bench.stations.close_door():
+            left, timeout = now, LINGER
+        elif now - left > timeout and bench.stations.close_door():
             return
         time.sleep(_POLL)
 

@@ -17,6 +17,7 @@ from winchkit.bench.bench import Bench
 from winchkit.bench.control.dead_man import LIFE_SIGN, remaining
 from winchkit.bench.ownership import digest_of, listen, log_path
 from winchkit.bench.remote.identity import Client, LifeSign
+from winchkit.bench.remote.operations import OPERATIONS
 from winchkit.bench.remote.station import LocalStation
 from winchkit.errors import (
     ConnectionLost,
@@ -29,54 +30,6 @@ from winchkit.errors import (
 
 _LOGGER = logging.getLogger(__name__)
 
-OPERATIONS = (
-    "names",
-    "status",
-    "jog",
-    "refresh",
-    "release",
-    "step",
-    "move",
-    "move_pose",
-    "pose",
-    "hold_tension",
-    "take_over",
-    "moving",
-    "home",
-    "homing",
-    "stop",
-    "reset",
-    "tare",
-    "start_log",
-    "log_rows",
-    "end_log",
-    "counters",
-    "trip_history",
-    "frames",
-    "start_programme",
-    "programme",
-    "answer_programme",
-    "end_programme",
-    "read_object",
-    "scanned",
-    "cell",
-)
-"""Methods of a station that may be called from outside."""
-
-_BEGINS = frozenset(
-    {
-        "jog",
-        "refresh",
-        "step",
-        "move",
-        "move_pose",
-        "hold_tension",
-        "home",
-        "start_programme",
-        "answer_programme",
-    }
-)
-"""Those that begin or extend a motion: refused where they have been on their way for too long."""
 _MAX_LINE = 65_536
 """Bytes: the longest request, a programme by name with its options, has some hundreds; a longer one
 is no client."""
@@ -109,19 +62,28 @@ class _Request:
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise UsageError(f"a request that cannot be read: {error}") from None
 
-    def permitted(self) -> dict[str, Any]:
-        """Its named arguments, a hold shortened by the age; raises NotPermitted where it is old."""
-        if self.operation not in _BEGINS:
-            return self.named
-        hold = self.named.get("hold")
-        if isinstance(hold, bool) or not isinstance(hold, float | int) or not 0 < hold <= 1:
-            remaining(LIFE_SIGN, self.age)  # and the station says what is wrong with the hold
-            return self.named
-        return {**self.named, "hold": remaining(hold, self.age)}
+    def bound(self, call: Callable[..., Any]) -> inspect.BoundArguments:
+        """Its arguments for ``call``, a hold shortened by the age.
+
+        Raises UsageError for arguments that do not fit, NotPermitted where it begins a motion and
+        is old.
+        """
+        try:
+            asked = inspect.signature(call).bind(*self.arguments, **self.named)
+        except TypeError as error:
+            raise UsageError(f"{self.operation}: a request that cannot be read: {error}") from None
+        if OPERATIONS.get(self.operation):
+            asked.apply_defaults()
+            hold = asked.arguments.get("hold")
+            if isinstance(hold, bool) or not isinstance(hold, float | int) or not 0 < hold <= 1:
+                remaining(LIFE_SIGN, self.age)  # and the station says what is wrong with the hold
+            else:
+                asked.arguments["hold"] = remaining(hold, self.age)
+        return asked
 
 
 @dataclass(eq=False)
-class _Seat:
+class _Link:
     """A client's connection, and its station once it has introduced itself."""
 
     connection: socket.socket
@@ -149,7 +111,7 @@ class StationServer:
         self._bench = bench
         self._closing = False
         self._socket, self._path = listen(bench.spec)
-        self._seats: set[_Seat] = set()
+        self._links: set[_Link] = set()
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._accept, name="stations", daemon=True)
         self._thread.start()
@@ -157,7 +119,7 @@ class StationServer:
     @property
     def clients(self) -> tuple[Client, ...]:
         """Who is connected."""
-        return tuple(seat.station.client for seat in tuple(self._seats))
+        return tuple(link.station.client for link in tuple(self._links))
 
     def close_door(self) -> bool:
         """Accept no client any more, unless one is attached; whether this was done."""
@@ -171,9 +133,9 @@ class StationServer:
         """Turn everybody out; the bench stops the winches, then finishes the logs."""
         self._closing = True
         self._path.unlink(missing_ok=True)
-        for seat in tuple(self._seats):
-            seat.station.begin_no_more()
-        for item in (self._socket, *(seat.connection for seat in tuple(self._seats))):
+        for link in tuple(self._links):
+            link.station.begin_no_more()
+        for item in (self._socket, *(link.connection for link in tuple(self._links))):
             _shut(item)
         self._thread.join(timeout=2.0)
         self._socket.close()
@@ -185,38 +147,38 @@ class StationServer:
             except OSError:
                 return
             unnamed = Client("a client without a name", life=LifeSign())
-            seat = _Seat(client, LocalStation(self._bench, unnamed))
-            self._seats.add(seat)
-            threading.Thread(target=self._serve, args=(seat,), name="station", daemon=True).start()
+            link = _Link(client, LocalStation(self._bench, unnamed))
+            self._links.add(link)
+            threading.Thread(target=self._serve, args=(link,), name="station", daemon=True).start()
 
-    def _serve(self, seat: _Seat) -> None:
+    def _serve(self, link: _Link) -> None:
         """Answer until the other side leaves or goes away, then end what it has started."""
         try:
-            with seat.connection as client, client.makefile("rwb") as stream:
-                while not seat.left and (line := stream.readline(_MAX_LINE)):
-                    stream.write(self._answer(seat, line) + b"\n")
+            with link.connection as client, client.makefile("rwb") as stream:
+                while not link.left and (line := stream.readline(_MAX_LINE)):
+                    stream.write(self._answer(link, line) + b"\n")
                     stream.flush()
         except OSError:
             pass
         finally:
-            if not seat.left and not self._closing:
+            if not link.left and not self._closing:
                 with suppress(WinchkitError):
-                    seat.leave()
-            self._seats.discard(seat)
+                    link.leave()
+            self._links.discard(link)
 
-    def _answer(self, seat: _Seat, line: bytes) -> bytes:
+    def _answer(self, link: _Link, line: bytes) -> bytes:
         """Execute a request; returns the reply."""
         request: _Request | None = None
         try:
             request = _Request.decode(line)
             if request.age < LIFE_SIGN:
-                seat.station.client.heard()
-            answer = json.dumps({"id": request.number, "ok": self._do(seat, request)})
+                link.station.client.heard()
+            answer = json.dumps({"id": request.number, "ok": self._do(link, request)})
         except WinchkitError as error:
             answer = _refusal(request, class_name(error), str(error))
         except Exception as error:
             what = "a request" if request is None else request.operation
-            _LOGGER.exception("%s of %s failed", what, seat.station.client.name)
+            _LOGGER.exception("%s of %s failed", what, link.station.client.name)
             answer = _refusal(
                 request,
                 "WinchkitError",
@@ -226,38 +188,35 @@ class StationServer:
             )
         return answer.encode()
 
-    def _do(self, seat: _Seat, request: _Request) -> Any:
+    def _do(self, link: _Link, request: _Request) -> Any:
         """Do an operation of a station, or one of those of the server; returns its result."""
         own: dict[str, Callable[..., Any]] = {
-            "introduce": lambda name, observer: self._introduce(seat, name, observer),
-            "hand_over": lambda: self._hand_over(seat),
-            "leave": seat.leave,
+            "introduce": lambda name, observer: self._introduce(link, name, observer),
+            "hand_over": lambda: self._hand_over(link),
+            "leave": link.leave,
         }
         operation = request.operation
         if operation not in own and operation not in OPERATIONS:
             raise UsageError(f"no operation '{operation}'")
-        call = own.get(operation) or getattr(seat.station, operation)
-        try:
-            inspect.signature(call).bind(*request.arguments, **request.named)
-        except TypeError as error:
-            raise UsageError(f"{operation}: a request that cannot be read: {error}") from None
-        return call(*request.arguments, **request.permitted())
+        call = own.get(operation) or getattr(link.station, operation)
+        asked = request.bound(call)
+        return call(*asked.args, **asked.kwargs)
 
-    def _introduce(self, seat: _Seat, name: str, observer: bool) -> dict[str, Any]:
+    def _introduce(self, link: _Link, name: str, observer: bool) -> dict[str, Any]:
         """Take a client's name; returns who owns the bench, and whether it is handed over."""
         with self._lock:
             if self.handed_to:
                 raise ConnectionLost(f"the bench is being handed over to {self.handed_to}")
-            seat.station.client = Client(str(name), observer=bool(observer), life=LifeSign())
+            link.station.client = Client(str(name), observer=bool(observer), life=LifeSign())
         return {
             "owner": self._bench.commanders.owner.name,
             "lends": self.may_hand_over,
             "digest": self.digest,
         }
 
-    def _hand_over(self, seat: _Seat) -> str:
+    def _hand_over(self, link: _Link) -> str:
         """Give the bench to a client; raises NotPermitted, naming who uses it."""
-        asking = seat.station.client
+        asking = link.station.client
         owner = self._bench.commanders.owner.name
         with self._lock:
             users = [c.name for c in self.clients if c is not asking and not c.observer]

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from winchkit.arguments import path_of
-from winchkit.bench.commissioning.hardware import tell_hardware
+from winchkit.bench.drives.set_up_progress import tell_hardware
 from winchkit.bench.ownership import digest_of, unless_stopped
-from winchkit.bench.remote.client import RemoteStation
+from winchkit.bench.remote.client import OwnerGone, RemoteStation
 from winchkit.bench.remote.client import attach as attach_to_owner
 from winchkit.bench.remote.identity import Client, client_name
 from winchkit.bench.remote.process import can_spawn, spawn
@@ -19,9 +19,10 @@ from winchkit.errors import ConnectionLost, MotionError, NotPermitted, UsageErro
 from winchkit.schema.bench import BenchSpec
 
 if TYPE_CHECKING:
-    from winchkit.bench.remote.station import Station
+    from winchkit.bench.remote.operations import Station
 
-_PATIENCE = 15.0
+
+_TIMEOUT = 15.0
 """For an owner that opens, closes or hands over the bench, s."""
 _POLL = 0.05
 """s: not noticed by an operator."""
@@ -134,7 +135,7 @@ def _sought(
     Two commands that come at once start two processes; one of them owns the bench, and both
     commands attach to it.
     """
-    deadline = time.monotonic() + _PATIENCE
+    deadline = time.monotonic() + _TIMEOUT
     while True:
         late = time.monotonic() > deadline
         problem: WinchkitError | None
@@ -153,7 +154,7 @@ def _sought(
                 raise problem
         if late:
             raise problem or ConnectionLost(
-                f"bench '{spec.name}': its owner has accepted no client for {_PATIENCE:g} s"
+                f"bench '{spec.name}': its owner has accepted no client for {_TIMEOUT:g} s"
             )
         time.sleep(_POLL)
 
@@ -192,3 +193,29 @@ def _serves(
     finally:
         station.close()
     return False
+
+
+_GRACE = 0.5
+"""For a program that takes the bench over, before a bench process is started, s."""
+_Result = TypeVar("_Result")
+
+
+def watch(
+    bench_file: str | Path,
+    client: str,
+    use: Callable[[Station], _Result],
+    lost: Callable[[str], None],
+    effects: Sequence[str] = (),
+) -> _Result:
+    """Call ``use`` with a station that only looks on, and again with a new one after each loss.
+
+    ``lost`` is called with a text when an owner has gone. Returns what ``use`` returns. Raises the
+    errors of ``at_station`` where the bench cannot be reached any more.
+    """
+    while True:
+        try:
+            with at_station(bench_file, effects, client=client, observer=True) as station:
+                return use(station)
+        except OwnerGone as error:
+            lost(f"{error}; connecting again")
+            time.sleep(_GRACE)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import asdict
-from typing import Any, Protocol
+from typing import Any
 
 from winchkit.bench.bench import Bench
 from winchkit.bench.cells.tasks import do
@@ -13,9 +13,9 @@ from winchkit.bench.control.dead_man import DEAD_MAN, LIFE_SIGN, DeadMan, remain
 from winchkit.bench.control.homing_motion import HomingRequest
 from winchkit.bench.control.snapshot import to_dict
 from winchkit.bench.direction import no_positional, paid_out
-from winchkit.bench.recording.owned_log import OwnedLog
-from winchkit.bench.recording.recorder import counters_of
+from winchkit.bench.recording.recorder import OwnedLog, counters_of
 from winchkit.bench.remote.identity import Client, client_name
+from winchkit.bench.remote.operations import Station
 from winchkit.bench.remote.programme_run import ProgrammeRun
 from winchkit.bench.winch import Winch
 from winchkit.drivers.can.bus.frame_tap import SeenFrame
@@ -25,170 +25,7 @@ from winchkit.errors import MotionError, UsageError
 from winchkit.schema.programme import ALL
 
 
-class Station(Protocol):
-    """An operator's place at a bench. Closing it ends what it has started."""
-
-    @property
-    def clock(self) -> Clock:
-        """Clock of the bench, on which a client waits."""
-
-    def names(self) -> list[str]:
-        """Winches there are."""
-
-    def status(self) -> dict[str, Any]:
-        """Newest snapshot and the health of the CAN buses, as JSON has them."""
-
-    def jog(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        hold: float = DEAD_MAN,
-        since: float | None = None,
-    ) -> None:
-        """Begin to move for ``hold`` seconds at a cable speed (m/s, positive), out or in.
-
-        The time counts from ``since`` (s on :attr:`clock`, by default now), when the operator was
-        seen to ask for it. This, ``step`` and ``move`` raise UsageError for a number without a
-        name.
-        """
-
-    def refresh(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        hold: float = DEAD_MAN,
-    ) -> None:
-        """Keep a jog or a held tension going for ``hold`` seconds more.
-
-        Raises MotionError where it has ended: a new motion needs a new command.
-        """
-
-    def release(self, winch: str | None) -> None:
-        """End a jog or a held tension by a ramp now, as the hand that releases the key does."""
-
-    def step(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        speed: float | None = None,
-        since: float | None = None,
-    ) -> None:
-        """Start to pay out or wind in a length (m, positive) of cable; ``since`` as of ``jog``."""
-
-    def move(
-        self,
-        winch: str | None,
-        *unnamed: object,
-        to: float | None = None,
-        pay_out: float | None = None,
-        wind_in: float | None = None,
-        speed: float | None = None,
-        acceleration: float | None = None,
-    ) -> None:
-        """Start a move to a cable length (m), or by a length (m, positive) paid out or wound in.
-
-        "all" moves all as one.
-        """
-
-    def move_pose(
-        self,
-        change: Mapping[str, float],
-        relative: bool,
-        speed: float | None = None,
-        acceleration: float | None = None,
-    ) -> None:
-        """Start to move the platform of the robot on a line.
-
-        ``change`` has some of x, y, z (m), roll, pitch, yaw (rad); with ``relative`` they are
-        added to those of the present pose.
-        """
-
-    def pose(self) -> dict[str, float]:
-        """Pose of the platform by the motor angles: x, y, z (m), roll, pitch, yaw (rad)."""
-
-    def hold_tension(
-        self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
-    ) -> None:
-        """Begin to keep the tension (N) of a winch for ``hold`` seconds.
-
-        ``bounds`` may have ``travel`` (m), ``speed`` (m/s) and ``stiffness`` (N/m).
-        """
-
-    def take_over(self, winch: str | None) -> None:
-        """Command a winch, or "all", that another client commands; its motion ends by a ramp."""
-
-    def moving(self, winch: str | None) -> bool:
-        """Whether a motion is under way; raises what stopped it, and who has taken it over."""
-
-    def home(
-        self, winch: str | None, method: int | None, at: float | None, speed: float | None
-    ) -> None:
-        """Start to home a winch: a method of 6098h, the cable length (m) there, speed (m/s)."""
-
-    def homing(self) -> bool:
-        """Whether the homing is under way, and lead it on; raises what ended it."""
-
-    def stop(self) -> None:
-        """Quick-stop every winch; returns at rest."""
-
-    def reset(self) -> list[str]:
-        """Clear trips and faults; returns the cleared ones, in words."""
-
-    def tare(self, winch: str | None) -> float:
-        """Tare a load cell; returns the tension after it, N."""
-
-    def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
-        """Log to a file in the owner's process, in parts of a size such as ``100MB``."""
-
-    def log_rows(self) -> int:
-        """Rows written so far."""
-
-    def end_log(self) -> int:
-        """Finish the log; returns its rows."""
-
-    def counters(self) -> dict[str, dict[str, Any]]:
-        """Counts by instrument (``A.cell``), and for the log of this station."""
-
-    def trip_history(self) -> dict[str, Any] | None:
-        """The cycles around the trip that is not reset yet, as JSON has them; None without one."""
-
-    def frames(self) -> dict[str, dict[str, Any]]:
-        """Frames of each CAN bus as JSON has them, collected while it is called."""
-
-    def start_programme(
-        self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
-    ) -> None:
-        """Execute a programme file in the owner's process; it lasts while ``programme`` is called.
-
-        Its runs are written into ``folder``.
-        """
-
-    def programme(self) -> dict[str, Any] | None:
-        """Where this station's programme is, as JSON has it; None where it started none."""
-
-    def answer_programme(self) -> None:
-        """Answer the programme's request as done."""
-
-    def end_programme(self) -> None:
-        """End this station's programme by a ramp; returns at rest."""
-
-    def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-        """Something with an instrument by name: one of the tasks of ``winchkit.bench.cells.tasks``.
-
-        Raises what that raises, and NotPermitted where it would change a moving winch's tension.
-        """
-
-    def close(self) -> None:
-        """Stop what was started here, finish the log."""
-
-
-class LocalStation(OwnedLog):
+class LocalStation(OwnedLog, Station):
     """A station in the process that owns the bench."""
 
     def __init__(self, bench: Bench, client: Client | None = None) -> None:
@@ -202,15 +39,12 @@ class LocalStation(OwnedLog):
 
     @property
     def clock(self) -> Clock:
-        """Clock of the bench, on which a client waits."""
         return self._bench.clock
 
     def names(self) -> list[str]:
-        """Winches there are."""
         return list(self._bench.winch)
 
     def status(self) -> dict[str, Any]:
-        """Newest snapshot as JSON has it."""
         buses = {name: asdict(item) for name, item in self._bench.bus_health.items()}
         for item in buses.values():
             item["state"] = item["state"].value
@@ -241,7 +75,6 @@ class LocalStation(OwnedLog):
         hold: float = DEAD_MAN,
         since: float | None = None,
     ) -> None:
-        """Begin to move for ``hold`` seconds."""
         hold = hold if since is None else remaining(hold, self.clock.now() - since)
         with self._acting():
             self._bench.named(winch).jog(*unnamed, pay_out=pay_out, wind_in=wind_in, hold=hold)
@@ -254,12 +87,10 @@ class LocalStation(OwnedLog):
         wind_in: float | None = None,
         hold: float = DEAD_MAN,
     ) -> None:
-        """Keep what is held going for ``hold`` seconds more."""
         with self._acting():
             self._bench.named(winch).refresh(*unnamed, pay_out=pay_out, wind_in=wind_in, hold=hold)
 
     def release(self, winch: str | None) -> None:
-        """End what is held by a ramp now."""
         with self._acting():
             self._bench.named(winch).release()
 
@@ -272,7 +103,6 @@ class LocalStation(OwnedLog):
         speed: float | None = None,
         since: float | None = None,
     ) -> None:
-        """Start to pay out or wind in a length of cable."""
         no_positional("step", "m", unnamed)
         if since is not None:
             remaining(LIFE_SIGN, self.clock.now() - since)
@@ -291,7 +121,6 @@ class LocalStation(OwnedLog):
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> None:
-        """Start a move to a cable length, or by a length paid out or wound in."""
         no_positional("move", "m", unnamed)
         if (to is None) == (pay_out is None and wind_in is None):
             raise UsageError(
@@ -313,31 +142,26 @@ class LocalStation(OwnedLog):
         speed: float | None = None,
         acceleration: float | None = None,
     ) -> None:
-        """Start to move the platform of the robot on a line."""
         platform = self._bench.robot
         goal = platform.moved(change, relative=relative)
         with self._acting():
             platform.move(goal, speed, acceleration, wait=False)
 
     def pose(self) -> dict[str, float]:
-        """Pose of the platform by the motor angles."""
         return self._bench.robot.coordinates()
 
     def hold_tension(
         self, winch: str | None, tension: float, hold: float, bounds: Mapping[str, float]
     ) -> None:
-        """Begin to keep the tension of a winch for ``hold`` seconds."""
         with self._acting():
             self._bench.named(winch).hold_tension(tension, hold=hold, **bounds)
 
     def take_over(self, winch: str | None) -> None:
-        """Command a winch that another client commands."""
         with self._acting():
             for item in self._chosen(winch):
                 self._bench.commanders.take_over(item.name)
 
     def moving(self, winch: str | None) -> bool:
-        """Whether a motion is under way."""
         chosen = self._chosen(winch)
         with self._acting():
             for item in chosen:
@@ -351,7 +175,6 @@ class LocalStation(OwnedLog):
     def home(
         self, winch: str | None, method: int | None, at: float | None, speed: float | None
     ) -> None:
-        """Start to home a winch."""
         asked = HomingRequest(method, at, speed)
         with self._acting():
             self._homing = self._bench.homing(self._bench.named(winch).name, asked)
@@ -359,7 +182,6 @@ class LocalStation(OwnedLog):
         self._led = DeadMan(self.clock.now() + LIFE_SIGN)
 
     def homing(self) -> bool:
-        """Whether the homing is under way, and lead it on."""
         if self._homing is None:
             return False
         with self._acting():
@@ -377,42 +199,34 @@ class LocalStation(OwnedLog):
         return False
 
     def stop(self) -> None:
-        """Quick-stop every winch."""
         with self._acting():
             self._bench.stop_now()
 
     def reset(self) -> list[str]:
-        """Clear trips and faults; returns the cleared ones, in words."""
         with self._acting():
             return self._bench.reset()
 
     def tare(self, winch: str | None) -> float:
-        """Tare a load cell."""
         return self._bench.named(winch).tare()
 
     def start_log(self, path: str, rotate: str | None = None, replace: bool = False) -> None:
-        """Start a log, ending the one before."""
         self.end_log()
         self._recorder = self._bench.log(path, rotate=rotate, replace=replace)
 
-    def read_object(self, winch: str, index: int, sub: int) -> str | None:
-        """Bytes of an object of a winch's drive in hexadecimal; None where it has none."""
+    def read_object(self, winch: str | None, index: int, sub: int) -> str | None:
         name = self._bench.named(winch).name
         data = self._bench.axes[name].objects.upload_if_there(index, sub)
         return None if data is None else data.hex()
 
     def scanned(self) -> list[dict[str, Any]]:
-        """Who is on the buses, as JSON has it."""
         return [asdict(item) for item in self._bench.scan()]
 
     def counters(self) -> dict[str, dict[str, Any]]:
-        """Counts by instrument, and for the log."""
         if self._recorder is not None:
             return self._recorder.counters()
         return counters_of({name: winch.sensors for name, winch in self._bench.winch.items()})
 
     def trip_history(self) -> dict[str, Any] | None:
-        """The cycles around the trip that is not reset yet, as JSON has them."""
         return self._bench.trip_history.to_dict(self._bench.snapshot)
 
     def begin_no_more(self) -> None:
@@ -421,7 +235,6 @@ class LocalStation(OwnedLog):
             self._programme.begin_no_more()
 
     def frames(self) -> dict[str, dict[str, Any]]:
-        """Frames of each CAN bus, collected while it is called."""
         return {
             name: {
                 "newest": [[count, *_frame(item)] for count, item in tap.newest],
@@ -433,7 +246,6 @@ class LocalStation(OwnedLog):
     def start_programme(
         self, path: str, folder: str, suffix: str = ".csv", replace: bool = False
     ) -> None:
-        """Execute a programme file."""
         if self._programme is not None and not self._programme.ended:
             raise UsageError("a programme of this client is under way; end it first")
         self._programme = ProgrammeRun(
@@ -441,22 +253,18 @@ class LocalStation(OwnedLog):
         )
 
     def programme(self) -> dict[str, Any] | None:
-        """Where this station's programme is, as JSON has it; None where it started none."""
         return None if self._programme is None else self._programme.state()
 
     def answer_programme(self) -> None:
-        """Answer the programme's request as done."""
         if self._programme is None:
             raise UsageError("no programme is under way")
         self._programme.answer()
 
     def end_programme(self) -> None:
-        """End this station's programme by a ramp; returns at rest."""
         if self._programme is not None:
             self._programme.end()
 
     def cell(self, task: str, name: str, *arguments: Any) -> dict[str, Any]:
-        """Something with an instrument by name."""
         return do(self._bench.cells, task, name, *arguments)
 
     def close(self) -> None:

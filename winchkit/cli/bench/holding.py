@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from winchkit.bench.remote.station import Station
+    from winchkit.bench.remote.operations import Station
 
 
 def hold_on(station: Station, winch: str | None, duration: float) -> None:

@@ -31,7 +31,7 @@ from winchkit.errors import NotPermitted, UsageError
 
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
-    from winchkit.bench.remote.station import Station
+    from winchkit.bench.remote.operations import Station
 
 _SPEED = "0.05 m/s"
 _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"

@@ -20,7 +20,7 @@ from winchkit.errors import ConnectionLost, MotionError, WinchkitError, printabl
 
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
-    from winchkit.bench.remote.station import Station
+    from winchkit.bench.remote.operations import Station
 
 _ARROWS = {"\x1b[A": "up", "\x1b[B": "down", "\x1bOA": "up", "\x1bOB": "down"}
 _WINDOWS_ARROWS = {"H": "up", "P": "down"}

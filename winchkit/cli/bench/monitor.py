@@ -19,7 +19,7 @@ from winchkit.errors import one_line
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from winchkit.bench.remote.station import Station
+    from winchkit.bench.remote.operations import Station
 
 
 @click.command(
@@ -64,7 +64,7 @@ def command(*, bench: str, period: str, duration: str | None, as_json: bool) -> 
 
 def _print_lines(bench: str, pause: float, end: float | None) -> None:
     """A picture a line as JSON."""
-    from winchkit.bench.remote.reconnection import watch
+    from winchkit.bench.remote.session import watch
 
     def show(station: Station) -> None:
         echo_json(station.status())
@@ -78,7 +78,7 @@ def _show_table(bench: str, pause: float, end: float | None) -> None:
     """A live table; empty while no process owns the bench."""
     from rich.text import Text
 
-    from winchkit.bench.remote.reconnection import watch
+    from winchkit.bench.remote.session import watch
 
     with live_table(Text("connecting\n"), auto_refresh=True) as live:
 

@@ -25,7 +25,7 @@ from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
     from winchkit.bench.direction import DirectionKeyword
-    from winchkit.bench.remote.station import Station
+    from winchkit.bench.remote.operations import Station
 
 _POLL = 0.05
 """s between two looks at a move; it delays the end of the command only."""

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from winchkit.bench.emergency_stop import Stopped
     from winchkit.schema.bench import BenchSpec
 
-_PATIENCE = 3.0
+_TIMEOUT = 3.0
 """With the owner, before the bus itself is used, s."""
 _BY_OWNER = "the bench's owner confirms it at rest"
 
@@ -51,7 +51,7 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
         return
     mark_stop(spec)
     try:
-        station = attach(spec, patience=_PATIENCE, name=client_name("stop"))
+        station = attach(spec, timeout=_TIMEOUT, name=client_name("stop"))
         if station is not None:
             station.stop()
             station.close()

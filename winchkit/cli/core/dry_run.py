@@ -17,7 +17,7 @@ from winchkit.cli.core.output import echo_json
 from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
-    from winchkit.bench.remote.station import Station
+    from winchkit.bench.remote.operations import Station
     from winchkit.drivers.can.tools.decode import Decoded, KnownNode
     from winchkit.schema.bench import BenchSpec
     from winchkit.schema.simbench import SimBench

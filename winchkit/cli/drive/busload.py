@@ -31,7 +31,7 @@ def command(ctx: click.Context, bench: str, as_json: bool) -> None:
     than 70 % of a bus, the rest is for SDO, emergencies and repeats. Opens nothing. Ends with 1
     when a bus carries more than that.
     """
-    from winchkit.bench.drives.bus_load import loads
+    from winchkit.bench.drives.calls import loads
     from winchkit.drivers.can.bus.load import ADVISED
     from winchkit.schema.read import read_bench
 

@@ -67,7 +67,7 @@ def _units_of(servo: ServoSpec) -> str:
 
 def _not_commissioned(spec: BenchSpec) -> list[Fault]:
     """Items of the commissioning record that are not valid, of a bench with real drives."""
-    from winchkit.bench.commissioning.validity import is_simulated, stale_items
+    from winchkit.bench.commissioning.record import is_simulated, stale_items
 
     if is_simulated(spec):
         return []

@@ -18,7 +18,7 @@ _SHOWN = 12
 def describe_eds(path: Path) -> tuple[DriveDescription, tuple[Fault, ...]]:
     """Facts in an EDS on its drive, with the warnings of its text; raises FileError."""
     from winchkit.drivers.can.canopen.description import describe
-    from winchkit.drivers.can.canopen.eds import read_eds
+    from winchkit.drivers.can.canopen.node import read_eds
 
     dictionary, warnings = read_eds(path, 1)
     return describe(dictionary), warnings

@@ -24,7 +24,7 @@ from winchkit.errors import UsageError, WinchkitError
 if TYPE_CHECKING:
     from winchkit.bench.cells.cell_log import CellStation
     from winchkit.bench.recording.live_sinks import LiveSink
-    from winchkit.bench.remote.station import Station
+    from winchkit.bench.remote.operations import Station
 
 COMMANDS = {
     "decode": At("winchkit.cli.log.decode", "Print a trace of CAN frames in words."),
@@ -139,7 +139,7 @@ def command(
 
 def _follow(bench: str, log: _Log, effects: Sequence[str]) -> None:
     """Log at the owner of a bench, or the instruments of a bench that has only these."""
-    from winchkit.bench.remote.reconnection import watch
+    from winchkit.bench.remote.session import watch
     from winchkit.schema.read import read_bench
 
     spec = read_bench(bench)

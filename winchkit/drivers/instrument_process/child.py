@@ -20,17 +20,17 @@ from contextlib import suppress
 from typing import Any, NoReturn
 
 from winchkit.drivers.clock import MonotonicClock
-from winchkit.drivers.instrument_process.lines import Line, line_of
 from winchkit.drivers.instrument_process.messages import (
     COUNTS,
+    InstrumentState,
     Kind,
     Messages,
     RawReading,
-    State,
     json_message,
     message,
     reading_message,
 )
+from winchkit.drivers.instrument_process.process import Line, line_of
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.publisher import Publisher, Sampled
 from winchkit.drivers.reading import Quality, Reading, Sensor
@@ -107,7 +107,7 @@ class _Reporter:
         self._instruments, self._out = instruments, out
         self._serving = threading.Event()
         self._loop: asyncio.AbstractEventLoop
-        self._known: list[State | None] = [None] * len(instruments)
+        self._known: list[InstrumentState | None] = [None] * len(instruments)
         self._bench = os.getppid()
         for number, instrument in enumerate(instruments):
             instrument.publisher = _Forwarding(
@@ -158,7 +158,7 @@ class _Reporter:
 
     def _state(self, number: int, instrument: Instrument | StreamInstrument) -> None:
         problem = instrument.problem
-        state = State(
+        state = InstrumentState(
             None if problem is None else _words(problem),
             instrument.tared,
             instrument.period,

@@ -60,7 +60,7 @@ class RawReading(NamedTuple):
     when: Sampled
 
 
-class State(NamedTuple):
+class InstrumentState(NamedTuple):
     """State of an instrument beside its readings."""
 
     problem: tuple[str, str] | None

@@ -8,7 +8,7 @@ from concurrent.futures import Future, wait
 from typing import Any, Protocol
 
 from winchkit.drivers.clock import Clock
-from winchkit.drivers.instrument_process.messages import COUNTS, State
+from winchkit.drivers.instrument_process.messages import COUNTS, InstrumentState
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.publisher import InstrumentReadings
 from winchkit.drivers.reading import Sensor
@@ -17,7 +17,7 @@ from winchkit.errors import ConnectionLost, error_of
 
 _LOOK = 0.1
 """Between two looks at whether the process still responds to a request, s."""
-_PATIENCE = 1.0
+_TIMEOUT = 1.0
 """A process may be silent for so long before a request to it is given up, s."""
 _SILENCE = 0.1
 """The process sends at least every 0.04 s: one that was silent for longer does not respond, s."""
@@ -60,7 +60,7 @@ class SeparateInstrument(InstrumentReadings):
         # Before the reading is stale, so that the trip has its reason.
         return self._serving.trouble(min(_SILENCE, self.max_age / 2)) or self._problem
 
-    def show(self, state: State) -> None:
+    def show(self, state: InstrumentState) -> None:
         """Take what it shows beside its readings."""
         error = None if state.problem is None else error_of(*state.problem)
         self._problem = error if isinstance(error, ConnectionLost) else None
@@ -132,7 +132,7 @@ class SeparateLine:
 
     def _require_life(self, *, answered: bool) -> None:
         """Raise why an answer that is outstanding cannot come."""
-        trouble = None if answered else self._serving.trouble(_PATIENCE)
+        trouble = None if answered else self._serving.trouble(_TIMEOUT)
         if trouble is not None:
             raise trouble
 

@@ -7,13 +7,14 @@ import asyncio
 from winchkit.drivers.clock import Clock
 from winchkit.drivers.device_command import confirm, permitted_command
 from winchkit.drivers.modbus.client import ModbusClient
-from winchkit.drivers.modbus.commands import identity, send
+from winchkit.drivers.modbus.decoder import number_of, words_of
 from winchkit.drivers.modbus.instrument import Instrument
 from winchkit.drivers.modbus.timing import exchange, silence_of, wire_times
 from winchkit.drivers.reading import Sensor
 from winchkit.drivers.sharing import RECONNECT, LineShare, next_of
 from winchkit.errors import ConnectionLost
 from winchkit.schema.bench import BusSpec
+from winchkit.schema.devices.modbus import REGISTERS, CommandSpec, ReadBlock
 
 _OPENING, _POLL = 1.0, 0.01
 """s that a command waits for a line that is being opened, a few attempts to connect; and between
@@ -158,3 +159,27 @@ class ModbusLine:
                 wire_times(item.decoder.spec, self._spec),
                 tagged=tagged,
             )
+
+
+async def send(client: ModbusClient, instrument: Instrument, command: CommandSpec) -> None:
+    """Unlock and write; raises NoReply, DeviceRefused, ConnectionLost."""
+    many = command.writes_many
+    for step in command.unlock:
+        await client.write(instrument.unit, step.register, [step.value], many=many)
+    words = words_of(command.type, command.order, command.value)
+    await client.write(instrument.unit, command.register, words, many=many)
+
+
+async def identity(client: ModbusClient, instrument: Instrument) -> dict[str, float]:
+    """What a device says of itself, e.g. its serial number; raises as :func:`send`."""
+    found: dict[str, float] = {}
+    spec = instrument.decoder.spec
+    for item in spec.identity:
+        count = REGISTERS[item.type]
+        block = ReadBlock(item.register, count, spec.read.function, fixed=True)
+        words = await instrument.ask(client, block)
+        number = number_of(
+            item.type, item.order, dict(enumerate(words, item.register)), block.start
+        )
+        found[item.name] = number * item.scale
+    return found

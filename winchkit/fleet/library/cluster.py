@@ -24,7 +24,7 @@ _AHEAD = 4
 """Tasks per worker that the scheduler holds: its memory does not grow with the library."""
 _LOSSES = 3
 """Lost workers after which a task counts as the cause and fails."""
-_PATIENCE = 30.0
+_TIMEOUT = 30.0
 """s: a scheduler answers at once, and workers of a cluster that is starting come within it."""
 _LOOK = 1.0
 """s between two looks at the workers."""
@@ -67,15 +67,15 @@ def cluster_outcomes(
                 yield from _outcomes(client, due, work)
             return
         try:
-            client = distributed.Client(scheduler, timeout=_PATIENCE, set_as_default=False)
+            client = distributed.Client(scheduler, timeout=_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ConnectionLost(f"{scheduler}: no Dask scheduler answers ({error})") from None
         with client:
             try:
-                client.wait_for_workers(1, timeout=_PATIENCE)
+                client.wait_for_workers(1, timeout=_TIMEOUT)
             except TimeoutError:
                 raise ConnectionLost(
-                    f"{scheduler}: has no workers after {_PATIENCE:g} s; start one with "
+                    f"{scheduler}: has no workers after {_TIMEOUT:g} s; start one with "
                     f"'dask worker {scheduler}'"
                 ) from None
             _require_version(client, scheduler)
@@ -133,7 +133,7 @@ def _outcomes(
                 if not deserted.is_set():
                     raise
                 raise ConnectionLost(
-                    f"the cluster has had no workers for {_PATIENCE:g} s; what was diagnosed is "
+                    f"the cluster has had no workers for {_TIMEOUT:g} s; what was diagnosed is "
                     "kept: look at the memory of its computers and repeat the command"
                 ) from None
             # Not before: a result whose worker is lost is computed again, or given up.
@@ -171,7 +171,7 @@ def _watched(client: Any, give_up: Callable[[], object]) -> Iterator[threading.E
             with suppress(OSError):  # the scheduler does not answer
                 there = client.scheduler_info(n_workers=-1)["workers"]
             alone = 0.0 if there else alone + _LOOK
-            if alone >= _PATIENCE:
+            if alone >= _TIMEOUT:
                 deserted.set()
                 give_up()
                 return

@@ -96,7 +96,7 @@ _OF_PLATFORM = {f"platform_{axis}": ("m", 1.0) for axis in "xyz"} | {
 
 
 @dataclass(frozen=True)
-class Reading:
+class AxisLabel:
     """Name and unit of a variable on an axis."""
 
     name: str
@@ -122,26 +122,26 @@ class Reading:
 
 
 _WITH_A_SIGN = {
-    "direction": Reading(
+    "direction": AxisLabel(
         "direction", "", categories=((-1.0, "paying out"), (0.0, "at rest"), (1.0, "winding in"))
     ),
-    "directed_length": Reading("free length, winding in; negative: paying out", "m"),
+    "directed_length": AxisLabel("free length, winding in; negative: paying out", "m"),
 }
 
 
-def reading(variable: str, *, within_turn: bool = False) -> Reading:
+def reading(variable: str, *, within_turn: bool = False) -> AxisLabel:
     """Unit and name of a variable; an angle within its turn in degrees, else in turns."""
     name = VARIABLE_NAMES.get(variable, variable.replace("_", " "))
     if variable in ANGLES and within_turn:
-        return Reading(f"{name} within its turn", "°", _TURN / _DEGREES)
+        return AxisLabel(f"{name} within its turn", "°", _TURN / _DEGREES)
     if variable in ANGLES:
-        return Reading(name, "turns", _TURN)
+        return AxisLabel(name, "turns", _TURN)
     if variable == "reversal_distance":
-        return Reading(name, "m", logarithmic=True)
+        return AxisLabel(name, "m", logarithmic=True)
     if variable in _WITH_A_SIGN:
         return _WITH_A_SIGN[variable]
     if variable in _OF_PLATFORM:
         unit, worth = _OF_PLATFORM[variable]
-        return Reading(name, unit, worth)
+        return AxisLabel(name, unit, worth)
     unit = {"degC": "°C", "1": ""}.get(own := VARIABLE_UNITS.get(variable, ""), own)
-    return Reading(name, unit)
+    return AxisLabel(name, unit)

@@ -9,7 +9,7 @@ import numpy as np
 from winchkit.diagnosis.residuals.maps import ResidualMap, residual_maps, same_cells
 from winchkit.model.variables import ANGLES
 from winchkit.quantity_text import Scale, percent
-from winchkit.report.figures.axes import Reading, reading
+from winchkit.report.figures.axes import AxisLabel, reading
 from winchkit.report.figures.figure import Cells, Figure, Panel
 from winchkit.report.figures.layout import signed_levels
 from winchkit.report.figures.residuals import Residuals
@@ -29,7 +29,7 @@ def map_text(drawn: ResidualMap, scale: Scale) -> str:
     return f"over {names} {share}, most {signed(mean, scale)} at {', '.join(places)}"
 
 
-def map_reading(variable: str) -> Reading:
+def map_reading(variable: str) -> AxisLabel:
     """Axis text of a map's variable; an angle is taken within its turn."""
     return reading(variable, within_turn=variable in ANGLES)
 
@@ -38,7 +38,7 @@ def _name(variable: str) -> str:
     return VARIABLE_NAMES.get(variable, variable.replace("_", " "))
 
 
-def _place(how: Reading, value: float) -> str:
+def _place(how: AxisLabel, value: float) -> str:
     return Scale(how.unit, 1.0).text(float(how.shown(value)), 2)
 
 

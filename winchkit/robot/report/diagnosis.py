@@ -12,7 +12,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.profile_edit.naming import extended_name
 from winchkit.quantity_text import scale_for
-from winchkit.report.figures.axes import Reading, reading
+from winchkit.report.figures.axes import AxisLabel, reading
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
 from winchkit.report.figures.ladder import error_ladder, present
 from winchkit.report.figures.unexplained import unexplained_figures
@@ -145,7 +145,7 @@ def _caption(trace: Trace, noise: float | None) -> str:
     return f"{capital(text)}. Points are poses, lines their means.{band}"
 
 
-def _axis(trace: Trace, how: Reading) -> Axis:
+def _axis(trace: Trace, how: AxisLabel) -> Axis:
     if trace.over.variable == "winch":
         last = float(trace.x.max())
         names = tuple((float(n), str(n)) for n in range(1, int(last) + 1))

@@ -21,7 +21,7 @@ from winchkit.sim.plant.servo import DriveCommand
 
 _STANDSTILL = 0.05
 """Speed below which a ramp has ended, rad/s."""
-_PATIENCE = 0.5
+_TIMEOUT = 0.5
 """Longest wait for standstill after the ramp of a stop, s."""
 _HOLD, _BRAKED, _FREE = DriveCommand(), DriveCommand.off(brake=True), DriveCommand.off(brake=False)
 
@@ -101,7 +101,7 @@ class Motion:
 
     def stop_is_over(self, speed: float) -> bool:
         """Whether a stop has ended, or its time-out has passed: a load may turn the motor."""
-        return self.at_rest(speed) or (self.stopping and self._stood > _PATIENCE)
+        return self.at_rest(speed) or (self.stopping and self._stood > _TIMEOUT)
 
     def _begin(self, angle: float) -> None:
         """Start the set-points at the present speed and an angle."""

@@ -8,7 +8,7 @@ from typing import Protocol
 from winchkit.sim.plant.servo import DriveCommand
 
 
-class Reading(Protocol):
+class ShaftReading(Protocol):
     """Readings of the drive's sensors with noise, SI."""
 
     @property
@@ -38,7 +38,7 @@ class Shaft(Protocol):
     def advance(self, duration: float, command: DriveCommand) -> None:
         """Advance by ``duration`` s under one command."""
 
-    def measure(self) -> Reading:
+    def measure(self) -> ShaftReading:
         """Read the sensors."""
 
 

@@ -8,7 +8,7 @@ from math import nan
 from winchkit.errors import UsageError
 from winchkit.schema.devices.stream import AskSpec, StreamSpec
 from winchkit.sim.instruments.instrument import SimulatedInstrument
-from winchkit.sim.instruments.stream_frames import Speech, State, example_unit
+from winchkit.sim.instruments.stream_frames import IndicatorState, Speech, example_unit
 from winchkit.units import convert, dimension_of, factor
 
 
@@ -158,7 +158,7 @@ class StreamInstrument(SimulatedInstrument):
         self._old = True
         return self._speech.frame(self._state())
 
-    def _state(self) -> State:
+    def _state(self) -> IndicatorState:
         """State of the conversion that is shown."""
         shown = self._shown
         gross = self.gross
@@ -166,7 +166,7 @@ class StreamInstrument(SimulatedInstrument):
         over = shown.overload or (capacity is not None and abs(gross) > capacity)
         if over or shown.broken:
             gross = nan
-        return State(
+        return IndicatorState(
             gross - self._tare,
             gross,
             self._converter.motion,

@@ -122,7 +122,7 @@ _IN_BITS: tuple[Says, ...] = ("overload", "underload", "fault", "unstable", "sta
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class IndicatorState:
     """State of an instrument, in the unit of its frames."""
 
     net: float
@@ -159,13 +159,13 @@ class Speech:
         found = [text for text, says in self._spec.replies.items() if says in wanted]
         return found[0].replace("*", " ").strip() if found else None
 
-    def status(self, state: State, *, old: bool) -> bytes:
+    def status(self, state: IndicatorState, *, old: bool) -> bytes:
         """The reply to the request for the presence of a new value."""
         assert self._spec.fresh is not None, "called only where the device file has the request"
         bits = self._bits(self._truths(state)) | self._bit("stale", old)
         return self.line(self._spec.fresh.frame.replace("{bits}", str(bits)))
 
-    def frame(self, state: State) -> bytes:
+    def frame(self, state: IndicatorState) -> bytes:
         """The frame with the state."""
         truths = self._truths(state)
         if self._spec.binary is not None:
@@ -179,7 +179,9 @@ class Speech:
             line = line[:-1] + ("0" if line[-1] != "0" else "1")
         return self.line(line)
 
-    def _fields(self, state: State, truths: dict[Says, bool], said: Says | None) -> dict[str, str]:
+    def _fields(
+        self, state: IndicatorState, truths: dict[Says, bool], said: Says | None
+    ) -> dict[str, str]:
         fields = self._status(truths)
         net = abs(state.net) if self._can_say("negative") else state.net
         tare = state.gross - state.net
@@ -215,7 +217,7 @@ class Speech:
         text = style_of(self._example[name], width).write(number)
         return text if text is not None else "-" * (width or 0)
 
-    def _binary(self, state: State, truths: dict[Says, bool]) -> bytes:
+    def _binary(self, state: IndicatorState, truths: dict[Says, bool]) -> bytes:
         layout = self._spec.binary
         assert layout is not None, "called for a binary frame"
         first, size = layout.value
@@ -228,7 +230,7 @@ class Speech:
             frame[layout.bits] = self._bits(truths) | self._bit("overload", clipped != counts)
         return bytes(frame) + self._spec.terminator.encode("latin-1")
 
-    def _truths(self, state: State) -> dict[Says, bool]:
+    def _truths(self, state: IndicatorState) -> dict[Says, bool]:
         """Meanings that are true for the shown conversion."""
         alarm = state.overload or state.broken
         stable = state.motion < _STABLE_DIGITS * self._one_digit()

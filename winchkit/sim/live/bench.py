@@ -11,6 +11,7 @@ from functools import partial
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
+from typing import Any, Protocol
 
 from winchkit import wings
 from winchkit.errors import NotPermitted, UsageError, suggest
@@ -22,12 +23,34 @@ from winchkit.sim.bench import hiding, profiles_of
 from winchkit.sim.clock.can_bus import SimulatedCanBus
 from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.live.bench_file import write_bench
-from winchkit.sim.live.buses import CanPort, Interface, Wire, wired
-from winchkit.sim.live.lines import Line, Placed, open_line
-from winchkit.sim.live.real_time import TICK, serve
-from winchkit.sim.live.robot import SimulatedRobot
+from winchkit.sim.live.buses import TICK, CanPort, Interface, Wire, serve, wired
+from winchkit.sim.live.instruments import Line, Placed, open_line
 from winchkit.sim.live.winch import LiveWinch
 from winchkit.sim.plant.hanging_load import Load
+
+
+class SimulatedRobot(Protocol):
+    """A platform, the ends of its cables, and its tracker; not thread-safe."""
+
+    platform: Any
+    """With ``position``, (3,), m, and ``count`` of cables."""
+    profiles: Mapping[str, WinchProfile]
+    """By winch, with the unstrained cable length at home as their reference."""
+    truth: Mapping[str, WinchTruth]
+    """By winch."""
+    on_pose: Callable[[bytes], None] | None
+    """Called with each datagram of the tracker, also in simulated time."""
+
+    @property
+    def ends(self) -> Mapping[str, Load]:
+        """End of each winch's cable."""
+
+    def advance(self, now: float) -> None:
+        """Let the tracker measure and send at a time (s)."""
+
+    def close(self) -> None:
+        """Close its socket."""
+
 
 _OVERRUN = 0.02
 """Lateness of a tick from which it is counted, s."""

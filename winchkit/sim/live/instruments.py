@@ -1,17 +1,24 @@
-"""Simulated instruments of a winch by role, as their device files declare them."""
+"""Simulated instruments of a winch by role, and the lines on which they answer."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 from winchkit.catalog import find
-from winchkit.errors import FileError
-from winchkit.schema.bench import DeviceRef, WinchWiring
+from winchkit.errors import FileError, UsageError
+from winchkit.schema.bench import BusSpec, DeviceRef, WinchWiring
 from winchkit.schema.devices.device import DeviceSpec
+from winchkit.sim.clock.serial_line import SimulatedSerialLine
+from winchkit.sim.clock.simulated_clock import SimulatedClock
 from winchkit.sim.instruments.modbus import ModbusInstrument, in_unit_of
+from winchkit.sim.instruments.modbus_line import ModbusLine
 from winchkit.sim.instruments.process import ProcessInstrument
 from winchkit.sim.instruments.stream import StreamInstrument, shown_by
+from winchkit.sim.instruments.stream_line import StreamLine
 from winchkit.units import dimension_of, factor
 
 Instrument = ModbusInstrument | StreamInstrument | ProcessInstrument
@@ -63,3 +70,61 @@ def _instrument(
             spec, path.parent / spec.eds, ref.node, lambda: measure() / size, send, now=now
         )
     raise FileError(f"{path}: '{ref.device}' is not an instrument that can be simulated here")
+
+
+Line = ModbusLine | StreamLine | SimulatedSerialLine
+
+
+class Placed(NamedTuple):
+    """An instrument and its address on a bus."""
+
+    where: str
+    """Winch and role, for messages."""
+    ref: DeviceRef
+    instrument: Instrument
+
+
+def open_line(
+    bus: BusSpec,
+    placed: Iterable[Placed],
+    up_to_date: Callable[[], AbstractContextManager[None]],
+    time: Callable[[], float] | SimulatedClock,
+) -> tuple[Line, BusSpec]:
+    """Serve the instruments of one bus; returns the line, and the bus for the user.
+
+    Modbus is served over TCP whatever the declaration has, a serial line at a pseudo-terminal; in
+    simulated time, where ``time`` is such a clock, both are within the process. Raises UsageError
+    where two instruments share an address, ConnectionLost where the bus cannot be served.
+    """
+    instruments = list(placed)
+    _refuse_shared(instruments)
+    if bus.kind == "serial":
+        streams = [
+            one.instrument for one in instruments if isinstance(one.instrument, StreamInstrument)
+        ]
+        stream_line = (
+            SimulatedSerialLine(streams, up_to_date, time)
+            if isinstance(time, SimulatedClock)
+            else StreamLine(streams, up_to_date, time)
+        )
+        stream_line.start()
+        return stream_line, replace(bus, port=stream_line.port)
+    units = {
+        one.ref.unit: one.instrument
+        for one in instruments
+        if isinstance(one.instrument, ModbusInstrument) and one.ref.unit is not None
+    }
+    clock = time if isinstance(time, SimulatedClock) else None
+    modbus_line = ModbusLine(units, up_to_date, clock=clock)
+    modbus_line.start()
+    host, port = modbus_line.address
+    return modbus_line, BusSpec("modbus-tcp", host=host, port=port, timeout=bus.timeout)
+
+
+def _refuse_shared(instruments: list[Placed]) -> None:
+    taken: set[int | None] = set()
+    for one in instruments:
+        alone = isinstance(one.instrument, StreamInstrument) and len(instruments) == 1
+        if one.ref.unit in taken or (one.ref.unit is None and not alone):
+            raise UsageError(f"{one.where} needs a unit of its own on the bus '{one.ref.bus}'")
+        taken.add(one.ref.unit)

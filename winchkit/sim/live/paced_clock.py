@@ -7,7 +7,7 @@ import time
 
 _SLACK = 0.008
 """s: two cycles of 4 ms; a drive then reacts to the host's silence as late as a real one would."""
-_PATIENCE = 1.0
+_TIMEOUT = 1.0
 """s: a participant without a report is ended; a suspension by the scheduler is shorter."""
 _NAP = 1e-3
 """s: resolution of the sleeps."""
@@ -57,7 +57,7 @@ class PacedClock:
     def _advance(self) -> float:
         wall = time.monotonic()
         wanted = self._time + wall - self._wall
-        waiting = [at for at, seen in self._beats.values() if wall - seen < _PATIENCE]
+        waiting = [at for at, seen in self._beats.values() if wall - seen < _TIMEOUT]
         allowed = min((at + self._slack for at in waiting), default=wanted)
         reached = max(self._time, min(wanted, allowed))
         self._time, self._wall = reached, wall

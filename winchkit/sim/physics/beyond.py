@@ -28,7 +28,6 @@ class FiveCornerDrum(Physics):
     size: ClassVar[str] = "amplitude"
 
     def wound_length(self, state: State) -> tuple[float, float]:
-        """Sine of a multiple of the drum angle."""
         angle = self.order * state.drum_angle
         return self.amplitude * sin(angle), self.amplitude * self.order * cos(angle)
 
@@ -44,7 +43,6 @@ class TorqueCrosstalk(Physics):
     size: ClassVar[str] = "per_torque"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Add the crosstalk."""
         return reading + self.per_torque * sin(2 * pi * self.wave * state.motor_torque)
 
 
@@ -58,7 +56,6 @@ class TemperatureCrosstalk(Physics):
     size: ClassVar[str] = "swing"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Add a sine of the temperature."""
         return reading + self.swing * sin(2 * pi * state.temperature / self.period)
 
 
@@ -107,5 +104,4 @@ class WanderingLength(Physics):
     size: ClassVar[str] = "amplitude"
 
     def length_signal(self, state: State, reading: float, dt: float) -> float:
-        """Add a slow sine of time."""
         return reading + self.amplitude * sin(2 * pi * state.time / self.period)

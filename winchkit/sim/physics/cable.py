@@ -32,7 +32,6 @@ class ElasticCable(Physics):
     inverse: ClassVar[bool] = True
 
     def compliance(self, state: State) -> float:
-        """Stressed length over EA."""
         return (state.unstrained + state.dead_length) / self.axial_stiffness
 
 
@@ -45,7 +44,6 @@ class SoftFrame(Physics):
     inverse: ClassVar[bool] = True
 
     def compliance(self, state: State) -> float:
-        """Inverse of the stiffness."""
         return 1.0 / self.stiffness
 
 
@@ -57,7 +55,6 @@ class WarmCable(Physics):
     size: ClassVar[str] = "expansion"
 
     def stretch(self, state: State, dt: float) -> float:
-        """Thermal strain of the stressed length."""
         strain = self.expansion * (state.temperature - _WARM)
         return strain * (state.unstrained + state.dead_length)
 
@@ -110,7 +107,6 @@ class HeavyCable(Physics):
     size: ClassVar[str] = "mass_per_length"
 
     def weight(self, state: State) -> float:
-        """Weight of the free cable along its slope."""
         return self.mass_per_length * GRAVITY * state.unstrained * sin(state.inclination)
 
 
@@ -123,5 +119,4 @@ class LoadLever(Physics):
     size: ClassVar[str] = "amplitude"
 
     def weight(self, state: State) -> float:
-        """Change of the load by the angle of the lever."""
         return state.load * self.amplitude * sin(state.drum_angle + self.phase)

@@ -20,7 +20,6 @@ class StretchedCell(Physics):
     size: ClassVar[str] = "gain_error"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Scale the reading."""
         return reading * (1.0 + self.gain_error)
 
 
@@ -32,7 +31,6 @@ class ShiftedCell(Physics):
     size: ClassVar[str] = "offset"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Shift the reading."""
         return reading + self.offset
 
 
@@ -44,7 +42,6 @@ class BentCell(Physics):
     size: ClassVar[str] = "quadratic"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Add a square of the tension."""
         return reading + self.quadratic * (state.tension / 500.0) ** 2
 
 
@@ -56,7 +53,6 @@ class DriftingCell(Physics):
     size: ClassVar[str] = "drift"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Add a ramp since the start."""
         return reading + self.drift * state.time
 
 
@@ -68,7 +64,6 @@ class WarmCell(Physics):
     size: ClassVar[str] = "sensitivity"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Add the thermal shift."""
         return reading + self.sensitivity * (state.temperature - 20.0)
 
 
@@ -97,7 +92,6 @@ class ClippingCell(Physics):
     size: ClassVar[str] = "share"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Take a share away of the reading above the limit."""
         return reading - self.share * max(0.0, reading - self.limit)
 
 
@@ -110,7 +104,6 @@ class LeakingCurrent(Physics):
     size: ClassVar[str] = "share"
 
     def cell(self, state: State, reading: float, dt: float) -> float:
-        """Add a share of the motor torque."""
         return reading + self.share * state.motor_torque
 
 

@@ -47,7 +47,6 @@ class MotorDrag(Physics):
     size: ClassVar[str] = "torque"
 
     def motor(self, state: State) -> float:
-        """Coulomb friction."""
         return motor_direction(state) * self.torque
 
 
@@ -59,7 +58,6 @@ class MotorGrease(Physics):
     size: ClassVar[str] = "viscosity"
 
     def motor(self, state: State) -> float:
-        """Torque proportional to speed."""
         return self.viscosity * state.motor_speed
 
 
@@ -71,7 +69,6 @@ class OneWayGrease(Physics):
     size: ClassVar[str] = "viscosity_difference"
 
     def motor(self, state: State) -> float:
-        """Torque proportional to the magnitude of the speed."""
         return self.viscosity_difference * abs(state.motor_speed)
 
 
@@ -84,7 +81,6 @@ class MotorStiction(Physics):
     size: ClassVar[str] = "torque"
 
     def motor(self, state: State) -> float:
-        """Torque that decreases with the square of the speed."""
         fall = exp(-((state.motor_speed / self.stribeck_speed) ** 2))
         return motor_direction(state) * self.torque * fall
 
@@ -100,7 +96,6 @@ class PreslidingMotor(Physics):
     _angle: float | None = None
 
     def motor(self, state: State) -> float:
-        """Dahl friction after the travel since the last step."""
         travel = 0.0 if self._angle is None else state.motor_angle - self._angle
         slope = self.torque / self.distance
         self._force = relax(self._force, travel, self.torque, slope, 1.0)
@@ -118,7 +113,6 @@ class Cogging(Physics):
     size: ClassVar[str] = "amplitude"
 
     def motor(self, state: State) -> float:
-        """Sine of the motor angle."""
         return self.amplitude * sin(self.order * state.motor_angle + self.phase)
 
 
@@ -132,7 +126,6 @@ class RippledMotor(Physics):
     size: ClassVar[str] = "amplitude"
 
     def torque_signal(self, state: State, reading: float, dt: float) -> float:
-        """Scale the torque by a sine of the motor angle."""
         return reading * (1.0 + self.amplitude * sin(self.order * state.motor_angle + self.phase))
 
 
@@ -145,7 +138,6 @@ class UnbalancedDrum(Physics):
     size: ClassVar[str] = "amplitude"
 
     def motor(self, state: State) -> float:
-        """Sine of the drum angle."""
         return self.amplitude * sin(state.drum_angle + self.phase)
 
 
@@ -165,7 +157,6 @@ class Balancer(Physics):
     size: ClassVar[str] = "stiffness"
 
     def motor(self, state: State) -> float:
-        """Torque linear in the drum angle."""
         return self.stiffness * state.drum_angle + self.torque
 
 
@@ -177,7 +168,6 @@ class GrowingDrag(Physics):
     size: ClassVar[str] = "rate"
 
     def motor(self, state: State) -> float:
-        """Coulomb friction in proportion to the time since the start."""
         return motor_direction(state) * self.rate * state.time
 
 
@@ -191,7 +181,6 @@ class RoughPlace(Physics):
     size: ClassVar[str] = "torque"
 
     def motor(self, state: State) -> float:
-        """Coulomb friction times a Gaussian window over the drum angle."""
         distance = (state.drum_angle - self.place) / self.width
         return motor_direction(state) * self.torque * exp(-distance * distance)
 
@@ -204,11 +193,9 @@ class HeavyRotor(Physics):
     size: ClassVar[str] = "inertia"
 
     def rotor_inertia(self) -> float:
-        """The inertia itself."""
         return self.inertia
 
     def motor(self, state: State) -> float:
-        """Torque proportional to acceleration."""
         return self.inertia * state.motor_acceleration
 
 
@@ -220,7 +207,6 @@ class WeakMotor(Physics):
     size: ClassVar[str] = "gain_error"
 
     def torque_signal(self, state: State, reading: float, dt: float) -> float:
-        """Scale the reported torque."""
         return reading * (1.0 + self.gain_error)
 
 

@@ -34,7 +34,6 @@ class StickyPulleys(Physics):
     size: ClassVar[str] = "friction"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Coulomb friction in proportion to the axle load."""
         return _dragged(tension, wrap, winding_direction(state) * self.friction)
 
 
@@ -49,7 +48,6 @@ class PreslidingPulleys(Physics):
     _force: dict[int, float] = field(default_factory=dict)
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Dahl force with the sliding force of the present axle load."""
         force = self._force.get(index, 0.0)
         limit = self.friction * pressure(tension, tension + force, wrap)
         force = relax(force, state.winding_speed * dt, limit, self.stiffness, self.shape)
@@ -65,7 +63,6 @@ class ViscousPulleys(Physics):
     size: ClassVar[str] = "viscosity"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Force proportional to speed."""
         return self.viscosity * state.winding_speed
 
 
@@ -79,7 +76,6 @@ class CreepPulleys(Physics):
     size: ClassVar[str] = "static"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Stribeck curve times the axle load."""
         fall = exp(-((state.winding_speed / self.stribeck_speed) ** 2))
         friction = self.coulomb + (self.static - self.coulomb) * fall
         return _dragged(tension, wrap, winding_direction(state) * friction)
@@ -93,5 +89,4 @@ class HeavyPulleys(Physics):
     size: ClassVar[str] = "equivalent_mass"
 
     def pulley(self, state: State, index: int, wrap: float, tension: float, dt: float) -> float:
-        """Force proportional to the cable's acceleration."""
         return self.equivalent_mass * state.winding_acceleration

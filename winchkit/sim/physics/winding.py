@@ -24,7 +24,6 @@ class FatDrum(Physics):
     size: ClassVar[str] = "radius_error"
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
-        """Add the error to the winding radius."""
         radius = profile.drum.winding_radius + self.radius_error
         return replace(profile, drum=replace(profile.drum, winding_radius=radius))
 
@@ -37,7 +36,6 @@ class WrongRatio(Physics):
     size: ClassVar[str] = "ratio_error"
 
     def reshape(self, profile: WinchProfile) -> WinchProfile:
-        """Scale the ratio."""
         ratio = profile.gearbox.ratio * (1 + self.ratio_error)
         return replace(profile, gearbox=replace(profile.gearbox, ratio=ratio))
 
@@ -90,7 +88,6 @@ class GuideOffset(Physics):
         self._distance = profile.guide.distance
 
     def wound_length(self, state: State) -> tuple[float, float]:
-        """Length of the oblique path less that of the straight one."""
         per_radian = self.mismatch / (2 * pi)
         aside = self.offset + per_radian * state.wound_angle
         slant = hypot(self._distance, aside)
@@ -108,11 +105,9 @@ class WavyGear(Physics):
     _ratio: float = 1.0
 
     def begin(self, profile: WinchProfile) -> None:
-        """Take the ratio."""
         self._ratio = profile.gearbox.ratio * profile.gearbox.direction
 
     def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
-        """Sine of the motor angle."""
         angle = self.order * state.motor_angle + self.phase
         slope = self.amplitude * self.order * cos(angle) * self._ratio
         return self.amplitude * sin(angle), slope, 0.0
@@ -154,12 +149,10 @@ class LooseGear(Physics):
     _drum: float | None = None
 
     def begin(self, profile: WinchProfile) -> None:
-        """Read the ratio and the winding radius."""
         self._ratio = profile.gearbox.ratio
         self._radius = profile.drum.winding_radius
 
     def drum_angle(self, state: State, dt: float) -> tuple[float, float, float]:
-        """Play between the gear's output angle and the drum."""
         driven = state.drum_angle
         half = self.gap / 2
         if self._drum is None:
@@ -172,5 +165,4 @@ class LooseGear(Physics):
         return self._drum - driven, -1.0 if inside else 0.0, 0.0
 
     def gear(self, state: State, torque: float) -> float:
-        """Add the friction."""
         return torque + motor_direction(state) * self.drag / self._ratio

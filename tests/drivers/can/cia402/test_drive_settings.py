@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hand_made import SCALE, Objects
-from winchkit.drivers.can.cia402.cycle import set_cycle
+from winchkit.drivers.can.cia402.commission import set_cycle
 from winchkit.drivers.can.cia402.limits import LimitsAtShaft, read_limits, set_limits
 from winchkit.drivers.can.cia402.option_codes import merged, read_options, set_options
 from winchkit.drivers.can.cia402.profile_parameters import HomingSpec, set_homing, set_profile

@@ -181,7 +181,7 @@ def test_polls_come_from_the_control_loop_and_end_with_it() -> None:
 
 @pytest.mark.parametrize("mechanism", ["guarding", "rpdo-timeout"])
 def test_silence_stops_a_drive_while_the_loop_goes_on(mechanism: str) -> None:
-    """The last rung: the control loop runs, SYNC goes on, and what the drive watches ends."""
+    """The last method: the control loop runs, SYNC goes on, and what the drive watches ends."""
     slave = drive()
     with rig(slave) as bench:
         axis = bench.axis(generic(host_loss=mechanism))

@@ -11,7 +11,7 @@ from canopen.objectdictionary import ODRecord
 
 from makers_rig import Host, axis_on, generic, opened
 from slave import Nmt, State
-from winchkit.drivers.can.canopen.communication import set_communication
+from winchkit.drivers.can.cia402.commission import set_communication
 from winchkit.drivers.can.tools.scan import Found, scan
 from winchkit.drivers.clock import MonotonicClock
 from winchkit.errors import ConnectionLost, NotPermitted

@@ -20,13 +20,7 @@ class SeenFrame:
 
 
 class FrameTap:
-    """Collects frames until it expires; cheap, for the threads that send and receive.
-
-    Parameters
-    ----------
-    expires : float
-        Time after which nothing is collected, s.
-    """
+    """Collects frames until ``expires`` (s); cheap, for the threads that send and receive."""
 
     def __init__(self, expires: float) -> None:
         self.expires = expires
@@ -34,17 +28,7 @@ class FrameTap:
         self._newest: dict[int, tuple[int, SeenFrame]] = {}
 
     def take(self, time: float, identifier: int, data: bytes) -> None:
-        """Take a frame.
-
-        Parameters
-        ----------
-        time : float
-            On the bench's clock, s.
-        identifier : int
-            COB-ID.
-        data : bytes
-            At most 8.
-        """
+        """Take a frame at a time on the bench's clock (s)."""
         frame = SeenFrame(time, identifier, data)
         self._last.append(frame)
         before = self._newest.get(identifier)

@@ -22,7 +22,7 @@ from winchkit.drivers.can.canopen.description import (
     host_loss_ways,
     lacking,
 )
-from winchkit.drivers.can.canopen.eds import read_eds
+from winchkit.drivers.can.canopen.node import read_eds
 from winchkit.drivers.can.canopen.pdo import parse_object
 from winchkit.drivers.can.canopen.pdo_parameters import cob_id
 from winchkit.drivers.can.cia402.modes import MODES

@@ -19,8 +19,15 @@ from winchkit.drivers.can.cia402.feedback import (
     Gathering,
     check_feedback,
 )
-from winchkit.drivers.can.cia402.mode_change import change_mode, require_mode
-from winchkit.drivers.can.cia402.modes import MODES, Homing, Target, homing_state, status_words
+from winchkit.drivers.can.cia402.modes import (
+    MODES,
+    Homing,
+    Target,
+    change_mode,
+    homing_state,
+    require_mode,
+    status_words,
+)
 from winchkit.drivers.can.cia402.motor_position import KeptPosition, MotorPosition
 from winchkit.drivers.can.cia402.profile_parameters import (
     HomingSpec,

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from winchkit.drivers.can.canopen.communication import set_communication
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState
 from winchkit.drivers.can.canopen.node import SdoNode
 from winchkit.drivers.can.canopen.pdo import PdoCodec
 from winchkit.drivers.can.canopen.pdo_parameters import codecs, set_up
-from winchkit.drivers.can.cia402.cycle import set_cycle
 from winchkit.drivers.can.cia402.limits import DriveLimits, LimitsAtShaft, set_limits
-from winchkit.drivers.can.cia402.mode_change import change_mode, supported_modes
-from winchkit.drivers.can.cia402.modes import MODES
+from winchkit.drivers.can.cia402.modes import MODES, change_mode, supported_modes
 from winchkit.drivers.can.cia402.option_codes import OptionCode, merged, set_options
 from winchkit.drivers.can.cia402.profile_parameters import keeps_zero, set_profile, set_quick_stop
 from winchkit.drivers.can.cia402.standstill import PolledStandstill
@@ -24,6 +21,118 @@ from winchkit.drivers.can.host_loss.watch import HostWatch
 from winchkit.drivers.clock import Clock
 from winchkit.errors import DeviceRefused, NoReply, NotPermitted
 from winchkit.schema.devices.servo import OptionSpec, ServoSpec
+
+_SYNC, _EMCY = 0x080, 0x080
+_PRODUCES = 1 << 30
+"""Of 1005h: the device sends SYNC itself."""
+_INVALID = 1 << 31
+"""Of 1014h: no EMCY is sent."""
+_IDENTIFIER = 0x1FFFFFFF
+"""Bits 0 to 28 of 1005h and 1014h (CiA 301): CAN-ID, with those of extended frames."""
+
+
+def set_communication(node: SdoNode) -> tuple[str, ...]:
+    """Configure a drive as SYNC consumer and EMCY producer by the predefined connection set.
+
+    Returns what was changed, in words. A drive may lack both objects, or keep them constant.
+    Raises NotPermitted where it goes on sending SYNC or listens to another identifier, NoReply.
+    """
+    return (*_sync(node), *_emergency(node))
+
+
+def _sync(node: SdoNode) -> tuple[str, ...]:
+    kept = node.read_if_there(0x1005)
+    if kept is None or kept & (_PRODUCES | _IDENTIFIER) == _SYNC:
+        return ()
+    place, produces = node.place(0x1005), bool(kept & _PRODUCES)
+    role = "the drive produces SYNC" if produces else "the drive consumes SYNC with another COB-ID"
+    try:
+        if produces:
+            # CiA 301: the identifier does not change while SYNC is produced.
+            node.write(0x1005, 0, kept & ~_PRODUCES)
+        if kept & _IDENTIFIER != _SYNC:
+            node.write(0x1005, 0, _SYNC)
+        now = node.read(0x1005)
+    except DeviceRefused:
+        now = kept
+    if now & (_PRODUCES | _IDENTIFIER) != _SYNC:
+        raise NotPermitted(
+            f"{place} is {kept:X}h: {role} and does not accept 80h; no cyclic mode works with two "
+            "producers of SYNC or another COB-ID; set it in the drive"
+        )
+    return (f"{place} was {kept:X}h: {role}; it is 80h now, until the drive restarts",)
+
+
+def _emergency(node: SdoNode) -> tuple[str, ...]:
+    kept = node.read_if_there(0x1014)
+    wanted = _EMCY + node.node
+    if kept is None or kept & (_INVALID | _IDENTIFIER) == wanted:
+        return ()
+    place = node.place(0x1014)
+    try:
+        node.write(0x1014, 0, kept | _INVALID)
+        node.write(0x1014, 0, wanted | _INVALID)
+        node.write(0x1014, 0, wanted)
+        now = node.read(0x1014)
+    except DeviceRefused:
+        now = kept
+    if now & (_INVALID | _IDENTIFIER) != wanted:
+        return (f"{place} is {kept:X}h and cannot be set to {wanted:X}h: its EMCY is not received",)
+    return (f"{place} was {kept:X}h, EMCY was not received; it is {wanted:X}h now",)
+
+
+_EXPONENTS = (-3, -4, -5, -6, -2)
+"""Of ten in 60C2h:2, ms first as most drives accept it; beside them 0.1 ms, 0.01 ms, µs and 10 ms.
+"""
+_LARGEST = 255
+"""60C2h:1 is an UNSIGNED8."""
+_EXACT = 1e-6
+"""Relative: decimals of a bench file are not exact in binary (1e-16), and a cycle of 1 s is not
+1e-6 off."""
+
+
+def set_cycle(node: SdoNode, cycle: float) -> float | None:
+    """Make 60C2h equal to ``cycle`` (s); returns what the drive keeps, None without a 60C2h.
+
+    A drive may take only some of the exponents by which the same period can be written; that which
+    it has is tried first, as it may be read-only. Raises
+    NotPermitted when it takes none of them, NoReply.
+    """
+    kept = _kept(node)
+    if kept is None or abs(kept - cycle) <= _EXACT * cycle:
+        return kept
+    refusals = []
+    present = node.read(0x60C2, 2)
+    for exponent, value in sorted(_ways(cycle), key=lambda way: way[0] != present):
+        try:
+            if exponent != node.read(0x60C2, 2):
+                node.write_verified(0x60C2, 2, exponent)
+            node.write_verified(0x60C2, 1, value)
+        except DeviceRefused as error:
+            refusals.append(str(error))
+            continue
+        return _kept(node)
+    kept = _kept(node)
+    reason = refusals[-1] if refusals else "a whole number of µs, of 0.1 ms up to 25.5 ms, or of ms"
+    raise NotPermitted(
+        f"{node.place(0x60C2, 1)} cannot hold a cycle of {cycle * 1e3:g} ms, the drive keeps "
+        f"{(kept or 0) * 1e3:g} ms: {reason}; set another `cycle` in the bench file"
+    )
+
+
+def _ways(cycle: float) -> Iterator[tuple[int, int]]:
+    for exponent in _EXPONENTS:
+        value = cycle / 10.0**exponent
+        if 1 <= round(value) <= _LARGEST and abs(value - round(value)) <= _EXACT * value:
+            yield exponent, round(value)
+
+
+def _kept(node: SdoNode) -> float | None:
+    value, exponent = node.read_if_there(0x60C2, 1), node.read_if_there(0x60C2, 2)
+    if value is None or exponent is None:
+        return None
+    return float(value * 10.0**exponent)
+
 
 _START, _PRE_OPERATIONAL = 0x01, 0x80
 """NMT command specifiers "start remote node" and "enter pre-operational" (CiA 301)."""

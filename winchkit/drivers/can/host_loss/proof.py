@@ -16,9 +16,9 @@ from winchkit.drivers.clock import Clock
 from winchkit.errors import NoReply, NotPermitted
 
 _PRE_OPERATIONAL, _START = 0x80, 0x01
-_PATIENCE = 0.4
+_TIMEOUT = 0.4
 """For its answer beyond its limit, s."""
-_GUARDED_PATIENCE = 0.1
+_GUARDED_TIMEOUT = 0.1
 """After which a guarded drive is asked by a poll, s."""
 _SETTLING = 1.0
 """s: for the transition after a fault reset or a quick stop at rest; drives take some tenths."""
@@ -148,12 +148,12 @@ def _await_reaction(
 ) -> Proof:
     """Reaction of the drive; a fault counts where it was ``faultless`` before the silence."""
     clock, asked = mechanism.clock, False
-    while (delay := clock.now() - start) <= limit + _PATIENCE:
+    while (delay := clock.now() - start) <= limit + _TIMEOUT:
         new = [e for e in tuple(emergencies) if e.time >= start and _fits(mechanism, e)]
         nmt = watch.state if watch.state is not None else NmtState.OPERATIONAL
         if new or nmt != NmtState.OPERATIONAL:
             return Proof(new[0] if new else None, nmt, delay, limit)
-        if isinstance(mechanism, Guarding) and delay > limit + _GUARDED_PATIENCE and not asked:
+        if isinstance(mechanism, Guarding) and delay > limit + _GUARDED_TIMEOUT and not asked:
             # Its state shows in an answer only, and the poll is one life sign more: ask once.
             asked = True
             mechanism.poll()

@@ -136,8 +136,8 @@ class HostWatch:
 
     def await_operational(self) -> None:
         """Wait for the heartbeat or reply that confirms the start; proves that it comes at all."""
-        patience = max(self._terms.limit, _BEATS * self._terms.period)
-        deadline = self._clock.now() + patience
+        timeout = max(self._terms.limit, _BEATS * self._terms.period)
+        deadline = self._clock.now() + timeout
         while self.heartbeat.state != NmtState.OPERATIONAL:
             if self._clock.now() > deadline:
                 guarded = isinstance(self.heartbeat, GuardingWatch)
@@ -145,7 +145,7 @@ class HostWatch:
                 look = "100Ch and remote frames" if guarded else "1017h"
                 raise NotPermitted(
                     f"bus '{self._node.bus.name}' node {self._node.node}: no {what} says "
-                    f"operational within {patience:g} s of the start; check {look} and "
+                    f"operational within {timeout:g} s of the start; check {look} and "
                     "the drive's errors"
                 )
             if isinstance(self.mechanism, Guarding):

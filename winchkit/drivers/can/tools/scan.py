@@ -13,8 +13,7 @@ import canopen
 from winchkit.drivers.can.bus.bus import SDO_SIZE, CanBus
 from winchkit.drivers.can.canopen.identity import Identity, fitting_device
 from winchkit.drivers.can.canopen.nmt import HeartbeatConsumer, NmtState, state_text
-from winchkit.drivers.can.canopen.node import ABSENT, ObjectPort
-from winchkit.drivers.can.canopen.sdo_client import sdo_client
+from winchkit.drivers.can.canopen.node import ABSENT, ObjectPort, sdo_client
 from winchkit.drivers.can.cia402.axis import Cia402Axis
 from winchkit.drivers.clock import Clock
 from winchkit.errors import DeviceRefused, NoReply
