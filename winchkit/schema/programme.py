@@ -98,18 +98,10 @@ class Programme(Table):
     description: str = ""
 
     def approach(self, winch: str) -> tuple[float, ...]:
-        """Cable lengths from which and to which a winch moves before the first repeat.
+        """Cable lengths (m) from which and to which a winch moves before the first repeat.
 
-        Parameters
-        ----------
-        winch : str
-            Name of the winch.
-
-        Returns
-        -------
-        tuple of float
-            m; the second is the length at which a repeat ends, approached from the same side, so
-            that all repeats have the same motion. Empty where the final length is unknown.
+        The second is the length at which a repeat ends, approached from the same side, so that all
+        repeats have the same motion. Empty where the final length is unknown.
         """
         here: float | None = None
         before: float | None = None

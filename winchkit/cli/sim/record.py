@@ -83,7 +83,7 @@ def command(
     """
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import quantity
-    from winchkit.runs import write_csv, write_mcap
+    from winchkit.runs import write_run
     from winchkit.schema.read import read_programme, read_simbench
     from winchkit.sim.bench import hiding, profiles_of, programme_path
     from winchkit.sim.record import simulate
@@ -93,7 +93,6 @@ def command(
         declared = hiding(declared, hidden)
     profiles = profiles_of(declared)
     hertz = quantity(rate, "frequency")
-    write = write_csv if suffix == "csv" else write_mcap
     named = (*programmes, *more)
     if not named:
         raise UsageError(
@@ -106,7 +105,7 @@ def command(
             for run in simulate(declared, profiles, programme, seed=seed, rate=hertz):
                 path = output / f"{run.name}.{suffix}"
                 output.mkdir(parents=True, exist_ok=True)
-                write(run, path)
+                write_run(run, path)
                 written.append(_entry(path, run, programme))
                 done = index / len(named) if len(named) > 1 else None
                 progress(f"{programme.name}: {path.name} written", done)
