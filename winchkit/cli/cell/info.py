@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import tell
 
 
 @click.command(
@@ -19,22 +20,18 @@ from winchkit.cli.core.output import echo_json
     ),
 )
 @cell_options
-def command(cell: str | None, bench: str, *, as_json: bool) -> None:
+def command(cell: str | None, bench: str) -> None:
     """Print device file, serial number, calibration, tare, a reading with its times, counters."""
     with cells(bench, cell) as (found, name):
         facts = found.do("about", name)
-    if as_json:
-        echo_json({"schema": 1, **facts})
-        return
-    for line in _lines(facts, unit_of(name)):
-        click.echo(line)
+    tell(facts, _lines(facts, unit_of(name)))
 
 
-def _lines(facts: dict[str, Any], unit: str) -> list[str]:
+def _lines(facts: dict[str, Any], unit: str) -> Iterator[str]:
     device, reading, times = facts["device"], facts["reading"], facts["timing"]
     identity = ", ".join(f"{key} {value:g}" for key, value in facts["identity"].items())
     tare = facts["tare"]
-    lines = [
+    yield from (
         f"{facts['cell']}: {device['maker']} {device['model']}",
         f"  device file  {device['name']} (trust: {device['trust']}; {device['source']})",
         f"  identity     {identity or 'the device file does not say how to ask'}",
@@ -47,5 +44,5 @@ def _lines(facts: dict[str, Any], unit: str) -> list[str]:
         f"  sampled      {times['age'] * 1e3:.1f} ± {times['uncertainty'] * 1e3:.1f} ms before "
         f"it was received, of which filter {times['filter'] * 1e3:.1f} ms",
         "  counters     " + ", ".join(f"{key} {value}" for key, value in facts["counters"].items()),
-    ]
-    return lines + [f"  ! {remark}" for remark in facts["remarks"]]
+    )
+    yield from (f"  ! {remark}" for remark in facts["remarks"])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import click
 
 from winchkit.cli.cell.options import cell_options, cells
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import tell
 from winchkit.cli.core.quantity_type import Quantity
 
 
@@ -28,38 +29,34 @@ from winchkit.cli.core.quantity_type import Quantity
     show_default=True,
     help="Duration of the measurement.",
 )
-def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
+def command(cell: str | None, bench: str, duration: str) -> None:
     """Measure the rate of CELL and say what limits it: wire, turnaround, conversions, sharing."""
     from winchkit.cli.core.quantities import quantity
 
     seconds = quantity(duration, "time")
     with cells(bench, cell) as (found, name):
         report = found.do("rate", name, seconds)
-    if as_json:
-        echo_json({"schema": 1, **report})
-        return
-    for line in _lines(report):
-        click.echo(line)
+    tell(report, _lines(report))
 
 
-def _lines(report: dict[str, Any]) -> list[str]:
+def _lines(report: dict[str, Any]) -> Iterator[str]:
     head = f"{report['cell']}: {report['rate']:.1f} readings a second "
     if report["by_itself"]:
         head += f"(its device file says {report['planned']:.1f}); the device sends them by itself"
     else:
         head += f"(planned {report['planned']:.1f}), limited by {report['limited_by']}"
-    lines = [head, *(f"  {rate:8.1f} /s  {what}" for what, rate in report["limits"].items())]
-    lines += _cost(report["exchange"])
+    yield head
+    yield from (f"  {rate:8.1f} /s  {what}" for what, rate in report["limits"].items())
+    yield from _cost(report["exchange"])
     latency = {key: value * 1e3 for key, value in report["latency"].items()}
     asked = "from its first byte to its last" if report["by_itself"] else "from request to answer"
-    lines.append(
+    yield (
         f"  {asked} p50 {latency['p50']:.2f}, p99 {latency['p99']:.2f}, "
         f"worst {latency['worst']:.2f} ms; {report['duplicates']:.1%} repeat the count before"
     )
-    lines.append(
-        "  " + ", ".join(f"{key} {value}" for key, value in report["counters"].items() if value)
-    )
-    return [*lines, f"  {report['advice']}"] if report["advice"] else lines
+    yield "  " + ", ".join(f"{key} {value}" for key, value in report["counters"].items() if value)
+    if report["advice"]:
+        yield f"  {report['advice']}"
 
 
 def _cost(cost: dict[str, Any]) -> list[str]:

@@ -7,7 +7,7 @@ import click
 from winchkit.cli.cell.options import cell_options, cells
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import yes_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import tell
 
 
 @click.command(
@@ -26,7 +26,7 @@ from winchkit.cli.core.output import echo_json
     help="Name of the command in the device file.",
 )
 @yes_option
-def command(cell: str | None, bench: str, name: str, *, yes: bool, as_json: bool) -> None:
+def command(cell: str | None, bench: str, name: str, *, yes: bool) -> None:
     """Send CELL a command that writes its EEPROM, such as its own store, or a lasting zero.
 
     An EEPROM wears out (100,000 writes are usual). Nothing else in winchkit writes it.
@@ -38,7 +38,4 @@ def command(cell: str | None, bench: str, name: str, *, yes: bool, as_json: bool
         if not yes:
             click.confirm(f"Write the EEPROM of {full} with '{name}'?", abort=True, err=True)
         found.do("store", full, name)
-    if as_json:
-        echo_json({"schema": 1, "cell": full, "command": name})
-    else:
-        click.echo(f"{full}: '{name}' sent and accepted")
+    tell({"cell": full, "command": name}, [f"{full}: '{name}' sent and accepted"])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import tell
 from winchkit.cli.core.quantity_type import Quantity
 
 _TASKS = {
@@ -38,9 +39,7 @@ _TASKS = {
 )
 @click.option("--clear", is_flag=True, help="Take the tare away: the host's, or with --device its.")
 @click.option("--device", is_flag=True, help="Send the device its own volatile tare instead.")
-def command(
-    cell: str | None, bench: str, duration: str, *, clear: bool, device: bool, as_json: bool
-) -> None:
+def command(cell: str | None, bench: str, duration: str, *, clear: bool, device: bool) -> None:
     """Let CELL count from what hangs on it now.
 
     The host subtracts the mean; the number stands in BENCH.tares.toml and holds for everything
@@ -56,12 +55,13 @@ def command(
         task = _TASKS[clear, device]
         result = found.do(task, name, *() if task == "clear tare" else (seconds,))
     unit = unit_of(name)
-    if as_json:
-        echo_json({"schema": 1, "cell": name, "unit": unit, **result})
-        return
-    click.echo(f"{name}: {_told(task, result, unit)}")
-    for line in host_tare_note(result, unit) if device else ():
-        click.echo(line)
+    tell({"cell": name, "unit": unit, **result}, _lines(name, task, result, unit))
+
+
+def _lines(name: str, task: str, result: dict[str, Any], unit: str) -> Iterator[str]:
+    yield f"{name}: {_told(task, result, unit)}"
+    if "device" in task:
+        yield from host_tare_note(result, unit)
 
 
 def _told(task: str, result: dict[str, Any], unit: str) -> str:

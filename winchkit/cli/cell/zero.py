@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import click
 
 from winchkit.cli.cell.options import cell_options, cells, host_tare_note, shown, unit_of
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import tell
 from winchkit.cli.core.quantity_type import Quantity
 
 
@@ -26,7 +29,7 @@ from winchkit.cli.core.quantity_type import Quantity
     show_default=True,
     help="Averaging time.",
 )
-def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> None:
+def command(cell: str | None, bench: str, duration: str) -> None:
     """Send the device of CELL its zero command: the present load becomes its gross zero.
 
     Only a volatile zero is sent; a device that keeps it in its EEPROM needs
@@ -38,12 +41,12 @@ def command(cell: str | None, bench: str, duration: str, *, as_json: bool) -> No
     with cells(bench, cell) as (found, name):
         result = found.do("zero", name, seconds)
     unit = unit_of(name)
-    if as_json:
-        echo_json({"schema": 1, "cell": name, "unit": unit, **result})
-        return
-    click.echo(
+    tell({"cell": name, "unit": unit, **result}, _lines(name, result, unit))
+
+
+def _lines(name: str, result: dict[str, Any], unit: str) -> Iterator[str]:
+    yield (
         f"{name}: the device zeroed itself at {shown(result['before'], unit)}; "
         f"it reads {shown(result['after'], unit)}"
     )
-    for line in host_tare_note(result, unit):
-        click.echo(line)
+    yield from host_tare_note(result, unit)

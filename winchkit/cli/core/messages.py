@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from winchkit.cli.core.output import is_json
+
 if TYPE_CHECKING:
     import logging
 
@@ -57,7 +59,7 @@ def suggest_next(*words: str | Sequence[str]) -> None:
     ``*words``: the command after ``winchkit``, one word each; a sequence is one of files.
     """
     context = click.get_current_context(silent=True)
-    if context is None or context.params.get("as_json"):
+    if context is None or context.params.get("as_json") or is_json():
         return
     flat = [word for item in words for word in ([item] if isinstance(item, str) else item)]
     if context.meta.get(COPY_OF_INPUT) in flat:

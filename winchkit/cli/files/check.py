@@ -13,7 +13,7 @@ from winchkit import wings
 from winchkit.arguments import require_type
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import TABLE, effects_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.check_computer import about_computer, refusals
 from winchkit.errors import Fault, FileError, one_line
@@ -60,7 +60,7 @@ class Verdict:
 @click.argument("files", nargs=-1, metavar="FILE...", type=TABLE)
 @effects_option
 @click.option("--computer", is_flag=True, help="Check this computer: real-time settings.")
-@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
+@json_flag("Print the verdicts as JSON.")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -68,7 +68,6 @@ def command(
     effects: Sequence[str],
     *,
     computer: bool,
-    as_json: bool,
 ) -> None:
     """Check files of any kind: profiles, benches, programmes, devices (.toml), runs (.csv, .mcap).
 
@@ -88,7 +87,7 @@ def command(
     for verdict in verdicts:
         for warning in verdict.warnings:
             click.echo(f"{warning} (warning)", err=True)
-    if as_json:
+    if is_json():
         extra = {"computer": lines} if computer else {}
         echo_json({"schema": 1, "files": [_entry(verdict) for verdict in verdicts], **extra})
     else:

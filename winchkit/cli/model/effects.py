@@ -13,7 +13,7 @@ from winchkit.cli.core.completion import complete_effect, complete_file
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.options import RUN
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
@@ -78,9 +78,9 @@ def command() -> None:
     shell_complete=complete_file,
     help="Python file with effects of your own; may be given several times.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON, complete, in SI units.")
+@json_flag("Print JSON, complete, in SI units.")
 @html_option
-def show(effect_id: str | None, files: Sequence[str], as_json: bool, html: str | None) -> None:
+def show(effect_id: str | None, files: Sequence[str], html: str | None) -> None:
     """List the effects that a model may lack, or describe one.
 
     The page of --html holds the card, or all cards, with the signatures drawn.
@@ -89,11 +89,10 @@ def show(effect_id: str | None, files: Sequence[str], as_json: bool, html: str |
     from winchkit.effects.catalogue import load_catalogue
 
     catalogue = load_catalogue(files)
-    if effect_id is not None and as_json:
-        echo_json({"schema": 1, **card_data(catalogue[effect_id])})
-    elif effect_id is not None:
-        click.echo(card(catalogue[effect_id]))
-    elif as_json:
+    if effect_id is not None:
+        effect = catalogue[effect_id]
+        tell(card_data(effect), [card(effect)])
+    elif is_json():
         echo_json({"schema": 1, "effects": [card_data(effect) for effect in catalogue]})
     else:
         click.echo(_listing(catalogue))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.model.options import html_option, profile_option, write_page
 
 
@@ -17,24 +17,18 @@ from winchkit.cli.model.options import html_option, profile_option, write_page
     ),
 )
 @profile_option
-@click.option("--json", "as_json", is_flag=True, help="Print the ledger as JSON.")
+@json_flag("Print the ledger as JSON.")
 @html_option
-def command(profile: str, as_json: bool, html: str | None) -> None:
+def command(profile: str, html: str | None) -> None:
     """List every effect that was added to or removed from a profile, and the errors then."""
     from winchkit.catalog import find
     from winchkit.cli.model.options import declared_profile
     from winchkit.profile_edit.history import ladder
+    from winchkit.report.pages.history import ladder_html, ladder_text
 
     declared = declared_profile(find("profiles", profile))
     rungs = ladder(declared)
-    if as_json:
-        steps = [rung.to_json() for rung in rungs]
-        echo_json({"schema": 1, "profile": declared.name, "steps": steps})
-    else:
-        from winchkit.report.pages.history import ladder_text
-
-        click.echo(ladder_text(declared.name, rungs))
+    steps = [rung.to_json() for rung in rungs]
+    tell({"profile": declared.name, "steps": steps}, [ladder_text(declared.name, rungs)])
     if html:
-        from winchkit.report.pages.history import ladder_html
-
         write_page(html, ladder_html(declared.name, rungs))
