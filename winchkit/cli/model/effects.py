@@ -12,14 +12,16 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_effect, complete_file
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.options import RUN
 from winchkit.cli.core.output import echo_json, is_json, json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
     ManyValues,
+    declared_profile,
+    fit_option,
     html_option,
     model_options,
+    refuse_curves,
     suggest_with,
     write_page,
 )
@@ -128,15 +130,7 @@ def _listing(catalogue: Catalogue) -> str:
     ),
 )
 @click.argument("file", metavar="FILE.py")
-@click.option(
-    "--fit",
-    "runs",
-    multiple=True,
-    required=True,
-    metavar="RUN...",
-    type=RUN,
-    help="Runs whose residual gives the initial values.",
-)
+@fit_option("Runs whose residual gives the initial values.", required=True)
 @click.option("--curve", metavar="ID", help="Empirical effect to begin from; else the strongest.")
 @click.option("--id", "effect_id", metavar="ID", help="Of the new effect; else the file's name.")
 @model_options
@@ -147,7 +141,6 @@ def new(
 
     It is ready for --effects: diagnose with it, then put in the physics that you recognise.
     """
-    from winchkit.cli.model.options import declared_profile, refuse_curves
     from winchkit.diagnosis.new_effect import new_effect
     from winchkit.effects.effect_template import check_own
 

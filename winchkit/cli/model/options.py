@@ -40,6 +40,15 @@ runs_argument = click.argument("runs", nargs=-1, required=True, metavar="RUN..."
 json_option = click.option(
     "--json", "as_json", is_flag=True, callback=keep_json, help="Print the answer as JSON."
 )
+
+
+def fit_option(help: str, *, required: bool = False) -> Callable[..., Any]:
+    """The option ``--fit``: runs by which values are fitted."""
+    return click.option(
+        "--fit", "runs", multiple=True, required=required, metavar="RUN...", type=RUN, help=help
+    )
+
+
 _MODEL_OPTIONS = (
     click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
     click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),

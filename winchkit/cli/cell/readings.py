@@ -1,4 +1,4 @@
-"""``winchkit cell rate``: how fast an instrument is read, and why not faster."""
+"""``winchkit cell info`` and ``rate``: what an instrument says now, and how fast it is read."""
 
 from __future__ import annotations
 
@@ -7,10 +7,46 @@ from typing import Any
 
 import click
 
-from winchkit.cli.cell.options import cell_options, cells
+from winchkit.cli.cell.options import cell_options, cells, shown, unit_of
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.output import tell
 from winchkit.cli.core.quantity_type import Quantity
+
+
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit cell info",
+        "winchkit cell info A -b bench.toml --json",
+    ),
+)
+@cell_options
+def info(cell: str | None, bench: str) -> None:
+    """Print device file, serial number, calibration, tare, a reading with its times, counters."""
+    with cells(bench, cell) as (found, name):
+        facts = found.do("about", name)
+    tell(facts, _lines_of_info(facts, unit_of(name)))
+
+
+def _lines_of_info(facts: dict[str, Any], unit: str) -> Iterator[str]:
+    device, reading, times = facts["device"], facts["reading"], facts["timing"]
+    identity = ", ".join(f"{key} {value:g}" for key, value in facts["identity"].items())
+    tare = facts["tare"]
+    yield from (
+        f"{facts['cell']}: {device['maker']} {device['model']}",
+        f"  device file  {device['name']} (trust: {device['trust']}; {device['source']})",
+        f"  identity     {identity or 'the device file does not say how to ask'}",
+        f"  calibration  {facts['calibration'] or 'none; the values of the device are used'}",
+        f"  tare         host {shown(tare['host'], unit)}, device "
+        + {True: "on", False: "off", None: "unknown"}[tare["device"]],
+        f"  reading      {shown(reading['value'], unit, 6)} net, "
+        f"{shown(reading['gross'], unit, 6)} gross, {reading['raw']:g} counts: "
+        f"{reading['quality']}",
+        f"  sampled      {times['age'] * 1e3:.1f} ± {times['uncertainty'] * 1e3:.1f} ms before "
+        f"it was received, of which filter {times['filter'] * 1e3:.1f} ms",
+        "  counters     " + ", ".join(f"{key} {value}" for key, value in facts["counters"].items()),
+    )
+    yield from (f"  ! {remark}" for remark in facts["remarks"])
 
 
 @click.command(
@@ -29,17 +65,17 @@ from winchkit.cli.core.quantity_type import Quantity
     show_default=True,
     help="Duration of the measurement.",
 )
-def command(cell: str | None, bench: str, duration: str) -> None:
+def rate(cell: str | None, bench: str, duration: str) -> None:
     """Measure the rate of CELL and say what limits it: wire, turnaround, conversions, sharing."""
     from winchkit.cli.core.quantities import quantity
 
     seconds = quantity(duration, "time")
     with cells(bench, cell) as (found, name):
         report = found.do("rate", name, seconds)
-    tell(report, _lines(report))
+    tell(report, _lines_of_rate(report))
 
 
-def _lines(report: dict[str, Any]) -> Iterator[str]:
+def _lines_of_rate(report: dict[str, Any]) -> Iterator[str]:
     head = f"{report['cell']}: {report['rate']:.1f} readings a second "
     if report["by_itself"]:
         head += f"(its device file says {report['planned']:.1f}); the device sends them by itself"
