@@ -20,7 +20,7 @@ from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.stored.numbers import range_of, restored
 from winchkit.runs.importing.table import Column, Table
-from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP, VECTOR
+from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, QUATERNION, STAMP, VECTOR
 
 _PADDED = 0.67
 """Share of rows with a value below which a column has a rate of its own: half the rate or less."""
@@ -32,8 +32,6 @@ _EXCEL_EPOCH = 25_569.0
 """1970-01-01 in days since 1899-12-30."""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(\.\d{3}){2,}|(,\d{3}){2,})")
 """Whole numbers with separators of thousands: one separator alone may be a decimal sign."""
-_ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
-_QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
 
 
 @dataclass(frozen=True)
@@ -235,9 +233,9 @@ def _clock_of(clocks: Sequence[Column], column: Column) -> Column | None:
 
 def _with_quaternion(channels: dict[str, Array], *, is_vector: bool) -> dict[str, Array]:
     """A quaternion in place of a rotation vector or of the elements of a rotation matrix."""
-    if is_vector and all(name in channels for name in _ANGLES):
-        vector = np.stack([channels[name] for name in _ANGLES], axis=-1)
-        others = {name: values for name, values in channels.items() if name not in _ANGLES}
+    if is_vector and all(name in channels for name in ANGLES):
+        vector = np.stack([channels[name] for name in ANGLES], axis=-1)
+        others = {name: values for name, values in channels.items() if name not in ANGLES}
         return {**others, **_quaternion(rotation_by(vector))}
     if not all(name in channels for name in MATRIX):
         return {name: values for name, values in channels.items() if name not in MATRIX}
@@ -251,7 +249,7 @@ def _quaternion(matrix: Array) -> dict[str, Array]:
     known = np.isfinite(matrix).all(axis=(1, 2))
     quaternion = np.full((len(matrix), 4), np.nan)
     quaternion[known] = quaternion_of(matrix[known])
-    return dict(zip(_QUATERNION, quaternion.T, strict=True))
+    return dict(zip(QUATERNION, quaternion.T, strict=True))
 
 
 def _forward(stream: Stream) -> Stream:

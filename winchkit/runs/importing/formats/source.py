@@ -9,7 +9,7 @@ from pathlib import Path
 
 from winchkit.errors import Fault, RunError
 from winchkit.regular_file import read_whole
-from winchkit.runs.importing.formats.cell_units import with_cell_units
+from winchkit.runs.importing.formats.cells import with_cell_units
 from winchkit.runs.importing.formats.channel_table import by_channel
 from winchkit.runs.importing.formats.split_stamps import joined_stamps
 from winchkit.runs.importing.table import LARGEST, Table

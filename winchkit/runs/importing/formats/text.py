@@ -12,8 +12,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.formats.cell_units import has_unit
-from winchkit.runs.importing.formats.cells import is_missing, number, numbers
+from winchkit.runs.importing.formats.cells import has_unit, is_missing, number, numbers
 from winchkit.runs.importing.formats.dialect import (
     BLANKS,
     FEWEST,
