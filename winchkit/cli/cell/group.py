@@ -11,9 +11,7 @@ COMMANDS = {
     "info": At(_READINGS, "What an instrument is, and what it says now.", "info"),
     "rate": At(_READINGS, "How fast it can be read, and what limits that.", "rate"),
     "diagnose": At("winchkit.cli.cell.diagnose", "Noise, drift, frozen counts, hum, creep."),
-    "tare": At(
-        "winchkit.cli.cell.zeroing", "Count from what hangs on it now, on the host only.", "tare"
-    ),
+    "tare": At(_ZEROING, "Count from what hangs on it now, on the host only.", "tare"),
     "zero": At(_ZEROING, "Send the device its own zero command.", "zero"),
     "calibrate": At("winchkit.cli.cell.calibrate", "Known weights up and down: fit and report."),
     "store": At(_ZEROING, "Write the device's EEPROM, on purpose.", "store"),

@@ -12,7 +12,7 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import is_quiet, note, suggest_next
-from winchkit.cli.core.options import TABLE, output_option
+from winchkit.cli.core.options import TABLE, device_option, output_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.quantity_type import Quantity, naming
 from winchkit.cli.core.terminal import progress_bar
@@ -27,7 +27,6 @@ from winchkit.cli.files.import_runs import (
     write_runs,
 )
 from winchkit.cli.files.import_table import shortened
-from winchkit.cli.log.descriptions import device_option
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:

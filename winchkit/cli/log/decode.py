@@ -11,9 +11,8 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.options import TABLE
+from winchkit.cli.core.options import TABLE, device_option
 from winchkit.cli.core.output import echo_json, is_json, json_flag
-from winchkit.cli.log.descriptions import device_option
 from winchkit.errors import one_line
 
 if TYPE_CHECKING:
