@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.names import meaning_of
@@ -281,11 +281,7 @@ def _filled(row: list[str]) -> list[str]:
     is_sparse = start > 0 and sum(bool(cell) for cell in cells[start:]) < len(cells) - start
     if not is_sparse:
         return cells
-    last = ""
-    for index in range(start, len(cells)):
-        last = cells[index] or last
-        cells[index] = last
-    return cells
+    return [*cells[:start], *accumulate(cells[start:], lambda last, cell: cell or last)]
 
 
 def _metadata(rows: Sequence[Sequence[str]]) -> dict[str, str]:
@@ -332,10 +328,8 @@ def _interval(metadata: dict[str, str], decimal: str) -> float | None:
 
 def _rate_alone(metadata: dict[str, str]) -> float | None:
     """Rate in a line of its own under the title of a section, as Vicon writes it, Hz."""
-    texts = list(metadata.values())
-    for title, value in pairwise(texts):
-        if title in {"Trajectories", "Model Outputs", "Devices"}:
-            rate = number(value, ".")
-            if rate and rate > 0:
-                return rate
+    for title, value in pairwise(metadata.values()):
+        rate = number(value, ".") if title in {"Trajectories", "Model Outputs", "Devices"} else None
+        if rate and rate > 0:
+            return rate
     return None
