@@ -13,7 +13,7 @@ from itertools import count
 from pathlib import Path
 
 from winchkit.errors import Fault, FileError
-from winchkit.regular_file import read_whole
+from winchkit.regular_file import regular
 from winchkit.schema.eds.repair import Findings, Section, canonical, canonical_key, mend
 from winchkit.schema.eds.xdd import read_xml
 
@@ -61,7 +61,11 @@ def read_eds_text(path: str | Path) -> EdsText:
 
 
 def _text(path: Path, findings: Findings) -> str:
-    data = read_whole(path, "file", _LARGEST)
+    try:
+        with open(path, "rb", opener=regular) as stream:
+            data = stream.read(_LARGEST + 1)
+    except OSError as error:
+        raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
     if len(data) > _LARGEST:
         reason = f"larger than {_LARGEST / 1e6:g} MB, so it is not an EDS"
         raise FileError(Fault(reason, str(path)))
