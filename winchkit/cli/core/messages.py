@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.output import is_json
-
 if TYPE_CHECKING:
     import logging
 
@@ -58,6 +56,8 @@ def suggest_next(*words: str | Sequence[str]) -> None:
 
     ``*words``: the command after ``winchkit``, one word each; a sequence is one of files.
     """
+    from winchkit.cli.core.output import is_json
+
     context = click.get_current_context(silent=True)
     if context is None or context.params.get("as_json") or is_json():
         return
