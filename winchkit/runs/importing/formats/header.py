@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate, pairwise
+from itertools import pairwise
 
 from winchkit.runs.importing.formats.cells import number
 from winchkit.runs.importing.names import meaning_of
@@ -281,7 +281,9 @@ def _filled(row: list[str]) -> list[str]:
     is_sparse = start > 0 and sum(bool(cell) for cell in cells[start:]) < len(cells) - start
     if not is_sparse:
         return cells
-    return [*cells[:start], *accumulate(cells[start:], lambda last, cell: cell or last)]
+    for index in range(start + 1, len(cells)):
+        cells[index] = cells[index] or cells[index - 1]
+    return cells
 
 
 def _metadata(rows: Sequence[Sequence[str]]) -> dict[str, str]:
