@@ -5,6 +5,9 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from pathlib import Path
+
+from winchkit.errors import Fault, FileError
 
 _KINDS = {
     stat.S_IFDIR: "a directory",
@@ -39,6 +42,26 @@ def read_text(path: str | os.PathLike[str], encoding: str = "utf-8") -> str:
     """Text of a regular file; raises OSError, UnicodeDecodeError."""
     with open(path, encoding=encoding, opener=regular) as file:
         return file.read()
+
+
+def read_whole(
+    path: Path, what: str, largest: int | None = None, error: type[FileError] = FileError
+) -> bytes:
+    """Content of a regular file, ``what`` in messages; raises ``error`` where it cannot be read.
+
+    Of a file that is larger than ``largest`` (bytes) one byte more.
+    """
+    try:
+        with open(path, "rb", opener=regular) as file:
+            return file.read() if largest is None else file.read(largest + 1)
+    except FileNotFoundError:
+        raise error(Fault("there is no such file", str(path))) from None
+    except IsADirectoryError:
+        raise error(Fault(f"is a directory, not a {what}", str(path))) from None
+    except OSError as reason:
+        raise error(Fault(f"cannot be read: {reason.strerror}", str(path))) from None
+    except ValueError as reason:
+        raise error(Fault(f"is not a usable file name: {reason}", repr(str(path)))) from None
 
 
 def file_kind(mode: int) -> str:

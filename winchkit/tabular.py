@@ -10,10 +10,10 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from winchkit.errors import UsageError
+from winchkit.extras import library
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,12 +54,8 @@ class Tabular(ABC):
         UsageError
             Without pandas (``pip install 'winchkit[pandas]'``).
         """
-        try:
-            import pandas as pd
-        except ImportError:
-            raise _absent("pandas", "pandas") from None
         columns = self._columns()
-        frame = pd.DataFrame(dict(columns.values))
+        frame: pd.DataFrame = library("pandas", "pandas").DataFrame(dict(columns.values))
         if columns.index:
             frame = frame.set_index(list(columns.index))
         frame.attrs = {"units": dict(columns.units), "metadata": dict(columns.metadata)}
@@ -78,7 +74,7 @@ class Tabular(ABC):
         UsageError
             Without pyarrow (``pip install 'winchkit[parquet]'``).
         """
-        pa, columns = _pyarrow(), self._columns()
+        pa, columns = library("pyarrow", "Arrow"), self._columns()
         # As from pandas, where NaN is a missing value.
         arrays = {name: pa.array(item, from_pandas=True) for name, item in columns.values.items()}
         fields = [
@@ -103,7 +99,7 @@ def arrow_of(table: Any) -> pa.Table:
 
     Raises UsageError for an object that is no table, or without pyarrow.
     """
-    pa = _pyarrow()
+    pa = library("pyarrow", "Arrow")
     if hasattr(table, "reset_index") and hasattr(table, "attrs"):
         units = table.attrs.get("units", {})
         metadata = {str(k): str(v) for k, v in table.attrs.get("metadata", {}).items()}
@@ -120,17 +116,3 @@ def arrow_of(table: Any) -> pa.Table:
         f"{kind} is no table: pass one of pandas, Polars or pyarrow, or any object with "
         "__arrow_c_stream__; of xarray pass dataset.to_dataframe()"
     )
-
-
-def _pyarrow() -> ModuleType:
-    try:
-        import pyarrow as pa
-    except ImportError:
-        raise _absent("Arrow", "parquet") from None
-    module: ModuleType = pa
-    return module
-
-
-def _absent(what: str, extra: str) -> UsageError:
-    package = {"Arrow": "pyarrow"}.get(what, what)
-    return UsageError(f"{what} needs {package}; install it with pip install 'winchkit[{extra}]'")

@@ -37,8 +37,10 @@ SECTIONS: dict[str, dict[str, At]] = {
             "winchkit.cli.model.diagnose", "Name the physical effect that the model lacks."
         ),
         "add": At("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
-        "remove": At("winchkit.cli.model.remove", "Remove an effect from a profile."),
-        "undo": At("winchkit.cli.model.undo", "Undo the last add or remove of a profile."),
+        "remove": At("winchkit.cli.model.add", "Remove an effect from a profile.", "remove"),
+        "undo": At(
+            "winchkit.cli.model.ledger", "Undo the last add or remove of a profile.", "undo"
+        ),
         "ledger": At(
             "winchkit.cli.model.ledger",
             "List the changes of a profile, with their errors.",

@@ -17,43 +17,12 @@ _BESIDE_PARAMETERS = {"id", "fitted"}
 
 
 def line_of(profile: WinchProfile, catalogue: Catalogue | None = None) -> Line:
-    """The line that a profile declares, its effects included.
-
-    Parameters
-    ----------
-    profile : WinchProfile
-        The profile.
-    catalogue : Catalogue, optional
-        Effects; by default all of the package and of entry points.
-
-    Returns
-    -------
-    Line
-        Line with the modifiers of the effects.
-
-    Raises
-    ------
-    FileError
-        With every fault of the effects.
-    """
+    """The line that a profile declares; raises FileError with every fault of its effects."""
     return Line(profile, modifiers_of(terms_of(profile, catalogue)))
 
 
 def terms_of(profile: WinchProfile, catalogue: Catalogue | None = None) -> tuple[Term, ...]:
-    """Terms of a profile, shorthands first. Raises FileError with every fault.
-
-    Parameters
-    ----------
-    profile : WinchProfile
-        The profile.
-    catalogue : Catalogue, optional
-        Effects; by default all.
-
-    Returns
-    -------
-    tuple[Term, ...]
-        Shorthand keys first, then the tables.
-    """
+    """Terms of a profile, shorthands first. Raises FileError with every fault."""
     terms, faults = _bind(profile, catalogue or load_catalogue())
     if faults:
         raise FileError(faults)
@@ -61,20 +30,7 @@ def terms_of(profile: WinchProfile, catalogue: Catalogue | None = None) -> tuple
 
 
 def check_profile(profile: WinchProfile, catalogue: Catalogue | None = None) -> list[Fault]:
-    """Every fault of the effects that a profile declares.
-
-    Parameters
-    ----------
-    profile : WinchProfile
-        The profile.
-    catalogue : Catalogue, optional
-        Effects; by default all.
-
-    Returns
-    -------
-    list of Fault
-        Faults with the lines of the file.
-    """
+    """Every fault of the effects that a profile declares, with its line of the file."""
     return _bind(profile, catalogue or load_catalogue())[1]
 
 

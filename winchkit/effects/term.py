@@ -67,16 +67,5 @@ class Term:
 
 
 def modifiers_of(terms: Iterable[Term]) -> tuple[Modifier, ...]:
-    """Modifiers of several terms.
-
-    Parameters
-    ----------
-    terms : iterable of Term
-        Effects with values.
-
-    Returns
-    -------
-    tuple[Modifier, ...]
-        In the order of the terms.
-    """
+    """Modifiers of several terms, in their order."""
     return tuple(term.modifier() for term in terms)

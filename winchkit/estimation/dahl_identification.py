@@ -113,24 +113,9 @@ class Identified:
 
 
 def record_of(run: Run, profile: WinchProfile) -> Record:
-    """Both tensions and the nominal motion of a run of one winch.
+    """Both tensions and the nominal motion of a run of one winch, without rows with NaN.
 
-    Parameters
-    ----------
-    run
-        With ``tension``, and ``load`` or a ``load_mass`` in the metadata.
-    profile
-        Winch profile.
-
-    Returns
-    -------
-    Record
-        Without rows in which a signal is NaN.
-
-    Raises
-    ------
-    RunError
-        Without a cell or without the tension at the platform.
+    Raises RunError without ``tension``, and without ``load`` and ``load_mass``.
     """
     load = run["load"] if "load" in run.channels else None
     if load is None and run.load_mass is None:

@@ -1,4 +1,4 @@
-"""Gearboxes: stages in series, their ratio, efficiency in both directions, and self-locking.
+"""A worm gear: its ratio, efficiency in both directions, and self-locking.
 
 Ratios are motor turns per drum turn; efficiencies are shares of power, 0 to 1.
 """
@@ -6,7 +6,7 @@ Ratios are motor turns per drum turn; efficiencies are shares of power, 0 to 1.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan, cos, nan, pi, prod, tan
+from math import atan, cos, pi, tan
 
 from winchkit.errors import UsageError
 
@@ -16,61 +16,15 @@ class GearStage:
     """One reduction."""
 
     ratio: float
-    efficiency: float = 1.0
+    efficiency: float
     """From the motor to the drum."""
-    back_efficiency: float | None = None
-    """From the drum to the motor; None: 2 − 1/η, the same loss of torque in both directions."""
-
-    @property
-    def backward(self) -> float:
-        """Share of the drum's power that reaches the motor; 0 where the stage is self-locking."""
-        if self.back_efficiency is not None:
-            return max(0.0, self.back_efficiency)
-        return max(0.0, 2.0 - 1.0 / self.efficiency)
+    backward: float
+    """From the drum to the motor: share of the drum's power that reaches the motor."""
 
     @property
     def self_locking(self) -> bool:
         """Whether a torque at the drum cannot turn the motor."""
         return self.backward == 0.0
-
-
-@dataclass(frozen=True)
-class Gearbox:
-    """Stages from the motor to the drum."""
-
-    stages: tuple[GearStage, ...]
-
-    @property
-    def ratio(self) -> float:
-        """Motor turns per drum turn."""
-        return prod(stage.ratio for stage in self.stages)
-
-    @property
-    def efficiency(self) -> float:
-        """From the motor to the drum."""
-        return prod(stage.efficiency for stage in self.stages)
-
-    @property
-    def back_efficiency(self) -> float:
-        """From the drum to the motor."""
-        return prod(stage.backward for stage in self.stages)
-
-    @property
-    def self_locking(self) -> bool:
-        """Whether one of the stages holds the drum without motor and brake."""
-        return any(stage.self_locking for stage in self.stages)
-
-    def motor_torque(self, drum_torque: float, *, lowering: bool = False) -> float:
-        """Motor torque against a drum torque at constant speed.
-
-        ``drum_torque``: N m. Returns: N m: drum_torque/(u η) when lifting, drum_torque η'/u when
-        lowering. NaN for lowering with a self-locking gearbox, which needs a driving torque that η
-        does not determine.
-        """
-        if lowering:
-            held = drum_torque * self.back_efficiency / self.ratio
-            return nan if self.self_locking else held
-        return drum_torque / (self.ratio * self.efficiency)
 
 
 def worm_stage(

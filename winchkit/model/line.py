@@ -98,18 +98,7 @@ class Line:
         return Path(turned, np.full_like(turned, slope))
 
     def motion(self, signals: Signals) -> Motion:
-        """Derivatives, directions and cable force along a run.
-
-        Parameters
-        ----------
-        signals : Signals
-            Measured channels of the run.
-
-        Returns
-        -------
-        Motion
-            Input of :meth:`predict`.
-        """
+        """Derivatives, directions and cable force along a run."""
         time, angle = signals.time, signals.motor_angle
         drum_angle, length = self._nominal_length(angle)
         clock = signals.clock or Clock(time - time[0], angle, signals.motor_velocity)
@@ -151,18 +140,7 @@ class Line:
         return Motion(at, clock, load, drum_tension, mass, discretization, load_std=load_std)
 
     def predict(self, motion: Motion) -> dict[str, Array]:
-        """Predict the outputs of a run.
-
-        Parameters
-        ----------
-        motion : Motion
-            Of the run, from :meth:`motion`.
-
-        Returns
-        -------
-        dict of (n,) array
-            ``cable_length``, m, ``motor_torque``, N m, and, where a load is known, ``tension``, N.
-        """
+        """Predict ``cable_length``, ``motor_torque`` and, with a known load, ``tension``, (n,)."""
         at = motion.at
         kinematics = self.kinematics(at)
         out = {"cable_length": self.indicated_length(at, kinematics)}
@@ -258,18 +236,10 @@ class Line:
         tension: Array,
         temperature: Array,
     ) -> At:
-        """Inputs of the modifiers for single samples without a time series.
+        """Inputs of the modifiers for single samples without a time series, SI and degC, (n,).
 
-        Parameters
-        ----------
-        time, motor_angle, motor_rate, tension, temperature : (n,) array
-            s, rad, rad/s, N and degrees Celsius.
-
-        Returns
-        -------
-        At
-            With accelerations of zero, and with directions that are smooth below the creep rates,
-            so that a controller's friction has no step at standstill.
+        Accelerations are zero, and directions smooth below the creep rates, so that a controller's
+        friction has no step at standstill.
         """
         drum_angle, length = self._nominal_length(motor_angle)
         speed = self._nominal_arm(motor_angle) * motor_rate

@@ -9,7 +9,7 @@ tables of poses, ``importing`` reads recordings of other programs. The public fu
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Channel, Run
 from winchkit.runs.run_writer import RunWriter
-from winchkit.runs.writer import open_writer, write_csv, write_mcap, write_run
+from winchkit.runs.writer import open_writer, write_run
 
 __all__ = [
     "Channel",
@@ -17,7 +17,5 @@ __all__ = [
     "RunWriter",
     "open_writer",
     "read_run",
-    "write_csv",
-    "write_mcap",
     "write_run",
 ]

@@ -10,8 +10,9 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError, UsageError, suggest
-from winchkit.runs.columns import POSE_DIMENSIONS, column_dimension, near_miss, unit_fault
+from winchkit.runs.columns import column_dimension, near_miss, unit_fault
 from winchkit.runs.run import Channel, Run
+from winchkit.schema.mapping import POSE_DIMENSIONS
 from winchkit.units import UNITS, convert, factor, parse
 
 _SHOWN = 20

@@ -7,17 +7,11 @@ from difflib import get_close_matches
 
 from winchkit.errors import suggest
 from winchkit.runs.run import CHANNEL_DIMENSIONS
+from winchkit.schema.mapping import POSE_DIMENSIONS, POSITION, QUATERNION
 from winchkit.units import GRAVITY, UNITS, dimension_of
 
-POSE_DIMENSIONS: dict[str, str] = {
-    **dict.fromkeys(("platform_x", "platform_y", "platform_z"), "length"),
-    **dict.fromkeys(("platform_qw", "platform_qx", "platform_qy", "platform_qz"), "ratio"),
-    **dict.fromkeys(("platform_roll", "platform_pitch", "platform_yaw"), "angle"),
-}
-"""Dimension of every channel of a robot's platform."""
 _TRACKER_DIMENSIONS: dict[str, str] = {
-    **dict.fromkeys(("tracker_x", "tracker_y", "tracker_z"), "length"),
-    **dict.fromkeys(("tracker_qw", "tracker_qx", "tracker_qy", "tracker_qz"), "ratio"),
+    name.replace("platform", "tracker"): POSE_DIMENSIONS[name] for name in (*POSITION, *QUATERNION)
 }
 """The same in the tracker's frame, as it was received."""
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from winchkit.arguments import path_of, require_types
 from winchkit.errors import RunError, UsageError
+from winchkit.runs.files import refuse_existing
 from winchkit.runs.log import aligned, log_of_run
-from winchkit.runs.overwriting import refuse_existing
 from winchkit.runs.read import read_log, read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run

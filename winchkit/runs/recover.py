@@ -11,7 +11,7 @@ from pathlib import Path
 
 from winchkit.arguments import path_of
 from winchkit.errors import Fault, RunError, UsageError
-from winchkit.runs.files import write_whole
+from winchkit.runs.files import refuse_existing, write_whole
 from winchkit.runs.formats.csv_read import read_bytes
 from winchkit.runs.formats.csv_write import CSV_MARK, EVENT_MARK
 from winchkit.runs.formats.mcap_file import COUNTERS, EVENTS, PROFILE, McapFile
@@ -29,7 +29,6 @@ from winchkit.runs.formats.mcap_records import (
     records,
     whole_chunk,
 )
-from winchkit.runs.overwriting import refuse_existing
 
 _COPIED = (Op.SCHEMA, Op.CHANNEL, Op.METADATA)
 _NO_SAMPLES = (EVENTS, COUNTERS)

@@ -81,38 +81,7 @@ def write_run(run: Run, path: str | Path) -> None:
         For an unknown suffix, and for a file to which a log is being written.
     """
     require_type(run, Run, "run")
-    _write(run, path, kind_for(path))
-
-
-def write_csv(run: Run, path: str | Path) -> None:
-    """Write a run as CSV, independent of the file's suffix.
-
-    Parameters
-    ----------
-    run : Run
-        The run.
-    path : str or Path
-        The file.
-    """
-    _write(run, path, CsvWriter)
-
-
-def write_mcap(run: Run, path: str | Path) -> None:
-    """Write a run as MCAP, independent of the file's suffix.
-
-    Parameters
-    ----------
-    run : Run
-        The run.
-    path : str or Path
-        The file.
-    """
-    from winchkit.runs.formats.mcap_write import McapWriter
-
-    _write(run, path, McapWriter)
-
-
-def _write(run: Run, path: str | Path, kind: type[RunWriter]) -> None:
+    kind = kind_for(path)
     columns = [("time", "s"), *((name, channel.unit) for name, channel in run.channels.items())]
     series = [run.time.tolist(), *(channel.values.tolist() for channel in run.channels.values())]
     begin = partial(create, path_of(path), replace=True)

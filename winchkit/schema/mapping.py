@@ -16,6 +16,15 @@ STAMP, EXCEL = "stamp", "excel"
 """Units of a time: text with a date or a time of day; days since 1899-12-30."""
 DATE = "date"
 """Channel of a column with the date, beside one with the time of day."""
+POSITION = ("platform_x", "platform_y", "platform_z")
+QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
+ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
+POSE_DIMENSIONS: dict[str, str] = {
+    **dict.fromkeys(POSITION, "length"),
+    **dict.fromkeys(QUATERNION, "ratio"),
+    **dict.fromkeys(ANGLES, "angle"),
+}
+"""Dimension of every channel of a robot's platform."""
 MATRIX = tuple(f"platform_r{row}{column}" for row in "123" for column in "123")
 """Elements of a platform's rotation matrix, which become its quaternion."""
 MODULO, TWOS, MAGNITUDE = "modulo", "two's complement", "sign and magnitude"
@@ -35,9 +44,7 @@ CHANNELS: dict[str, str] = {
     "time": "time",
     DATE: "time",
     **_OF_A_WINCH,
-    **dict.fromkeys(("platform_x", "platform_y", "platform_z"), "length"),
-    **dict.fromkeys(("platform_qw", "platform_qx", "platform_qy", "platform_qz"), "ratio"),
-    **dict.fromkeys(("platform_roll", "platform_pitch", "platform_yaw"), "angle"),
+    **POSE_DIMENSIONS,
     **dict.fromkeys(MATRIX, "ratio"),
 }
 """Dimension of every channel that a column may be."""

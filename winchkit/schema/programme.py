@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from winchkit.arguments import require_type
 from winchkit.errors import Fault, FileError
+from winchkit.schema.file_text import file_text
 from winchkit.schema.quantity import (
     Length,
     PositiveAcceleration,
@@ -20,7 +21,6 @@ from winchkit.schema.quantity import (
     Whole,
 )
 from winchkit.schema.table import Rule, Table
-from winchkit.units import format_quantity
 
 ALL = "all"
 """Name that stands for all winches of a bench, in programmes and commands."""
@@ -98,18 +98,10 @@ class Programme(Table):
     description: str = ""
 
     def approach(self, winch: str) -> tuple[float, ...]:
-        """Cable lengths from which and to which a winch moves before the first repeat.
+        """Cable lengths (m) from which and to which a winch moves before the first repeat.
 
-        Parameters
-        ----------
-        winch : str
-            Name of the winch.
-
-        Returns
-        -------
-        tuple of float
-            m; the second is the length at which a repeat ends, approached from the same side, so
-            that all repeats have the same motion. Empty where the final length is unknown.
+        The second is the length at which a repeat ends, approached from the same side, so that all
+        repeats have the same motion. Empty where the final length is unknown.
         """
         here: float | None = None
         before: float | None = None
@@ -133,18 +125,6 @@ class Programme(Table):
             yield "step", "a programme needs at least one [[step]]"
 
 
-_UNITS = {
-    "to": "m",
-    "by": "m",
-    "speed": "m/s",
-    "acceleration": "m/s^2",
-    "hold": "s",
-    "load_mass": "kg",
-    "temperature": "degC",
-}
-_ORDER = ("ask", "load_mass", "temperature", "to", "by", "speed", "acceleration", "hold")
-
-
 def write_programme(programme: Programme, path: Path) -> None:
     """Write a programme file; raises FileError.
 
@@ -156,31 +136,8 @@ def write_programme(programme: Programme, path: Path) -> None:
         The file.
     """
     require_type(programme, Programme, "programme")
-    import tomlkit
-
-    document = tomlkit.document()
-    document["schema"] = 1
-    document["kind"] = "programme"
-    document["name"] = programme.name
-    document["repeat"] = programme.repeat
-    if programme.description:
-        document["description"] = programme.description
-    steps = tomlkit.aot()
-    for step in programme.step:
-        table = tomlkit.table()
-        table.update(_written(step))
-        steps.append(table)
-    document["step"] = steps
+    text = file_text("programme", programme)
     try:
-        path.write_text(tomlkit.dumps(document), encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
     except OSError as error:
         raise FileError(Fault(f"cannot be written: {error.strerror}", str(path))) from error
-
-
-def _written(step: Step) -> dict[str, Any]:
-    out: dict[str, Any] = {} if step.winch == ALL else {"winch": step.winch}
-    for key in _ORDER:
-        value = getattr(step, key)
-        if value is not None:
-            out[key] = format_quantity(value, _UNITS[key]) if key in _UNITS else value
-    return out

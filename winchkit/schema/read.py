@@ -88,11 +88,7 @@ def read_profile(path: PathLike) -> WinchProfile:
 
 
 def read_winch(path: PathLike) -> WinchProfile:
-    """Read the profile of a winch for what needs its drum.
-
-    ``path``: file in TOML of the kind ``winch``, or the name of a shipped one. Returns: in SI.
-    Raises FileError with every fault of the file, and for an axis.
-    """
+    """Read the profile of a winch for what needs its drum; raises FileError for an axis too."""
     return _read(_located("profiles", path), "winch", WinchProfile)
 
 
@@ -160,12 +156,7 @@ def read_programme(path: PathLike) -> Programme:
 
 
 def read_robot_programme(path: PathLike) -> RobotProgramme:
-    """Read a programme of a robot's platform.
-
-    ``path``: file in TOML of the kind ``robot-programme``, or the name of a shipped one. Returns:
-    poses, arcs, blended corners and holds, in SI. Raises FileError with every fault of the file,
-    each with its line.
-    """
+    """Read a programme of a robot's platform: poses, arcs, blended corners and holds."""
     return _read(_located("sim", path), "robot-programme", RobotProgramme)
 
 
@@ -191,11 +182,7 @@ def read_simbench(path: PathLike) -> SimBench:
 
 
 def read_device(path: PathLike) -> DeviceSpec:
-    """Read a device file.
-
-    ``path``: TOML file of the kind ``device``, or the name of a shipped one. Returns: in SI. Raises
-    FileError with every fault of the file.
-    """
+    """Read a device file, or the shipped device of a name."""
     return _read(_located("devices", path), "device", DeviceSpec)
 
 
@@ -221,20 +208,12 @@ def read_size(path: PathLike) -> SizeSpec:
 
 
 def read_calibration(path: PathLike) -> CellCalibration:
-    """Read the calibration of a load cell.
-
-    ``path``: TOML file of the kind ``calibration``. Returns: in SI. Raises FileError with every
-    fault of the file.
-    """
+    """Read the calibration of a load cell."""
     return _read(path, "calibration", CellCalibration)
 
 
 def read_tares(path: PathLike) -> TareBook:
-    """Read the host's tares of a bench.
-
-    ``path``: TOML file of the kind ``tares``. Returns: in SI. Raises FileError with every fault of
-    the file.
-    """
+    """Read the host's tares of a bench."""
     return _read(path, "tares", TareBook)
 
 
@@ -260,18 +239,12 @@ def read_mapping(path: PathLike) -> ImportMapping:
 
 
 def read_any(path: PathLike) -> Declared:
-    """Read a declaration of the kind that it declares.
-
-    Returns: in SI. Raises FileError with every fault of the file.
-    """
+    """Read a declaration of the kind that it declares."""
     return load(path).value
 
 
 def load(path: PathLike, kind: str | None = None) -> Declaration:
-    """Read a declaration with its warnings; ``kind``, if given, is required.
-
-    Raises FileError with every fault of the file.
-    """
+    """Read a declaration with its warnings; ``kind``, if given, is required."""
     reading = Reading(open_source(path))
     found = reading.source.kind
     if kind is not None and found != kind:

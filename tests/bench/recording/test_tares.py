@@ -13,7 +13,7 @@ from click.testing import CliRunner
 from fed import Fed, recording
 from winchkit.bench.recording.recorder import Recorder
 from winchkit.cli import main
-from winchkit.runs import read_run, write_csv
+from winchkit.runs import read_run, write_run
 from winchkit.runs.read import read_log
 from winchkit.runs.recording.rotation import Rotation
 
@@ -105,7 +105,7 @@ def test_gross_is_kept_by_every_conversion(tmp_path: Path) -> None:
         tare(fed, "A", 1.0)
         fed.run(recorder, 1.0)
     run = read_run(tmp_path / "lift.mcap")
-    write_csv(run, tmp_path / "lift.csv")
+    write_run(run, tmp_path / "lift.csv")
     again = read_run(tmp_path / "lift.csv")
     assert np.array_equal(again["tension_gross"], run["tension_gross"])
     assert again["tension_gross"] - again["tension"] == pytest.approx(1.0)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from model_files import record_files, side_by_side
-from winchkit.runs import read_run, write_csv
+from winchkit.runs import read_run, write_run
 
 SLOW = """
 from pathlib import Path
@@ -37,7 +37,7 @@ PATIENCE = 60
 @pytest.mark.parametrize("winch", ["all", "A"])
 def test_an_interrupted_diagnosis_waits_for_nothing(winch: str, tmp_path: Path) -> None:
     runs, both = record_files(tmp_path), tmp_path / "both.csv"
-    write_csv(side_by_side(read_run(runs[0]), read_run(runs[2])), both)
+    write_run(side_by_side(read_run(runs[0]), read_run(runs[2])), both)
     marker, effects = tmp_path / "begun", tmp_path / "slow.py"
     effects.write_text(SLOW.format(marker=str(marker)), encoding="utf-8")
     asked = ("diagnose", both, "-p", "bench-spiral", "--winch", winch, "--effects", effects)

@@ -13,7 +13,7 @@ from winchkit.cli.model.plan import suggest_run
 from winchkit.diagnosis.data.dataset import prepare
 from winchkit.diagnosis.design.plan import programme_of
 from winchkit.diagnosis.design.programmes import CANDIDATE_PROGRAMMES
-from winchkit.runs import read_run, write_csv
+from winchkit.runs import read_run, write_run
 from winchkit.schema.programme import Programme
 from winchkit.schema.read import read_profile, read_programme, read_simbench
 from winchkit.sim.bench import profiles_of
@@ -28,7 +28,7 @@ def recorded(programme: Programme, folder: Path, seed: int) -> list[Path]:
     out = []
     for run in simulate(BENCH, profiles_of(BENCH), programme, seed=seed):
         out.append(folder / f"{seed}-{run.name}.csv")
-        write_csv(run, out[-1])
+        write_run(run, out[-1])
     return out
 
 

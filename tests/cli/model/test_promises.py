@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from model_files import SHIPPED, answer, invoke, record_files, side_by_side
-from winchkit.runs import read_run, write_csv
+from winchkit.runs import read_run, write_run
 from winchkit.schema.read import read_profile
 
 UNITS = {"cable_length": "m", "tension": "N", "motor_torque": "N m"}
@@ -236,7 +236,7 @@ def test_the_band_is_the_users(runs: list[Path]) -> None:
 
 def test_one_winch_of_several(runs: list[Path], tmp_path: Path) -> None:
     both = tmp_path / "both.csv"
-    write_csv(side_by_side(read_run(runs[0]), read_run(runs[2])), both)
+    write_run(side_by_side(read_run(runs[0]), read_run(runs[2])), both)
     result = invoke("compare", both, "-p", "bench-spiral", "--json")
     assert result.exit_code == 2
     assert result.stdout == ""
@@ -256,7 +256,7 @@ def both(runs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> list[Pat
     folder = tmp_path_factory.mktemp("winches")
     out = [folder / "both-1.csv", folder / "both-2.csv"]
     for path, (first, second) in zip(out, ((0, 2), (1, 3)), strict=True):
-        write_csv(side_by_side(read_run(runs[first]), read_run(runs[second])), path)
+        write_run(side_by_side(read_run(runs[first]), read_run(runs[second])), path)
     return out
 
 
@@ -321,7 +321,7 @@ def test_winches_whose_pages_would_be_one(runs: list[Path], tmp_path: Path) -> N
     run = side_by_side(read_run(runs[0]), read_run(runs[2]))
     odd = {name.replace("A.", "x y.").replace("B.", "x-y."): c for name, c in run.channels.items()}
     path = tmp_path / "odd.csv"
-    write_csv(replace(run, channels=odd), path)
+    write_run(replace(run, channels=odd), path)
     asked = ("compare", path, "-p", "bench-spiral", "--winch", "all")
     refused = invoke(*asked, "--html", tmp_path / "o.html")
     assert refused.exit_code == 2

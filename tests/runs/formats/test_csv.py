@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from winchkit.errors import RunError
-from winchkit.runs import Run, read_run, write_csv
+from winchkit.runs import Run, read_run, write_run
 from winchkit.runs.info import info_of, summary_of
 from winchkit.runs.read import read_log
 
@@ -242,7 +242,7 @@ def test_numbers_survive_to_the_last_bit(
     assert np.array_equal(
         np.array([first["motor_angle"], first["tension"], first["odd"]]).T, rows, equal_nan=True
     )
-    write_csv(first, tmp_path / "copy.csv")
+    write_run(first, tmp_path / "copy.csv")
     second = read_run(tmp_path / "copy.csv")
     assert np.array_equal(first.time, second.time)
     assert dict(first.metadata) == dict(second.metadata)

@@ -20,7 +20,7 @@ from mcap.writer import Writer
 
 from small_disk import run_on_small_disk
 from winchkit.errors import FileError, RunError, UsageError
-from winchkit.runs import Run, open_writer, read_run, write_mcap, write_run
+from winchkit.runs import Run, open_writer, read_run, write_run
 
 COLUMNS = [("time", "s"), ("motor_angle", "rad"), ("tension", "N"), ("valve", "bar")]
 
@@ -54,7 +54,7 @@ def test_what_is_appended_reads_back(tmp_path: Path, suffix: str) -> None:
 
 def test_both_formats_hold_the_same(tmp_path: Path) -> None:
     first = written(tmp_path / "a.csv", 50)
-    write_mcap(first, tmp_path / "b.mcap")
+    write_run(first, tmp_path / "b.mcap")
     second = read_run(tmp_path / "b.mcap")
     write_run(second, tmp_path / "c.csv")
     assert (tmp_path / "c.csv").read_text() == (tmp_path / "a.csv").read_text()

@@ -10,7 +10,6 @@ import pytest
 from scipy.io import savemat
 
 from logger_layouts import motion
-from winchkit.runs.columns import POSE_DIMENSIONS
 from winchkit.runs.importing.answers import Answers, read_column
 from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.consistency import likely_counts, ratio_of
@@ -21,7 +20,7 @@ from winchkit.runs.importing.guess import guess_columns
 from winchkit.runs.importing.names import meaning_of, words_of
 from winchkit.runs.importing.unit_spelling import read_unit, split_unit
 from winchkit.runs.run import CHANNEL_DIMENSIONS
-from winchkit.schema.mapping import CHANNELS, DATE, MATRIX
+from winchkit.schema.mapping import CHANNELS, DATE, MATRIX, POSE_DIMENSIONS
 from winchkit.units import UNITS
 
 TURN = 2 * math.pi

@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from winchkit.catalog import find
 from winchkit.cli import main
-from winchkit.runs import write_csv
+from winchkit.runs import write_run
 from winchkit.runs.run import Channel, Run
 from winchkit.schema.read import read_programme, read_simbench
 from winchkit.sim.bench import hiding, profiles_of, programme_path
@@ -79,7 +79,7 @@ def record_files(
         programme = read_programme(programme_path(name))
         for run in simulate(declared, profiles_of(declared), programme, seed=11):
             path = folder / f"{run.name}.csv"
-            write_csv(change(run) if change else run, path)
+            write_run(change(run) if change else run, path)
             out.append(path)
     return out
 

@@ -43,24 +43,15 @@ _SATURATED = Quality.OVERLOAD | Quality.UNDERLOAD
 
 @dataclass(frozen=True)
 class CellRecording:
-    """Readings of one cell.
-
-    Attributes
-    ----------
-    name : str
-        Column of the file, or ``A.cell`` of a log.
-    unit : str
-        Of the file; empty where it gives none.
-    samples : Samples
-        Readings in that unit.
-    temperature : ndarray or None
-        Shape (n,), in the unit of the file.
-    """
+    """Readings of one cell in the unit of the file."""
 
     name: str
+    """Column of the file, or ``A.cell`` of a log."""
     unit: str
+    """Empty where the file gives none."""
     samples: Samples
     temperature: Array | None = None
+    """Shape (n,), in the unit of the file."""
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import click
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import bench_argument
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 
 
 @click.command(
@@ -27,8 +27,8 @@ from winchkit.cli.core.output import echo_json
     type=click.Path(exists=True, dir_okay=False),
     help="Answers by key (TOML), for tests; the record says that they were not typed.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the record as JSON.")
-def command(*, bench: str, answers: str | None, as_json: bool) -> None:
+@json_flag("Print the record as JSON.")
+def command(*, bench: str, answers: str | None) -> None:
     """Commission BENCH: directions, units, brake, cell sign, limits, and the loss of the host.
 
     Asks on stderr and reads answers from stdin; enables one drive at a time and moves slowly. The
@@ -49,8 +49,8 @@ def command(*, bench: str, answers: str | None, as_json: bool) -> None:
         TypedAnswers(say, sys.stdin.readline) if answers is None else AnswerFile(answers, say)
     )
     record = commission_bench(spec, dialogue, MonotonicClock())
-    if as_json:
-        echo_json({"schema": 1, "path": spec.record_file, **dataclasses.asdict(record)})
-    else:
-        click.echo(f"{spec.record_file}: commissioned by {record.by}, {record.date}")
+    tell(
+        {"path": spec.record_file, **dataclasses.asdict(record)},
+        [f"{spec.record_file}: commissioned by {record.by}, {record.date}"],
+    )
     suggest_next("monitor", "-b", bench)

@@ -15,7 +15,7 @@ from winchkit.cli.core.options import (
     effects_option,
     take_over_option,
 )
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 
@@ -67,7 +67,7 @@ _NEEDS_CELL = "needs a bench with a load cell"
 @take_over_option
 @effects_option
 @dry_run_option
-@click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
+@json_flag("Print where it stands as JSON.")
 def command(
     winch: str,
     tension: str,
@@ -80,7 +80,6 @@ def command(
     take_over: bool,
     effects: Sequence[str],
     dry_run: bool,
-    as_json: bool,
 ) -> None:
     """Keep the tension of WINCH's cable at TENSION (at its platform end, by the load cell).
 
@@ -97,7 +96,7 @@ def command(
     if (bound := optional(stiffness, "stiffness")) is not None:
         bounds["stiffness"] = bound
     with station_for(
-        bench, client="hold-tension", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
+        bench, client="hold-tension", dry_run=dry_run, effects=effects, winch=winch
     ) as station:
         if take_over:
             station.take_over(winch)
@@ -107,7 +106,5 @@ def command(
         while station.moving(winch):
             station.clock.sleep(REFRESH)
         status = station.status()
-    if as_json and not dry_run:
-        echo_json(status)
-    elif not dry_run:
-        click.echo(status_line(status))
+    if not dry_run:
+        tell(status, [status_line(status)])

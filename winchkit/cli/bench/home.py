@@ -14,7 +14,7 @@ from winchkit.cli.core.options import (
     take_over_option,
     winch_argument,
 )
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
@@ -58,7 +58,7 @@ _POLL = 0.02
 @take_over_option
 @effects_option
 @dry_run_option
-@click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
+@json_flag("Print where it stands as JSON.")
 def command(
     winch: str | None,
     *,
@@ -70,7 +70,6 @@ def command(
     take_over: bool,
     effects: Sequence[str],
     dry_run: bool,
-    as_json: bool,
 ) -> None:
     """Home WINCH: by a method of its drive, or by telling it the present cable length.
 
@@ -88,7 +87,7 @@ def command(
         raise UsageError("--at belongs to --method; --here names the length already")
     length = optional(here if here is not None else at, "length")
     with station_for(
-        bench, client="home", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
+        bench, client="home", dry_run=dry_run, effects=effects, winch=winch
     ) as station:
         if take_over:
             station.take_over(winch)
@@ -96,9 +95,5 @@ def command(
         while station.homing():
             station.clock.sleep(_POLL)
         status = station.status()
-    if dry_run:
-        return
-    if as_json:
-        echo_json(status)
-    else:
-        click.echo(status_line(status))
+    if not dry_run:
+        tell(status, [status_line(status)])

@@ -24,7 +24,7 @@ from winchkit.cli.core.options import (
     take_over_option,
     winch_argument,
 )
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line, unknown_length
 from winchkit.errors import NotPermitted, UsageError
@@ -64,9 +64,7 @@ _HOW = "--pay-out 0.1m/s --for 2s moves for a time, --wind-in 50mm by a length"
 @take_over_option
 @effects_option
 @dry_run_option
-@click.option(
-    "--json", "as_json", is_flag=True, help="Without keys: print where it stands as JSON."
-)
+@json_flag("Without keys: print where it stands as JSON.")
 def command(
     winch: str | None,
     *,
@@ -79,7 +77,6 @@ def command(
     take_over: bool,
     effects: Sequence[str],
     dry_run: bool,
-    as_json: bool,
 ) -> None:
     """Move WINCH (the only one where there is one) by hand.
 
@@ -93,9 +90,7 @@ def command(
     asked = _read(pay_out, wind_in, duration, speed)
     if asked.direction is None and (dry_run or not sys.stdin.isatty()):
         raise UsageError(f"there is no terminal to hold a key on: {_HOW}")
-    with station_for(
-        bench, client="jog", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
-    ) as station:
+    with station_for(bench, client="jog", dry_run=dry_run, effects=effects, winch=winch) as station:
         if reset:
             station.reset()
         if take_over:
@@ -108,10 +103,9 @@ def command(
             _wait(station, winch)
         else:
             _jog_for(station, winch, asked.direction.speed, asked.duration)
-        if as_json and not dry_run:
-            echo_json(station.status())
-        elif not dry_run:
-            click.echo(status_line(station.status()))
+        if not dry_run:
+            status = station.status()
+            tell(status, [status_line(status)])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import click
 from winchkit.bench.remote.interruption import Terminated
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import cell, live_table
 from winchkit.errors import one_line
@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     type=Quantity("time", example="10 s"),
     help="End after this time.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a line.")
-def command(*, bench: str, period: str, duration: str | None, as_json: bool) -> None:
+@json_flag("Print one JSON object a line.")
+def command(*, bench: str, period: str, duration: str | None) -> None:
     """Show the winches of a bench until Ctrl-C. Moves nothing.
 
     Keeps no program from owning the bench; when the owner ends it connects to the next one.
@@ -55,7 +55,7 @@ def command(*, bench: str, period: str, duration: str | None, as_json: bool) -> 
     limit, pause = seconds(duration), quantity(period, "time")
     end = None if limit is None else time.monotonic() + limit
     try:
-        (_print_lines if as_json else _show_table)(bench, pause, end)
+        (_print_lines if is_json() else _show_table)(bench, pause, end)
     except Terminated:
         raise
     except KeyboardInterrupt:

@@ -17,7 +17,7 @@ from winchkit.cli.core.options import (
     take_over_option,
     winch_argument,
 )
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import status_line
 from winchkit.errors import UsageError
@@ -63,7 +63,7 @@ _POLL = 0.05
 @take_over_option
 @effects_option
 @dry_run_option
-@click.option("--json", "as_json", is_flag=True, help="Print where it stands as JSON.")
+@json_flag("Print where it stands as JSON.")
 def command(
     winch: str | None,
     *,
@@ -78,7 +78,6 @@ def command(
     take_over: bool,
     effects: Sequence[str],
     dry_run: bool,
-    as_json: bool,
 ) -> None:
     """Move WINCH to a cable length, or by one, on an S-curve; then disable it.
 
@@ -101,18 +100,14 @@ def command(
         if pose is not None and pose_by is not None:
             raise UsageError("give one of --pose and --pose-by")
         goal = read_pose(pose or pose_by or "")
-        with station_for(
-            bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects
-        ) as station:
+        with station_for(bench, client="move", dry_run=dry_run, effects=effects) as station:
             if take_over:
                 station.take_over(ALL)
             station.move_pose(goal, pose is None, limit, gentle)
             _wait(station, ALL)
             status, there = station.status(), station.pose()
-        if as_json and not dry_run:
-            echo_json({**status, "pose": there})
-        elif not dry_run:
-            click.echo(pose_line(there))
+        if not dry_run:
+            tell({**status, "pose": there}, [pose_line(there)])
         return
     if (to is None) == (direction is None):
         raise UsageError(
@@ -122,19 +117,15 @@ def command(
     target = optional(to, "length")
     change: DirectionKeyword = {} if direction is None else direction.length
     with station_for(
-        bench, client="move", dry_run=dry_run, as_json=as_json, effects=effects, winch=winch
+        bench, client="move", dry_run=dry_run, effects=effects, winch=winch
     ) as station:
         if take_over:
             station.take_over(winch)
         station.move(winch, to=target, **change, speed=limit, acceleration=gentle)
         _wait(station, winch)
         status = station.status()
-    if dry_run:
-        return
-    if as_json:
-        echo_json(status)
-    else:
-        click.echo(status_line(status))
+    if not dry_run:
+        tell(status, [status_line(status)])
 
 
 def _wait(station: Station, winch: str | None) -> None:

@@ -20,7 +20,7 @@ from winchkit.cli.core.options import (
     effects_option,
     output_option,
 )
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import is_json, json_flag, tell
 from winchkit.cli.core.standard_input import forget_typed, is_standard_input
 from winchkit.errors import UsageError
 
@@ -62,7 +62,7 @@ _POLL = 0.05
 @click.option("--replace", is_flag=True, help="Write over earlier runs of that programme.")
 @effects_option
 @dry_run_option
-@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
+@json_flag("Print what was written as JSON.")
 def command(
     programme: str,
     *,
@@ -73,7 +73,6 @@ def command(
     replace: bool,
     effects: Sequence[str],
     dry_run: bool,
-    as_json: bool,
 ) -> None:
     """Execute PROGRAMME (a file, or a shipped name) on a bench, one log per load and repeat.
 
@@ -96,7 +95,7 @@ def command(
             f".{suffix}",
             replace=replace,
             dry_run=dry_run,
-            as_json=as_json,
+            as_json=is_json(),
         )
         return
     declared = read_programme(path)
@@ -109,17 +108,13 @@ def command(
     check_winches(declared, wired)
     check_folder(output)
     if dry_run:
-        _rehearse(bench, declared, effects, as_json=as_json)
+        _rehearse(bench, declared, effects)
         return
     if not replace:
         _refuse_to_lose(declared, output, f".{suffix}")
     ask = partial(_agree, bench) if yes else _ask
     written = _execute(bench, effects, declared, output, f".{suffix}", ask, replace=replace)
-    if as_json:
-        echo_json({"schema": 1, "programme": declared.name, "runs": written})
-    else:
-        for path in written:
-            click.echo(path)
+    tell({"programme": declared.name, "runs": written}, map(str, written))
     winches = wired.winch
     words = ["-p", next(iter(winches.values())).profile]
     words += ["--winch", "all"] if len(winches) > 1 else []
@@ -141,14 +136,14 @@ def _execute(
     from winchkit.bench.programme import run_programme
     from winchkit.bench.remote.identity import client_name
 
-    def tell(repeat: int, number: int, step: Step) -> None:
+    def report(repeat: int, number: int, step: Step) -> None:
         place = f"{programme.name} {repeat}/{programme.repeat}, step {number}"
         note(f"{place}: {step.words}")
 
     name = client_name("run")
     with open_bench(bench, effects=effects, name=name, realtime="try") as opened:
         return run_programme(
-            opened, programme, out, ask, suffix=suffix, progress=tell, replace=replace
+            opened, programme, out, ask, suffix=suffix, progress=report, replace=replace
         )
 
 
@@ -163,14 +158,12 @@ def _refuse_to_lose(programme: Programme, out: Path, suffix: str) -> None:
         )
 
 
-def _rehearse(bench: str, programme: Programme, effects: Sequence[str], *, as_json: bool) -> None:
+def _rehearse(bench: str, programme: Programme, effects: Sequence[str]) -> None:
     """Make the moves of one repeat on simulated drives, leaving out holds and questions."""
     from winchkit.bench.direction import directed
     from winchkit.cli.core.dry_run import station_for
 
-    with station_for(
-        bench, client="run", dry_run=True, as_json=as_json, effects=effects
-    ) as station:
+    with station_for(bench, client="run", dry_run=True, effects=effects) as station:
         for step in programme.step:
             if step.to is None and not step.by:
                 continue

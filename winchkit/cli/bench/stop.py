@@ -9,7 +9,7 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option, dry_run_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.errors import ConnectionLost, MotionError, WinchkitError
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ _BY_OWNER = "the bench's owner confirms it at rest"
 )
 @bench_option
 @dry_run_option
-@click.option("--json", "as_json", is_flag=True, help="Print who has confirmed as JSON.")
-def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
+@json_flag("Print who has confirmed as JSON.")
+def command(bench: str, *, dry_run: bool) -> None:
     """Quick-stop every winch of a bench and wait until each drive confirms.
 
     Goes through the process that owns the bench where there is one, else straight to the drives
@@ -47,7 +47,7 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
 
     spec = read_bench(bench)
     if dry_run:
-        _show(spec, as_json=as_json)
+        _show(spec)
         return
     mark_stop(spec)
     try:
@@ -55,14 +55,14 @@ def command(bench: str, *, dry_run: bool, as_json: bool) -> None:
         if station is not None:
             station.stop()
             station.close()
-            _tell([Stopped(name, True, _BY_OWNER) for name in spec.winch], as_json)
+            _tell([Stopped(name, True, _BY_OWNER) for name in spec.winch])
             return
     except WinchkitError as error:
         click.echo(f"winchkit: {error}; acting on the bus itself", err=True)
-    _stop_on_bus(spec, as_json)
+    _stop_on_bus(spec)
 
 
-def _show(spec: BenchSpec, *, as_json: bool) -> None:
+def _show(spec: BenchSpec) -> None:
     """Frames to the drives themselves where no process owns the bench."""
     from winchkit.cli.core.dry_run import nodes_of, show_frames, writes
     from winchkit.drivers.can.cia402.state_machine import QUICK_STOP
@@ -72,14 +72,14 @@ def _show(spec: BenchSpec, *, as_json: bool) -> None:
     frames = [
         frame for ref in servos for frame in writes(ref.bus, ref.node or 1, [(0x6040, 0, word)])
     ]
-    show_frames(frames, nodes_of(spec), as_json=as_json)
+    show_frames(frames, nodes_of(spec))
 
 
-def _stop_on_bus(spec: BenchSpec, as_json: bool) -> None:
+def _stop_on_bus(spec: BenchSpec) -> None:
     from winchkit.bench.emergency_stop import stop_on_bus
 
     results = stop_on_bus(spec)
-    _tell(results, as_json)
+    _tell(results)
     missing = [result.winch for result in results if not result.confirmed]
     if missing:
         message = f"winch {', '.join(missing)} not confirmed at rest; use the emergency stop"
@@ -87,8 +87,8 @@ def _stop_on_bus(spec: BenchSpec, as_json: bool) -> None:
         raise MotionError(message) if reached else ConnectionLost(message)
 
 
-def _tell(results: Sequence[Stopped], as_json: bool) -> None:
-    if as_json:
+def _tell(results: Sequence[Stopped]) -> None:
+    if is_json():
         echo_json({"schema": 1, "stopped": list(results)})
         return
     for result in results:

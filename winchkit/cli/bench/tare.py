@@ -8,7 +8,7 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_option, winch_argument
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 
 if TYPE_CHECKING:
     from winchkit.schema.bench import BenchSpec
@@ -26,8 +26,8 @@ _DURATION = 1.0
 )
 @winch_argument
 @bench_option
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def command(winch: str | None, bench: str, as_json: bool) -> None:
+@json_flag("Print the result as JSON.")
+def command(winch: str | None, bench: str) -> None:
     """Tare the load cell of WINCH, at rest (the only winch where there is one).
 
     Subtracts the present reading: by the device's own volatile tare where it has one, which
@@ -44,14 +44,14 @@ def command(winch: str | None, bench: str, as_json: bool) -> None:
         name = spec.winch_named(winch)
         with at_station(spec, client="tare") as station:
             tension = station.tare(name)
-    if as_json:
-        echo_json({"schema": 1, "winch": name, "tension": tension})
-    else:
-        click.echo(f"tared: the cell reads {tension:.2f} N")
-        click.echo(
-            f"  `winchkit cell tare {name} --clear -b {bench}` takes a tare of the host away, with "
-            "--device the device's own"
-        )
+    advice = (
+        f"  `winchkit cell tare {name} --clear -b {bench}` takes a tare of the host away, with "
+        "--device the device's own"
+    )
+    tell(
+        {"winch": name, "tension": tension},
+        [f"tared: the cell reads {tension:.2f} N", advice],
+    )
 
 
 def _tare_alone(bench: str, spec: BenchSpec, winch: str | None) -> tuple[str, float]:

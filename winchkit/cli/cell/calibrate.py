@@ -14,7 +14,7 @@ from winchkit.cli.core.completion import complete_bench, complete_winch
 from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import TABLE, bench_by_default
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.cli.model.options import figures_option, write_figures, write_page
@@ -99,7 +99,7 @@ def _bench(ctx: click.Context, param: click.Parameter, value: str | None) -> str
 @click.option("--html", metavar="FILE", help="Also write the report as one page.")
 @figures_option
 @click.option("-y", "--yes", is_flag=True, help="Accept the fit without asking.")
-@click.option("--json", "as_json", is_flag=True, help="Print the fit as JSON.")
+@json_flag("Print the fit as JSON.")
 def command(
     cell: str | None,
     bench: str | None,
@@ -113,7 +113,6 @@ def command(
     *,
     figures: str | None,
     yes: bool,
-    as_json: bool,
     **guided: Any,
 ) -> None:
     """Calibrate the load cell CELL with known weights, and write the calibration beside the bench.
@@ -140,7 +139,7 @@ def command(
     target = Path(output or beside / f"{found.name.replace('.', '-')}.toml")
     calibration = _calibration(target.stem, fit, found, degrees, direction)
     for line in [*report_lines(fit, found.points, found.unit), *effect_lines(needed)]:
-        click.echo(line, err=as_json)
+        click.echo(line, err=is_json())
     if html is not None:
         _write_page(html, calibration, fit, needed)
     if figures is not None:
@@ -151,7 +150,7 @@ def command(
         click.confirm(f"Accept, and write {target}?", abort=True, err=True)
     write_text(target, calibration_toml(calibration))
     note(f"written: {target}")
-    if as_json:
+    if is_json():
         echo_json(
             {"schema": 1, "file": str(target), "fit": fit, "points": found.points}
             | {"diagnosis": needed}

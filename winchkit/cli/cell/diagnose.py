@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections import Counter
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, NoReturn
 
 import click
@@ -13,12 +14,13 @@ from winchkit.cli.cell.options import cells, shown, unit_of
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_bench, complete_winch
 from winchkit.cli.core.options import TABLE, bench_by_default
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.errors import one_line
 
 if TYPE_CHECKING:
     from winchkit.calibration.cell.health import Health
+    from winchkit.calibration.cell.recordings import CellFindings
     from winchkit.drivers.reading import Reading
 
 _MEANINGS = {
@@ -66,7 +68,7 @@ _MEANINGS = {
     show_default=True,
     help="Duration of the readings.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_flag("Print the result as JSON.")
 @click.pass_context
 def command(
     context: click.Context,
@@ -75,8 +77,6 @@ def command(
     run: str | None,
     column: str | None,
     duration: str,
-    *,
-    as_json: bool,
 ) -> None:
     """Watch CELL and report rate, noise, drift, frozen or repeated counts, hum and creep.
 
@@ -88,7 +88,7 @@ def command(
     if run is not None:
         if bench is not None and context.get_parameter_source("bench") is not _ENVIRONMENT:
             raise click.UsageError("'--run' reads a file, so '--bench' has no place there.")
-        _examine_recording(run, column or cell, as_json=as_json)
+        _examine_recording(run, column or cell)
         return
     if column is not None:
         raise click.UsageError("'--column' is a column of '--run FILE'.")
@@ -106,19 +106,16 @@ def command(
     unit = unit_of(name)
     flags = _flags(readings)
     if sum(item.quality.usable for item in readings) < len(readings) / 2:
-        _tell_unusable(name, len(readings), flags, counters, as_json)
+        _tell_unusable(name, len(readings), flags, counters)
     health = examine(samples_of_readings(readings))
-    if as_json:
-        record = {"cell": name, "unit": unit, **dataclasses.asdict(health)}
-        record |= {"flags": flags, "counters": counters}
-        echo_json({"schema": 1, **record})
-    else:
-        click.echo(f"{name}, {seconds:g} s:")
-        for line in _lines(health, unit):
-            click.echo(f"  {line}")
-        click.echo("  counters: " + ", ".join(f"{k} {v}" for k, v in counters.items()))
-        for remark in health.remarks:
-            click.echo(f"  ! {remark}")
+    record = {"cell": name, "unit": unit, **dataclasses.asdict(health)}
+    lines = [
+        f"{name}, {seconds:g} s:",
+        *(f"  {line}" for line in _lines(health, unit)),
+        "  counters: " + ", ".join(f"{k} {v}" for k, v in counters.items()),
+        *(f"  ! {remark}" for remark in health.remarks),
+    ]
+    tell({**record, "flags": flags, "counters": counters}, lines)
     if health.saturated or health.usable < health.readings or health.unique == 1:
         click.get_current_context().exit(1)
 
@@ -130,27 +127,27 @@ def _parameter(context: click.Context, name: str) -> click.Parameter:
     return next(item for item in context.command.params if item.name == name)
 
 
-def _examine_recording(run: str, column: str | None, *, as_json: bool) -> None:
+def _examine_recording(run: str, column: str | None) -> None:
     """Report on every cell of a file; exit with 1 where its readings are wrong."""
     from winchkit.calibration.cell.recordings import recorded_cell_health
 
     found = recorded_cell_health(run, column)
-    if as_json:
-        echo_json({"schema": 1, "run": run, "cells": [dataclasses.asdict(one) for one in found]})
-    for one in found if not as_json else ():
-        unit = f" in {one.unit}" if one.unit else ""
-        click.echo(one_line(f"{one.name}{unit}, {run}:"))
-        for line in _lines(one.health, one.unit):
-            click.echo(f"  {line}")
-        if math.isfinite(one.temperature_slope):
-            slope = f"{one.temperature_slope:+.3g} ± {one.temperature_slope_std:.2g}"
-            click.echo(f"  over the temperature: {slope} {one.unit} per degree of its column")
-        for remark in one.remarks:
-            click.echo(f"  ! {remark}")
+    lines = (line for one in found for line in _lines_of_recorded(one, run))
+    tell({"run": run, "cells": [dataclasses.asdict(one) for one in found]}, lines)
     health = [one.health for one in found]
     is_wrong = any(h.saturated or h.usable < h.readings or h.unique == 1 for h in health)
     if is_wrong or any(one.spikes for one in found):
         click.get_current_context().exit(1)
+
+
+def _lines_of_recorded(one: CellFindings, run: str) -> Iterator[str]:
+    unit = f" in {one.unit}" if one.unit else ""
+    yield one_line(f"{one.name}{unit}, {run}:")
+    yield from (f"  {line}" for line in _lines(one.health, one.unit))
+    if math.isfinite(one.temperature_slope):
+        slope = f"{one.temperature_slope:+.3g} ± {one.temperature_slope_std:.2g}"
+        yield f"  over the temperature: {slope} {one.unit} per degree of its column"
+    yield from (f"  ! {remark}" for remark in one.remarks)
 
 
 def _flags(readings: list[Reading]) -> dict[str, int]:
@@ -162,18 +159,13 @@ def _flags(readings: list[Reading]) -> dict[str, int]:
 
 
 def _tell_unusable(
-    name: str, count: int, flags: dict[str, int], counters: dict[str, int], as_json: bool
+    name: str, count: int, flags: dict[str, int], counters: dict[str, int]
 ) -> NoReturn:
     """Say why there is nothing to examine, and end with 1."""
-    if as_json:
-        record = {"cell": name, "readings": count, "flags": flags, "counters": counters}
-        echo_json({"schema": 1, **record})
-    else:
-        listed = ", ".join(f"{flag} {number}" for flag, number in flags.items())
-        click.echo(f"{name}: most of {count} readings are no measurements: {listed}")
-        for flag in flags:
-            if flag in _MEANINGS:
-                click.echo(f"  ! {flag}: {_MEANINGS[flag]}")
+    listed = ", ".join(f"{flag} {number}" for flag, number in flags.items())
+    lines = [f"{name}: most of {count} readings are no measurements: {listed}"]
+    lines += [f"  ! {flag}: {_MEANINGS[flag]}" for flag in flags if flag in _MEANINGS]
+    tell({"cell": name, "readings": count, "flags": flags, "counters": counters}, lines)
     click.get_current_context().exit(1)
 
 

@@ -6,14 +6,15 @@ import click
 
 from winchkit.cli.core.lazy import At, LazyGroup
 
+_READINGS, _ZEROING = "winchkit.cli.cell.readings", "winchkit.cli.cell.zeroing"
 COMMANDS = {
-    "info": At("winchkit.cli.cell.info", "What an instrument is, and what it says now."),
-    "rate": At("winchkit.cli.cell.rate", "How fast it can be read, and what limits that."),
+    "info": At(_READINGS, "What an instrument is, and what it says now.", "info"),
+    "rate": At(_READINGS, "How fast it can be read, and what limits that.", "rate"),
     "diagnose": At("winchkit.cli.cell.diagnose", "Noise, drift, frozen counts, hum, creep."),
-    "tare": At("winchkit.cli.cell.tare", "Count from what hangs on it now, on the host only."),
-    "zero": At("winchkit.cli.cell.zero", "Send the device its own zero command."),
+    "tare": At(_ZEROING, "Count from what hangs on it now, on the host only.", "tare"),
+    "zero": At(_ZEROING, "Send the device its own zero command.", "zero"),
     "calibrate": At("winchkit.cli.cell.calibrate", "Known weights up and down: fit and report."),
-    "store": At("winchkit.cli.cell.store", "Write the device's EEPROM, on purpose."),
+    "store": At(_ZEROING, "Write the device's EEPROM, on purpose.", "store"),
 }
 
 

@@ -11,6 +11,7 @@ import click
 
 from winchkit.cli.core.completion import complete_winch
 from winchkit.cli.core.options import bench_option
+from winchkit.cli.core.output import json_flag
 
 if TYPE_CHECKING:
     from winchkit.bench.cells.tasks import Cells
@@ -23,7 +24,7 @@ def cell_options(function: Callable[..., Any]) -> Callable[..., Any]:
     options: list[Callable[..., Any]] = [
         click.argument("cell", required=False, shell_complete=complete_winch),
         bench_option,
-        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+        json_flag("Print the result as JSON."),
     ]
     for option in reversed(options):
         function = option(function)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json
 from winchkit.schema.programme import ALL
 
 if TYPE_CHECKING:
@@ -44,7 +44,6 @@ def station_for(
     *,
     client: str,
     dry_run: bool,
-    as_json: bool = False,
     effects: Sequence[str] = (),
     winch: str | None = ALL,
 ) -> Iterator[Station]:
@@ -67,7 +66,7 @@ def station_for(
     frames: list[Frame] = []
     with _rehearsal(spec, frames) as station:
         yield station
-    show_frames(frames, nodes_of(spec), as_json=as_json)
+    show_frames(frames, nodes_of(spec))
 
 
 def nodes_of(spec: BenchSpec) -> dict[str, dict[int, KnownNode]]:
@@ -96,16 +95,14 @@ def writes(bus: str, node: int, values: Iterable[tuple[int, int, bytes]]) -> lis
     ]
 
 
-def show_frames(
-    frames: Sequence[Frame], nodes: Mapping[str, Mapping[int, KnownNode]], *, as_json: bool
-) -> None:
+def show_frames(frames: Sequence[Frame], nodes: Mapping[str, Mapping[int, KnownNode]]) -> None:
     """Print frames in words; as JSON all of them, else cyclic ones where they change."""
     from winchkit.drivers.can.tools.decode import decode
 
     decoded = [
         (frame, decode(frame.identifier, frame.data, nodes.get(frame.bus, {}))) for frame in frames
     ]
-    if as_json:
+    if is_json():
         listed = [
             {
                 "time": frame.time,

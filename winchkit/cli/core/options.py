@@ -138,6 +138,15 @@ yes_option: Decorator = click.option("-y", "--yes", is_flag=True, help="Do not a
 dry_run_option: Decorator = click.option(
     "--dry-run", is_flag=True, help="Print the frames that it would send; send nothing."
 )
+device_option: Decorator = click.option(
+    "--device",
+    "devices",
+    multiple=True,
+    metavar="[NODE=]DEVICE",
+    shell_complete=complete_file,
+    help="EDS, DCF or device file of the nodes in a trace of CAN frames, or of one: "
+    "'maxon-epos4', '5=cell.eds'. May be given several times.",
+)
 
 
 def output_option(help: str, metavar: str = "FILE", *names: str, **more: Any) -> Decorator:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from datetime import date
 from enum import Enum
@@ -15,6 +15,35 @@ import click
 
 from winchkit.errors import CONTROL_CHARACTERS
 from winchkit.plain_json import finite_or_none
+
+_JSON = "winchkit.json"
+
+
+def keep_json(ctx: click.Context, _param: click.Parameter, value: bool) -> bool:
+    """Keep ``--json`` for :func:`is_json`."""
+    if value:
+        ctx.meta[_JSON] = True
+    return value
+
+
+def json_flag(help: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """The option ``--json``, which :func:`tell` and :func:`is_json` read."""
+    return click.option("--json", is_flag=True, expose_value=False, callback=keep_json, help=help)
+
+
+def is_json() -> bool:
+    """Whether the present command prints JSON."""
+    context = click.get_current_context(silent=True)
+    return context is not None and _JSON in context.meta
+
+
+def tell(data: Mapping[str, Any], lines: Iterable[str]) -> None:
+    """Print a result: with ``--json`` its data, else its lines."""
+    if is_json():
+        echo_json({"schema": 1, **data})
+        return
+    for line in lines:
+        click.echo(line)
 
 
 def to_json(value: object) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import bench_argument
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 
 if TYPE_CHECKING:
     from winchkit.drivers.can.bus.load import Load
@@ -22,9 +23,9 @@ if TYPE_CHECKING:
     ),
 )
 @bench_argument
-@click.option("--json", "as_json", is_flag=True, help="Print the loads as JSON.")
+@json_flag("Print the loads as JSON.")
 @click.pass_context
-def command(ctx: click.Context, bench: str, as_json: bool) -> None:
+def command(ctx: click.Context, bench: str) -> None:
     """Worst-case load of each CAN bus of BENCH, and the fastest SYNC that fits.
 
     Counts every frame with all stuff bits that it may need. Cyclic traffic should take no more
@@ -36,11 +37,8 @@ def command(ctx: click.Context, bench: str, as_json: bool) -> None:
     from winchkit.schema.read import read_bench
 
     found = loads(read_bench(bench))
-    if as_json:
-        echo_json({"schema": 1, "advised": ADVISED, "bus": _trees(found)})
-    else:
-        for name, load in found.items():
-            _show(name, load)
+    lines = (line for name, load in found.items() for line in _lines(name, load))
+    tell({"advised": ADVISED, "bus": _trees(found)}, lines)
     ctx.exit(0 if all(load.share <= ADVISED for load in found.values()) else 1)
 
 
@@ -57,16 +55,16 @@ def _trees(found: dict[str, Load]) -> dict[str, Any]:
     }
 
 
-def _show(name: str, load: Load) -> None:
+def _lines(name: str, load: Load) -> Iterator[str]:
     fastest = load.fastest()
-    click.echo(
+    yield (
         f"bus {name}: {load.share:.1%} of {load.bitrate / 1000:g} kbit/s at a cycle of "
         f"{load.cycle * 1e3:g} ms ({1 / load.cycle:.0f} Hz); fastest that fits: "
         f"{fastest * 1e3:.1f} ms ({1 / fastest:.0f} Hz)"
     )
     for frame in load.frames:
         when = f"every {_ordinal(frame.every)}" if frame.every else f"every {frame.period:g} s"
-        click.echo(f"  {frame.name}: {_bytes(frame.size)}, {frame.bits} bits, {when}")
+        yield f"  {frame.name}: {_bytes(frame.size)}, {frame.bits} bits, {when}"
 
 
 def _bytes(size: int) -> str:

@@ -21,7 +21,7 @@ from winchkit.cli.core.options import (
     output_option,
     yes_option,
 )
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import is_json, json_flag, tell
 
 if TYPE_CHECKING:
     from winchkit.cli.core.dry_run import Frame
@@ -32,7 +32,7 @@ _FORMATS = (".dcf", ".json")
 _FILE = click.Path(dir_okay=False, path_type=Path)
 _who = click.argument("who", required=True, metavar="WINCH|NODE", shell_complete=complete_winch)
 _file = click.argument("file", type=TABLE, metavar="FILE")
-_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_json = json_flag("Print the result as JSON.")
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,6 @@ class Asking:
     what: str
     yes: bool
     dry_run: bool
-    as_json: bool
 
 
 @click.group(
@@ -70,7 +69,7 @@ def command() -> None:
 @bus_options
 @output_option("A .dcf or .json file.", required=True, type=_FILE, callback=None)
 @_json
-def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
+def save(who: str, *, output: Path, **bus: Any) -> None:
     """Read every setting of a drive into a file."""
     from winchkit.bench.drives.node_access import drive_at
     from winchkit.drivers.can.tools.config import read_config, write_config_file
@@ -83,10 +82,10 @@ def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
     for reason in config.refused:
         click.echo(f"left out: {reason}", err=True)
     count = len(config.values)
-    if as_json:
-        echo_json({"schema": 1, "output": output, "settings": count, "refused": config.refused})
-    else:
-        click.echo(f"{output}: {count} settings of {node.name}")
+    tell(
+        {"output": output, "settings": count, "refused": config.refused},
+        [f"{output}: {count} settings of {node.name}"],
+    )
     suggest_next("config", "diff", who, str(output), *choice.words)
 
 
@@ -100,7 +99,7 @@ def save(who: str, *, output: Path, as_json: bool, **bus: Any) -> None:
 @_file
 @bus_options
 @_json
-def diff(who: str, file: str, *, as_json: bool, **bus: Any) -> None:
+def diff(who: str, file: str, **bus: Any) -> None:
     """Compare a file with a drive; ends with 1 where they differ."""
     from winchkit.bench.drives.node_access import drive_at
     from winchkit.drivers.can.tools.config import difference, fitting_config
@@ -109,11 +108,8 @@ def diff(who: str, file: str, *, as_json: bool, **bus: Any) -> None:
     with drive_at(BusChoice(**bus).spec(), who) as node:
         config = fitting_config(Path(file), node.objects)
         found = difference(config, node.objects)
-    if as_json:
-        echo_json({"schema": 1, "differences": found})
-    else:
-        for item in found:
-            click.echo(_line(item))
+    tell({"differences": found}, map(_line, found))
+    if not is_json():
         click.echo(f"{len(found)} of {len(config.values)} settings differ", err=True)
     click.get_current_context().exit(1 if found else 0)
 
@@ -129,7 +125,7 @@ def diff(who: str, file: str, *, as_json: bool, **bus: Any) -> None:
 @bus_options
 @dry_run_option
 @_json
-def load(who: str, file: str, *, dry_run: bool, as_json: bool, **bus: Any) -> None:
+def load(who: str, file: str, *, dry_run: bool, **bus: Any) -> None:
     """Write what differs from a file to a drive, and read it back.
 
     The drive must be disabled. It forgets what was loaded when it is switched off, unless
@@ -141,17 +137,15 @@ def load(who: str, file: str, *, dry_run: bool, as_json: bool, **bus: Any) -> No
     check_exists(file)
     choice = BusChoice(**bus)
     if dry_run:
-        _show_load(choice, who, file, as_json=as_json)
+        _show_load(choice, who, file)
         return
     with drive_at(choice.spec(), who, writes=True) as node:
         config = fitting_config(Path(file), node.objects)
         changed = write_config(config, node.objects)
-    if as_json:
-        echo_json({"schema": 1, "changed": changed, "same": len(config.values) - len(changed)})
-        return
-    for item in changed:
-        click.echo(_line(item))
     same = len(config.values) - len(changed)
+    tell({"changed": changed, "same": same}, map(_line, changed))
+    if is_json():
+        return
     note(f"{len(changed)} settings written and read back, {same} were so already")
     if changed:
         suggest_next("config", "store", who, *choice.words)
@@ -168,12 +162,12 @@ def load(who: str, file: str, *, dry_run: bool, as_json: bool, **bus: Any) -> No
 @yes_option
 @dry_run_option
 @_json
-def store(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> None:
+def store(who: str, *, yes: bool, dry_run: bool, **bus: Any) -> None:
     """Store the present settings of a drive in its memory (1010h)."""
     from winchkit.drivers.can.tools.config import STORE
     from winchkit.drivers.can.tools.config import store as write
 
-    asking = Asking("overwrite its memory", yes, dry_run, as_json)
+    asking = Asking("overwrite its memory", yes, dry_run)
     _sign(BusChoice(**bus), who, STORE, write, asking)
 
 
@@ -188,12 +182,12 @@ def store(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> N
 @yes_option
 @dry_run_option
 @_json
-def restore(who: str, *, yes: bool, dry_run: bool, as_json: bool, **bus: Any) -> None:
+def restore(who: str, *, yes: bool, dry_run: bool, **bus: Any) -> None:
     """Restore the maker's settings at the drive's next start (1011h)."""
     from winchkit.drivers.can.tools.config import RESTORE
     from winchkit.drivers.can.tools.config import restore as write
 
-    asking = Asking("forget its settings at its next start", yes, dry_run, as_json)
+    asking = Asking("forget its settings at its next start", yes, dry_run)
     _sign(BusChoice(**bus), who, RESTORE, write, asking)
 
 
@@ -209,19 +203,16 @@ def _sign(
 
     index, signature = signed
     if asking.dry_run:
-        _show(choice, who, [(index, 1, signature)], as_json=asking.as_json)
+        _show(choice, who, [(index, 1, signature)])
         return
     with drive_at(choice.spec(), who, writes=True) as node:
         if not asking.yes:
             click.confirm(f"{node.name}: {asking.what}?", abort=True, err=True)
         write(node.objects)
-    if asking.as_json:
-        echo_json({"schema": 1, "name": node.name, "done": asking.what})
-    else:
-        click.echo(f"{node.name}: done")
+    tell({"name": node.name, "done": asking.what}, [f"{node.name}: done"])
 
 
-def _show_load(choice: BusChoice, who: str, file: str, *, as_json: bool) -> None:
+def _show_load(choice: BusChoice, who: str, file: str) -> None:
     from winchkit.bench.drives.node_access import declared_drive
     from winchkit.drivers.can.tools.config import read_config_file, settings
 
@@ -229,12 +220,10 @@ def _show_load(choice: BusChoice, who: str, file: str, *, as_json: bool) -> None
     config = read_config_file(Path(file), dictionary)
     known = settings(dictionary)
     values = [(*key, known[key].encode_raw(value)) for key, value in config.values.items()]
-    _show(choice, who, values, as_json=as_json)
+    _show(choice, who, values)
 
 
-def _show(
-    choice: BusChoice, who: str, values: list[tuple[int, int, bytes]], *, as_json: bool
-) -> None:
+def _show(choice: BusChoice, who: str, values: list[tuple[int, int, bytes]]) -> None:
     """Print the frames that would write these objects."""
     from winchkit.bench.drives.node_access import declared_drive
     from winchkit.cli.core.dry_run import nodes_of, show_frames, writes
@@ -242,7 +231,7 @@ def _show(
     spec = choice.spec()
     drive = declared_drive(spec, who)
     frames: list[Frame] = writes(drive.bus, drive.node, values)
-    show_frames(frames, nodes_of(spec), as_json=as_json)
+    show_frames(frames, nodes_of(spec))
 
 
 def _line(item: Difference) -> str:

@@ -10,7 +10,7 @@ import click
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.completion import complete_device, complete_winch
 from winchkit.cli.core.options import BusChoice, bus_options
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 
 if TYPE_CHECKING:
     from winchkit.bench.drives.node_access import Node
@@ -32,8 +32,8 @@ if TYPE_CHECKING:
     shell_complete=complete_device,
     help="Device file of a node that the bench does not name.  [default: the one that fits]",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print all of it as JSON.")
-def command(who: str | None, *, device: str | None, as_json: bool, **bus: Any) -> None:
+@json_flag("Print all of it as JSON.")
+def command(who: str | None, *, device: str | None, **bus: Any) -> None:
     """Show identity, state, modes, errors, limits, option codes and units of a drive.
 
     Reads by SDO, through the process that owns the bench where there is one; writes nothing.
@@ -46,11 +46,7 @@ def command(who: str | None, *, device: str | None, as_json: bool, **bus: Any) -
         find("devices", device)
     with drive_at(BusChoice(**bus).spec(), who, device=device) as node:
         info = read_info(node.objects)
-    if as_json:
-        echo_json(_tree(node, info))
-    else:
-        for line in _lines(node, info):
-            click.echo(line)
+    tell(_tree(node, info), _lines(node, info))
 
 
 def _lines(node: Node, info: DriveInfo) -> Iterator[str]:
@@ -84,7 +80,6 @@ def _shown(entry: Noted) -> str:
 def _tree(node: Node, info: DriveInfo) -> dict[str, Any]:
     brake = node.wiring.brake if node.wiring is not None else None
     return {
-        "schema": 1,
         **vars(info),
         "drive": info.name,
         "name": node.name,

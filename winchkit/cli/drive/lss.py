@@ -11,7 +11,7 @@ import click
 from winchkit.cli.core.command import Example, Group
 from winchkit.cli.core.dry_run import Frame, show_frames
 from winchkit.cli.core.options import BusChoice, bus_options, dry_run_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ for."""
 
 
 @contextmanager
-def rehearsed(*, as_json: bool) -> Iterator[LssLine]:
+def rehearsed() -> Iterator[LssLine]:
     """An LSS line to nowhere; its frames are shown at the end."""
     from winchkit.drivers.can.canopen.lss import LssLine
 
@@ -35,7 +35,7 @@ def rehearsed(*, as_json: bool) -> Iterator[LssLine]:
     line = LssLine(network)
     yield line
     line.close()
-    show_frames(network.frames, {}, as_json=as_json)
+    show_frames(network.frames, {})
 
 
 class _Network:
@@ -62,7 +62,7 @@ class _Network:
             self.lss.on_message_received(0x7E4, answer, 0.0)
 
 
-_json = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+_json = json_flag("Print the result as JSON.")
 _PARTS = ("vendor", "product", "revision", "serial")
 
 
@@ -114,17 +114,15 @@ def command() -> None:
 )
 @bus_options
 @_json
-def find(*, as_json: bool, **bus: Any) -> None:
+def find(**bus: Any) -> None:
     """Find a device without a node number (fast scan); several are found one after another.
 
     Those with a number are shown by `winchkit scan`.
     """
     with _line(BusChoice(**bus)) as line:
         found = line.find_unconfigured()
-    if as_json:
-        echo_json({"schema": 1, "unconfigured": [] if found is None else [found]})
-    else:
-        click.echo("no device without a node number" if found is None else str(found))
+    words = "no device without a node number" if found is None else str(found)
+    tell({"unconfigured": [] if found is None else [found]}, [words])
 
 
 @command.command(
@@ -139,7 +137,7 @@ def find(*, as_json: bool, **bus: Any) -> None:
 @_identity_options
 @bus_options
 @_json
-def identify(*, only: bool, as_json: bool, **rest: Any) -> None:
+def identify(*, only: bool, **rest: Any) -> None:
     """Ask a device of a known identity for its node number."""
     from winchkit.drivers.can.canopen.lss import UNCONFIGURED
 
@@ -148,10 +146,8 @@ def identify(*, only: bool, as_json: bool, **rest: Any) -> None:
         identity = _select(line, parts, only=only)
         node = line.node()
     number = None if node == UNCONFIGURED else node
-    if as_json:
-        echo_json({"schema": 1, "identity": identity, "node": number})
-    else:
-        click.echo(f"{identity}: {'no node number' if number is None else f'node {number}'}")
+    words = "no node number" if number is None else f"node {number}"
+    tell({"identity": identity, "node": number}, [f"{identity}: {words}"])
 
 
 @command.command(
@@ -175,7 +171,6 @@ def assign(
     new_bitrate: int | None,
     store: bool,
     dry_run: bool,
-    as_json: bool,
     **rest: Any,
 ) -> None:
     """Set node number and bit rate of a device.
@@ -192,21 +187,18 @@ def assign(
     parts = {part: rest.pop(part) for part in _PARTS}
     choice = BusChoice(**rest)
     if dry_run:
-        from winchkit.cli.drive.lss import rehearsed
-
-        with rehearsed(as_json=as_json) as line:
+        with rehearsed() as line:
             _assign(line, parts, only, node, new_bitrate, store)
         return
     with _line(choice) as line:
         identity = _assign(line, parts, only, node, new_bitrate, store)
-    if as_json:
-        done = {"node": node, "bitrate": new_bitrate, "stored": store}
-        echo_json({"schema": 1, "identity": identity, **done})
-        return
     settings = [f"node {node}"] if node is not None else []
     settings += [f"{new_bitrate} bit/s"] if new_bitrate is not None else []
     settings += ["stored"] if store else []
-    click.echo(f"{identity}: {', '.join(settings)}; switch it off and on")
+    tell(
+        {"identity": identity, "node": node, "bitrate": new_bitrate, "stored": store},
+        [f"{identity}: {', '.join(settings)}; switch it off and on"],
+    )
 
 
 def _assign(

@@ -9,7 +9,7 @@ import click
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import BusChoice, bus_options
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.errors import NoReply
 
 if TYPE_CHECKING:
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     ),
 )
 @bus_options
-@click.option("--json", "as_json", is_flag=True, help="Print the nodes as JSON.")
-def command(*, as_json: bool, **bus: Any) -> None:
+@json_flag("Print the nodes as JSON.")
+def command(**bus: Any) -> None:
     """List every node of a CAN bus: identity, heartbeat, the device file that fits.
 
     Asks each node number for its device type and listens for heartbeats; writes nothing. Every
@@ -38,10 +38,7 @@ def command(*, as_json: bool, **bus: Any) -> None:
     spec = choice.spec()
     bench = str(spec.path) if spec.path else None
     found = nodes_on(spec)
-    if as_json:
-        echo_json({"schema": 1, "nodes": found})
-    for item in () if as_json else found:
-        click.echo(_line(item))
+    tell({"nodes": found}, map(_line, found))
     if found and bench is not None:
         suggest_next("check", bench)
     elif found:

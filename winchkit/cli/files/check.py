@@ -13,9 +13,8 @@ from winchkit import wings
 from winchkit.arguments import require_type
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import TABLE, effects_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
-from winchkit.cli.files.check_computer import about_computer, refusals
 from winchkit.errors import Fault, FileError, one_line
 from winchkit.schema.eds.eds import SUFFIXES
 
@@ -60,7 +59,7 @@ class Verdict:
 @click.argument("files", nargs=-1, metavar="FILE...", type=TABLE)
 @effects_option
 @click.option("--computer", is_flag=True, help="Check this computer: real-time settings.")
-@click.option("--json", "as_json", is_flag=True, help="Print the verdicts as JSON.")
+@json_flag("Print the verdicts as JSON.")
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -68,7 +67,6 @@ def command(
     effects: Sequence[str],
     *,
     computer: bool,
-    as_json: bool,
 ) -> None:
     """Check files of any kind: profiles, benches, programmes, devices (.toml), runs (.csv, .mcap).
 
@@ -84,11 +82,11 @@ def command(
         for index, file in enumerate(files):
             progress(f"checking {file}", index / len(files))
             verdicts.append(check(file, effects))
-    lines = about_computer() if computer else ()
+    lines = _about_computer() if computer else ()
     for verdict in verdicts:
         for warning in verdict.warnings:
             click.echo(f"{warning} (warning)", err=True)
-    if as_json:
+    if is_json():
         extra = {"computer": lines} if computer else {}
         echo_json({"schema": 1, "files": [_entry(verdict) for verdict in verdicts], **extra})
     else:
@@ -133,6 +131,13 @@ def check(file: str | Path, effects: Sequence[str] = ()) -> Verdict:
         return Verdict(file, "", faults=error.faults)
 
 
+def _about_computer() -> tuple[str, ...]:
+    """Everything that the control loop asks of this computer, a line each."""
+    from winchkit.bench.control.computer import survey
+
+    return tuple(f"{'ok' if item.granted else 'no'}  {item}" for item in survey())
+
+
 def _run(file: str) -> Verdict:
     from winchkit.runs import read_run
     from winchkit.runs.info import summary_of
@@ -164,10 +169,14 @@ def _eds(file: str) -> Verdict:
 
 
 def _declaration(file: str, effects: Sequence[str]) -> Verdict:
-    from winchkit.cli.files.check_drives import report_of
-    from winchkit.cli.files.check_drums import stroke_of, warnings_of_drums
-    from winchkit.cli.files.check_effects import bench_of
-    from winchkit.cli.files.check_effects import faults_and_warnings as of_effects
+    from winchkit.cli.files.check_declaration import (
+        bench_of,
+        effect_faults_and_warnings,
+        refusals,
+        report_of,
+        stroke_of,
+        warnings_of_drums,
+    )
     from winchkit.schema.read import load
 
     declaration = load(file)
@@ -175,7 +184,7 @@ def _declaration(file: str, effects: Sequence[str]) -> Verdict:
     drives = report_of(declaration.value)
     by_wing = wings.call("check", declaration.value)
     robot_faults, robot_warnings = ((), ()) if by_wing is None else by_wing(file, declaration.value)
-    effect_faults, effect_warnings = of_effects(file, declaration.value, effects)
+    effect_faults, effect_warnings = effect_faults_and_warnings(file, declaration.value, effects)
     faults = (*effect_faults, *drives.faults, *robot_faults)
     warnings = (
         *declaration.warnings,

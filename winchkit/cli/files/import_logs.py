@@ -12,8 +12,8 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import is_quiet, note, suggest_next
-from winchkit.cli.core.options import TABLE, output_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.options import TABLE, device_option, output_option
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.quantity_type import Quantity, naming
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.files.import_dialogue import asked
@@ -27,7 +27,6 @@ from winchkit.cli.files.import_runs import (
     write_runs,
 )
 from winchkit.cli.files.import_table import shortened
-from winchkit.cli.log.descriptions import device_option
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:
@@ -177,7 +176,7 @@ class _Written(Quantity):
     help="Clock of the first FILE less that of the others; '0 s': one clock.",
 )
 @click.option("--replace", "overwrite", is_flag=True, help="Write over earlier runs.")
-@click.option("--json", "as_json", is_flag=True, help="Print columns, joints and runs as JSON.")
+@json_flag("Print columns, joints and runs as JSON.")
 def command(
     *,
     files: tuple[str, ...],
@@ -190,7 +189,6 @@ def command(
     join: bool,
     lag: str | None,
     overwrite: bool,
-    as_json: bool,
     **options: Any,
 ) -> None:
     """Import recordings of other programs as runs in DIR, one for each FILE.
@@ -206,7 +204,7 @@ def command(
 
     masses = _masses(load_masses, len(files))
     tables = _tables(files, devices)
-    guesses, declared = _guesses(tables, mapping, _answers(options), asking=_may_ask(yes, as_json))
+    guesses, declared = _guesses(tables, mapping, _answers(options), asking=_may_ask(yes))
     is_new = declared is None
     report: dict[str, Any] = {
         "schema": 1,
@@ -218,17 +216,17 @@ def command(
         "sanity": [],
     }
     shown = "\n\n".join(tables_text(group) for group in alike(guesses))
-    if is_new and not as_json and (output is None or not is_quiet()):
+    if is_new and not is_json() and (output is None or not is_quiet()):
         click.echo(shown, err=output is not None)
-    elif is_new and not as_json:
+    elif is_new and not is_json():
         _warn(guesses)
     if output is None:
-        if as_json:
+        if is_json():
             echo_json(report)
         return
     is_open = any(guess.questions for guess in guesses)
-    if is_open or (is_new and not _is_accepted(guesses, yes, as_json)):
-        if as_json:
+    if is_open or (is_new and not _is_accepted(guesses, yes)):
+        if is_json():
             echo_json(report)
         raise UsageError(_unanswered(guesses))
     mapping_file = declared or _mapping_of(files, guesses)
@@ -252,10 +250,10 @@ def command(
         told.setdefault(f"{finding['channel']}: {finding['text']}", []).append(finding["run"])
     for text, names in told.items():
         click.echo(f"{shortened(list(dict.fromkeys(names)))}: {text}", err=True)
-    report["runs"] = write_runs(results, targets, Path(output), as_json=as_json)
+    report["runs"] = write_runs(results, targets, Path(output))
     if is_new or save_mapping:
         report["mapping"] = _saved(mapping_file, save_mapping or str(Path(output) / _MAPPING))
-    if as_json:
+    if is_json():
         echo_json(report)
     suggest_next("check", [str(entry["path"]) for entry in report["runs"]])
 
@@ -270,9 +268,9 @@ def _warn(guesses: Sequence[Guess]) -> None:
         click.echo(f"{shortened(paths)}: {text} (warning)", err=True)
 
 
-def _may_ask(yes: bool, as_json: bool) -> bool:
+def _may_ask(yes: bool) -> bool:
     """Whether somebody can answer: a terminal, and no request for silence."""
-    return not yes and not as_json and sys.stdin.isatty() and sys.stderr.isatty()
+    return not yes and not is_json() and sys.stdin.isatty() and sys.stderr.isatty()
 
 
 def _answers(options: Mapping[str, Any]) -> Answers:
@@ -420,10 +418,10 @@ def _with_own_times(tables: Sequence[Table], answers: Answers) -> list[Table]:
     return timed if len(timed) < len(tables) else []
 
 
-def _is_accepted(guesses: Sequence[Guess], yes: bool, as_json: bool) -> bool:
+def _is_accepted(guesses: Sequence[Guess], yes: bool) -> bool:
     if yes or (all(guess.is_certain for guess in guesses) and not _are_integrated(guesses)):
         return True
-    if not _may_ask(yes, as_json):
+    if not _may_ask(yes):
         return False
     return click.confirm("Import as shown?", default=True, abort=True, err=True)
 

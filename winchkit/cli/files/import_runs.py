@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from winchkit.cli.core.messages import note
+from winchkit.cli.core.output import is_json
 from winchkit.errors import Fault, FileError, RunError, UsageError, one_line
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def targets_in(
     files: Sequence[str], folder: Path, *, overwrite: bool, is_joined: bool
 ) -> list[Path]:
     """File of each run; raises UsageError rather than write over a recording."""
-    from winchkit.runs.overwriting import refuse_existing
+    from winchkit.runs.files import refuse_existing
 
     stems: list[str] = []
     for file in files:
@@ -54,7 +55,7 @@ def targets_of(
     results: Sequence[tuple[int, Run]], targets: Sequence[Path], *, overwrite: bool
 ) -> list[Path]:
     """File of each run; pieces of one recording have ``-piece1`` and so on behind its name."""
-    from winchkit.runs.overwriting import refuse_existing
+    from winchkit.runs.files import refuse_existing
 
     found = []
     for index, run in results:
@@ -159,7 +160,7 @@ def inspected(runs: Sequence[Run]) -> list[dict[str, Any]]:
 
 
 def write_runs(
-    results: Sequence[tuple[int, Run]], targets: Sequence[Path], folder: Path, *, as_json: bool
+    results: Sequence[tuple[int, Run]], targets: Sequence[Path], folder: Path
 ) -> list[dict[str, Any]]:
     """Write the runs; their paths to stdout, sizes and notes to stderr."""
     from winchkit.runs.info import summary_of
@@ -176,7 +177,7 @@ def write_runs(
         for remark in run.notes:
             click.echo(f"{run.path}: {remark} (warning)", err=True)
         note(f"{target}: {summary.text}")
-        if not as_json:
+        if not is_json():
             click.echo(str(target))
         entries.append(
             {

@@ -11,9 +11,8 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.options import TABLE
-from winchkit.cli.core.output import echo_json
-from winchkit.cli.log.descriptions import device_option
+from winchkit.cli.core.options import TABLE, device_option
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.errors import one_line
 
 if TYPE_CHECKING:
@@ -39,8 +38,8 @@ _KINDS = ("NMT", "SYNC", "EMCY", "TPDO", "RPDO", "SDO", "heartbeat", "LSS", "oth
     type=click.Choice(_KINDS, case_sensitive=False),
     help="Print frames of this kind only; may be given several times.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print all frames as JSON.")
-def command(*, file: str, devices: Sequence[str], kinds: Sequence[str], as_json: bool) -> None:
+@json_flag("Print all frames as JSON.")
+def command(*, file: str, devices: Sequence[str], kinds: Sequence[str]) -> None:
     """Print the CAN frames of FILE in words: NMT, heartbeats, EMCY, SDO transfers, aborts, PDOs.
 
     FILE is a trace of candump (all three forms), PCAN (.trc), Vector (.asc, .blf), or a CSV table
@@ -51,7 +50,7 @@ def command(*, file: str, devices: Sequence[str], kinds: Sequence[str], as_json:
 
     trace = decode_trace(file, devices)
     shown = [pair for pair in trace.frames if not kinds or pair[1].kind in kinds]
-    if as_json:
+    if is_json():
         frames = [_entry(frame, words) for frame, words in shown]
         echo_json(
             {

@@ -9,7 +9,7 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.options import RUN
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.errors import one_line
 
@@ -28,8 +28,8 @@ _SHOWN = 100
     ),
 )
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=RUN)
-@click.option("--json", "as_json", is_flag=True, help="Print everything as JSON.")
-def command(files: tuple[str, ...], as_json: bool) -> None:
+@json_flag("Print everything as JSON.")
+def command(files: tuple[str, ...]) -> None:
     """Summarise FILE: channels, rates, gaps, duration, counters, and whether it was closed.
 
     Several files are the parts of one log; so is FILE itself where only its parts exist.
@@ -40,11 +40,7 @@ def command(files: tuple[str, ...], as_json: bool) -> None:
     with progress_bar() as progress:
         progress(f"reading {files[0]}", None)
         info = info_of(read_log(files))
-    if as_json:
-        echo_json({"schema": 1, **vars(info)})
-        return
-    for line in _lines(info):
-        click.echo(one_line(line))
+    tell(vars(info), map(one_line, _lines(info)))
 
 
 def _lines(info: LogInfo) -> list[str]:

@@ -17,7 +17,7 @@ from winchkit.cli.core.early_checks import check_output
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import bench_by_default, effects_option, output_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.errors import UsageError, WinchkitError
 
@@ -76,7 +76,7 @@ _SHOW_PERIOD = 0.5
 )
 @effects_option
 @click.option("--strict", is_flag=True, help="Exit with 1 where a drive or instrument fell silent.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_flag("Print the result as JSON.")
 @click.pass_context
 def command(
     context: click.Context,
@@ -91,7 +91,6 @@ def command(
     period: str,
     effects: Sequence[str],
     strict: bool,
-    as_json: bool,
 ) -> None:
     """Log every winch of a bench until Ctrl-C, or for a time.
 
@@ -107,7 +106,7 @@ def command(
     assert bench is not None, "else UsageError"
     if output is not None:
         check_output(output, (".csv", ".mcap"))
-    _refuse(output, rotate, jsonl=jsonl, udp=udp, as_json=as_json)
+    _refuse(output, rotate, jsonl=jsonl, udp=udp)
     _refuse_to_lose(None if replace else output)
     from winchkit.cli.core.quantities import quantity, seconds
     from winchkit.cli.core.terminal import live_sinks
@@ -120,12 +119,12 @@ def command(
         except KeyboardInterrupt as error:
             log.note_interrupt(error)
         except WinchkitError as error:
-            if as_json:
+            if is_json():
                 echo_json(log.result | {"problem": str(error)})
             raise
     for line in log.silences.summary:
         click.echo(f"winchkit: {line}", err=True)
-    if as_json:
+    if is_json():
         echo_json(log.result)
     elif output and not jsonl:
         for file, rows in log.files.items():
@@ -309,13 +308,11 @@ def _refuse_to_lose(output: str | None) -> None:
         )
 
 
-def _refuse(
-    output: str | None, rotate: str | None, *, jsonl: bool, udp: str | None, as_json: bool
-) -> None:
+def _refuse(output: str | None, rotate: str | None, *, jsonl: bool, udp: str | None) -> None:
     """Raise UsageError for options that cannot be meant together, before anything is opened."""
     if not (output or jsonl or udp):
         raise click.UsageError("Missing option '-o' / '--output' (or '--jsonl', '--udp').")
-    if jsonl and as_json:
+    if jsonl and is_json():
         raise click.UsageError("'--jsonl' and '--json' both print to stdout; choose one.")
     if rotate is not None:
         from winchkit.runs.recording.rotation import Rotation

@@ -7,7 +7,7 @@ import click
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import RUN, output_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.standard_input import is_standard_input
 from winchkit.errors import UsageError
 
@@ -22,8 +22,8 @@ from winchkit.errors import UsageError
 @click.argument("file", metavar="FILE", type=RUN)
 @output_option("Where to; without it FILE with .recovered in its name.", "OUT")
 @click.option("--replace", is_flag=True, help="Write over a file of that name.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-def command(*, file: str, output: str | None, replace: bool, as_json: bool) -> None:
+@json_flag("Print the result as JSON.")
+def command(*, file: str, output: str | None, replace: bool) -> None:
     """Save everything whole of FILE (.mcap or .csv), which stays as it is.
 
     Several logs that were joined in FILE are saved to a file each.
@@ -33,15 +33,13 @@ def command(*, file: str, output: str | None, replace: bool, as_json: bool) -> N
     if output is None and is_standard_input(file):
         raise UsageError("FILE -: the log from standard input is saved to a file with -o")
     found = recover(file, output, replace=replace)
-    if as_json:
-        echo_json({"schema": 1, "file": file, **vars(found)})
-        return
     kind = "messages" if found.output.lower().endswith(".mcap") else "rows"
     logs = (found, *found.further)
     whole = "; the log was whole" if len(logs) > 1 else "; the file was whole"
-    for one in logs:
-        click.echo(
-            f"{one.output}: {one.kept} {kind} saved, {one.dropped_pieces} damaged pieces and "
-            f"{one.dropped_bytes} bytes at the end left out" + (whole if one.was_whole else "")
-        )
+    lines = (
+        f"{one.output}: {one.kept} {kind} saved, {one.dropped_pieces} damaged pieces and "
+        f"{one.dropped_bytes} bytes at the end left out" + (whole if one.was_whole else "")
+        for one in logs
+    )
+    tell({"file": file, **vars(found)}, lines)
     suggest_next("log", "info", found.output)

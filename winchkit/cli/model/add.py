@@ -1,33 +1,35 @@
-"""``winchkit add``: fit an effect and write it into a copy of a profile."""
+"""``winchkit add`` and ``remove``: an effect fitted into a copy of a profile, or taken out."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from winchkit.cli.core.completion import complete_effect
-from winchkit.cli.core.messages import note
-from winchkit.cli.core.options import RUN, output_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.completion import complete_effect, complete_effect_of_profile
+from winchkit.cli.core.messages import note, suggest_next
+from winchkit.cli.core.options import output_option
+from winchkit.cli.core.output import json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
     ManyValues,
+    declared_profile,
     figures_option,
+    fit_option,
     html_option,
-    json_option,
     model_options,
     page_title,
+    refuse_options,
     suggest_with,
     write_figures,
     write_page,
 )
 
 if TYPE_CHECKING:
-    from winchkit.diagnosis.add import Addition
+    from winchkit.diagnosis.add import Addition, Removal
 
 
 @click.command(
@@ -38,18 +40,10 @@ if TYPE_CHECKING:
     ),
 )
 @click.argument("effect", shell_complete=complete_effect)
-@click.option(
-    "--fit",
-    "runs",
-    multiple=True,
-    required=True,
-    metavar="RUN...",
-    type=RUN,
-    help="Runs to fit.",
-)
+@fit_option("Runs to fit.", required=True)
 @output_option("Profile to write.", "NEW.toml", required=True)
 @model_options
-@json_option
+@json_flag("Print the answer as JSON.")
 @html_option
 @figures_option
 def command(
@@ -58,7 +52,6 @@ def command(
     runs: Sequence[str],
     output: str,
     asked: Asked,
-    as_json: bool,
     html: str | None,
     figures: str | None,
 ) -> None:
@@ -67,7 +60,6 @@ def command(
     Values that the profile has already are refitted with it; every value gets its standard
     deviation, the runs and the date.
     """
-    from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.diagnosis.add import fitted_addition
     from winchkit.diagnosis.write import write_addition
 
@@ -80,7 +72,7 @@ def command(
         named = asked.placed(effect, declared)
         fitted = fitted_addition(named, own, declared, catalogue, asked.band)
     write_addition(asked.source, fitted.addition, names, Path(output))
-    _tell(fitted.addition, output, as_json)
+    _tell(output, fitted.addition.to_json(), fitted.addition)
     if html:
         from winchkit.report.pages.pages import addition_html
 
@@ -96,11 +88,47 @@ def command(
     suggest_with("compare", asked, runs, profile=output)
 
 
-def _tell(addition: Addition, output: str, as_json: bool) -> None:
-    note(f"written: {output}")
-    if as_json:
-        echo_json(addition.to_json())
-        return
+@click.command(
+    cls=ManyValues,
+    examples=(
+        "winchkit remove cable-elongation-linear -p better.toml -o without.toml",
+        "winchkit remove motor-viscous --fit demo-*.csv -p both.toml -o better.toml",
+    ),
+)
+@click.argument("effect", shell_complete=complete_effect_of_profile)
+@fit_option("Runs to refit the others on.")
+@output_option("Profile to write.", "NEW.toml", required=True)
+@model_options
+@json_flag("Print the answer as JSON.")
+def remove(effect: str, runs: Sequence[str], output: str, asked: Asked) -> None:
+    """Write a profile without EFFECT; with --fit the other effects are refitted.
+
+    A robot's effect on one line is EFFECT/LINE, or EFFECT with --winch LINE. The ledger records the
+    step, and 'winchkit undo' takes it back.
+    """
+    from winchkit.diagnosis.add import remove as removed
+    from winchkit.diagnosis.write import write_removal
+
+    declared, removal = declared_profile(asked.source), None
+    refuse_options(declared, asked.band)
+    effect = asked.placed(effect, declared)
+    with progress_bar() as progress:
+        progress("fitting", None)
+        if runs:
+            own = asked.runs(runs, declared)
+            removal = removed(effect, own, declared, asked.catalogue, asked.band)
+    names = [Path(run).name for run in runs]
+    write_removal(asked.source, effect, removal, names, output)
+    nothing = {"schema": 1, "effect": effect, "outputs": {}, "parameters": {}, "notes": []}
+    _tell(output, nothing if removal is None else removal.to_json(), removal)
+    if runs:
+        suggest_with("compare", asked, runs, profile=output)
+    else:
+        suggest_next("ledger", "-p", output)
+
+
+def _tell(output: str, data: dict[str, Any], fitted: Addition | Removal | None) -> None:
     from winchkit.report.text import addition_text
 
-    click.echo(addition_text(addition))
+    note(f"written: {output}")
+    tell(data, [] if fitted is None else [addition_text(fitted)])

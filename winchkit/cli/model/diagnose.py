@@ -10,15 +10,16 @@ import click
 from winchkit import wings
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import is_verbose, suggest_next
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
+    declared_profile,
     figures_option,
     html_option,
-    json_option,
     model_options,
     page_title,
+    refuse_options,
     runs_argument,
     suggest_with,
     write_figures,
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     "--as-recorded", is_flag=True, help="Look for effects although a sign or unit looks wrong."
 )
 @click.option("--fit-report", is_flag=True, help="Print the report of the fit too.")
-@json_option
+@json_flag("Print the answer as JSON.")
 @html_option
 @figures_option
 def command(
@@ -57,7 +58,6 @@ def command(
     every_sample: bool,
     as_recorded: bool,
     fit_report: bool,
-    as_json: bool,
     html: str | None,
     figures: str | None,
 ) -> None:
@@ -69,7 +69,6 @@ def command(
     Long runs are decimated as far as their signals allow; --winch all diagnoses each by
     itself and reports what they have in common.
     """
-    from winchkit.cli.model.options import declared_profile, refuse_options
     from winchkit.schema.profiles.winch import WinchProfile
 
     declared = declared_profile(asked.source)
@@ -77,9 +76,9 @@ def command(
     refuse_options(declared, asked.band, asked.winch)
     if asked.each and isinstance(declared, WinchProfile):
         by_winch = wings.part("fleet", "diagnose_command")
-        by_winch(runs, declared, asked, how, as_json, html, figures)
+        by_winch(runs, declared, asked, how, is_json(), html, figures)
     else:
-        _tell_one(runs, declared, asked, how, as_json, html, figures)
+        _tell_one(runs, declared, asked, how, html, figures)
 
 
 def _tell_one(
@@ -87,7 +86,6 @@ def _tell_one(
     declared: WinchProfile | RobotProfile,
     asked: Asked,
     how: Mapping[str, bool],
-    as_json: bool,
     html: str | None,
     figures: str | None,
 ) -> None:
@@ -109,22 +107,17 @@ def _tell_one(
             )
     except KeyboardInterrupt:
         for each in known:  # The bar has ended: nothing is printed into its line.
-            _tell_known(each, as_json)
+            # Errors and candidates so far, no verdict.
+            (echo_json if is_json() else click.echo)(
+                each.diagnosis.to_json() if is_json() else said(each, False)
+            )
         raise
-    (echo_json if as_json else click.echo)(said(answer, as_json))
+    (echo_json if is_json() else click.echo)(said(answer, is_json()))
     if html:
         write_page(html, answer_page(answer, page_title(declared.name, runs), asked))
     if figures:
         write_figures(figures, answer_figures(answer, asked))
     _suggest(answer.diagnosis, runs, asked)
-
-
-def _tell_known(known: WinchAnswer, as_json: bool) -> None:
-    """Results of a search that Ctrl-C ended: errors and candidates, no verdict."""
-    if as_json:
-        echo_json(known.diagnosis.to_json())
-    else:
-        click.echo(said(known, as_json))
 
 
 def answer_figures(answer: Answer, asked: Asked) -> Sequence[Figure]:

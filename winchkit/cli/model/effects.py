@@ -12,14 +12,16 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_effect, complete_file
 from winchkit.cli.core.lazy import At, LazyGroup
 from winchkit.cli.core.messages import note
-from winchkit.cli.core.options import RUN
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
     ManyValues,
+    declared_profile,
+    fit_option,
     html_option,
     model_options,
+    refuse_curves,
     suggest_with,
     write_page,
 )
@@ -78,9 +80,9 @@ def command() -> None:
     shell_complete=complete_file,
     help="Python file with effects of your own; may be given several times.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON, complete, in SI units.")
+@json_flag("Print JSON, complete, in SI units.")
 @html_option
-def show(effect_id: str | None, files: Sequence[str], as_json: bool, html: str | None) -> None:
+def show(effect_id: str | None, files: Sequence[str], html: str | None) -> None:
     """List the effects that a model may lack, or describe one.
 
     The page of --html holds the card, or all cards, with the signatures drawn.
@@ -89,11 +91,10 @@ def show(effect_id: str | None, files: Sequence[str], as_json: bool, html: str |
     from winchkit.effects.catalogue import load_catalogue
 
     catalogue = load_catalogue(files)
-    if effect_id is not None and as_json:
-        echo_json({"schema": 1, **card_data(catalogue[effect_id])})
-    elif effect_id is not None:
-        click.echo(card(catalogue[effect_id]))
-    elif as_json:
+    if effect_id is not None:
+        effect = catalogue[effect_id]
+        tell(card_data(effect), [card(effect)])
+    elif is_json():
         echo_json({"schema": 1, "effects": [card_data(effect) for effect in catalogue]})
     else:
         click.echo(_listing(catalogue))
@@ -129,15 +130,7 @@ def _listing(catalogue: Catalogue) -> str:
     ),
 )
 @click.argument("file", metavar="FILE.py")
-@click.option(
-    "--fit",
-    "runs",
-    multiple=True,
-    required=True,
-    metavar="RUN...",
-    type=RUN,
-    help="Runs whose residual gives the initial values.",
-)
+@fit_option("Runs whose residual gives the initial values.", required=True)
 @click.option("--curve", metavar="ID", help="Empirical effect to begin from; else the strongest.")
 @click.option("--id", "effect_id", metavar="ID", help="Of the new effect; else the file's name.")
 @model_options
@@ -148,7 +141,6 @@ def new(
 
     It is ready for --effects: diagnose with it, then put in the physics that you recognise.
     """
-    from winchkit.cli.model.options import declared_profile, refuse_curves
     from winchkit.diagnosis.new_effect import new_effect
     from winchkit.effects.effect_template import check_own
 

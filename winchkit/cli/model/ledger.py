@@ -1,12 +1,19 @@
-"""``winchkit ledger``: how a profile grew, as a ladder of held-out errors."""
+"""``winchkit ledger`` and ``undo``: the steps by which a profile grew, and the last one undone."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
+from winchkit.catalog import find
 from winchkit.cli.core.command import Command
-from winchkit.cli.core.output import echo_json
-from winchkit.cli.model.options import html_option, profile_option, write_page
+from winchkit.cli.core.messages import suggest_next
+from winchkit.cli.core.options import output_option
+from winchkit.cli.core.output import json_flag, tell
+from winchkit.cli.core.standard_input import is_standard_input
+from winchkit.cli.model.options import declared_profile, html_option, profile_option, write_page
+from winchkit.errors import UsageError
 
 
 @click.command(
@@ -17,24 +24,40 @@ from winchkit.cli.model.options import html_option, profile_option, write_page
     ),
 )
 @profile_option
-@click.option("--json", "as_json", is_flag=True, help="Print the ledger as JSON.")
+@json_flag("Print the ledger as JSON.")
 @html_option
-def command(profile: str, as_json: bool, html: str | None) -> None:
+def command(profile: str, html: str | None) -> None:
     """List every effect that was added to or removed from a profile, and the errors then."""
-    from winchkit.catalog import find
-    from winchkit.cli.model.options import declared_profile
     from winchkit.profile_edit.history import ladder
+    from winchkit.report.pages.history import ladder_html, ladder_text
 
     declared = declared_profile(find("profiles", profile))
     rungs = ladder(declared)
-    if as_json:
-        steps = [rung.to_json() for rung in rungs]
-        echo_json({"schema": 1, "profile": declared.name, "steps": steps})
-    else:
-        from winchkit.report.pages.history import ladder_text
-
-        click.echo(ladder_text(declared.name, rungs))
+    steps = [rung.to_json() for rung in rungs]
+    tell({"profile": declared.name, "steps": steps}, [ladder_text(declared.name, rungs)])
     if html:
-        from winchkit.report.pages.history import ladder_html
-
         write_page(html, ladder_html(declared.name, rungs))
+
+
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit undo -p better.toml",
+        "winchkit undo -p better.toml -o before.toml",
+    ),
+)
+@profile_option
+@output_option("Profile to write; else the same file.", "NEW.toml")
+def undo(profile: str, output: str | None) -> None:
+    """Undo the last 'add' or 'remove'; the values that it refitted are restored too."""
+    from winchkit.profile_edit.ledger import undo as undone
+
+    if output is None and is_standard_input(profile):
+        raise UsageError("-p -: a profile from standard input is written to a file with -o")
+    source = find("profiles", profile)
+    declared_profile(source)
+    if output is None and source != Path(profile):
+        raise UsageError(f"'{profile}' ships with winchkit; write the copy to a file with -o")
+    done = undone(source, Path(output) if output else source)
+    click.echo(f"taken back: {done}")
+    suggest_next("ledger", "-p", output or profile)

@@ -17,6 +17,7 @@ from winchkit.cli.core.completion import complete_file
 from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import PROFILE, RUN, checked
+from winchkit.cli.core.output import keep_json
 from winchkit.errors import Fault, FileError, UsageError
 from winchkit.schema.programme import ALL
 
@@ -36,7 +37,18 @@ profile_option = click.option(
     help="Profile: a name or a file.",
 )
 runs_argument = click.argument("runs", nargs=-1, required=True, metavar="RUN...", type=RUN)
-json_option = click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")
+json_option = click.option(
+    "--json", "as_json", is_flag=True, callback=keep_json, help="Print the answer as JSON."
+)
+
+
+def fit_option(help: str, *, required: bool = False) -> Callable[..., Any]:
+    """The option ``--fit``: runs by which values are fitted."""
+    return click.option(
+        "--fit", "runs", multiple=True, required=required, metavar="RUN...", type=RUN, help=help
+    )
+
+
 _MODEL_OPTIONS = (
     click.option("--band", metavar="HZ", type=float, help="Low-pass of the torque, Hz."),
     click.option("--winch", help="Which winch of runs with several; 'all' for each by itself."),

@@ -14,11 +14,11 @@ from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import files_of_kind
 from winchkit.cli.core.messages import note, suggest_next
 from winchkit.cli.core.options import BENCH, output_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import is_json, json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
     Asked,
-    json_option,
+    declared_profile,
     model_options,
     runs_argument,
     suggest_with,
@@ -56,10 +56,8 @@ _FEW = 2
     help="Bench file whose limits say how far, how fast and how heavy; else as the RUNs were.",
 )
 @model_options
-@json_option
-def command(
-    runs: Sequence[str], output: str | None, bench: str | None, asked: Asked, as_json: bool
-) -> None:
+@json_flag("Print the answer as JSON.")
+def command(runs: Sequence[str], output: str | None, bench: str | None, asked: Asked) -> None:
     """Propose motion programmes, ranked by the effects that they distinguish and show per minute.
 
     Kinds of programmes are tried on the model with the noise of the RUNs: those that separate
@@ -68,14 +66,13 @@ def command(
     For a robot's profile the plan is a list of poses, and NEXT.csv a run of them to measure at.
     """
     from winchkit import wings
-    from winchkit.cli.model.options import declared_profile
     from winchkit.diagnosis.profiles import require_winch
 
     declared = declared_profile(asked.source)
     if (by_wing := wings.call("plan_command", declared)) is not None:
-        by_wing(runs, declared, asked, output, bench, as_json)
+        by_wing(runs, declared, asked, output, bench, is_json())
     else:
-        _plan_winch(runs, require_winch(declared), asked, output, bench, as_json)
+        _plan_winch(runs, require_winch(declared), asked, output, bench)
 
 
 def _plan_winch(
@@ -84,7 +81,6 @@ def _plan_winch(
     asked: Asked,
     output: str | None,
     bench: str | None,
-    as_json: bool,
 ) -> None:
     """The next programme of one winch."""
     from winchkit.diagnosis.diagnose import diagnose
@@ -105,13 +101,9 @@ def _plan_winch(
         )
         progress("simulating programmes", None)
         found = plan(answer, asked.catalogue, limits)
-    if as_json:
-        best = found.offers[0].kind.name
-        echo_json({**found.to_json(), "programme": path, "chosen": best if path else None})
-    else:
-        click.echo(_text(found.offers, found.pairs))
-        for line in _silent(found, widened=limits is not None):
-            click.echo(line)
+    chosen = found.offers[0].kind.name if path else None
+    lines = [_text(found.offers, found.pairs), *_silent(found, widened=limits is not None)]
+    tell({**found.to_json(), "programme": path, "chosen": chosen}, lines)
     if path is None:
         words = () if bench is None else ("-b", bench)
         suggest_with("plan", asked, runs, *words, "-o", "next.toml")

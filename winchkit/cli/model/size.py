@@ -9,7 +9,7 @@ import click
 
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.options import TABLE
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 
 if TYPE_CHECKING:
     from winchkit.model.sizing.row import Row
@@ -26,9 +26,9 @@ _SHOWN = {"m": ("mm", 1e-3), "rad/s": ("rpm", 0.10471975511965977)}
     ),
 )
 @click.argument("spec", metavar="SPEC", type=TABLE)
-@click.option("--json", "as_json", is_flag=True, help="Print the table as JSON, in SI units.")
+@json_flag("Print the table as JSON, in SI units.")
 @click.pass_context
-def command(ctx: click.Context, spec: str, as_json: bool) -> None:
+def command(ctx: click.Context, spec: str) -> None:
     """Size a winch: motor, gearbox, drum, screw and belt of a SPEC file (kind = "size").
 
     After the winding-device paper, Eq. 10 to 18, corrected; see docs/papers.md. Where a
@@ -40,11 +40,10 @@ def command(ctx: click.Context, spec: str, as_json: bool) -> None:
     declared = read_size(spec)
     rows = sized(declared)
     failed = [row for row in rows if row.ok is False]
-    if as_json:
-        echo_json({"schema": 1, "name": declared.name, "ok": not failed, "requirements": rows})
-    else:
-        click.echo(_table(rows))
-        click.echo(_summary(declared.name, len(failed)))
+    tell(
+        {"name": declared.name, "ok": not failed, "requirements": rows},
+        [_table(rows), _summary(declared.name, len(failed))],
+    )
     ctx.exit(1 if failed else 0)
 
 

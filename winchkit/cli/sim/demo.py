@@ -13,7 +13,7 @@ import click
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import output_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.terminal import progress_bar
 
 if TYPE_CHECKING:
@@ -49,9 +49,9 @@ _OPENING = (
     show_default=True,
     type=click.Path(file_okay=False, path_type=Path),
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@json_flag("Print the result as JSON.")
 @click.pass_context
-def command(ctx: click.Context, seed: int, output: Path, as_json: bool) -> None:
+def command(ctx: click.Context, seed: int, output: Path) -> None:
     """Find a hidden effect on a simulated bench, from the first CAN frame to the extended profile.
 
     A drive on a CAN bus and instruments on Modbus are simulated, with real protocols; a minute of
@@ -66,7 +66,7 @@ def command(ctx: click.Context, seed: int, output: Path, as_json: bool) -> None:
     from winchkit.sim import choose_bench
 
     started, out = time.monotonic(), output
-    story = _Story(quiet=as_json)
+    story = _Story(quiet=is_json())
     bench = choose_bench(seed)
     profile_name = next(iter(bench.bench.winch.values())).profile
     story.add(_OPENING.format(seed=seed))
@@ -88,7 +88,7 @@ def command(ctx: click.Context, seed: int, output: Path, as_json: bool) -> None:
     report = _write_report(out, story, findings, profile_name, hidden)
     seconds = time.monotonic() - started
     story.print(f"Report: {report}   ({seconds:.0f} s)")
-    if as_json:
+    if is_json():
         echo_json(_outcome(seed, findings, truth, seconds, out))
     if right and findings.addition is not None:
         improved = str(out / "improved.toml")

@@ -10,7 +10,7 @@ import click
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.messages import suggest_next
 from winchkit.cli.core.options import PROGRAMME, SIM_BENCH, output_option
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import echo_json, is_json, json_flag
 from winchkit.cli.core.quantity_type import Quantity
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.errors import UsageError
@@ -64,7 +64,7 @@ if TYPE_CHECKING:
     help="Hide this instead of what the bench hides: a name of 'sim list --physics', also with "
     "numbers as 'elastic rope, axial_stiffness=80 kN', or 'none'. May be given several times.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print what was written as JSON.")
+@json_flag("Print what was written as JSON.")
 def command(
     *,
     bench: str,
@@ -75,7 +75,6 @@ def command(
     output: Path,
     suffix: str,
     hidden: tuple[str, ...],
-    as_json: bool,
 ) -> None:
     """Run PROGRAMMEs on a simulated BENCH without buses; write one run per load and repeat.
 
@@ -83,7 +82,7 @@ def command(
     """
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import quantity
-    from winchkit.runs import write_csv, write_mcap
+    from winchkit.runs import write_run
     from winchkit.schema.read import read_programme, read_simbench
     from winchkit.sim.bench import hiding, profiles_of, programme_path
     from winchkit.sim.record import simulate
@@ -93,7 +92,6 @@ def command(
         declared = hiding(declared, hidden)
     profiles = profiles_of(declared)
     hertz = quantity(rate, "frequency")
-    write = write_csv if suffix == "csv" else write_mcap
     named = (*programmes, *more)
     if not named:
         raise UsageError(
@@ -106,13 +104,13 @@ def command(
             for run in simulate(declared, profiles, programme, seed=seed, rate=hertz):
                 path = output / f"{run.name}.{suffix}"
                 output.mkdir(parents=True, exist_ok=True)
-                write(run, path)
+                write_run(run, path)
                 written.append(_entry(path, run, programme))
                 done = index / len(named) if len(named) > 1 else None
                 progress(f"{programme.name}: {path.name} written", done)
-                if not as_json:
+                if not is_json():
                     click.echo(path)
-    if as_json:
+    if is_json():
         echo_json({"schema": 1, "bench": bench, "seed": seed, "runs": written})
     winches = declared.bench.winch
     words = ["-p", next(iter(winches.values())).profile]

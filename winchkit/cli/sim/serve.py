@@ -14,7 +14,7 @@ import click
 
 from winchkit.cli.core.command import Command
 from winchkit.cli.core.completion import complete_sim_bench
-from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.output import json_flag, tell
 
 if TYPE_CHECKING:
     from winchkit.sim.live.bench import LiveBench
@@ -62,9 +62,7 @@ _DETERMINED = 6
     is_flag=True,
     help="End where standard input ends, as with the program that started it.",
 )
-@click.option(
-    "--json", "as_json", is_flag=True, help="Print a line of JSON when it is ready, and per reply."
-)
+@json_flag("Print a line of JSON when it is ready, and per reply.")
 def command(
     *,
     bench: str,
@@ -73,7 +71,6 @@ def command(
     interface: Interface,
     hidden: tuple[str, ...],
     end_with_input: bool,
-    as_json: bool,
 ) -> None:
     """Run a simulated BENCH live until Ctrl-C: drives on CAN, instruments on Modbus or serial.
 
@@ -105,8 +102,8 @@ def command(
             # As the bench process: ordinary threads would wait for those of a bench in real time.
             closing(acquire("try", live.bus_threads)),
         ):
-            _introduce(live, path, as_json=as_json)
-            _listen(live, ended, end_with_input=end_with_input, as_json=as_json)
+            _introduce(live, path)
+            _listen(live, ended, end_with_input=end_with_input)
             while not ended.wait(_CHECK_EVERY):
                 live.check()
     click.echo(f"ended; {path} leads nowhere any more", err=True)
@@ -145,14 +142,11 @@ def _ended_by_signals(ended: threading.Event) -> Iterator[None]:
             signal.signal(number, handler)
 
 
-def _introduce(live: LiveBench, path: Path, *, as_json: bool) -> None:
+def _introduce(live: LiveBench, path: Path) -> None:
     move = f"jog {next(iter(live.winches))}"
     if live.robot is not None and live.robot.platform.count >= _DETERMINED:
         move = "move --pose-by z=10mm"  # one cable alone would become slack or be overloaded
-    if as_json:
-        echo_json({"schema": 1, "bench": path, "ready": True})
-    else:
-        click.echo(path)
+    tell({"bench": path, "ready": True}, [str(path)])
     name = path.name.removesuffix("-bench.toml").removesuffix(".toml")
     click.echo(f"{name} runs. From another terminal:", err=True)
     click.echo(f"  winchkit monitor --bench {path}", err=True)
@@ -160,20 +154,20 @@ def _introduce(live: LiveBench, path: Path, *, as_json: bool) -> None:
     click.echo("Lines here: load, fault, recover, status, quit, help. Ctrl-C ends it.", err=True)
 
 
-def _listen(
-    live: LiveBench, ended: threading.Event, *, end_with_input: bool, as_json: bool
-) -> None:
+def _listen(live: LiveBench, ended: threading.Event, *, end_with_input: bool) -> None:
     """Obey what is typed, on a thread; the end of the input ends nothing unless it is to."""
+    context = click.get_current_context()
 
     def listen() -> None:
-        _obey_input(live, ended, as_json=as_json)
+        with context.scope(cleanup=False):
+            _obey_input(live, ended)
         if end_with_input:
             ended.set()
 
     threading.Thread(target=listen, name="sim-input", daemon=True).start()
 
 
-def _obey_input(live: LiveBench, ended: threading.Event, *, as_json: bool) -> None:
+def _obey_input(live: LiveBench, ended: threading.Event) -> None:
     from winchkit.errors import WinchkitError
     from winchkit.sim.live.control import HELP, obey
 
@@ -186,9 +180,6 @@ def _obey_input(live: LiveBench, ended: threading.Event, *, as_json: bool) -> No
             continue
         try:
             reply = HELP if line == "help" else obey(live, line)
-            if as_json:
-                echo_json({"schema": 1, "line": line, "reply": reply})
-            else:
-                click.echo(reply)
+            tell({"line": line, "reply": reply}, [reply])
         except WinchkitError as error:
             click.echo(f"{error}", err=True)

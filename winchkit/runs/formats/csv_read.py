@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
-from winchkit.regular_file import regular
+from winchkit.regular_file import read_whole, regular
 from winchkit.runs.assemble import Recording, assemble, refuse
 from winchkit.runs.columns import column_dimension, header_of
 from winchkit.runs.formats.csv_write import CSV_MARK, EVENT_MARK
@@ -32,17 +32,7 @@ _PIECE = 1 << 20
 
 def read_bytes(path: Path, *, may_be_empty: bool = False) -> bytes:
     """Content of a file; raises RunError where it cannot be read."""
-    try:
-        with open(path, "rb", opener=regular) as file:
-            data = file.read()
-    except FileNotFoundError:
-        raise RunError(Fault("there is no such file", str(path))) from None
-    except IsADirectoryError:
-        raise RunError(Fault("is a directory, not a run", str(path))) from None
-    except OSError as error:
-        raise RunError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
-    except ValueError as error:
-        raise RunError(Fault(f"is not a usable file name: {error}", repr(str(path)))) from None
+    data = read_whole(path, "run", error=RunError)
     if not data and not may_be_empty:
         raise RunError(Fault("the file is empty", str(path)))
     return data

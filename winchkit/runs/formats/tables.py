@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from winchkit.errors import Fault, FileError, UsageError
+from winchkit.errors import Fault, FileError
+from winchkit.extras import library
 from winchkit.runs.log import Log
 from winchkit.runs.run import Run
 
@@ -14,18 +15,13 @@ def write_mf4(log: Log, path: str | Path) -> None:
 
     Raises UsageError without asammdf, FileError where the file cannot be written.
     """
-    try:
-        from asammdf import MDF, Signal
-    except ImportError:
-        raise UsageError(
-            f"{path}: MF4 needs asammdf; install it with pip install 'winchkit[mf4]'"
-        ) from None
+    asammdf = library("asammdf", f"{path}: MF4")
     start, _ = log.span
-    with MDF(version="4.10") as mdf:
+    with asammdf.MDF(version="4.10") as mdf:
         for source in log.layout.sources:
             samples = log.samples[source.topic]
             signals = [
-                Signal(
+                asammdf.Signal(
                     samples=samples.values[:, n],
                     timestamps=samples.times - start,
                     unit=signal.unit,
@@ -47,12 +43,9 @@ def write_parquet(run: Run, path: str | Path) -> None:
 
     Raises UsageError without pyarrow, FileError where the file cannot be written.
     """
-    try:
-        from pyarrow import parquet
-    except ImportError:
-        raise UsageError(
-            f"{path}: Parquet needs pyarrow; install it with pip install 'winchkit[parquet]'"
-        ) from None
+    library("pyarrow", f"{path}: Parquet")
+    from pyarrow import parquet
+
     table = run.to_arrow()
     try:
         with Path(path).open("wb") as stream:

@@ -8,6 +8,7 @@ import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from winchkit.errors import UsageError, suggest
 from winchkit.runs.columns import column_dimension
@@ -228,20 +229,13 @@ def with_options(answers: Answers, options: Iterable[str]) -> Answers:
         except ValueError:
             words = []
         for option, value in zip(words[::2], words[1::2], strict=False):
-            if option == "--signed":
-                answers = replace(answers, signed=(*answers.signed, value))
-            elif option == "--unsigned":
-                answers = replace(answers, unsigned=(*answers.unsigned, value))
-            elif option == "--modulo":
-                answers = replace(answers, modulo=(*answers.modulo, read_modulo(value)))
-            elif option == "--orientation":
-                answers = replace(answers, orientation=value)
-            elif option == "--axis":
-                answers = replace(answers, axis=value)
-            elif option == "--kind":
-                answers = replace(answers, kind=value)
-            else:
+            name = option.removeprefix("--")
+            if name not in {"signed", "unsigned", "modulo", "orientation", "axis", "kind"}:
                 raise UsageError(f"'{text}' is no option that answers a question of a file")
+            given: Any = read_modulo(value) if name == "modulo" else value
+            if name in {"signed", "unsigned", "modulo"}:
+                given = (*getattr(answers, name), given)
+            answers = replace(answers, **{name: given})
     return answers
 
 

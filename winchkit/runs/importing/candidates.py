@@ -8,17 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.runs.columns import POSE_DIMENSIONS, column_dimension
+from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.answers import permitted
 from winchkit.runs.importing.assignment import Candidate, Choice, Question
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import CURRENT, IGNORED, Meaning, meaning_of
-from winchkit.runs.importing.orientation import quaternion_order
-from winchkit.runs.importing.pose_columns import (
+from winchkit.runs.importing.orientation import (
     body_of,
     chosen_body,
     complete_sets,
     quaternion_names,
+    quaternion_order,
     vector_names,
 )
 from winchkit.runs.importing.source_stamps import SOURCE_STAMP
@@ -34,7 +34,7 @@ from winchkit.runs.importing.unit_spelling import (
 )
 from winchkit.runs.importing.winches import FEWEST, choose_channels
 from winchkit.schema.linear_axis import CHANNELS, ROTARY
-from winchkit.schema.mapping import DATE, MATRIX
+from winchkit.schema.mapping import DATE, MATRIX, POSE_DIMENSIONS
 
 _BY_DIMENSION = {
     "time": "time",

@@ -13,7 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of, clock_values, is_counted
+from winchkit.runs.importing.assignment import (
+    ChosenColumn,
+    Work,
+    clock_of,
+    clock_values,
+    is_counted,
+)
 
 _CLEAR = 0.98
 """Least correlation of angle and integral at which their ratio is used."""

@@ -11,9 +11,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from winchkit.runs.importing.answers import Answers, ColumnAnswer
-from winchkit.runs.importing.assignment import Assignment, Guess, Question
+from winchkit.runs.importing.assignment import (
+    Assignment,
+    ChosenColumn,
+    Guess,
+    Question,
+    Work,
+    clock_of,
+)
 from winchkit.runs.importing.candidates import choose
-from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of
 from winchkit.runs.importing.consistency import beyond_rating, from_velocity
 from winchkit.runs.importing.formats.arithmetic import is_expression, with_derived
 from winchkit.runs.importing.long_table import axes_of, by_kind, likely_axis

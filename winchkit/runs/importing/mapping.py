@@ -14,6 +14,7 @@ from winchkit.runs.importing.assignment import Assignment, Guess
 from winchkit.runs.importing.formats.arithmetic import with_derived
 from winchkit.runs.importing.long_table import axes_of, by_kind
 from winchkit.runs.importing.table import Table
+from winchkit.schema.file_text import file_text
 from winchkit.schema.mapping import MODULO, ImportMapping, MappedColumn, MappedLog
 
 
@@ -59,38 +60,7 @@ def mapping_id(mapping: ImportMapping) -> str:
 
 def write_mapping(mapping: ImportMapping, path: Path) -> None:
     """Write a mapping file; raises FileError."""
-    import tomlkit
-
-    document = tomlkit.document()
-    document["schema"] = 1
-    document["kind"] = "mapping"
-    document["name"] = mapping.name
-    logs = tomlkit.aot()
-    for log in mapping.log:
-        table = tomlkit.table()
-        table["name"] = log.name
-        if log.sample_rate is not None:
-            table["sample_rate"] = f"{log.sample_rate!r} Hz"
-        for key in ("axis", "kind"):
-            if getattr(log, key):
-                table[key] = getattr(log, key)
-        columns = tomlkit.aot()
-        for item in log.column:
-            column = tomlkit.table()
-            column["source"], column["channel"] = item.source, item.channel
-            if item.unit:
-                column["unit"] = item.unit
-            if item.factor is not None:
-                column["factor"] = float(item.factor)
-            if item.offset:
-                column["offset"] = float(item.offset)
-            if item.stored:
-                column["stored"] = item.stored
-            columns.append(column)
-        table["column"] = columns
-        logs.append(table)
-    document["log"] = logs
-    write_whole(path, tomlkit.dumps(document).encode())
+    write_whole(path, file_text("mapping", mapping).encode())
 
 
 def guess_by(whole: Table, mapping: ImportMapping) -> Guess:

@@ -44,58 +44,42 @@ _JOINT = (
     r"\b(angles?|pos|positions?|\w*winkel)\b"
 )
 """Angles of a joint, which a cable or a gearbox may separate from the motor."""
-_RULES: tuple[tuple[str, int, str], ...] = (
-    # Set points, errors, states and counters.
-    (
-        r"\b(soll\w*|\w+soll|target|tar(?= (pos|vel|tor|cur|ang|spe))|set ?points?|"
-        r"set (?=pos|vel|tor|cur|ang|spe)|"
-        r"sp|cmd|cmptd|computed|commande?d?|demand(ed)?|desired|des|"
-        r"reference|ref|consigne|consigna|goal|planned|feed ?forward|"
-        r"vorgabe|fuhrungs\w*|profile|offset|"
-        r"limit\w*)\b",
-        1,
-        IGNORED,
-    ),
-    (
-        r"\b(error|err|diff|difference|fehler|regelabweichung|schlepp\w*|following|erreur|deviation|abweichung|"
-        r"residual|mean error|std|stddev|variance|covariance|droop)\b",
-        1,
-        IGNORED,
-    ),
+_NOT_USED = (
+    # Set points and errors.
+    r"\b(soll\w*|\w+soll|target|tar(?= (pos|vel|tor|cur|ang|spe))|set ?points?|"
+    r"set (?=pos|vel|tor|cur|ang|spe)|"
+    r"sp|cmd|cmptd|computed|commande?d?|demand(ed)?|desired|des|"
+    r"reference|ref|consigne|consigna|goal|planned|feed ?forward|"
+    r"vorgabe|fuhrungs\w*|profile|offset|"
+    r"limit\w*)\b",
+    r"\b(error|err|diff|difference|fehler|regelabweichung|schlepp\w*|following|erreur|deviation|abweichung|"
+    r"residual|mean error|std|stddev|variance|covariance|droop)\b",
     # Constants of a device, the wind, and angles of what is no motor.
-    (
-        r"\b(constants?|gain|stiffness|inertia|angle of attack|aoa|wind|wind ?speed|"
-        r"windgeschwindigkeit|\w*wind ?speed|latitude|longitude|altitude|azimuth|elevation|"
-        r"east|north|south|west|easting|northing|ang(le|ular) increments?|"
-        r"(cable|r[o]pe|wire|tether|line|hook|load|trolley|platform|reel ?out|reel ?in)"
-        r" ?(reel ?out |reel ?in )?(speed|velocity))\b",
-        1,
-        IGNORED,
-    ),
+    r"\b(constants?|gain|stiffness|inertia|angle of attack|aoa|wind|wind ?speed|"
+    r"windgeschwindigkeit|\w*wind ?speed|latitude|longitude|altitude|azimuth|elevation|"
+    r"east|north|south|west|easting|northing|ang(le|ular) increments?|"
+    r"(cable|r[o]pe|wire|tether|line|hook|load|trolley|platform|reel ?out|reel ?in)"
+    r" ?(reel ?out |reel ?in )?(speed|velocity))\b",
     # Components of an acceleration, a twist or a magnetic field: no position.
-    (
-        r"^(?!.*\b(position|pos|translation|orientation|rotation)\b).*"
-        r"\b(acceleration|accel\w*|acc|gyro\w*|gravity|magnetic|magnetometer|mag|twist|"
-        r"linear|angular)\b.* [xyz]$",
-        1,
-        IGNORED,
-    ),
+    r"^(?!.*\b(position|pos|translation|orientation|rotation)\b).*"
+    r"\b(acceleration|accel\w*|acc|gyro\w*|gravity|magnetic|magnetometer|mag|twist|"
+    r"linear|angular)\b.* [xyz]$",
     # Quantities of the tool of a robot; its components by number are no joints.
-    (r"\btcp\b|\b(ee|eef|end ?effector|tool)\b.* \d$", 1, IGNORED),
+    r"\btcp\b|\b(ee|eef|end ?effector|tool)\b.* \d$",
     # Torques of what the motor drives: of a brake on a test bench, of the load.
-    (r"\b(brake|absorber|load|external|ext|brems\w*)( \w+)? (torques?|moments?)\b", 1, IGNORED),
-    (r"\b(brems|last)(dreh)?moment\b", 1, IGNORED),
-    (_CRANE, 1, IGNORED),
-    (r"\b(theta|phi|q|x|y|z) ?(ddot|dot dot|double ?dot)\b|\bdd(theta|phi|q)\b", 1, IGNORED),
-    (r"^pulses?$", 1, IGNORED),
-    (
-        r"^(frame|sub ?frame|index|idx|nr|no|number|sample|samples|counter|count|row|"
-        r"zeile|status|state|"
-        r"status ?word|control ?word|mode|modes|flags?|seq|sequence|comment|comments|kommentar|id|"
-        r"event|trigger|marker|quality|valid|time ?code)( \d+)?$",
-        1,
-        IGNORED,
-    ),
+    r"\b(brake|absorber|load|external|ext|brems\w*)( \w+)? (torques?|moments?)\b",
+    r"\b(brems|last)(dreh)?moment\b",
+    _CRANE,
+    r"\b(theta|phi|q|x|y|z) ?(ddot|dot dot|double ?dot)\b|\bdd(theta|phi|q)\b",
+    r"^pulses?$",
+    # States and counters.
+    r"^(frame|sub ?frame|index|idx|nr|no|number|sample|samples|counter|count|row|"
+    r"zeile|status|state|"
+    r"status ?word|control ?word|mode|modes|flags?|seq|sequence|comment|comments|kommentar|id|"
+    r"event|trigger|marker|quality|valid|time ?code)( \d+)?$",
+)
+_RULES: tuple[tuple[str, int, str], ...] = (
+    *((pattern, 1, IGNORED) for pattern in _NOT_USED),
     (r"^(date|datum|fecha|data|jour|day|tag|local date|recording date)$", 1, "date"),
     # Time.
     (
@@ -124,20 +108,14 @@ _RULES: tuple[tuple[str, int, str], ...] = (
     (r"^(roll|rx|rot ?x|a rx|euler x)$|\broll\b", 1, "platform_roll"),
     (r"^(pitch|ry|rot ?y|a ry|euler y)$|\bpitch\b", 1, "platform_pitch"),
     (r"^(yaw|rz|rot ?z|a rz|euler z)$|\byaw\b", 1, "platform_yaw"),
-    (
-        r"^(x|px|pos(ition)? x|x pos(ition)?|tx|x coord\w*|.* position x|translation x)$",
-        1,
-        "platform_x",
-    ),
-    (
-        r"^(y|py|pos(ition)? y|y pos(ition)?|ty|y coord\w*|.* position y|translation y)$",
-        1,
-        "platform_y",
-    ),
-    (
-        r"^(z|pz|pos(ition)? z|z pos(ition)?|tz|z coord\w*|.* position z|translation z)$",
-        1,
-        "platform_z",
+    *(
+        (
+            rf"^({axis}|p{axis}|pos(ition)? {axis}|{axis} pos(ition)?|t{axis}|{axis} coord\w*|"
+            rf".* position {axis}|translation {axis})$",
+            1,
+            f"platform_{axis}",
+        )
+        for axis in "xyz"
     ),
     # Forces and lengths of the cable.
     (

@@ -1,21 +1,23 @@
-"""Conventions of an orientation that names leave open: rotation vectors, orders of a quaternion."""
+"""Poses of trackers: the body, the complete set of columns, and conventions that names leave open.
+
+Names do not distinguish fixed angles from a rotation vector, nor the orders of a quaternion.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.model.rotation import rotation_by, rotation_of, rotation_vector
-from winchkit.runs.importing.assignment import Question
-from winchkit.runs.importing.chosen import ChosenColumn, Work
+from winchkit.runs.importing.assignment import ChosenColumn, Question, Work
 from winchkit.runs.importing.names import words_of
-from winchkit.schema.mapping import VECTOR
+from winchkit.runs.importing.table import Column
+from winchkit.schema.mapping import ANGLES, MATRIX, POSITION, QUATERNION, VECTOR
 
-_ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
 _OPEN = re.compile(r"(a )?r(ot)? ?[xyz]")
 """Names of components of a rotation, which may be fixed angles or a rotation vector."""
 _ALIKE = math.radians(0.05)
@@ -34,8 +36,8 @@ def settle_orientation(work: Work) -> None:
     A pitch beyond ±π/2 is none, and a rotation vector is not longer than π. Else the convention
     counts whose largest step from row to row is five times smaller; small angles are alike in both.
     """
-    found = {item.base: item for item in work.columns if item.base in _ANGLES}
-    items = [found[name] for name in _ANGLES if name in found]
+    found = {item.base: item for item in work.columns if item.base in ANGLES}
+    items = [found[name] for name in ANGLES if name in found]
     is_open = all(_OPEN.fullmatch(words_of(item.column.name)) for item in items)
     if len(items) < 3 or not is_open or any(item.factor is None for item in items):
         return
@@ -86,3 +88,78 @@ def quaternion_order(first: Array, last: Array) -> str:
     ends = [np.abs(values[np.isfinite(values)]) for values in (first, last)]
     is_real = [bool(len(end)) and bool(np.all(end > limit)) for end in ends]
     return {(True, False): "wxyz", (False, True): "xyzw"}.get((is_real[0], is_real[1]), "")
+
+
+_NOT_A_BODY = re.compile(
+    r"^(rigid body|rigid body marker|marker|bone|type|name|position|rotation|orientation|"
+    r"mean marker error|marker quality|trajectories|pose pose|pose|transform)$"
+)
+_AXES = re.compile("[xyz]")
+
+
+def body_of(column: Column) -> str:
+    """Body or marker of a tracker that a column belongs to; empty without labels.
+
+    Returns: labels without words such as ``Rigid Body`` and ``Position``.
+    """
+    own = [text for text in column.labels if not _NOT_A_BODY.match(words_of(text))]
+    return " ".join(own) or column.group
+
+
+def chosen_body(
+    columns: Sequence[Column], wanted: str | None
+) -> tuple[str | None, tuple[str, ...]]:
+    """Body whose pose is imported.
+
+    Returns: ``body``: None where there are several and none is chosen. ``bodies``: all of them.
+    Where bodies with an orientation exist, single markers are not among them.
+    """
+    bodies = tuple(dict.fromkeys(body_of(item) for item in columns))
+    turned = tuple(
+        dict.fromkeys(
+            body_of(item)
+            for item in columns
+            if "rotation" in words_of(" ".join(item.labels)) or "quat" in words_of(item.name)
+        )
+    )
+    bodies = turned or bodies
+    if wanted is not None:
+        found = next((b for b in bodies if b.casefold() == wanted.casefold()), None)
+        return found, bodies
+    return (bodies[0] if len(bodies) == 1 else None), bodies
+
+
+def complete_sets(channels: Mapping[str, object]) -> tuple[str, ...]:
+    """Pose channels whose set is complete; the quaternion is preferred to matrix and angles."""
+    found: tuple[str, ...] = ()
+    if all(name in channels for name in POSITION):
+        found += POSITION
+    for group in (QUATERNION, MATRIX, ANGLES):
+        if all(name in channels for name in group):
+            return found + group
+    return found
+
+
+def vector_names(names: Sequence[str]) -> frozenset[str]:
+    """Names that differ in x, y and z only, as those of a six-axis cell: ``Fx``, ``Fy``, ``Fz``."""
+    stems: dict[tuple[str, str], dict[str, str]] = {}
+    for name in names:
+        plain = words_of(name).replace(" ", "")
+        for axis in _AXES.finditer(plain):
+            stem = plain[: axis.start()], plain[axis.end() :]
+            stems.setdefault(stem, {})[axis[0]] = name
+    return frozenset(n for own in stems.values() if len(own) == 3 for n in own.values())
+
+
+def quaternion_names(names: Sequence[str], order: str = "wxyz") -> dict[str, str]:
+    """Channels of numbered quaternions: ``q0`` to ``q3`` beside positions.
+
+    Returns: channel by name, from ``q0`` to ``q3``; empty where the four names are not there, or no
+    positions.
+    """
+    words = {words_of(name).replace(" ", ""): name for name in names}
+    axes = all(any(key in words for key in (axis, f"pos{axis}", f"p{axis}")) for axis in "xyz")
+    joint = any(key.startswith(("q4", "q5", "dq")) for key in words)
+    if not axes or joint or not all(f"q{n}" in words for n in range(4)):
+        return {}
+    return {words[f"q{n}"]: f"platform_q{axis}" for n, axis in enumerate(order)}

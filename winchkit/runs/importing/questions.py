@@ -5,8 +5,14 @@ from __future__ import annotations
 import math
 
 from winchkit.runs.columns import column_dimension
-from winchkit.runs.importing.assignment import Choice, Question
-from winchkit.runs.importing.chosen import ChosenColumn, Work, is_counted, is_whole
+from winchkit.runs.importing.assignment import (
+    Choice,
+    ChosenColumn,
+    Question,
+    Work,
+    is_counted,
+    is_whole,
+)
 from winchkit.runs.importing.long_table import axes_of, has_kinds
 from winchkit.runs.importing.table import Column, Table
 from winchkit.runs.importing.unit_settling import is_alike

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from winchkit.runs.importing.chosen import Work
+from winchkit.runs.importing.assignment import Work
 from winchkit.runs.importing.table import Table
 
 SOURCE_STAMP, LOG_TIME = "header.stamp", "log_time"

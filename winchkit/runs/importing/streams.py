@@ -20,7 +20,7 @@ from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.long_table import axes_of
 from winchkit.runs.importing.stored.numbers import range_of, restored
 from winchkit.runs.importing.table import Column, Table
-from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP, VECTOR
+from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, QUATERNION, STAMP, VECTOR
 
 _PADDED = 0.67
 """Share of rows with a value below which a column has a rate of its own: half the rate or less."""
@@ -32,8 +32,6 @@ _EXCEL_EPOCH = 25_569.0
 """1970-01-01 in days since 1899-12-30."""
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:(\.\d{3}){2,}|(,\d{3}){2,})")
 """Whole numbers with separators of thousands: one separator alone may be a decimal sign."""
-_ANGLES = ("platform_roll", "platform_pitch", "platform_yaw")
-_QUATERNION = ("platform_qw", "platform_qx", "platform_qy", "platform_qz")
 
 
 @dataclass(frozen=True)
@@ -177,7 +175,7 @@ def _cell_faults(
 ) -> list[Fault]:
     found = []
     for source, column in columns.items():
-        wrong = [(row, text) for row, text in column.wrong]
+        wrong = list(column.wrong)
         if column.texts is not None and used[source].channel in {"time", DATE}:
             stamps = [(row, column.texts[row]) for row in read_stamps(column.texts).wrong]
             if 2 * len(stamps) > len(column.texts):
@@ -235,14 +233,12 @@ def _clock_of(clocks: Sequence[Column], column: Column) -> Column | None:
 
 def _with_quaternion(channels: dict[str, Array], *, is_vector: bool) -> dict[str, Array]:
     """A quaternion in place of a rotation vector or of the elements of a rotation matrix."""
-    if is_vector and all(name in channels for name in _ANGLES):
-        vector = np.stack([channels[name] for name in _ANGLES], axis=-1)
-        others = {name: values for name, values in channels.items() if name not in _ANGLES}
-        return {**others, **_quaternion(rotation_by(vector))}
-    if not all(name in channels for name in MATRIX):
-        return {name: values for name, values in channels.items() if name not in MATRIX}
-    matrix = np.stack([channels[name] for name in MATRIX], axis=-1).reshape(-1, 3, 3)
-    others = {name: values for name, values in channels.items() if name not in MATRIX}
+    names = ANGLES if is_vector and set(ANGLES) <= channels.keys() else MATRIX
+    others = {name: values for name, values in channels.items() if name not in names}
+    if not set(names) <= channels.keys():
+        return others
+    parts = np.stack([channels[name] for name in names], axis=-1)
+    matrix = rotation_by(parts) if names is ANGLES else parts.reshape(-1, 3, 3)
     return {**others, **_quaternion(matrix)}
 
 
@@ -251,7 +247,7 @@ def _quaternion(matrix: Array) -> dict[str, Array]:
     known = np.isfinite(matrix).all(axis=(1, 2))
     quaternion = np.full((len(matrix), 4), np.nan)
     quaternion[known] = quaternion_of(matrix[known])
-    return dict(zip(_QUATERNION, quaternion.T, strict=True))
+    return dict(zip(QUATERNION, quaternion.T, strict=True))
 
 
 def _forward(stream: Stream) -> Stream:
@@ -322,11 +318,7 @@ def _by_rate(stream: Stream) -> list[Stream]:
     streams = []
     for names in found.values():
         only = replace(stream, channels={name: stream.channels[name] for name in names})
-        first = names[0]
-        mask = known[first] if first in padded else np.ones(len(stream.time), dtype=bool)
-        if first not in padded:
-            mask = np.any([known[name] for name in names], axis=0)
-        streams.append(_rows_of(only, mask))
+        streams.append(_rows_of(only, np.any([known[name] for name in names], axis=0)))
     return streams
 
 

@@ -97,19 +97,7 @@ def named_apart(columns: Sequence[Column]) -> tuple[Column, ...]:
     for number, (item, name) in enumerate(zip(columns, full, strict=True), start=1):
         seen[name] = seen.get(name, 0) + 1
         source = name if seen[name] == 1 else f"{name} #{seen[name]}"
-        found.append(
-            Column(
-                item.name,
-                item.values,
-                item.unit,
-                item.labels,
-                item.texts,
-                item.wrong,
-                item.group,
-                number,
-                source,
-            )
-        )
+        found.append(replace(item, number=number, source=source))
     return tuple(found)
 
 

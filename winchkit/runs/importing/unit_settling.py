@@ -10,8 +10,14 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.runs.columns import column_dimension
 from winchkit.runs.importing.answers import ColumnAnswer
-from winchkit.runs.importing.assignment import Candidate, Confidence
-from winchkit.runs.importing.chosen import ChosenColumn, Work, is_counted, is_whole
+from winchkit.runs.importing.assignment import (
+    Candidate,
+    ChosenColumn,
+    Confidence,
+    Work,
+    is_counted,
+    is_whole,
+)
 from winchkit.runs.importing.consistency import CLOCKS
 from winchkit.runs.importing.formats.stamps import epoch_unit, read_stamps
 from winchkit.runs.importing.names import words_of
@@ -25,14 +31,11 @@ from winchkit.runs.importing.unit_spelling import (
     read_unit,
 )
 from winchkit.runs.importing.winches import stem_of
-from winchkit.schema.mapping import DATE, EXCEL, MATRIX, STAMP
+from winchkit.schema.mapping import ANGLES, DATE, EXCEL, MATRIX, POSITION, STAMP
 from winchkit.units import GRAVITY, UNITS
 
 _TURN = 2 * math.pi
-_AXES = (
-    {"platform_x", "platform_y", "platform_z"},
-    {"platform_roll", "platform_pitch", "platform_yaw"},
-)
+_AXES = (set(POSITION), set(ANGLES))
 _TURNS = {"motor_angle": "turn", "motor_velocity": "turn/s"}
 _SI_LAYOUTS = ("MAT", "HDF5", "NPZ", "NPY", "MCAP")
 _SI_WORDS = {"q", "dq", "qd", "qdot", "qm", "tau", "theta", "omega", "thetadot", "dtheta"}

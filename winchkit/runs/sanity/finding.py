@@ -1,4 +1,4 @@
-"""Finding: one property of a run's channel that limits what can be concluded from it."""
+"""Finding: one property of a run's channel that limits conclusions, and numbers in its text."""
 
 from __future__ import annotations
 
@@ -24,3 +24,14 @@ class Finding:
     def to_json(self) -> dict[str, Any]:
         """Dictionary that commands print."""
         return dict(vars(self))
+
+
+def share(part: float) -> str:
+    """A share in per cent with two digits, never in scientific notation."""
+    percent = 100 * part
+    return f"{percent:.0f} %" if abs(percent) >= 9.95 else f"{percent:.2g} %"
+
+
+def counted(count: int, noun: str) -> str:
+    """``1 gap``, ``3 gaps``."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.runs.run import Run
-from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import share
+from winchkit.runs.sanity.finding import Finding, share
 
 ON_GROUND = "load-on-ground"
 _FORCES = ("tension", "motor_torque")

@@ -12,8 +12,7 @@ import numpy as np
 
 from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
-from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import share
+from winchkit.runs.sanity.finding import Finding, share
 
 _LEAST_SHARE = 0.2
 """Share of repeated values that is reported; fewer hardly change a spectrum. Rule of thumb."""

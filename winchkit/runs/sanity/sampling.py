@@ -8,8 +8,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.runs.run import Run, lost_samples
-from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import counted, share
+from winchkit.runs.sanity.finding import Finding, counted, share
 
 _JITTER = 0.05
 """Standard deviation of the intervals, relative to their mean, that is reported."""

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from winchkit.arrays import Array
 from winchkit.quantity_text import quantity
 from winchkit.runs.run import Run
-from winchkit.runs.sanity.finding import Finding
-from winchkit.runs.sanity.text import share
+from winchkit.runs.sanity.finding import Finding, share
 
 _LEAST_SAMPLES = 5
 """Fewer equal samples at an end are an extremum that the resolution flattens. Rule of thumb."""

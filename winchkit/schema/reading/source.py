@@ -12,7 +12,7 @@ from typing import Any
 from winchkit import wings
 from winchkit.arguments import path_of
 from winchkit.errors import Fault, FileError, suggest
-from winchkit.regular_file import regular
+from winchkit.regular_file import read_whole
 from winchkit.schema.reading.lines import Key, line_of, lines_of_keys
 
 # As messages list them; those of robots are read by their wing.
@@ -75,17 +75,7 @@ def open_source(path: str | Path) -> Source:
 
 
 def _text(path: Path) -> str:
-    try:
-        with open(path, "rb", opener=regular) as stream:
-            data = stream.read(_LARGEST + 1)
-    except FileNotFoundError:
-        raise FileError(Fault("there is no such file", str(path))) from None
-    except IsADirectoryError:
-        raise FileError(Fault("is a directory, not a file", str(path))) from None
-    except OSError as error:
-        raise FileError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
-    except ValueError as error:
-        raise FileError(Fault(f"is not a usable file name: {error}", repr(str(path)))) from None
+    data = read_whole(path, "file", _LARGEST)
     if len(data) > _LARGEST:
         limit = f"larger than {_LARGEST / 1e6:g} MB, so it is not a declaration"
         raise FileError(Fault(limit, str(path)))

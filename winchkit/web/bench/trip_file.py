@@ -11,7 +11,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.runs.run import Channel, Run
-from winchkit.runs.writer import write_csv
+from winchkit.runs.writer import write_run
 
 _CHANNELS = {
     "motor_angle": ("motor_angle", "rad"),
@@ -50,7 +50,7 @@ def trip_file(found: Mapping[str, Any], bench: str, folder: Path) -> tuple[str, 
     """File name with the present time (UTC), and text of the run as CSV."""
     name = f"trip-{datetime.now(UTC):%Y%m%d-%H%M%S}.csv"
     path = folder / name
-    write_csv(trip_run(found, bench), path)
+    write_run(trip_run(found, bench), path)
     text = path.read_text(encoding="utf-8")
     path.unlink()
     return name, text

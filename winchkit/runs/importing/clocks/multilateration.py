@@ -33,8 +33,8 @@ from winchkit.runs.importing.clocks.cross_correlation import (
     vertex_of,
 )
 from winchkit.runs.importing.streams import Streams
+from winchkit.schema.mapping import POSITION
 
-_COORDINATES = ("platform_x", "platform_y", "platform_z")
 _LEAST_LINES = 3
 """Two differences of squared lengths determine a position in a plane."""
 _MOST_ROWS = 2000
@@ -51,7 +51,7 @@ def pose_agreement(first: Streams, second: Streams) -> Agreement | None:
     for lines, tracker in ((first, second), (second, first)):
         angles = signals_by_base(lines).get("motor_angle", [])
         found = signals_by_base(tracker)
-        position = [signal for name in _COORDINATES for signal in found.get(name, [])]
+        position = [signal for name in POSITION for signal in found.get(name, [])]
         if len(angles) >= _LEAST_LINES and position:
             return _agreement(angles, position, lines_first=lines is first)
     return None

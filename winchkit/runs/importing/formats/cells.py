@@ -1,14 +1,22 @@
-"""Cells of text as numbers: decimal commas, separators of thousands, missing values."""
+"""Cells of text as numbers, with decimal commas and separators of thousands, or with a unit each.
+
+A column of text is one of numbers where its cells are numbers with units of one dimension. A few
+such texts (``1A``, ``2A``) may be labels, so that a decimal sign or several values are needed.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from winchkit.arrays import Array
+from winchkit.runs.importing.table import Column
+from winchkit.runs.importing.unit_spelling import SpelledUnit, read_unit
 
 _MISSING = {
     *("", "nan", "-nan", "+nan", "n/a", "na", "#n/a", "#nv", "#na", "null", "none", "-", "--"),
@@ -68,3 +76,65 @@ def numbers(cells: Sequence[str], decimal: str) -> tuple[Array, list[int]]:
     read = [number(cell, decimal) for cell in cells]
     wrong = [row for row, value in enumerate(read) if value is None]
     return np.array([math.nan if v is None else v for v in read], dtype=np.float64), wrong
+
+
+_QUANTITY = re.compile(r"([+\-−]?[\d.,'\s]*\d[.,]?(?:[eE][+-]?\d+)?)\s*([^\d\s.,+\-][^\d]{0,11})")
+_SHARE = 0.8
+"""Least share of the cells with text that have a number and a unit; others are faults."""
+_FEWEST = 5
+"""Least number of different texts without a decimal sign."""
+
+
+def has_unit(cell: str, decimal: str) -> bool:
+    """Whether a cell is a number with its unit.
+
+    ``decimal``: decimal sign.
+    """
+    return _read_quantity(cell, decimal) is not None
+
+
+def with_cell_units(column: Column) -> Column:
+    """A column of text whose cells have units as one of numbers; another one unchanged.
+
+    Returns: in the most frequent unit of the cells. Cells with another text are in ``wrong``.
+    """
+    if column.texts is None:
+        return column
+    for decimal in ".,":
+        found = _converted(column, column.texts, decimal)
+        if found is not None:
+            return found
+    return column
+
+
+def _converted(column: Column, texts: Sequence[str], decimal: str) -> Column | None:
+    given = [row for row, text in enumerate(texts) if not is_missing(text)]
+    if not given or _read_quantity(texts[given[0]], decimal) is None:
+        return None
+    quantities = {row: _read_quantity(texts[row], decimal) for row in given}
+    read = {row: found for row, found in quantities.items() if found is not None}
+    distinct = {texts[row] for row in read}
+    is_label = len(distinct) < _FEWEST and not any(set(text) & {".", ","} for text in distinct)
+    dimensions = {unit.dimension for _, unit, _ in read.values()}
+    if len(read) < _SHARE * len(given) or is_label or len(dimensions) > 1:
+        return None
+    spelling = Counter(text for _, _, text in read.values()).most_common(1)[0][0]
+    usual = read_unit(spelling)
+    if usual is None:
+        return None
+    values = np.full(len(texts), math.nan)
+    for row, (value, unit, _) in read.items():
+        values[row] = (value * unit.factor + unit.offset - usual.offset) / usual.factor
+    wrong = tuple((row, texts[row]) for row in given if row not in read)
+    return replace(column, values=values, unit=spelling, texts=None, wrong=wrong)
+
+
+def _read_quantity(cell: str, decimal: str) -> tuple[float, SpelledUnit, str] | None:
+    """Value, unit and spelling of a cell."""
+    found = _QUANTITY.fullmatch(cell.strip())
+    if found is None:
+        return None
+    value, unit = number(found[1], decimal), read_unit(found[2])
+    if value is None or not math.isfinite(value) or unit is None:
+        return None
+    return value, unit, found[2].strip()

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.errors import Fault, RunError, UsageError
+from winchkit.errors import Fault, RunError
+from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import Table, refuse_size
 from winchkit.runs.importing.unit_spelling import split_unit
@@ -53,13 +54,9 @@ def read_parquet(path: str, data: bytes) -> Table:
     Returns: a column per column of numbers or dates. Raises UsageError without pyarrow; RunError
     for an invalid file.
     """
-    try:
-        import pyarrow as pa
-        from pyarrow import parquet
-    except ImportError:
-        raise UsageError(
-            f"{path}: Parquet needs pyarrow; install it with pip install 'winchkit[parquet]'"
-        ) from None
+    pa = library("pyarrow", f"{path}: Parquet")
+    from pyarrow import parquet
+
     try:
         source = parquet.ParquetFile(io.BytesIO(data))
         shape = source.metadata.num_rows * source.metadata.num_columns

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.formats.cell_units import has_unit
-from winchkit.runs.importing.formats.cells import number
+from winchkit.runs.importing.formats.cells import has_unit, number
 from winchkit.runs.importing.formats.stamps import is_stamp
 
 BLANKS = " "

@@ -281,10 +281,8 @@ def _filled(row: list[str]) -> list[str]:
     is_sparse = start > 0 and sum(bool(cell) for cell in cells[start:]) < len(cells) - start
     if not is_sparse:
         return cells
-    last = ""
-    for index in range(start, len(cells)):
-        last = cells[index] or last
-        cells[index] = last
+    for index in range(start + 1, len(cells)):
+        cells[index] = cells[index] or cells[index - 1]
     return cells
 
 
@@ -332,10 +330,8 @@ def _interval(metadata: dict[str, str], decimal: str) -> float | None:
 
 def _rate_alone(metadata: dict[str, str]) -> float | None:
     """Rate in a line of its own under the title of a section, as Vicon writes it, Hz."""
-    texts = list(metadata.values())
-    for title, value in pairwise(texts):
-        if title in {"Trajectories", "Model Outputs", "Devices"}:
-            rate = number(value, ".")
-            if rate and rate > 0:
-                return rate
+    for title, value in pairwise(metadata.values()):
+        rate = number(value, ".") if title in {"Trajectories", "Model Outputs", "Devices"} else None
+        if rate and rate > 0:
+            return rate
     return None

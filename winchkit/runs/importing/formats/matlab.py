@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.errors import Fault, RunError, UsageError
+from winchkit.errors import Fault, RunError
+from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import table_of_arrays
 from winchkit.runs.importing.table import Table, refuse_size
 
@@ -112,12 +113,7 @@ def read_hdf5(path: str, data: bytes) -> Table:
     Returns: every dataset of numbers by its path; attributes ``unit`` or ``units`` are units. Links
     to other files are not followed. Raises UsageError without h5py; RunError for an invalid file.
     """
-    try:
-        import h5py
-    except ImportError:
-        raise UsageError(
-            f"{path}: HDF5 and MAT 7.3 need h5py; install it with pip install 'winchkit[hdf5]'"
-        ) from None
+    h5py = library("h5py", f"{path}: HDF5 or MAT 7.3")
     arrays: dict[str, Any] = {}
     units: dict[str, str] = {}
     notes: list[str] = []

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.errors import Fault, RunError, UsageError, WinchkitError
+from winchkit.errors import Fault, RunError, WinchkitError
+from winchkit.extras import library
 from winchkit.runs.importing.formats.variables import column_of
 from winchkit.runs.importing.table import Column, Table, named_apart, refuse_size
 
@@ -30,18 +31,13 @@ def read_mdf(path: str, data: bytes) -> Table:
     that the file marks as invalid are NaN. Lines ``key: value`` of its comment are metadata. Raises
     UsageError without asammdf; RunError for an invalid file, or one without channels of numbers.
     """
-    try:
-        from asammdf import MDF
-    except ImportError:
-        raise UsageError(
-            f"{path}: MDF needs asammdf; install it with pip install 'winchkit[mf4]'"
-        ) from None
+    asammdf = library("asammdf", f"{path}: MDF")
     notes: list[str] = []
     columns: list[Column] = []
     version = comment = failure = ""
     with _failing_destructors():
         try:
-            with MDF(io.BytesIO(data)) as file:
+            with asammdf.MDF(io.BytesIO(data)) as file:
                 count = sum(g.channel_group.cycles_nr * len(g.channels) for g in file.groups)
                 refuse_size(path, 8 * count, "channels")
                 columns += _channels(file, notes)
@@ -104,15 +100,10 @@ def read_tdms(path: str, data: bytes) -> Table:
     time of their increment; those of one group with one time are sampled together. Raises
     UsageError without npTDMS; RunError for an invalid file, or one without channels of numbers.
     """
-    try:
-        from nptdms import TdmsFile
-    except ImportError:
-        raise UsageError(
-            f"{path}: TDMS needs npTDMS; install it with pip install 'winchkit[tdms]'"
-        ) from None
+    nptdms = library("nptdms", f"{path}: TDMS")
     notes: list[str] = []
     try:
-        file = TdmsFile.read(io.BytesIO(data))
+        file = nptdms.TdmsFile.read(io.BytesIO(data))
         refuse_size(path, 8 * sum(len(c) for g in file.groups() for c in g.channels()), "channels")
         columns = [column for group in file.groups() for column in _of_group(group, notes)]
         metadata = {str(key): str(value) for key, value in file.properties.items()}

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from winchkit.errors import Fault, RunError, UsageError, WinchkitError, one_line
+from winchkit.errors import Fault, RunError, WinchkitError, one_line
+from winchkit.extras import library
 from winchkit.runs.importing.formats.fields import numbers_of, stamp_of
 from winchkit.runs.importing.source_stamps import LOG_TIME, SOURCE_STAMP
 from winchkit.runs.importing.table import Column, Table, named_apart
@@ -75,19 +76,9 @@ def _decoded(path: str, schema: Any, channel: Any, data: bytes, decoders: dict[i
     if channel.message_encoding != "cdr" or schema is None or schema.encoding != "ros2msg":
         return None
     if schema.id not in decoders:
-        decoders[schema.id] = _ros2(path, schema)
+        ros2 = library("mcap_ros2.decoder", f"{path}: a message of ROS 2")
+        decoders[schema.id] = ros2.DecoderFactory().decoder_for("cdr", schema)
     return decoders[schema.id](data)
-
-
-def _ros2(path: str, schema: Any) -> Any:
-    try:
-        from mcap_ros2.decoder import DecoderFactory
-    except ImportError:
-        raise UsageError(
-            f"{path}: messages of ROS 2 need mcap-ros2-support; install it with "
-            "pip install 'winchkit[ros2]'"
-        ) from None
-    return DecoderFactory().decoder_for("cdr", schema)
 
 
 def _columns(topic: str, found: Sequence[_Message], notes: list[str]) -> Iterator[Column]:

@@ -8,8 +8,8 @@ from io import BytesIO
 from pathlib import Path
 
 from winchkit.errors import Fault, RunError
-from winchkit.regular_file import regular
-from winchkit.runs.importing.formats.cell_units import with_cell_units
+from winchkit.regular_file import read_whole
+from winchkit.runs.importing.formats.cells import with_cell_units
 from winchkit.runs.importing.formats.channel_table import by_channel
 from winchkit.runs.importing.formats.split_stamps import joined_stamps
 from winchkit.runs.importing.table import LARGEST, Table
@@ -75,15 +75,7 @@ def _of_arrays(name: str, data: bytes) -> Table:
 
 def _content(path: Path) -> bytes:
     """Content of a regular file; raises RunError where it cannot be read."""
-    try:
-        with open(path, "rb", opener=regular) as file:
-            data = file.read(LARGEST + 1)
-    except FileNotFoundError:
-        raise RunError(Fault("there is no such file", str(path))) from None
-    except OSError as error:
-        raise RunError(Fault(f"cannot be read: {error.strerror}", str(path))) from None
-    except ValueError as error:
-        raise RunError(Fault(f"is not a usable file name: {error}", repr(str(path)))) from None
+    data = read_whole(path, "recording", LARGEST, RunError)
     if not data:
         raise RunError(Fault("the file is empty", str(path)))
     if len(data) > LARGEST:

@@ -8,7 +8,8 @@ from collections.abc import Iterable
 from dataclasses import replace
 from datetime import date, datetime, time, timedelta
 
-from winchkit.errors import Fault, RunError, UsageError
+from winchkit.errors import Fault, RunError
+from winchkit.extras import library
 from winchkit.runs.importing.formats.dialect import Dialect, has_cell_units
 from winchkit.runs.importing.formats.header import Row
 from winchkit.runs.importing.formats.text import table_of_rows
@@ -21,12 +22,7 @@ def read_workbook(path: str, data: bytes) -> Table:
     Returns: cached values of formulas; dates as text in ISO 8601. Raises UsageError without
     openpyxl; RunError for an invalid workbook, and one without rows of numbers.
     """
-    try:
-        import openpyxl
-    except ImportError:
-        raise UsageError(
-            f"{path}: XLSX needs openpyxl; install it with pip install 'winchkit[xlsx]'"
-        ) from None
+    openpyxl = library("openpyxl", f"{path}: XLSX")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as packed:
             refuse_size(path, sum(item.file_size for item in packed.infolist()), "a workbook")

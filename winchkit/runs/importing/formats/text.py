@@ -12,8 +12,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.errors import Fault, RunError
-from winchkit.runs.importing.formats.cell_units import has_unit
-from winchkit.runs.importing.formats.cells import is_missing, number, numbers
+from winchkit.runs.importing.formats.cells import has_unit, is_missing, number, numbers
 from winchkit.runs.importing.formats.dialect import (
     BLANKS,
     FEWEST,
@@ -57,18 +56,8 @@ def read_text_table(path: str, data: bytes) -> Table:
         raise RunError(Fault(message, path))
     rows = _SplitLines(lines, dialect.delimiter, numbers)
     is_ended = data[-1:] in b"\r\n" or data[-2:] in (b"\n\0", b"\0\n")
-    table = table_of_rows(path, rows, dialect, is_ended=is_ended)
     layout = f"text in {encoding}, {dialect.text}" if encoding else f"text, {dialect.text}"
-    return Table(
-        table.path,
-        layout,
-        table.columns,
-        table.line_of,
-        table.metadata,
-        faults=table.faults,
-        notes=table.notes,
-        interval=table.interval,
-    )
+    return replace(table_of_rows(path, rows, dialect, is_ended=is_ended), layout=layout)
 
 
 def _end_of_header(lines: Sequence[str]) -> int:

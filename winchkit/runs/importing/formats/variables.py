@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -58,15 +59,10 @@ def table_of_arrays(
     lengths = sorted({len(item) for item in columns})
     if not lengths or lengths[-1] < 2:
         raise RunError(Fault("has no variables with more than one number", path))
-    several = len(lengths) > 1
-    grouped = [
-        Column(
-            c.name, c.values, c.unit, texts=c.texts, group=f"{len(c)} samples" if several else ""
-        )
-        for c in columns
-    ]
+    if len(lengths) > 1:
+        columns = [replace(item, group=f"{len(item)} samples") for item in columns]
     return Table(
-        path, layout, named_apart(grouped), metadata=texts, constants=constants, notes=tuple(left)
+        path, layout, named_apart(columns), metadata=texts, constants=constants, notes=tuple(left)
     )
 
 

@@ -9,8 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.runs.importing.assignment import Question
-from winchkit.runs.importing.chosen import ChosenColumn, Work, clock_of, clock_values, is_whole
+from winchkit.runs.importing.assignment import (
+    ChosenColumn,
+    Question,
+    Work,
+    clock_of,
+    clock_values,
+    is_whole,
+)
 from winchkit.runs.importing.clocks.row_order import longest_stretch, rows_in_order
 from winchkit.runs.importing.consistency import USUAL_COUNTS
 from winchkit.runs.importing.names import words_of
