@@ -14,15 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from winchkit.robot.calibration.elongation import LAWS
-from winchkit.robot.calibration.equations import Equations
-from winchkit.robot.calibration.parameters import EFFECTS, Parameters, parameters_of
 from winchkit.robot.identification.bundle_adjustment import (
     Solution,
     State,
     Weights,
     linearise,
 )
+from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.parameters import EFFECTS, LAWS, Parameters, parameters_of
 
 Blocks = Mapping[str, NDArray[np.intp]]
 Values = NDArray[np.float64] | NDArray[np.bool_]
@@ -73,7 +72,7 @@ def _possible(equations: Equations, effect: str) -> bool:
     if effect not in LAWS:
         return "home_length" not in equations.parameters.block
     forces = bool(np.any(np.isfinite(equations.measured.tension)))
-    return equations.parameters.law is None and (forces or equations.forces.middle is not None)
+    return equations.parameters.law is None and (forces or equations.middle_force is not None)
 
 
 def _gain(

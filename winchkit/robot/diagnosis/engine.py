@@ -22,7 +22,7 @@ from winchkit.robot.diagnosis.candidates import BALANCING
 from winchkit.robot.diagnosis.errors import FittedModel, held_out_rms
 from winchkit.robot.diagnosis.regression import PoseRegression
 from winchkit.robot.diagnosis.trajectory_regression import TrajectoryRegression
-from winchkit.robot.diagnosis.variance_components import PoseNoise
+from winchkit.robot.identification.variance_components import PoseNoise
 
 
 class PoseSelection(SelectionEngine):

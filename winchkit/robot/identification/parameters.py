@@ -1,4 +1,4 @@
-"""Parameters of a robot's calibration: names, units, priors and bounds, in one vector."""
+"""Parameters of a robot's identification: names, units, priors and bounds, in one vector."""
 
 from __future__ import annotations
 
@@ -10,15 +10,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.drum import drum_of
-from winchkit.robot.calibration.elongation import LAWS, LawParameter
-from winchkit.robot.calibration.instruments import LARGEST_SCALE, Instruments
 from winchkit.robot.geometry.constraints import ZERO_STD
 from winchkit.robot.geometry.robot import Robot
+from winchkit.robot.identification.instruments import LARGEST_SCALE, Instruments
 from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse
+
+
+@dataclass(frozen=True)
+class LawParameter:
+    """One parameter of a law in the unit that is fitted."""
+
+    name: str
+    unit: str
+    start: float
+    std: float
+    low: float = -np.inf
+    high: float = np.inf
+    reciprocal: bool = False
+    """Files have 1/value: a stiffness is fitted as a compliance."""
+
+
+LAWS: dict[str, tuple[LawParameter, ...]] = {
+    "cable-elongation-linear": (
+        LawParameter("axial_stiffness", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
+    ),
+    "cable-elongation-quartic": (
+        LawParameter("k1", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
+        LawParameter("b2", "1", 0.0, 100.0),
+        LawParameter("b3", "1", 0.0, 3e4),
+        LawParameter("b4", "1", 0.0, 1e7),
+    ),
+    "cable-elongation-exponential": (
+        LawParameter("strain_scale", "1", 0.0, 2e-3, 0.0, 0.2),
+        LawParameter("force_scale", "N", 200.0, 100.0, 1.0, 1e6),
+    ),
+}
+"""Laws of elongation that can be parameters, one for all cables."""
 
 HOME_LENGTH = "home-length"
 
@@ -94,6 +127,8 @@ _OF_LINES_STD = {"cell_gain": 0.2, "length_scale": 0.02}
 of instruments in use, so that the data decide."""
 _REFLECTOR_STD = 0.1
 """Of a reflector's offset, m: the size of a platform."""
+_FLAT = 1e3
+"""Standard deviation of the prior of an effect's coordinates."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +216,23 @@ class Parameters:
         for at, value in zip(self.block[block].ravel(), values.ravel(), strict=True):
             everything[at] = replace(everything[at], nominal=float(value))
         return replace(self, all=tuple(everything))
+
+    def about(self, values: Array) -> Parameters:
+        """The same parameters with other nominal values, (q,)."""
+        both = zip(self.all, values.tolist(), strict=True)
+        return replace(self, all=tuple(replace(own, nominal=value) for own, value in both))
+
+    def with_terms(self, terms: Sequence[Term]) -> Parameters:
+        """These and the coordinates of effects, which are near one in size, with a flat prior."""
+        more: list[Parameter] = []
+        for term in terms:
+            own = Coordinates(term.effect)
+            start, low, high = own.vector(term.values), *own.bounds()
+            for name, *numbers in zip(own.names, start, low, high, strict=True):
+                at, least, most = map(float, numbers)
+                more.append(Parameter(f"{term.effect.id}.{name}", "1", at, _FLAT, least, most))
+        block = {**self.block, "terms": np.arange(len(self), len(self) + len(more))}
+        return replace(self, all=(*self.all, *more), block=block)
 
 
 class _Builder:
@@ -325,20 +377,13 @@ def _known(effects: Sequence[str]) -> None:
 
 def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
     """One growth for all layered drums, which wind the same cable."""
-    growths = {
+    growths = [
         getattr(drum_of(winch), "growth", 0.0) for winch in winches if winch.drum.kind in LAYERED
-    }
-    if len(growths) > 1:
-        listed = ", ".join(f"{growth * 1e3:g} mm" for growth in sorted(growths))
-        raise UsageError(
-            f"the winches of '{build.robot.profile.name}' have the layer growths {listed}; the "
-            "lines of "
-            "one robot are calibrated with one, so give them the same cable"
-        )
+    ]
     prior = build.prior("layer_growth")
     low, high = prior.bounds or (0.0, np.inf)
-    value = growths.pop() if growths else 0.0
-    std = prior.std if any(winch.drum.kind in LAYERED for winch in winches) else 0.0
+    std = prior.std if growths else 0.0
+    value = growths[0] if growths else 0.0
     build.add("layer_growth", [Parameter("layer_growth", "m", value, std, low, high)])
 
 

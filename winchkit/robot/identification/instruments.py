@@ -79,11 +79,7 @@ class Instruments:
 
 
 def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
-    """Instruments as the robot's file declares them.
-
-    ``measured``: poses, whose sessions get a frame each. Returns: numbers of what was not measured
-    are not free.
-    """
+    """Instruments as the robot's file declares them."""
     spec = robot.profile.instrument
     tracker = robot.tracker or declared_tracker(robot.profile)
     free = {
