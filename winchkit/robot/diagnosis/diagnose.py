@@ -117,24 +117,16 @@ class RobotAnswer(Answer):
 
 @dataclass(frozen=True)
 class RobotSelection:
-    """A selection on poses and its verdict.
-
-    Attributes
-    ----------
-    preparation : Preparation
-        Data, candidates and noise.
-    engine : PoseSelection
-        Engine of the selection.
-    file_engine : PoseSelection
-        Engine with the geometry of the file; the same object where the geometry was not free.
-    result : SelectionResult
-        Result of the selection, with the simplest laws.
-    """
+    """A selection on poses and its verdict."""
 
     preparation: Preparation
+    """Data, candidates and noise."""
     engine: PoseSelection
+    """Engine of the selection."""
     file_engine: PoseSelection
+    """Engine with the geometry of the file; the same object where the geometry was not free."""
     result: SelectionResult
+    """Result of the selection, with the simplest laws."""
 
     @classmethod
     def of(

@@ -136,33 +136,22 @@ _GEOMETRY_LEVEL = 1e-3
 
 @dataclass(frozen=True)
 class Preparation:
-    """Data, candidates and noise of a robot's identification, for any treatment of its geometry.
-
-    Attributes
-    ----------
-    dataset : RobotDataset
-        Poses of one robot.
-    catalogue : Catalogue
-        Effects.
-    candidates : tuple of Effect
-        Effects at their places that the poses could show.
-    noise : PoseNoise
-        Variance components.
-    prior : Parameters
-        The geometry with the priors of a calibration.
-    guess : tuple of Term
-        The effect that explains most, beside which a free geometry is fitted.
-    registration : Registration, optional
-        Effects of the tracker in the initial model.
-    """
+    """Data, candidates and noise of a robot's identification, for any treatment of its geometry."""
 
     dataset: RobotDataset
+    """Poses of one robot."""
     catalogue: Catalogue
+    """Effects."""
     candidates: tuple[Effect, ...]
+    """Effects at their places that the poses could show."""
     noise: PoseNoise
+    """Variance components."""
     prior: Parameters
+    """The geometry with the priors of a calibration."""
     guess: tuple[Term, ...] = ()
+    """The effect that explains most, beside which a free geometry is fitted."""
     registration: Registration | None = None
+    """Effects of the tracker in the initial model."""
 
     @cached_property
     def of_file(self) -> tuple[Term, ...]:

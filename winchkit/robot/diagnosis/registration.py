@@ -57,22 +57,15 @@ _SUBSETS: tuple[frozenset[str], ...] = (
 
 @dataclass(frozen=True)
 class Registration:
-    """Effects of the tracker that the initial model has beside those of the robot's file.
-
-    Attributes
-    ----------
-    dataset : RobotDataset
-        With a robot whose angles are declared those of an IMU where they do not turn with the
-        tracker's frame.
-    found : tuple of Term
-        Effects that the file does not declare, to be reported.
-    declared : tuple of Term
-        Effects whose numbers the file declares unknown.
-    """
+    """Effects of the tracker that the initial model has beside those of the robot's file."""
 
     dataset: RobotDataset
+    """With a robot whose angles are declared those of an IMU where they do not turn with the
+    tracker's frame."""
     found: tuple[Term, ...] = ()
+    """Effects that the file does not declare, to be reported."""
     declared: tuple[Term, ...] = ()
+    """Effects whose numbers the file declares unknown."""
 
     @property
     def terms(self) -> tuple[Term, ...]:
