@@ -345,15 +345,7 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
     Raises UsageError where a measurement is missing that an effect needs.
     """
     instruments = declared_instruments(robot, measured)
-    parameters = parameters_of(
-        robot,
-        options.effects,
-        swivel=bool(np.any(np.isfinite(measured.swivel)))
-        and isinstance(robot.profile.instrument.swivels.zero, str),
-        length_offset=bool(np.any(np.isfinite(measured.cable_length)))
-        and not measured.length_zeroed,
-        instruments=instruments,
-    )
+    parameters = parameters_of(robot, measured, options.effects, instruments)
     tension = bool(np.any(np.isfinite(measured.tension)))
     needing = [e for e in options.effects if e.startswith(("cable-elongation", "payload"))]
     if needing and not tension and options.middle_force is None:

@@ -79,13 +79,7 @@ def _gain(
     equations: Equations, solution: Solution, weights: Weights, effects: tuple[str, ...]
 ) -> float:
     """Fall of the cost in one linearised step with the effect's parameters free."""
-    wider = parameters_of(
-        equations.robot,
-        effects,
-        swivel="swivel_zero" in equations.parameters.block,
-        length_offset="length_offset" in equations.parameters.block,
-        instruments=equations.instruments,
-    )
+    wider = parameters_of(equations.robot, equations.measured, effects, equations.instruments)
     values = wider.nominal
     _carry(equations.parameters.block, wider.block, solution.state.values, values)
     wider_equations = replace(equations, parameters=_with_nominal(equations, wider))

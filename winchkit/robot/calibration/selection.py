@@ -390,14 +390,7 @@ def _registered(
 
 def with_instruments(equations: Equations, instruments: Instruments) -> Equations:
     """The equations with other instruments; the other parameters start as they do."""
-    block = equations.parameters.block
-    wider = parameters_of(
-        equations.robot,
-        equations.effects,
-        swivel="swivel_zero" in block,
-        length_offset="length_offset" in block,
-        instruments=instruments,
-    )
+    wider = parameters_of(equations.robot, equations.measured, equations.effects, instruments)
     return replace(equations, parameters=wider, instruments=instruments)
 
 

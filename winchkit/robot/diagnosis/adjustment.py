@@ -105,14 +105,8 @@ def geometry_parameters(
     ``stated``: standard deviations by number, without which one is held; by default the priors of
     a calibration.
     """
-    measured, profile = dataset.measured, replace(dataset.robot, effect=())
-    parameters = parameters_of(
-        robot_of(profile),
-        swivel=bool(np.any(np.isfinite(measured.swivel)))
-        and isinstance(profile.instrument.swivels.zero, str),
-        length_offset=bool(np.any(np.isfinite(measured.cable_length)))
-        and not measured.length_zeroed,
-    )
+    robot = robot_of(replace(dataset.robot, effect=()))
+    parameters = parameters_of(robot, dataset.measured)
     everything = []
     for own in parameters:
         std = own.std

@@ -87,17 +87,7 @@ rises above the second one."""
 
 
 class RobotAnswer(Answer):
-    """A diagnosis of a robot's poses with everything that it was derived from.
-
-    Parameters
-    ----------
-    selection
-        Selection and judgement.
-    sets
-        Equivalence set of every addition.
-    diagnosis
-        What is printed.
-    """
+    """A diagnosis of a robot's poses with everything that it was derived from."""
 
     wing: ClassVar[str] = "robot"
 

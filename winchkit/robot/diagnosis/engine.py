@@ -26,19 +26,7 @@ from winchkit.robot.identification.variance_components import PoseNoise
 
 
 class PoseSelection(SelectionEngine):
-    """Selection among hypotheses on a robot's poses.
-
-    Parameters
-    ----------
-    regression
-        The poses and the model.
-    initial_model
-        Initial model: the profile's own effects.
-    candidates
-        Effects that may be added, each at its places.
-    noise
-        Variance components of the measurements.
-    """
+    """Selection among hypotheses on a robot's poses."""
 
     regression: PoseRegression
 

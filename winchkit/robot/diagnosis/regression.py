@@ -240,7 +240,8 @@ class PoseRegression(Regression):
         first = self.nuisance_columns.shape[1] - len(free)
         values = self.point.state.values.copy()
         if hypothesis.nuisances:
-            values[free] += hypothesis.nuisances[first:] * self.equations.parameters.std[free]
+            moved_by = np.array(hypothesis.nuisances[first:])
+            values[free] += moved_by * self.equations.parameters.std[free]
         moved = replace(self.point, state=State(values, self.point.pose))
         found = self._residuals(moved.state, moved.robot(hypothesis.terms))
         found = self._zeroed(found)

@@ -178,22 +178,6 @@ def closure(
     at_home = sensitivities(geometry, home.position, home.rotation)
     taken = 0.0 if strain is None else strain.value
     slack = np.asarray(1 - taken + np.zeros_like(length))
-    by_line, by_robot = closure_by_geometry(by, at_home, winding, radius, slack)
-    if strain is not None:
-        stressed = (length + dead_length)[..., None]
-        by_robot |= {name: -part * stressed for name, part in strain.by_robot.items()}
-    residual = closure_residual(length, by_drum, taken, dead_length)
-    return Constraint(residual, by_pose(by) * slack[..., None], by_line, by_robot)
-
-
-def closure_by_geometry(
-    by: Sensitivities, at_home: Sensitivities, winding: Winding, radius: Array, slack: Array
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Derivatives of the closure equations by the numbers of each line and by those of all lines.
-
-    ``by``, ``at_home``: of the geometric lengths at the p poses and at the home pose. ``radius``
-    (n,): winding radii, m. ``slack`` (p, n).
-    """
     by_line = {
         "exit_point": by.exit_point * slack[..., None] - at_home.exit_point,
         "anchor_point": by.anchor_point * slack[..., None] - at_home.anchor_point,
@@ -201,7 +185,12 @@ def closure_by_geometry(
         "winding_radius": winding.by_radius(radius),
         "home_length": np.full_like(slack, -1.0),
     }
-    return by_line, {"layer_growth": winding.gain[..., None]}
+    by_robot = {"layer_growth": winding.gain[..., None]}
+    if strain is not None:
+        stressed = (length + dead_length)[..., None]
+        by_robot |= {name: -part * stressed for name, part in strain.by_robot.items()}
+    residual = closure_residual(length, by_drum, taken, dead_length)
+    return Constraint(residual, by_pose(by) * slack[..., None], by_line, by_robot)
 
 
 def position(pose: Pose, measured: Array) -> Constraint:
@@ -213,9 +202,10 @@ def position(pose: Pose, measured: Array) -> Constraint:
 
 def rotation(pose: Pose, angles: Array) -> Constraint:
     """Rotation of the platform less the measured one, (p, 3), rad."""
-    return Constraint(
-        rotation_residual(pose.rotation, angles), rotation_by_pose(pose.rotation, angles)
-    )
+    by = np.zeros((len(angles), 3, 6))
+    by[..., 3:] = angle_rates(pose.rotation)
+    by[np.all(np.isfinite(angles), axis=1), :, 3:] = np.eye(3)
+    return Constraint(rotation_residual(pose.rotation, angles), by)
 
 
 def rotation_residual(turned: Array, angles: Array) -> Array:
@@ -224,14 +214,6 @@ def rotation_residual(turned: Array, angles: Array) -> Array:
     out = wrapped(angles_of(turned) - angles)
     seen = np.swapaxes(rotation_of(*angles[whole].T), 1, 2)
     out[whole] = rotation_vector(turned[whole] @ seen)
-    return out
-
-
-def rotation_by_pose(turned: Array, angles: Array) -> Array:
-    """Derivative of :func:`rotation_residual` by position and rotation vector, (p, 3, 6)."""
-    out = np.zeros((len(turned), 3, 6))
-    out[..., 3:] = angle_rates(turned)
-    out[np.all(np.isfinite(angles), axis=1), :, 3:] = np.eye(3)
     return out
 
 

@@ -14,44 +14,13 @@ from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.drum import drum_of
+from winchkit.robot.files.poses import Measured
 from winchkit.robot.geometry.constraints import ZERO_STD
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.instruments import LARGEST_SCALE, Instruments
 from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse
-
-
-@dataclass(frozen=True)
-class LawParameter:
-    """One parameter of a law in the unit that is fitted."""
-
-    name: str
-    unit: str
-    start: float
-    std: float
-    low: float = -np.inf
-    high: float = np.inf
-    reciprocal: bool = False
-    """Files have 1/value: a stiffness is fitted as a compliance."""
-
-
-LAWS: dict[str, tuple[LawParameter, ...]] = {
-    "cable-elongation-linear": (
-        LawParameter("axial_stiffness", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
-    ),
-    "cable-elongation-quartic": (
-        LawParameter("k1", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
-        LawParameter("b2", "1", 0.0, 100.0),
-        LawParameter("b3", "1", 0.0, 3e4),
-        LawParameter("b4", "1", 0.0, 1e7),
-    ),
-    "cable-elongation-exponential": (
-        LawParameter("strain_scale", "1", 0.0, 2e-3, 0.0, 0.2),
-        LawParameter("force_scale", "N", 200.0, 100.0, 1.0, 1e6),
-    ),
-}
-"""Laws of elongation that can be parameters, one for all cables."""
 
 HOME_LENGTH = "home-length"
 
@@ -103,6 +72,48 @@ def _fault(table: EffectTable, message: str) -> Fault:
     return Fault(message, table.path, table.line, f"effect {table.id}")
 
 
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter in the unit that is fitted."""
+
+    name: str
+    """``LINE.exit_point.x``, ``layer_growth``, ``cable-elongation-linear.axial_stiffness`` …"""
+    unit: str
+    """Unit of the value in files."""
+    nominal: float
+    std: float
+    """Of the prior; zero for a parameter that is held."""
+    low: float = -np.inf
+    high: float = np.inf
+    reciprocal: bool = False
+    """Files have 1/value."""
+    zero: bool = False
+    """Whether it is the zero of an instrument and no part of the robot."""
+
+    def shown(self, value: float, std: float) -> tuple[float, float]:
+        """Value and standard deviation in the unit of files; NaN for an infinite stiffness's."""
+        if not self.reciprocal:
+            return value, std
+        return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
+
+
+LAWS: dict[str, tuple[Parameter, ...]] = {
+    "cable-elongation-linear": (
+        Parameter("axial_stiffness", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
+    ),
+    "cable-elongation-quartic": (
+        Parameter("k1", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
+        Parameter("b2", "1", 0.0, 100.0),
+        Parameter("b3", "1", 0.0, 3e4),
+        Parameter("b4", "1", 0.0, 1e7),
+    ),
+    "cable-elongation-exponential": (
+        Parameter("strain_scale", "1", 0.0, 2e-3, 0.0, 0.2),
+        Parameter("force_scale", "N", 200.0, 100.0, 1.0, 1e6),
+    ),
+}
+"""Laws of elongation that can be parameters, one for all cables."""
+
 Indices = NDArray[np.intp]
 
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius")
@@ -129,31 +140,6 @@ _REFLECTOR_STD = 0.1
 """Of a reflector's offset, m: the size of a platform."""
 _FLAT = 1e3
 """Standard deviation of the prior of an effect's coordinates."""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter in the unit that is fitted."""
-
-    name: str
-    """``LINE.exit_point.x``, ``layer_growth``, ``cable-elongation-linear.axial_stiffness`` …"""
-    unit: str
-    """Unit of the value in files."""
-    nominal: float
-    std: float
-    """Of the prior; zero for a parameter that is held."""
-    low: float = -np.inf
-    high: float = np.inf
-    reciprocal: bool = False
-    """Files have 1/value."""
-    zero: bool = False
-    """Whether it is the zero of an instrument and no part of the robot."""
-
-    def shown(self, value: float, std: float) -> tuple[float, float]:
-        """Value and standard deviation in the unit of files; NaN for an infinite stiffness's."""
-        if not self.reciprocal:
-            return value, std
-        return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
 
 
 @dataclass(frozen=True)
@@ -301,20 +287,16 @@ class _Builder:
 
 def parameters_of(
     robot: Robot,
+    measured: Measured,
     effects: Sequence[str] = (),
-    *,
-    swivel: bool = False,
-    length_offset: bool = False,
     instruments: Instruments | None = None,
 ) -> Parameters:
     """Parameters of geometry, winches, named effects and instruments.
 
-    ``robot``: of n lines; its numbers are the nominal values. ``effects``: beside those of the
-    robot's profile. A law of elongation adds home lengths, since the tension at home is unknown.
-    ``swivel``, ``length_offset``: whether the zeros of swivel angles and the offsets
-    of length instruments are unknown. ``instruments``: numbers of instruments that are unknown,
-    with their starting values. Raises UsageError for an effect that a calibration cannot fit, or
-    two laws of elongation.
+    ``measured``: readings, whose instruments have zeros where the robot's file does not know them.
+    ``effects``: beside those of the robot's profile. A law of elongation adds home lengths, since
+    the tension at home is unknown. ``instruments``: numbers that are unknown, with their starting
+    values. Raises UsageError for an effect that is no parameter, or two laws of elongation.
     """
     own = own_effects(robot.profile)
     effects = tuple(dict.fromkeys((*effects, *own)))
@@ -333,11 +315,12 @@ def parameters_of(
     if law or "home-length" in effects:
         build.zeros("home_length", "m", build.prior("home_length").std, zero=False)
     if law:
-        build.add("law", [_of_law(law, p, own.get(law, {})) for p in LAWS[law]])
+        build.add("law", _of_law(law, own.get(law, {})))
     _payload(build, effects)
-    if swivel:
+    unknown = isinstance(robot.profile.instrument.swivels.zero, str)
+    if unknown and np.any(np.isfinite(measured.swivel)):
         build.zeros("swivel_zero", "rad", ZERO_STD["swivel"], zero=True)
-    if length_offset:
+    if not measured.length_zeroed and np.any(np.isfinite(measured.cable_length)):
         build.zeros("length_offset", "m", ZERO_STD["cable_length"], zero=True)
     if instruments is not None:
         _tracker(build, instruments)
@@ -350,14 +333,15 @@ def parameters_of(
     return found
 
 
-def _of_law(law: str, spec: LawParameter, own: Mapping[str, float]) -> Parameter:
-    """Parameter of a law that starts at the value of the robot's file."""
-    start = spec.start
-    if spec.name in own:
-        start = 1 / own[spec.name] if spec.reciprocal else own[spec.name]
-    return Parameter(
-        f"{law}.{spec.name}", spec.unit, start, spec.std, spec.low, spec.high, spec.reciprocal
-    )
+def _of_law(law: str, own: Mapping[str, float]) -> list[Parameter]:
+    """Parameters of a law that start at the values of the robot's file."""
+    out = []
+    for spec in LAWS[law]:
+        start = own.get(spec.name, np.nan)
+        start = 1 / start if spec.reciprocal else start
+        at = start if spec.name in own else spec.nominal
+        out.append(replace(spec, name=f"{law}.{spec.name}", nominal=at))
+    return out
 
 
 def _known(effects: Sequence[str]) -> None:

@@ -51,9 +51,8 @@ class ParametrizedRobot:
     def platform(self, values: Array) -> PlatformSpec:
         """Platform with the parameters' values."""
         block = self.parameters.block
-        x, y, z = values[block["payload_centre"]].tolist()
-        mass = float(values[block["payload_mass"][0]])
-        return replace(self.robot.platform, mass=mass, center_of_mass=(x, y, z))
+        mass, centre = float(values[block["payload_mass"][0]]), values[block["payload_centre"]]
+        return replace(self.robot.platform, mass=mass, center_of_mass=_point(centre))
 
     @cached_property
     def _growths(self) -> Array:
@@ -87,8 +86,8 @@ class ParametrizedRobot:
             lines.append(
                 replace(
                     line,
-                    exit_point=tuple(geometry.exit_point[i].tolist()),
-                    anchor_point=tuple(geometry.anchor_point[i].tolist()),
+                    exit_point=_point(geometry.exit_point[i]),
+                    anchor_point=_point(geometry.anchor_point[i]),
                     swivel_radius=float(geometry.swivel_radius[i]),
                     winch=replace(winch, drum=drum, gearbox=gearbox),
                 )
@@ -151,3 +150,8 @@ class ParametrizedRobot:
         """Values of a block with a number per line, (n,); zero where it is no parameter."""
         own = self.parameters.block.get(block)
         return np.zeros(len(self.robot.names)) if own is None else values[own]
+
+
+def _point(values: Array) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return x, y, z

@@ -8,6 +8,7 @@ is no mistake. Every equation has one standard deviation, and Huber's loss bound
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -44,7 +45,12 @@ def adjustment_of(
     """
     robot = replace(robot, profile=replace(robot.profile, effect=()))
     instruments = Instruments(frozenset({"frame", "reflector"}), ("",), (tracker,))
-    parameters = parameters_of(robot, (HOME_LENGTH,), instruments=instruments)
+    nothing: dict[str, Any] = {
+        name: np.full_like(getattr(measured, name), np.nan)
+        for name in ("angles", "swivel", "cable_length", "tension")
+    }
+    measured = replace(measured, **nothing)
+    parameters = parameters_of(robot, measured, (HOME_LENGTH,), instruments)
     everything = list(parameters)
     for block, indices in parameters.block.items():
         radius = block == "winding_radius"
@@ -53,14 +59,10 @@ def adjustment_of(
             std = 0.0 if block in held else _STD.get(block, 0.0) * (own.nominal if radius else 1.0)
             low = _LEAST_RADIUS if radius else -np.inf
             everything[index] = replace(own, std=std, low=low, high=np.inf)
-    nothing = {
-        name: np.full_like(getattr(measured, name), np.nan)
-        for name in ("angles", "swivel", "cable_length", "tension")
-    }
     return Equations(
         robot,
         replace(parameters, all=tuple(everything)),
-        replace(measured, **nothing),
+        measured,
         instruments,
         balanced=False,
     )

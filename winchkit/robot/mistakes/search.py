@@ -315,8 +315,9 @@ class _Search:
         equations = adjustment_of(self.robot, table, tracker)
         sigma = _SIGMA * self.motion
         solution = adjusted(equations, start, sigma)
-        found = equations.instruments_at(solution.state.values)
-        turned = rotation_by((found or equations.instruments).trackers[0].turn)
+        own = equations.instruments_at(solution.state.values)
+        assert own is not None, "they have the tracker"
+        turned = rotation_by(own.trackers[0].turn)
         error = misfit(equations, solution, sigma)
         return _Adjusted(mistakes, error, table, solution.state.pose, turned)
 
