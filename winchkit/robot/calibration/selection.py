@@ -414,18 +414,15 @@ def _shows_more(first: Fitted, wider: Equations) -> bool:
     if not (own.free < free and len(free) == len(own.free) + 1):
         return False
     trial = with_instruments(first.equations, replace(own, free=free))
-    values, held = trial.parameters.nominal, np.zeros(len(trial.parameters), dtype=bool)
-    for name, indices in first.equations.parameters.block.items():
-        target = trial.parameters.block[name]
-        values[target] = first.solution.state.values[indices]
-        held[target] = first.solution.held[indices] != 0
-    linear = linearise(trial, State(values, first.solution.state.pose), first.weights)
-    gradient, prior = linear.gradient[~held], linear.prior[~held]
-    matrix = linear.information[np.ix_(~held, ~held)] + np.eye(len(gradient))
+    before, wide, state = first.equations.parameters, trial.parameters, first.solution.state
+    values = before.carried(state.values, wide, wide.nominal)
+    left = before.carried(first.solution.held, wide, np.zeros(len(values))) == 0
+    linear = linearise(trial, State(values, state.pose), first.weights)
+    gradient, prior = linear.gradient[left], linear.prior[left]
+    matrix = linear.information[np.ix_(left, left)] + np.eye(len(gradient))
     step = -np.linalg.solve(matrix, gradient)
     fall = -float(gradient @ step) + float(np.sum((prior + step) ** 2 - prior**2))
-    more = len(trial.parameters) - len(first.equations.parameters)
-    return not fall < chdtri(more, _LEVEL)
+    return not fall < chdtri(len(wide) - len(before), _LEVEL)
 
 
 def _mounted(best: Fitted, predicted: Pose, options: Options, progress: ProgressCallback) -> Fitted:
@@ -469,13 +466,10 @@ def _fitted(
 
 def _continued(equations: Equations, fitted: Fitted) -> tuple[Equations, State]:
     """Equations with the priors of a fit of fewer parameters, and its end as their state."""
-    parameters, own = equations.parameters, fitted.equations.parameters
-    for name, indices in own.block.items():
-        parameters = parameters.starting(name, own.nominal[indices])
-    values = parameters.nominal
-    for name, indices in own.block.items():
-        values[parameters.block[name]] = fitted.solution.state.values[indices]
-    return replace(equations, parameters=parameters), State(values, fitted.solution.state.pose)
+    wider, own, end = equations.parameters, fitted.equations.parameters, fitted.solution.state
+    wider = wider.about(own.carried(own.nominal, wider, wider.nominal))
+    values = own.carried(end.values, wider, wider.nominal)
+    return replace(equations, parameters=wider), State(values, end.pose)
 
 
 def _sigma(equations: Equations, options: Options) -> dict[str, float]:

@@ -208,6 +208,13 @@ class Parameters:
         both = zip(self.all, values.tolist(), strict=True)
         return replace(self, all=tuple(replace(own, nominal=value) for own, value in both))
 
+    def carried(self, values: NDArray[Any], wider: Parameters, others: Array) -> Array:
+        """Values of these parameters in the layout of wider ones, beside those of ``others``."""
+        out = others.copy()
+        for name, place in self.block.items():
+            out[wider.block[name]] = values[place]
+        return out
+
     def with_terms(self, terms: Sequence[Term]) -> Parameters:
         """These and the coordinates of effects, which are near one in size, with a flat prior."""
         more: list[Parameter] = []
