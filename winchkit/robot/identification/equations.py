@@ -383,7 +383,7 @@ class Equations(ParametrizedRobot):
         return swivel(robot.geometry, pose, self.measured.swivel, zero)
 
     def _cable_length(self, values: Array, robot: Robot, pose: Pose) -> Constraint:
-        offset, size = self._of_lines("length_offset", values), 1.0
+        offset = self._of_lines("length_offset", values)
         if "length_scale" not in self.parameters.block:
             return cable_length(robot.geometry, pose, self.measured.cable_length, offset)
         size = 1 + self._of_lines("length_scale", values)

@@ -68,7 +68,7 @@ class ParametrizedRobot:
         """Growth of each drum's radius per turn, (n,), m; a common change where they differ."""
         known = self._growths[np.isfinite(self._growths)]
         change = values[self.parameters.block["layer_growth"][0]] - known[:1].sum()
-        return np.nan_to_num(self._growths + change)
+        return np.asarray(np.nan_to_num(self._growths + change))
 
     def profile_at(self, values: Array) -> RobotProfile:
         """The robot's profile with the parameters' values of lines, drums, gears and platform."""
