@@ -432,18 +432,24 @@ class Equations(ParametrizedRobot):
         """Derivatives by the coordinates of effects, (p, k, m), by kind; empty without effects."""
         if not self.terms:
             return {}
-        here = self.residuals(state, robot, self.kinds)
+        kinds, whiten = self.kinds, None
+        if "balance" in kinds and not self.hangs:
+            # The basis of whitened forces is not continuous in the robot.
+            kinds = tuple(kind for kind in kinds if kind != "balance")
+            whiten, _ = force_basis(robot.structure(state.pose))
+        here = self.residuals(state, robot, kinds, whiten)
         _, high = self.parameters.bounds
         columns: dict[str, list[Array]] = {kind: [] for kind in here}
         for index in self.parameters.block["terms"]:
             step = _STEP * max(1.0, abs(state.values[index]))
             moved = state.values.copy()
             moved[index] += step if moved[index] + step <= high[index] else -step
-            there = self.residuals(State(moved, state.pose), self.robot_at(moved), self.kinds)
+            there = self.residuals(State(moved, state.pose), self.robot_at(moved), kinds, whiten)
             for kind, column in columns.items():
                 by = (there[kind] - here[kind]) / (moved[index] - state.values[index])
                 column.append(by)
-        return {kind: np.stack(column, axis=-1) for kind, column in columns.items()}
+        out = {kind: np.stack(column, axis=-1) for kind, column in columns.items()}
+        return out if whiten is None else out | {"balance": -out["tension"]}
 
     @cached_property
     def _blocks(self) -> dict[str, Array]:
