@@ -32,7 +32,7 @@ RESULTS = {
     "winchkit.bench.remote.client": ("RemoteStation",),
     "winchkit.bench.winch": ("Winch",),
     "winchkit.robot.calibration.calibrate": ("Calibrated", "Options"),
-    "winchkit.robot.calibration.parameters": ("Estimated",),
+    "winchkit.robot.identification.parameters": ("Estimated",),
     "winchkit.diagnosis.add": ("Addition", "Removal"),
     "winchkit.diagnosis.diagnose": ("Answer", "WinchAnswer"),
     "winchkit.diagnosis.plan": ("Plan", "WinchPlan"),

@@ -16,14 +16,14 @@ from winchkit.effects import load_catalogue
 from winchkit.model.drum import drum_of
 from winchkit.robot import Pose, rotation_of
 from winchkit.robot.calibration.calibrate import calibrate, equations_of
-from winchkit.robot.calibration.elongation import LAWS
-from winchkit.robot.calibration.equations import Equations
-from winchkit.robot.calibration.instruments import declared_instruments
 from winchkit.robot.calibration.options import Options
 from winchkit.robot.calibration.selection import with_instruments
 from winchkit.robot.forces.elongation import strain_of
 from winchkit.robot.geometry.constraints import winding_of
 from winchkit.robot.identification.bundle_adjustment import State, moved
+from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.instruments import declared_instruments
+from winchkit.robot.identification.parameters import LAWS
 from winchkit.schema.profiles.winch import DrumSpec, GearboxSpec, ReferenceSpec, WinchProfile
 
 FEW = 6

@@ -8,18 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from calibration_cases import measured, robot, rows
+from calibration_cases import held, measured, robot, rows
 from robot_poses.truth import csv
-from winchkit.effects import load_catalogue
 from winchkit.robot import robot_of
 from winchkit.robot.calibration.calibrate import calibrate
 from winchkit.robot.calibration.options import Options
-from winchkit.robot.diagnosis.adjustment import adjusted
-from winchkit.robot.diagnosis.candidates import priors_of_geometry
-from winchkit.robot.diagnosis.data.dataset import RobotDataset, prepare_poses
-from winchkit.robot.diagnosis.equations import Equations, start_pose
-from winchkit.robot.diagnosis.prior import GeometryPrior, profile_with_geometry
-from winchkit.robot.diagnosis.variance_components import START
+from winchkit.robot.diagnosis.adjustment import equations_of, fitted_point, geometry_parameters
+from winchkit.robot.diagnosis.dataset import RobotDataset, prepare_poses
+from winchkit.robot.identification.bundle_adjustment import State
+from winchkit.robot.identification.variance_components import START
 from winchkit.runs import read_run
 from winchkit.schema.profiles.robot import PriorSpec
 
@@ -37,28 +34,25 @@ def dataset(tmp_path: Path) -> RobotDataset:
     return prepare_poses([read_run(path)], robot().profile)
 
 
-def name_of(item: GeometryPrior) -> str:
-    """Name of the same number in a calibration."""
-    if not item.line:
-        return item.field
-    axis = f".{item.parameter}" if item.parameter in ("x", "y", "z") else ""
-    return f"{item.line}.{item.field}{axis}"
-
-
 def test_derivatives_by_the_geometry_are_those_of_the_residuals(dataset: RobotDataset) -> None:
-    geometry = priors_of_geometry(dataset, load_catalogue(), fitted=False)
-    assert len(geometry) == 65
-    equations = Equations(dataset, start_pose(dataset), robot())
-    by = equations.by_geometry(robot(), geometry)
-    for index, item in enumerate(geometry):
-        up, down = (
-            equations.residuals(robot_of(profile_with_geometry(robot().profile, [item.moved(s)])))
-            for s in (0.01, -0.01)
-        )
-        for kind in ("closure", "swivel", "gauge"):
-            slope = (up[kind] - down[kind]) / (0.02 * item.std)
-            known = np.isfinite(slope)
-            np.testing.assert_allclose(by[kind][..., index][known], slope[known], 1e-5, 1e-6)
+    """Of the robot of a profile with the numbers moved."""
+    geometry = geometry_parameters(dataset)
+    assert np.count_nonzero(geometry.lasting) == 65
+    made, values = equations_of(dataset, geometry), geometry.nominal
+    state = State(values, made.start(values))
+    by = {rows.kind: rows.by_values for rows in made.rows(state)}
+    for index in np.flatnonzero(geometry.lasting):
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = values.copy()
+            moved[index] += sign * 0.01 * geometry.std[index]
+            there = robot_of(made.profile_at(moved))
+            ends.append(made.residuals(State(moved, state.pose), there, ["closure", "swivel"]))
+        for kind, up in ends[0].items():
+            slope = (up - ends[1][kind]) / (0.02 * geometry.std[index])
+            known, own = np.isfinite(slope), by[kind]
+            assert own is not None
+            np.testing.assert_allclose(own[..., index][known], slope[known], 1e-5, 1e-6)
 
 
 def test_a_calibration_estimates_the_same_geometry(dataset: RobotDataset) -> None:
@@ -69,13 +63,14 @@ def test_a_calibration_estimates_the_same_geometry(dataset: RobotDataset) -> Non
     profile = robot().profile
     profile = replace(profile, prior={n: PriorSpec(p.std) for n, p in profile.prior.items()})
     dataset = replace(dataset, robot=profile)
-    priors = priors_of_geometry(dataset, load_catalogue(), fitted=False)
-    found = adjusted(dataset, (), SIGMA, priors)
+    geometry = geometry_parameters(dataset)
+    point, _ = fitted_point(dataset, (), SIGMA, geometry)
     poses = measured(text(30))
-    calibrated = calibrate(robot_of(profile), poses, options=Options(sigma=SIGMA)).estimates
+    calibrated = calibrate(robot_of(profile), poses, held(), Options(sigma=SIGMA)).estimates
     differences = []
-    for item in found.geometry:
-        own = calibrated[name_of(item)]
-        differences.append((own.nominal + item.value - own.value) / own.std)
+    for own, value in zip(geometry, point.state.values, strict=True):
+        if own.std > 0 and not own.zero:
+            estimate = calibrated[own.name]
+            differences.append((value - estimate.value) / estimate.std)
     assert len(differences) == 65
     assert np.max(np.abs(differences)) < 0.01

@@ -12,8 +12,8 @@ from robot_poses.hidden import profile_text, record
 from winchkit.effects import Term, load_catalogue
 from winchkit.effects.placement import at_line
 from winchkit.robot import robot_with_terms
-from winchkit.robot.diagnosis.data.dataset import prepare_poses
-from winchkit.robot.diagnosis.equations import Equations, start_pose
+from winchkit.robot.diagnosis.adjustment import equations_of, geometry_parameters
+from winchkit.robot.diagnosis.dataset import prepare_poses
 from winchkit.runs import read_run
 from winchkit.schema.read import read_robot
 
@@ -39,7 +39,8 @@ def test_a_force_is_what_the_cell_would_show_as_measured(
     dataset = prepare_poses([read_run(run)], profile)
     term = Term(at_line(load_catalogue()[effect], "2"), values)
     robot = robot_with_terms(profile, [term])
-    force = Equations(dataset, start_pose(dataset), robot).forces(robot)
+    geometry = geometry_parameters(dataset)
+    force = equations_of(dataset, geometry).forces(geometry.nominal, robot)
     t, shown = force[:, 1], dataset.measured.tension
     said = {
         "cell-gain": t * (1 + values.get("gain_error", 0.0)),

@@ -11,12 +11,18 @@ import pytest
 from robot_poses.truth import Truth, csv, poses
 from winchkit.arrays import Array
 from winchkit.catalog import find
-from winchkit.robot import Pose, Robot, robot_of, rotation_of, structure_matrix
+from winchkit.effects import Term, load_catalogue
+from winchkit.robot import (
+    Pose,
+    Robot,
+    robot_of,
+    robot_with_terms,
+    rotation_of,
+    structure_matrix,
+)
 from winchkit.robot.calibration.calibrate import equations_of
-from winchkit.robot.calibration.equations import State
 from winchkit.robot.calibration.options import Options
-from winchkit.robot.diagnosis.data.dataset import RobotDataset, prepare_poses
-from winchkit.robot.diagnosis.equations import Equations, start_pose
+from winchkit.robot.diagnosis.dataset import RobotDataset, prepare_poses
 from winchkit.robot.forces.balance import balance, force_basis
 from winchkit.robot.geometry.constraints import mean_offset
 from winchkit.robot.geometry.pose_estimation import (
@@ -27,6 +33,8 @@ from winchkit.robot.geometry.pose_estimation import (
 from winchkit.robot.geometry.pose_estimation import (
     start_pose as completed,
 )
+from winchkit.robot.identification.bundle_adjustment import State
+from winchkit.robot.identification.equations import KINDS, Equations
 from winchkit.robot.identification.pose_design import (
     chosen_in_turn,
     determinant_gain,
@@ -56,35 +64,42 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> RobotDataset:
     return replace(found, measured=replace(found.measured, angles=angles))
 
 
-def test_calibration_and_diagnosis_have_the_same_equations(dataset: RobotDataset) -> None:
+def equations(dataset: RobotDataset) -> tuple[Equations, State]:
+    """Every kind of equation at poses a little off."""
+    made = replace(equations_of(robot(), dataset.measured, Options()), balanced=True)
     rng = np.random.default_rng(4)
-    pose = start_pose(dataset)
+    pose = made.start(made.parameters.nominal)
     pose = moved_pose(pose, rng.normal(0, 1e-3, (len(dataset.measured), 6)))
-    made = equations_of(robot(), dataset.measured, Options())
-    fitted = {r.kind: r for r in made.rows(State(made.parameters.nominal, pose))}
-    diagnosed = Equations(dataset, pose, robot())
-    residuals, by_pose = diagnosed.residuals(robot()), diagnosed.by_pose(robot())
-    names = {
-        "closure": "closure",
-        "position": "position",
-        "rotation": "rotation",
-        "swivel": "swivel",
-    }
-    for kind, other in {**names, "cable_length": "gauge"}.items():
-        np.testing.assert_allclose(fitted[kind].residual, residuals[other], rtol=0, atol=1e-14)
-        np.testing.assert_allclose(fitted[kind].by_pose, by_pose[other], rtol=0, atol=1e-14)
+    return made, State(made.parameters.nominal, pose)
+
+
+def test_lines_with_effects_have_the_lengths_of_the_winding_laws(dataset: RobotDataset) -> None:
+    """Line by line by the model of a winch, against all lines at once."""
+    made, state = equations(dataset)
+    found = {kind: constraint.residual for kind, constraint in made.constraints(state)}
+    assert tuple(found) == KINDS
+    bare = made.residuals(state, made.robot_at(state.values), KINDS)
+    terms = tuple(
+        Term(e, e.null) for e in (load_catalogue()[n] for n in ("gear-ratio", "exit-point"))
+    )
+    effects = robot_with_terms(made.profile_at(state.values), terms)
+    assert all(effects.modifiers)
+    for kind, residual in made.residuals(state, effects, KINDS).items():
+        np.testing.assert_allclose(bare[kind], found[kind], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(residual, found[kind], rtol=0, atol=1e-12)
 
 
 def test_the_two_whitenings_of_the_balance_differ_by_an_orthogonal_matrix(
     dataset: RobotDataset,
 ) -> None:
-    pose, geometry = start_pose(dataset), robot().geometry
+    made, state = equations(dataset)
+    pose, geometry = state.pose, robot().geometry
     platform, tension = PlatformSpec(3.0, (0.01, 0.0, -0.02)), dataset.measured.tension
     rows = balance(geometry, pose, tension, platform).residual
-    diagnosed = Equations(dataset, pose, robot())
     changed = replace(robot(), platform=platform)
     np.testing.assert_allclose(
-        np.sum(rows**2, axis=1), np.sum(diagnosed.residuals(changed)["tension"] ** 2, axis=1)
+        np.sum(rows**2, axis=1),
+        np.sum(made.residuals(state, changed, ["balance"])["balance"] ** 2, axis=1),
     )
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     whiten, to_cables = force_basis(structure)

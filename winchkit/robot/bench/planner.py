@@ -84,10 +84,7 @@ class Planner:
 
 
 def moved(pose: Pose, change: Mapping[str, float], *, relative: bool) -> Pose:
-    """A pose with some of its coordinates replaced or changed.
-
-    ``change``: ``x``, ``y``, ``z`` in m, ``roll``, ``pitch``, ``yaw`` in rad.
-    """
+    """A pose with some of its coordinates replaced or changed."""
     new = _six(pose)
     for name, value in change.items():
         if name not in _COORDINATES:

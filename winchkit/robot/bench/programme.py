@@ -25,10 +25,7 @@ Motions = list[PlatformTrajectory | float]
 
 
 def programme_files(programme: RobotProgramme, folder: str | Path, suffix: str) -> list[Path]:
-    """Files that a programme writes, one per repeat.
-
-    ``suffix``: format, ``.csv`` or ``.mcap``. Returns: in order.
-    """
+    """Files that a programme writes, one per repeat."""
     numbers = range(1, programme.repeat + 1)
     return [Path(folder) / f"{programme.name}-{n}{suffix}" for n in numbers]
 

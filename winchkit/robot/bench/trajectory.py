@@ -66,9 +66,6 @@ def plan_along(
 ) -> PlatformTrajectory:
     """Plan an S-curve along a path, and the cables with it.
 
-    ``speed``, ``acceleration``: along the path, m/s and m/s^2; rotation counts as ρ times its
-    angle.
-
     Notes
     -----
     On a curved path tangential and centripetal acceleration each get acceleration/√2.

@@ -28,26 +28,17 @@ from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.errors import RunError, UsageError
 from winchkit.fit_statistics import FitStatistics
+from winchkit.model.drum import drum_of
 from winchkit.rendering import Plotted
-from winchkit.robot.calibration.cable_forces import CableForces
 from winchkit.robot.calibration.candidate_effects import Candidate, candidates
-from winchkit.robot.calibration.equations import Equations
 from winchkit.robot.calibration.identifiability import (
     Observability,
     observability,
     outside_bounds,
     refuse_unfit,
 )
-from winchkit.robot.calibration.instruments import declared_instruments
 from winchkit.robot.calibration.options import Options, ProgressCallback
 from winchkit.robot.calibration.outliers import far_off, gross_errors, left_out_poses, unexplained
-from winchkit.robot.calibration.parameters import (
-    EFFECTS,
-    Estimated,
-    Parameters,
-    own_effects,
-    parameters_of,
-)
 from winchkit.robot.calibration.prediction import PoseErrors, cable_errors, errors_at, rms
 from winchkit.robot.calibration.ratios import Ratios, ratios_of
 from winchkit.robot.calibration.selection import Fitted, first_model, fitted_with_instruments
@@ -55,8 +46,18 @@ from winchkit.robot.calibration.statistics import calibration_statistics
 from winchkit.robot.files.poses import Measured, copies, of_poses
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.identification.bundle_adjustment import Solution, Weights
+from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.instruments import declared_instruments
+from winchkit.robot.identification.parameters import (
+    EFFECTS,
+    Estimated,
+    Parameters,
+    own_effects,
+    parameters_of,
+)
 from winchkit.robot.identification.variance_components import START
 from winchkit.robot.mistakes.search import refuse_mistakes
+from winchkit.schema.profiles.winch import LAYERED
 from winchkit.tabular import Columns, Tabular
 
 _HELD_OUT_EVERY = 10
@@ -281,7 +282,7 @@ def calibrate(
     given = equations
     for _ in range(_CLEANINGS):
         declared, chosen = fitted_with_instruments(equations.of(~wrong), options, progress)
-        own = _at(chosen.equations, fit, options)
+        own = replace(chosen.equations, measured=fit)
         before, wrong = wrong, gross_errors(own, chosen.solution.state.values, chosen.weights)
         if np.array_equal(before, wrong):
             break
@@ -292,17 +293,14 @@ def calibrate(
 
     start = declared
     nominal, values = start.parameters.nominal, solution.state.values
-    missed = far_off(errors_at(_at(equations, validation, options), values).distance)
+    missed = far_off(errors_at(replace(equations, measured=validation), values).distance)
     judged = validation[~missed]
 
-    def held_out(own: Equations) -> Equations:
-        return _at(own, judged, options)
-
-    errors_before = errors_at(held_out(start), nominal)
-    after = errors_at(held_out(equations), values)
+    errors_before = errors_at(replace(start, measured=judged), nominal)
+    after = errors_at(replace(equations, measured=judged), values)
     lengths = (float("nan"), float("nan"))
     if "position" not in equations.kinds and len(judged):
-        there, initial = held_out(equations), equations.parameters.nominal
+        there, initial = replace(equations, measured=judged), equations.parameters.nominal
         lengths = (
             rms(cable_errors(there, initial, weights)),
             rms(cable_errors(there, values, weights)),
@@ -347,15 +345,7 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
     Raises UsageError where a measurement is missing that an effect needs.
     """
     instruments = declared_instruments(robot, measured)
-    parameters = parameters_of(
-        robot,
-        options.effects,
-        swivel=bool(np.any(np.isfinite(measured.swivel)))
-        and isinstance(robot.profile.instrument.swivels.zero, str),
-        length_offset=bool(np.any(np.isfinite(measured.cable_length)))
-        and not measured.length_zeroed,
-        instruments=instruments,
-    )
+    parameters = parameters_of(robot, measured, options.effects, instruments)
     tension = bool(np.any(np.isfinite(measured.tension)))
     needing = [e for e in options.effects if e.startswith(("cable-elongation", "payload"))]
     if needing and not tension and options.middle_force is None:
@@ -378,23 +368,25 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
             f"{payload[0]} shows in tensions, or in elongation by computed forces: record "
             "'LINE.tension [N]', or add an elongation effect"
         )
+    growths = {
+        getattr(drum_of(winch), "growth", 0.0)
+        for winch in robot.winches
+        if winch.drum.kind in LAYERED
+    }
+    if len(growths) > 1:
+        listed = ", ".join(f"{growth * 1e3:g} mm" for growth in sorted(growths))
+        raise UsageError(
+            f"the winches of '{robot.profile.name}' have the layer growths {listed}; the lines of "
+            "one robot are calibrated with one, so give them the same cable"
+        )
     return Equations(
         robot,
         parameters,
         measured,
-        _forces(measured, options),
         None if instruments.is_trivial else instruments,
         tuple(options.effects),
+        middle_force=options.middle_force,
     )
-
-
-def _at(own: Equations, measured: Measured, options: Options) -> Equations:
-    """The equations of other poses."""
-    return replace(own, measured=measured, forces=_forces(measured, options))
-
-
-def _forces(measured: Measured, options: Options) -> CableForces:
-    return CableForces(measured.tension, options.middle_force)
 
 
 def _estimates(

@@ -8,24 +8,18 @@ It is a hint, to be confirmed by a fit of the effect and by the held-out error.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from winchkit.robot.calibration.elongation import LAWS
-from winchkit.robot.calibration.equations import Equations
-from winchkit.robot.calibration.parameters import EFFECTS, Parameters, parameters_of
 from winchkit.robot.identification.bundle_adjustment import (
     Solution,
     State,
     Weights,
     linearise,
 )
-
-Blocks = Mapping[str, NDArray[np.intp]]
-Values = NDArray[np.float64] | NDArray[np.bool_]
+from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.parameters import EFFECTS, LAWS, parameters_of
 
 _LEAST_SHARE = 0.2
 """Least share of the cost (rule of thumb)."""
@@ -73,41 +67,21 @@ def _possible(equations: Equations, effect: str) -> bool:
     if effect not in LAWS:
         return "home_length" not in equations.parameters.block
     forces = bool(np.any(np.isfinite(equations.measured.tension)))
-    return equations.parameters.law is None and (forces or equations.forces.middle is not None)
+    return equations.parameters.law is None and (forces or equations.middle_force is not None)
 
 
 def _gain(
     equations: Equations, solution: Solution, weights: Weights, effects: tuple[str, ...]
 ) -> float:
     """Fall of the cost in one linearised step with the effect's parameters free."""
-    wider = parameters_of(
-        equations.robot,
-        effects,
-        swivel="swivel_zero" in equations.parameters.block,
-        length_offset="length_offset" in equations.parameters.block,
-        instruments=equations.instruments,
-    )
-    values = wider.nominal
-    _carry(equations.parameters.block, wider.block, solution.state.values, values)
-    wider_equations = replace(equations, parameters=_with_nominal(equations, wider))
-    linear = linearise(wider_equations, State(values, solution.state.pose), weights)
-    held = np.zeros(len(values), dtype=bool)
-    _carry(equations.parameters.block, wider.block, solution.held != 0, held)
-    free = ~held
+    own = equations.parameters
+    wider = parameters_of(equations.robot, equations.measured, effects, equations.instruments)
+    values = own.carried(solution.state.values, wider, wider.nominal)
+    free = own.carried(solution.held, wider, np.zeros(len(values))) == 0
+    # Their priors are those that the fit started with.
+    wider = wider.about(own.carried(own.nominal, wider, wider.nominal))
+    state = State(values, solution.state.pose)
+    linear = linearise(replace(equations, parameters=wider), state, weights)
     matrix = linear.information[np.ix_(free, free)] + np.eye(int(np.count_nonzero(free)))
     gradient = linear.gradient[free]
     return float(gradient @ np.linalg.solve(matrix, gradient)) / 2
-
-
-def _carry(old: Blocks, new: Blocks, source: Values, target: Values) -> None:
-    """Copy the blocks of one layout of parameters into another."""
-    for name, place in old.items():
-        target[new[name]] = source[place]
-
-
-def _with_nominal(equations: Equations, wider: Parameters) -> Parameters:
-    """The wider parameters with the nominal values that the fit started with."""
-    nominal = equations.parameters.nominal
-    for name, place in equations.parameters.block.items():
-        wider = wider.starting(name, nominal[place])
-    return wider

@@ -15,8 +15,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.model.rotation import mean_rotation, rotation_by, rotation_vector, skew
-from winchkit.robot.calibration.equations import Equations
-from winchkit.robot.calibration.parameters import Parameters
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.identification.bundle_adjustment import (
     Linear,
@@ -25,6 +23,8 @@ from winchkit.robot.identification.bundle_adjustment import (
     Weights,
     linearise,
 )
+from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.parameters import Parameters
 
 _LEAST_EIGENVALUE = 1e-11
 """Least eigenvalue of an identifiable direction, as a share of the largest: above rounding."""

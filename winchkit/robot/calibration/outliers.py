@@ -6,9 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.robot.calibration.equations import Equations
-from winchkit.robot.calibration.prediction import start_of
-from winchkit.robot.calibration.variance_components import NOISE
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.identification.bundle_adjustment import (
     Solution,
@@ -18,6 +15,8 @@ from winchkit.robot.identification.bundle_adjustment import (
     place,
     solve,
 )
+from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.variance_components import NOISE
 
 _LIMIT = 10.0
 """Misfit of a pose in that of the usual pose from which on it is a gross error; the largest of ten
@@ -60,7 +59,7 @@ def gross_errors(equations: Equations, values: Array, weights: Weights) -> NDArr
     ----------
     P. J. Rousseeuw and K. Van Driessen, *Computing LTS Regression for Large Data Sets*, 2006.
     """
-    state = place(equations, State(values, start_of(equations, values)), weights)
+    state = place(equations, State(values, equations.start(values)), weights)
     weights = _robust_weights(equations, state)
     state = place(equations, state, weights)
     information = linearise(equations, state, weights).information

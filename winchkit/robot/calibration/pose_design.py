@@ -10,10 +10,9 @@ from winchkit.arguments import require_type
 from winchkit.arrays import Array
 from winchkit.model.rotation import angles_of
 from winchkit.robot.calibration.calibrate import Calibrated
-from winchkit.robot.files.poses import Measured
 from winchkit.robot.geometry.forward import forward
 from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose, lengths
-from winchkit.robot.geometry.robot import Robot, robot_of
+from winchkit.robot.geometry.robot import robot_of
 from winchkit.robot.identification.bundle_adjustment import State, linearise
 from winchkit.robot.identification.pose_design import (
     chosen_in_turn,
@@ -22,6 +21,7 @@ from winchkit.robot.identification.pose_design import (
     is_held,
     middle_and_half,
     random_poses,
+    simulated,
 )
 
 _CANDIDATES = 400
@@ -115,51 +115,9 @@ def _candidates(found: Calibrated) -> Pose:
 def _information(found: Calibrated, pose: Pose) -> Array:
     """Whitened equations of each candidate with its pose projected out, (c, r, q)."""
     equations = found.equations
-    measured = _as_measured(found, pose)
-    forces = replace(equations.forces, tension=measured.tension)
-    there = replace(equations, measured=measured, forces=forces)
+    known = np.isfinite(equations.measured.tension)
+    total = np.where(known, equations.measured.tension, 0.0).sum(axis=0)
+    mean = np.tile(total / np.maximum(known.sum(axis=0), 1), (len(pose.position), 1))
+    robot = robot_of(equations.profile_at(found.values))
+    there = replace(equations, measured=simulated(equations.measured, robot, pose, mean))
     return linearise(there, State(found.values, pose), found.weights).pose_free
-
-
-def _as_measured(found: Calibrated, pose: Pose) -> Measured:
-    """Placeholders for measurements: only which of them are finite is used."""
-    measured, many = found.equations.measured, len(pose.position)
-
-    def typical(values: Array) -> Array:
-        known = np.any(np.isfinite(values), axis=0)
-        filled = np.where(np.isfinite(values), values, 0.0).sum(axis=0)
-        mean = filled / np.maximum(np.isfinite(values).sum(axis=0), 1)
-        return np.tile(np.where(known, mean, np.nan), (many, 1))
-
-    return Measured(
-        _fitted_robot(found).motor_angles(pose),
-        np.where(np.isfinite(typical(measured.position)), pose.position, np.nan),
-        np.where(np.isfinite(typical(measured.angles)), angles_of(pose.rotation), np.nan),
-        typical(measured.swivel),
-        typical(measured.cable_length),
-        typical(measured.tension),
-        typical(measured.temperature),
-        np.zeros(many, dtype=np.intp),
-        np.full(many, "proposed"),
-        measured.length_zeroed,
-    )
-
-
-def _fitted_robot(found: Calibrated) -> Robot:
-    """The robot with the fitted drums, for the motor angles at a pose."""
-    profile, block = found.equations.robot.profile, found.equations.parameters.block
-    growth = float(found.values[block["layer_growth"][0]])
-    lines = []
-    for line, winch, radius in zip(
-        profile.line,
-        found.equations.robot.winches,
-        found.values[block["winding_radius"]].tolist(),
-        strict=True,
-    ):
-        layered = winch.drum.layer_growth is not None or winch.drum.kind in {
-            "spiral",
-            "archimedean",
-        }
-        drum = replace(winch.drum, winding_radius=radius, layer_growth=growth if layered else None)
-        lines.append(replace(line, winch=replace(winch, drum=drum)))
-    return robot_of(replace(profile, line=tuple(lines)))

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.model.rotation import rotation_of, rotation_vector
-from winchkit.robot.calibration.equations import Equations
 from winchkit.robot.geometry.forward import forward
 from winchkit.robot.geometry.kinematics import Pose
-from winchkit.robot.geometry.pose_estimation import start_pose
-from winchkit.robot.geometry.tracker import pose_behind, reading_of, registered
+from winchkit.robot.geometry.tracker import reading_of, registered
 from winchkit.robot.identification.bundle_adjustment import State, Weights, place
+from winchkit.robot.identification.equations import Equations
 
 _ROUNDS = 4
 """Each multiplies the error of the lengths by the strain, at most some per cent: four reach 1e-6 of
@@ -69,7 +68,7 @@ def cable_errors(equations: Equations, values: Array, weights: Weights) -> Array
     """
     # Kinds that were not fitted have unknown zeros and take no part.
     sigma = {kind: weights.sigma.get(kind, np.inf) for kind in equations.kinds}
-    state = place(equations, State(values, start_of(equations, values)), Weights(sigma))
+    state = place(equations, State(values, equations.start(values)), Weights(sigma))
     return next(c.residual for kind, c in equations.constraints(state) if kind == "closure")
 
 
@@ -80,16 +79,17 @@ def predicted_poses(equations: Equations, values: Array, start: Pose | None = No
     ``start``: by default at the measured poses. Returns: (p,); NaN where no pose was found. A
     search that fails starts again from home.
     """
-    geometry, slack = equations.geometry(values), equations.by_drum(values)
-    dead = equations.robot.dead_length
-    start = start_of(equations, values) if start is None else start
-    given, platform = slack, equations.platform(values)
-    strained = equations.parameters.law is not None and equations.forces.middle is not None
+    robot = equations.robot_at(values)
+    given = slack = equations.by_drum(values, robot)
+    start = equations.start(values) if start is None else start
+    strained = equations.parameters.law is not None and equations.middle_force is not None
     for _ in range(_ROUNDS if strained else 1):
-        if (strain := equations.strain(values, start)) is not None:
-            given = (slack + strain.value * dead) / (1 - strain.value)
+        if (strain := equations.strain(values, robot, start)) is not None:
+            given = (slack + strain.value * robot.dead_length) / (1 - strain.value)
         # Nominal numbers may be wrong by more than a robot in use: the pose that fits best.
-        found = forward(geometry, given, start, platform, tolerance=np.inf, search="outlying")
+        found = forward(
+            robot.geometry, given, start, robot.platform, tolerance=np.inf, search="outlying"
+        )
         # A search that did not converge starts again from home.
         start = _where(found.converged, found.pose, equations)
     return found.pose
@@ -122,10 +122,7 @@ def _known(equations: Equations) -> NDArray[np.bool_]:
 
 
 def rms(values: Sequence[float] | Array) -> float:
-    """Root of the mean square of finite values; NaN without any.
-
-    ``values``: NaN is ignored. Returns: in the unit of the values.
-    """
+    """Root of the mean square of finite values; NaN without any."""
     known = np.asarray(values)[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
@@ -135,24 +132,4 @@ def _where(good: NDArray[np.bool_], pose: Pose, equations: Equations) -> Pose:
     return Pose(
         np.where(good[:, None], pose.position, home.position),
         np.where(good[:, None, None], pose.rotation, home.rotation),
-    )
-
-
-def start_of(equations: Equations, values: Array | None = None) -> Pose:
-    """Measured poses in the base frame; those of the home pose where one was not measured whole.
-
-    ``values`` (q,): by default the nominal ones.
-    """
-    measured, home = equations.measured, equations.robot.home
-    whole = np.all(np.isfinite(measured.angles), axis=1, keepdims=True)
-    angles = np.where(whole, measured.angles, np.nan)
-    tracker = equations.tracker(equations.parameters.nominal if values is None else values)
-    if tracker is None:
-        return start_pose(measured.position, angles, home)
-    # Without a measured rotation the platform is taken to stand as at home.
-    turned = reading_of(tracker, Pose(np.zeros_like(measured.position), home.rotation)).rotation
-    seen = np.where(whole[..., None], rotation_of(*np.nan_to_num(angles).T), turned)
-    behind = pose_behind(tracker, Pose(measured.position, seen))
-    return Pose(
-        np.where(np.isfinite(behind.position), behind.position, home.position), behind.rotation
     )

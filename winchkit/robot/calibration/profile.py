@@ -19,10 +19,9 @@ from winchkit.errors import UsageError
 from winchkit.model.rotation import angles_of, rotation_by, rotation_of
 from winchkit.profile_edit.document import effect_tables, read_document, write_document
 from winchkit.robot.calibration.calibrate import Calibrated
-from winchkit.robot.calibration.elongation import LAWS
-from winchkit.robot.calibration.instruments import NUMBERS
-from winchkit.robot.calibration.parameters import Estimated
 from winchkit.robot.calibration.prediction import rms
+from winchkit.robot.identification.instruments import NUMBERS
+from winchkit.robot.identification.parameters import LAWS, Estimated
 from winchkit.schema.profiles.winch import LAYERED
 from winchkit.units import format_quantity, parse
 

@@ -29,8 +29,8 @@ from math import comb
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.robot.calibration.equations import Equations
 from winchkit.robot.identification.bundle_adjustment import Solution
+from winchkit.robot.identification.equations import Equations
 
 _PENALTY = 25.0
 """χ² that a line must explain to be named: five standard deviations."""
@@ -102,10 +102,7 @@ def _listed(lines: Sequence[str]) -> str:
 
 
 def ratios_of(equations: Equations, solution: Solution) -> Ratios:
-    """Cable per motor turn of each line at the end of a fit.
-
-    ``equations``: of a robot of n lines.
-    """
+    """Cable per motor turn of each line at the end of a fit."""
     parameters, names = equations.parameters, equations.robot.names
     values, scale = solution.state.values, parameters.std
     posterior = np.linalg.inv(solution.linear.information + np.eye(len(scale)))
@@ -148,7 +145,7 @@ def _wound(equations: Equations, values: Array) -> tuple[Array, Array]:
     """Cable wound since home (p, n) and its derivatives (p, n, q)."""
     known = np.isfinite(equations.measured.motor_angle)
     block, lines = equations.parameters.block, np.arange(known.shape[1])
-    radius, growth = values[block["winding_radius"]], float(values[block["layer_growth"][0]])
+    radius, growth = values[block["winding_radius"]], equations.growth(values)
     winding = equations.winding_at(values)
     wound = winding.wound(radius, growth)
     by = np.zeros((*wound.shape, len(values)))

@@ -10,19 +10,16 @@ import numpy as np
 
 from winchkit.model.rotation import angles_of
 from winchkit.robot.calibration.calibrate import Calibrated
-from winchkit.robot.calibration.parameters import Estimated
 from winchkit.robot.calibration.pose_design import NextPose
 from winchkit.robot.calibration.prediction import PoseErrors, rms
-from winchkit.robot.calibration.variance_components import NOISE
+from winchkit.robot.identification.parameters import Estimated
+from winchkit.robot.identification.variance_components import NOISE
 
 _SHOWN = {"m": ("mm", 1e3), "rad": ("deg", degrees(1.0))}
 
 
 def calibration_json(found: Calibrated, following: Sequence[NextPose]) -> dict[str, Any]:
-    """The object that ``winchkit calibrate --json`` prints; SI, rms over poses.
-
-    Returns: SI; null where not finite.
-    """
+    """The object that ``winchkit calibrate --json`` prints; SI, rms over poses."""
     after, angle = found.validation_after, found.validation_after.angle
     return {
         "schema": 1,
@@ -122,10 +119,7 @@ def calibration_text(found: Calibrated, following: Sequence[NextPose]) -> str:
 
 
 def candidate_lines(found: Calibrated) -> list[str]:
-    """Candidate effects in words.
-
-    Returns: one line per candidate effect.
-    """
+    """Candidate effects in words."""
     return [
         f"the effect {c.effect} would explain {c.share * 100:.0f} % of the remaining cost; "
         f"try --effect {c.effect}"
@@ -134,10 +128,7 @@ def candidate_lines(found: Calibrated) -> list[str]:
 
 
 def noise_words(found: Calibrated) -> str:
-    """Standard deviation of each kind of measurement in words.
-
-    Returns: standard deviations with units.
-    """
+    """Standard deviation of each kind of measurement in words."""
     return ", ".join(
         f"{kind.replace('_', ' ')} {_shown(sigma, NOISE[kind].unit)}"
         for kind, sigma in found.weights.sigma.items()

@@ -26,25 +26,14 @@ from math import log
 
 import numpy as np
 
-from winchkit.robot.calibration.equations import Equations
-from winchkit.robot.calibration.instruments import (
-    LARGEST_SCALE,
-    OF_LINES,
-    Instruments,
-    declared_instruments,
-    registered_instruments,
-)
 from winchkit.robot.calibration.options import Options, ProgressCallback
-from winchkit.robot.calibration.parameters import HOME_LENGTH, parameters_of
 from winchkit.robot.calibration.prediction import (
     PoseErrors,
     errors_at,
     predicted_poses,
     rms,
-    start_of,
 )
 from winchkit.robot.calibration.ratios import ratios_of
-from winchkit.robot.calibration.variance_components import NOISE, re_estimated_weights
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.tracker import Tracker
 from winchkit.robot.identification.bundle_adjustment import (
@@ -52,9 +41,18 @@ from winchkit.robot.identification.bundle_adjustment import (
     State,
     Weights,
     linearise,
-    place,
     solve,
 )
+from winchkit.robot.identification.equations import Equations, started
+from winchkit.robot.identification.instruments import (
+    LARGEST_SCALE,
+    OF_LINES,
+    Instruments,
+    declared_instruments,
+    registered_instruments,
+)
+from winchkit.robot.identification.parameters import HOME_LENGTH, parameters_of
+from winchkit.robot.identification.variance_components import NOISE, re_estimated_weights
 from winchkit.robot.mistakes.adjustment import lengths_at_home
 
 _NOISE_ROUNDS = 8
@@ -187,7 +185,8 @@ def first_model(equations: Equations, options: Options) -> tuple[Equations, Weig
     """The declared model at the values from which its fit starts, and its standard deviations."""
     predicted = predicted_poses(equations, equations.parameters.nominal, equations.robot.home)
     declared = _declared(equations, predicted)
-    return _start(declared, options)[0], Weights(_sigma(equations, options))
+    sigma = _sigma(equations, options)
+    return started(declared, sigma)[0], Weights(sigma)
 
 
 def _declared(equations: Equations, predicted: Pose) -> Equations:
@@ -391,14 +390,7 @@ def _registered(
 
 def with_instruments(equations: Equations, instruments: Instruments) -> Equations:
     """The equations with other instruments; the other parameters start as they do."""
-    block = equations.parameters.block
-    wider = parameters_of(
-        equations.robot,
-        equations.effects,
-        swivel="swivel_zero" in block,
-        length_offset="length_offset" in block,
-        instruments=instruments,
-    )
+    wider = parameters_of(equations.robot, equations.measured, equations.effects, instruments)
     return replace(equations, parameters=wider, instruments=instruments)
 
 
@@ -422,18 +414,15 @@ def _shows_more(first: Fitted, wider: Equations) -> bool:
     if not (own.free < free and len(free) == len(own.free) + 1):
         return False
     trial = with_instruments(first.equations, replace(own, free=free))
-    values, held = trial.parameters.nominal, np.zeros(len(trial.parameters), dtype=bool)
-    for name, indices in first.equations.parameters.block.items():
-        target = trial.parameters.block[name]
-        values[target] = first.solution.state.values[indices]
-        held[target] = first.solution.held[indices] != 0
-    linear = linearise(trial, State(values, first.solution.state.pose), first.weights)
-    gradient, prior = linear.gradient[~held], linear.prior[~held]
-    matrix = linear.information[np.ix_(~held, ~held)] + np.eye(len(gradient))
+    before, wide, state = first.equations.parameters, trial.parameters, first.solution.state
+    values = before.carried(state.values, wide, wide.nominal)
+    left = before.carried(first.solution.held, wide, np.zeros(len(values))) == 0
+    linear = linearise(trial, State(values, state.pose), first.weights)
+    gradient, prior = linear.gradient[left], linear.prior[left]
+    matrix = linear.information[np.ix_(left, left)] + np.eye(len(gradient))
     step = -np.linalg.solve(matrix, gradient)
     fall = -float(gradient @ step) + float(np.sum((prior + step) ** 2 - prior**2))
-    more = len(trial.parameters) - len(first.equations.parameters)
-    return not fall < chdtri(more, _LEVEL)
+    return not fall < chdtri(len(wide) - len(before), _LEVEL)
 
 
 def _mounted(best: Fitted, predicted: Pose, options: Options, progress: ProgressCallback) -> Fitted:
@@ -460,7 +449,7 @@ def _fitted(
     """
     given = options.sigma or {}
     if from_fit is None:
-        equations, state = _start(equations, options)
+        equations, state = started(equations, _sigma(equations, options))
         weights = Weights(_sigma(equations, options))
     else:
         equations, state = _continued(equations, from_fit)
@@ -477,27 +466,10 @@ def _fitted(
 
 def _continued(equations: Equations, fitted: Fitted) -> tuple[Equations, State]:
     """Equations with the priors of a fit of fewer parameters, and its end as their state."""
-    parameters, own = equations.parameters, fitted.equations.parameters
-    for name, indices in own.block.items():
-        parameters = parameters.starting(name, own.nominal[indices])
-    values = parameters.nominal
-    for name, indices in own.block.items():
-        values[parameters.block[name]] = fitted.solution.state.values[indices]
-    return replace(equations, parameters=parameters), State(values, fitted.solution.state.pose)
-
-
-def _start(equations: Equations, options: Options) -> tuple[Equations, State]:
-    """Nominal parameters within bounds, poses estimated with them, zeros of instruments."""
-    low, high = equations.parameters.bounds
-    values = np.clip(equations.parameters.nominal, low, high)
-    placing = Weights({**_sigma(equations, options), "swivel": np.inf, "cable_length": np.inf})
-    state = place(equations, State(values, start_of(equations)), placing)
-    parameters = equations.parameters
-    for kind, block in (("swivel", "swivel_zero"), ("cable_length", "length_offset")):
-        if block in parameters.block:
-            parameters = parameters.starting(block, equations.offsets(kind, state))
-    equations = replace(equations, parameters=parameters)
-    return equations, State(np.clip(parameters.nominal, low, high), state.pose)
+    wider, own, end = equations.parameters, fitted.equations.parameters, fitted.solution.state
+    wider = wider.about(own.carried(own.nominal, wider, wider.nominal))
+    values = own.carried(end.values, wider, wider.nominal)
+    return replace(equations, parameters=wider), State(values, end.pose)
 
 
 def _sigma(equations: Equations, options: Options) -> dict[str, float]:

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 
 from winchkit.fit_statistics import FitStatistics, FittedParameter, correlations_of
-from winchkit.robot.calibration.equations import Equations
-from winchkit.robot.calibration.parameters import Estimated
 from winchkit.robot.identification.bundle_adjustment import Solution
+from winchkit.robot.identification.equations import Equations
+from winchkit.robot.identification.parameters import Estimated
 
 _95 = 1.959964
 """Standard deviations: 97.5 % quantile of the normal distribution, for 95 % two-sided."""
@@ -25,10 +25,7 @@ def calibration_statistics(
     solution: Solution,
     estimates: Mapping[str, Estimated],
 ) -> FitStatistics:
-    """Statistics of a fit of poses and parameters.
-
-    ``equations``: of the p fitted poses. ``estimates``: values by parameter, in the unit of files.
-    """
+    """Statistics of a fit of poses and parameters."""
     linear, parameters = solution.linear, equations.parameters
     free = parameters.std > 0
     posterior = np.linalg.inv(linear.information + np.eye(len(linear.prior)))

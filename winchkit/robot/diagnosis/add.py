@@ -10,11 +10,15 @@ from winchkit.arguments import require_type, require_types
 from winchkit.diagnosis.add import Addition, FittedAddition, Removal
 from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.intervals import estimates, spread_of
+from winchkit.diagnosis.regression.noise import Noise
+from winchkit.diagnosis.results import Estimate, OutputFit
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import at_line
+from winchkit.effects.term import Term
 from winchkit.errors import UsageError
 from winchkit.robot.diagnosis.candidates import lacking, with_needs_met
+from winchkit.robot.diagnosis.engine import PoseSelection
 from winchkit.robot.diagnosis.errors import Errors, FittedModel, errors_of, output_fits_of
 from winchkit.robot.diagnosis.preparation import Preparation, prepare_selection
 from winchkit.robot.diagnosis.regression import PoseRegression
@@ -86,25 +90,28 @@ def _added(preparation: Preparation, effect: Effect) -> FittedRobotAddition:
     if not scores:
         raise UsageError(f"effect '{effect.id}' changes nothing that these poses measured")
     final: Fit = engine.trial(initial_model, scores[0], noise).fit
-    regression = engine.regression
-    before, after = (
-        FittedModel(regression, fit, noise, engine.regression.groups)
-        for fit in (initial_model, final)
-    )
-    spread = spread_of(regression, final, noise, engine.regression.blocks)
+    outputs, found = _outputs_and_values(preparation, engine, initial_model, final, noise)
     own = {
         term.effect.id for term in declared_terms(preparation.dataset.robot, preparation.catalogue)
     }
-    found = estimates(regression, final, spread)
     # Effects of a line's winch are refitted too and stay in the winch's own profile.
     terms = tuple(item for item in found if item[0].effect.id in own or item is found[-1])
+    regression = engine.regression
     was, now = (
         errors_of(regression, regression.at(fit.hypothesis)) for fit in (initial_model, final)
     )
-    addition = Addition(
-        output_fits_of(before, after, preparation.noise), terms, preparation.dataset.notes
-    )
+    addition = Addition(outputs, terms, preparation.dataset.notes)
     return FittedRobotAddition(regression, addition, (was, now))
+
+
+def _outputs_and_values(
+    preparation: Preparation, engine: PoseSelection, first: Fit, final: Fit, noise: Noise
+) -> tuple[dict[str, OutputFit], list[tuple[Term, dict[str, Estimate]]]]:
+    """Errors of every output before and after, and the effects with their estimates."""
+    regression = engine.regression
+    before, after = (FittedModel(regression, f, noise, regression.groups) for f in (first, final))
+    found = estimates(regression, final, spread_of(regression, final, noise, regression.blocks))
+    return output_fits_of(before, after, preparation.noise), found
 
 
 def remove(
@@ -136,15 +143,7 @@ def remove(
         if hypothesis.terms[index].effect.id in gone:
             hypothesis = hypothesis.without(index)
     final, _ = engine.fit_with_noise(hypothesis)
-    regression = engine.regression
-    before, after = (
-        FittedModel(regression, fit, noise, engine.regression.groups)
-        for fit in (initial_model, final)
-    )
-    found = estimates(
-        regression, final, spread_of(regression, final, noise, engine.regression.blocks)
-    )
+    outputs, found = _outputs_and_values(preparation, engine, initial_model, final, noise)
     # Effects of a line's winch are refitted too and stay in the winch's own profile.
     left = tuple(item for item in found if item[0].effect.id in own)
-    outputs = output_fits_of(before, after, preparation.noise)
     return Removal(effect_id, outputs, left, preparation.dataset.notes)

@@ -1,236 +1,163 @@
 """Joint estimate of poses, geometry and a profile's own effects by the solver of the calibration.
 
-The observation equations of :mod:`winchkit.robot.diagnosis.equations` as functions of
-
-* the numbers of the geometry, with the priors of the diagnosis and analytic derivatives,
-* the coordinates of effects, with a flat prior and forward differences, since an effect of the
-  catalogue, perhaps a user's own, has no derivatives,
-* the zeros of swivel angles and the offsets of length instruments, with the priors of a
-  calibration about their mean readings.
-
-:func:`winchkit.robot.identification.bundle_adjustment.solve` eliminates the poses by a Schur
-complement. The regression problem (:mod:`winchkit.robot.diagnosis.regression`) eliminates them at
-the solution by an orthonormal basis, which gives the same normal equations and independent rows, as
-tests need.
+The parameters are the numbers of the geometry, with the priors of the diagnosis and without bounds,
+the coordinates of effects, and the zeros of swivel angles and length instruments about their mean
+readings. :func:`winchkit.robot.identification.bundle_adjustment.solve` eliminates the poses by a
+Schur complement. The regression problem (:mod:`winchkit.robot.diagnosis.regression`) eliminates
+them at the solution by an orthonormal basis, which gives the same normal equations and independent
+rows, as tests need.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from winchkit.arrays import Array
-from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.term import Term
-from winchkit.robot.diagnosis.data.dataset import RobotDataset
-from winchkit.robot.diagnosis.equations import POSED, Equations, start_pose
-from winchkit.robot.diagnosis.prior import GeometryPrior, profile_with_geometry
+from winchkit.model.stages import Stage
+from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.effects.term import robot_with_terms
-from winchkit.robot.geometry.constraints import ZERO_STD, Constraint, mean_offset
 from winchkit.robot.geometry.kinematics import Pose
-from winchkit.robot.geometry.robot import Robot
-from winchkit.robot.identification.bundle_adjustment import Rows, State, Weights, place, solve
+from winchkit.robot.geometry.robot import Robot, robot_of
+from winchkit.robot.identification.bundle_adjustment import State, Weights, solve
+from winchkit.robot.identification.equations import Equations, placed, started
+from winchkit.robot.identification.parameters import Parameters, parameters_of
+from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.units import parse
 
-_FLAT = 1e3
-"""Standard deviation of the prior of an effect's coordinates, which are near one in size."""
-_STEP = 1e-3
-"""Step of a forward difference by an effect's coordinate; numerical."""
-_PLACED_BY = ("closure", "position", "rotation", "tension", "statics")
-STD_OF_ZERO = {"swivel": ZERO_STD["swivel"], "gauge": ZERO_STD["cable_length"]}
-"""Standard deviation of the prior of an instrument's zero, by kind of residual."""
-
-
-@dataclass(frozen=True)
-class _Unknowns:
-    """Parameters of an adjustment, (q,) each: geometry, coordinates of effects, zeros."""
-
-    nominal: Array
-    std: Array
-    low: Array
-    high: Array
-
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds."""
-        return self.low, self.high
+GEOMETRY = {
+    "exit-point": ("exit_point", ("x", "y", "z")),
+    "anchor-point": ("anchor_point", ("x", "y", "z")),
+    "swivel-radius": ("swivel_radius", ("radius_error",)),
+    "drum-radius": ("winding_radius", ("radius_error",)),
+    "layer-thickness": ("layer_growth", ("thickness_error",)),
+}
+"""Block of the parameters that each effect of the geometry changes, and its own parameters."""
 
 
 @dataclass(frozen=True)
-class Adjusted:
-    """Result of an adjustment.
+class GeometryNumber:
+    """Free number of the geometry as a parameter of an effect."""
 
-    Attributes
-    ----------
-    pose : Pose
-        Estimated poses, one per row of the data set.
-    geometry : tuple of GeometryPrior
-        Numbers of the geometry at their estimates.
-    terms : tuple of Term
-        Effects at their estimates.
-    """
-
-    pose: Pose
-    geometry: tuple[GeometryPrior, ...]
-    terms: tuple[Term, ...]
+    effect: str
+    """With its line."""
+    parameter: str
+    index: int
+    """In the vector of parameters."""
 
 
 @dataclass(frozen=True)
-class _Adjustment:
-    """Observation equations as functions of poses and parameters."""
+class LinearizationPoint:
+    """Parameters and poses at which a regression is linearised."""
 
     dataset: RobotDataset
-    own_terms: tuple[Term, ...]
-    own_geometry: tuple[GeometryPrior, ...]
-    zeros: Mapping[str, Array]
-    """Mean readings of instruments with an unknown zero, (n,) by kind."""
+    equations: Equations
+    """Without effects; free numbers of the geometry are nuisance parameters."""
+    state: State
+    sigma: Mapping[str, float]
+    """Standard deviation per type of measurement, SI."""
+    instruments: tuple[Term, ...] = ()
+    """Effects of the tracker at which the derivatives by the pose are taken."""
 
     @property
-    def parameters(self) -> _Unknowns:
-        """Parameters at the values where the adjustment starts."""
-        coordinates = [Coordinates(term.effect) for term in self.own_terms]
-        bounds = [c.bounds() for c in coordinates]
-        geometry, zeros = self.own_geometry, self.zeros
-        free = np.full(len(geometry), np.inf)
-        n_zeros = sum(map(len, zeros.values()))
-        nominal = [
-            np.array([item.at for item in geometry]),
-            *(c.vector(t.values) for c, t in zip(coordinates, self.own_terms, strict=True)),
-            *zeros.values(),
+    def pose(self) -> Pose:
+        """Estimated pose of the platform in every row."""
+        return self.state.pose
+
+    @cached_property
+    def geometry(self) -> tuple[GeometryNumber, ...]:
+        """Free numbers of the geometry."""
+        return free_geometry(self.equations.parameters, self.dataset.names)
+
+    @cached_property
+    def profile(self) -> RobotProfile:
+        """Robot profile with the geometry at its present values."""
+        return self.equations.profile_at(self.state.values)
+
+    def robot(self, terms: Sequence[Term] = ()) -> Robot:
+        """Robot model with effects, at the present geometry."""
+        return robot_with_terms(self.profile, terms)
+
+
+def free_geometry(parameters: Parameters, lines: Sequence[str]) -> tuple[GeometryNumber, ...]:
+    """Numbers of the geometry that are not held."""
+    out = []
+    for effect, (block, names) in GEOMETRY.items():
+        places = [""] if block == "layer_growth" else [f"/{line}" for line in lines]
+        indices = parameters.block[block].reshape(len(places), len(names)).tolist()
+        out += [
+            GeometryNumber(effect + place, name, index)
+            for place, row in zip(places, indices, strict=True)
+            for name, index in zip(names, row, strict=True)
+            if parameters.std[index] > 0
         ]
-        std = [
-            np.array([item.std for item in geometry]),
-            *(np.full(len(c), _FLAT) for c in coordinates),
-            *(np.full(len(values), STD_OF_ZERO[kind]) for kind, values in zeros.items()),
-        ]
-        low = [-free, *(b[0] for b in bounds), np.full(n_zeros, -np.inf)]
-        high = [free, *(b[1] for b in bounds), np.full(n_zeros, np.inf)]
-        return _Unknowns(*map(np.concatenate, (nominal, std, low, high)))
-
-    def geometry(self, values: Array) -> tuple[GeometryPrior, ...]:
-        """Numbers of the geometry at parameter values."""
-        given = zip(self.own_geometry, values[: len(self.own_geometry)].tolist(), strict=True)
-        return tuple(item.moved((value - item.value) / item.std) for item, value in given)
-
-    def terms(self, values: Array) -> tuple[Term, ...]:
-        """Effects at parameter values."""
-        out, at = [], len(self.own_geometry)
-        for term in self.own_terms:
-            coordinates = Coordinates(term.effect)
-            part = values[at : at + len(coordinates)]
-            out.append(Term(term.effect, coordinates.values(part, term.values)))
-            at += len(coordinates)
-        return tuple(out)
-
-    def robot(self, values: Array) -> Robot:
-        """Robot model at parameter values."""
-        profile = profile_with_geometry(self.dataset.robot, self.geometry(values))
-        return robot_with_terms(profile, self.terms(values))
-
-    def constraints(self, state: State) -> Iterator[tuple[str, Constraint]]:
-        """Equations by kind with derivatives by the pose."""
-        robot = self.robot(state.values)
-        equations = Equations(self.dataset, state.pose, robot)
-        by_pose = equations.by_pose(robot)
-        for kind, residual in self._residuals(equations, robot, state.values).items():
-            by = by_pose.get(kind)
-            yield kind, Constraint(residual, np.zeros((*residual.shape, 6)) if by is None else by)
-
-    def rows(self, state: State) -> Iterator[Rows]:
-        """Equations by kind with derivatives by the vector of parameters."""
-        robot = self.robot(state.values)
-        equations = Equations(self.dataset, state.pose, robot)
-        here = self._residuals(equations, robot, state.values)
-        by_pose = equations.by_pose(robot)
-        by_values = self._by_values(equations, robot, state.values, here)
-        for kind, residual in here.items():
-            by = by_pose.get(kind)
-            by = np.zeros((*residual.shape, 6)) if by is None else by
-            yield Rows(kind, residual, by, by_values[kind])
-
-    def _residuals(self, equations: Equations, robot: Robot, values: Array) -> dict[str, Array]:
-        """Residuals with the zeros of the instruments, by kind that was measured."""
-        found = equations.residuals(robot)
-        at = len(values) - sum(map(len, self.zeros.values()))
-        for kind, own in self.zeros.items():
-            found[kind] = found[kind] + values[at : at + len(own)]
-            at += len(own)
-        if self.dataset.hangs:
-            # A part of the statics, which have all of it.
-            found.pop("tension")
-        return {kind: r for kind, r in found.items() if np.isfinite(r).any()}
-
-    def _by_values(
-        self, equations: Equations, robot: Robot, values: Array, here: Mapping[str, Array]
-    ) -> dict[str, Array]:
-        """Derivatives by the parameters, (p, k, q), by kind."""
-        out = {kind: np.zeros((*r.shape, len(values))) for kind, r in here.items()}
-        geometry = self.geometry(values)
-        for kind, part in equations.by_geometry(robot, geometry).items():
-            if kind in out:
-                out[kind][..., : len(geometry)] = part
-        end = len(values) - sum(map(len, self.zeros.values()))
-        _, high = self.parameters.bounds
-        for index in range(len(geometry), end):
-            step = _STEP * max(1.0, abs(values[index]))
-            moved = values.copy()
-            moved[index] += step if values[index] + step <= high[index] else -step
-            there = self._residuals(equations, self.robot(moved), moved)
-            for kind, residual in here.items():
-                difference = there[kind] - residual
-                out[kind][..., index] = difference / (moved[index] - values[index])
-        for kind, own in self.zeros.items():
-            line = np.arange(len(own))
-            if kind in out:
-                out[kind][:, line, end + line] = 1.0
-            end += len(own)
-        return out
+    return tuple(out)
 
 
-def placed(dataset: RobotDataset, terms: Sequence[Term], sigma: Mapping[str, float]) -> Pose:
-    """Least-squares estimate of the poses with geometry and effects as given.
+def geometry_parameters(
+    dataset: RobotDataset, stated: Mapping[str, str] | None = None
+) -> Parameters:
+    """Parameters of the geometry, without bounds, and the zeros of instruments.
 
-    Swivel angles and length instruments take no part: their zeros are not known.
+    ``stated``: standard deviations by number, without which one is held; by default the priors of
+    a calibration.
     """
-    adjustment = _Adjustment(dataset, tuple(terms), (), {})
-    return _placed(adjustment, sigma).pose
+    robot = robot_of(replace(dataset.robot, effect=()))
+    parameters = parameters_of(robot, dataset.measured)
+    everything = []
+    for own in parameters:
+        std = own.std
+        if stated is not None and std > 0 and not own.zero:
+            std = parse(stated[own.name], "length") if own.name in stated else 0.0
+        everything.append(replace(own, std=std, low=-np.inf, high=np.inf))
+    return replace(parameters, all=tuple(everything))
 
 
-def adjusted(
+def equations_of(dataset: RobotDataset, geometry: Parameters) -> Equations:
+    """Constraint equations of a data set without effects."""
+    measured = dataset.measured
+    if not dataset.has_tension:
+        measured = replace(measured, tension=np.full_like(measured.tension, np.nan))
+    return Equations(
+        robot_of(replace(dataset.robot, effect=())),
+        geometry,
+        measured,
+        trajectory=dataset.trajectory,
+        balanced=dataset.has_balance,
+    )
+
+
+def _with_terms(equations: Equations, terms: Sequence[Term]) -> Equations:
+    parameters = equations.parameters.with_terms(terms)
+    return replace(equations, parameters=parameters, terms=tuple(terms))
+
+
+def point_of_file(
+    dataset: RobotDataset, terms: Sequence[Term], sigma: Mapping[str, float]
+) -> LinearizationPoint:
+    """Least-squares estimate of the poses alone, with geometry and effects as given."""
+    equations = equations_of(dataset, geometry_parameters(dataset, {}))
+    pose = placed(_with_terms(equations, terms), sigma).pose
+    return LinearizationPoint(dataset, equations, State(equations.parameters.nominal, pose), sigma)
+
+
+def fitted_point(
     dataset: RobotDataset,
     terms: Sequence[Term],
     sigma: Mapping[str, float],
-    geometry: Sequence[GeometryPrior] = (),
-) -> Adjusted:
-    """Estimate of poses, geometry, effects and instruments' zeros at once.
-
-    ``sigma``: standard deviation per type of measurement, SI.
-    """
-    adjustment = _Adjustment(dataset, tuple(terms), tuple(geometry), {})
-    state = _placed(adjustment, sigma)
-    robot = adjustment.robot(state.values)
-    found = Equations(dataset, state.pose, robot).residuals(robot)
-    adjustment = replace(adjustment, zeros=instrument_zeros(found, dataset))
-    start = State(adjustment.parameters.nominal, state.pose)
-    state = solve(adjustment, start, Weights(sigma)).state
-    return Adjusted(state.pose, adjustment.geometry(state.values), adjustment.terms(state.values))
-
-
-def _placed(adjustment: _Adjustment, sigma: Mapping[str, float]) -> State:
-    low, high = adjustment.parameters.bounds
-    values = np.clip(adjustment.parameters.nominal, low, high)
-    used = {kind: sigma[kind] if kind in _PLACED_BY else np.inf for kind in (*POSED, "tension")}
-    return place(adjustment, State(values, start_pose(adjustment.dataset)), Weights(used))
-
-
-def instrument_zeros(residuals: Mapping[str, Array], dataset: RobotDataset) -> dict[str, Array]:
-    """First estimate of the zeros of swivel angles and length instruments, (n,) by kind."""
-    kinds = [] if dataset.measured.length_zeroed else ["gauge"]
-    if isinstance(dataset.robot.instrument.swivels.zero, str):
-        kinds.insert(0, "swivel")
-    return {
-        kind: mean_offset(residuals[kind], angles=kind == "swivel")
-        for kind in kinds
-        if np.isfinite(residuals[kind]).any()
-    }
+    geometry: Parameters,
+) -> tuple[LinearizationPoint, tuple[Term, ...]]:
+    """Geometry, poses, effects and instruments' zeros at their best fit under a given noise."""
+    equations = equations_of(dataset, geometry)
+    joint, start = started(_with_terms(equations, terms), sigma)
+    found = solve(joint, start, Weights(sigma)).state
+    terms = joint.terms_at(found.values)
+    # The regression has zeros of its own.
+    zero = np.array([own.zero for own in geometry])
+    values = np.where(zero, 0.0, found.values[: len(geometry)])
+    instruments = tuple(term for term in terms if term.effect.stage is Stage.TRACKER)
+    state = State(values, found.pose)
+    return LinearizationPoint(dataset, equations, state, sigma, instruments), terms

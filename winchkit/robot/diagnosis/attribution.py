@@ -47,12 +47,7 @@ class _Share:
 
 
 def pose_attributions(regression: PoseRegression, errors: Errors) -> list[Attribution]:
-    """Variables that explain the errors of each output, the largest share first.
-
-    ``regression``: of p poses. ``errors``: by output, as
-    :func:`winchkit.robot.diagnosis.errors.errors_of` returns them. Returns: ``winch`` is the share
-    of a constant per line, ``pose`` that of a constant per pose.
-    """
+    """Variables that explain the errors of each output, the largest share first."""
     variables, out = variables_of_poses(regression), []
     for output, error in on_cables(regression, errors).items():
         lines = AXES if output == "platform_position" else regression.dataset.names
@@ -81,7 +76,7 @@ def on_cables(regression: PoseRegression, errors: Errors) -> Errors:
     if "tension" in out:
         known = np.isfinite(out["tension"])
         inside = np.where(known, out["tension"], 0.0)
-        spread = (regression.equations.to_cables @ inside[..., None])[..., 0]
+        spread = (regression.to_cables @ inside[..., None])[..., 0]
         out["tension"] = np.where(known.all(axis=1, keepdims=True), spread, np.nan)
     return out
 
@@ -94,7 +89,7 @@ def variables_of_poses(regression: PoseRegression) -> dict[str, Array]:
     for i, winch in enumerate(regression.robot.winches):
         turned = angle[:, i] - winch.reference.motor_angle
         drum[:, i] = turned * winch.gearbox.direction / winch.gearbox.ratio
-    pose = regression.equations.pose
+    pose = regression.point.pose
     place = np.concatenate([pose.position, angles_of(pose.rotation)], axis=1)
     out = {name: place[:, [k]] for k, name in enumerate(ON_PLATFORM)}
     out |= {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,22 +10,16 @@ import numpy as np
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.effect import Effect
 from winchkit.effects.placement import (
-    at_line,
     base_of,
     line_of_effect,
     placements,
     with_home_lengths,
 )
-from winchkit.effects.term import Term
 from winchkit.model.stages import Stage
-from winchkit.robot.diagnosis.data.dataset import RobotDataset
-from winchkit.robot.diagnosis.prior import FIELDS, GeometryPrior
+from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.effects.bind import lines_with_home_length
-from winchkit.schema.profiles.robot import PRIORS
 from winchkit.schema.profiles.winch import LAYERED, WinchProfile
 
-GEOMETRY = ("exit-point", "anchor-point", "swivel-radius", "drum-radius", "layer-thickness")
-"""Effects that are the geometry which a calibration fits."""
 BALANCING = frozenset({"payload-mass", "payload-centre", "cell-offset", "cell-thermal"})
 """Effects that may explain an imbalance of tensions while its noise is estimated.
 
@@ -82,46 +76,6 @@ def with_needs_met(effect: Effect, dataset: RobotDataset) -> Effect:
         known = lines_with_home_length(dataset.robot)
         effect = with_home_lengths(effect, [n for n in dataset.names if n not in known])
     return replace(effect, needs=())
-
-
-def priors_of_geometry(
-    dataset: RobotDataset, catalogue: Catalogue, fitted: bool
-) -> list[GeometryPrior]:
-    """Geometry as nuisance parameters.
-
-    ``fitted``: use the standard deviations that a calibration wrote into the profile, without which
-    there are no nuisance parameters; else the priors of a calibration.
-    """
-    out = []
-    for name in GEOMETRY:
-        effect = catalogue[name]
-        for placed in [effect] if name == "layer-thickness" else _each(effect, dataset):
-            if not _has_part(placed, dataset):
-                continue
-            for parameter in placed.parameters:
-                std = _std(dataset, placed, parameter.name, fitted)
-                if std > 0:
-                    out.append(GeometryPrior(Term(placed, placed.null), parameter.name, std))
-    return out
-
-
-def _each(effect: Effect, dataset: RobotDataset) -> Iterable[Effect]:
-    return (at_line(effect, line) for line in dataset.names)
-
-
-def _std(dataset: RobotDataset, effect: Effect, parameter: str, fitted: bool) -> float:
-    """Standard deviation of one number of the geometry, m."""
-    key = FIELDS[base_of(effect)]
-    profile = dataset.robot
-    if not fitted:
-        return profile.prior[key].std if key in profile.prior else PRIORS[key]
-    from winchkit.units import parse
-
-    line = line_of_effect(effect)
-    axis = f".{parameter}" if parameter in ("x", "y", "z") else ""
-    name = f"{line}.{key}{axis}" if line else key
-    stated = profile.fitted.std.get(name) if profile.fitted else None
-    return parse(stated, "length") if stated else 0.0
 
 
 def _has_part(effect: Effect, dataset: RobotDataset) -> bool:

@@ -15,14 +15,14 @@ from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.residuals.traces import pose_traces
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.effects.catalogue import Catalogue
-from winchkit.robot.diagnosis.adjustment import placed
+from winchkit.robot.diagnosis.adjustment import point_of_file
 from winchkit.robot.diagnosis.attribution import pose_attributions
-from winchkit.robot.diagnosis.data.dataset import RobotDataset, prepare_poses
+from winchkit.robot.diagnosis.dataset import RobotDataset, prepare_poses
 from winchkit.robot.diagnosis.errors import UNITS, Errors, column_names, errors_of, rms, signal_rms
-from winchkit.robot.diagnosis.regression import LinearizationPoint, PoseRegression
+from winchkit.robot.diagnosis.regression import PoseRegression
 from winchkit.robot.diagnosis.trajectory_regression import regression_at
-from winchkit.robot.diagnosis.variance_components import START
 from winchkit.robot.effects.bind import robot_terms
+from winchkit.robot.identification.variance_components import START
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
@@ -45,8 +45,7 @@ def compared(
     """Compare poses with a robot's profile at its file values."""
     dataset = prepare_poses(runs, profile)
     terms = robot_terms(profile, catalogue, moving=dataset.moves)
-    pose = placed(dataset, terms, START)
-    regression = regression_at(LinearizationPoint(dataset, pose, START))
+    regression = regression_at(point_of_file(dataset, terms, START))
     errors = errors_of(regression, regression.residuals(terms))
     noise = _noise(errors, dataset)
     follows = pose_attributions(regression, errors)

@@ -48,8 +48,8 @@ from winchkit.diagnosis.verdict.profile_values import held, refitted_steps
 from winchkit.effects.catalogue import Catalogue, load_catalogue
 from winchkit.effects.term import Term
 from winchkit.model.stages import Stage
+from winchkit.robot.diagnosis.adjustment import GEOMETRY
 from winchkit.robot.diagnosis.attribution import pose_attributions
-from winchkit.robot.diagnosis.candidates import GEOMETRY
 from winchkit.robot.diagnosis.engine import PoseSelection
 from winchkit.robot.diagnosis.errors import (
     UNITS,
@@ -63,11 +63,11 @@ from winchkit.robot.diagnosis.errors import (
     refuted_outputs,
     rms,
 )
-from winchkit.robot.diagnosis.excitation import missing_pose_excitation
 from winchkit.robot.diagnosis.pose_design import next_pose_runs
 from winchkit.robot.diagnosis.preparation import (
     Preparation,
     calibrated_on,
+    missing_pose_excitation,
     own_effects,
     prepare_selection,
 )
@@ -84,17 +84,7 @@ rises above the second one."""
 
 
 class RobotAnswer(Answer):
-    """A diagnosis of a robot's poses with everything that it was derived from.
-
-    Parameters
-    ----------
-    selection
-        Selection and judgement.
-    sets
-        Equivalence set of every addition.
-    diagnosis
-        What is printed.
-    """
+    """A diagnosis of a robot's poses with everything that it was derived from."""
 
     wing: ClassVar[str] = "robot"
 
@@ -114,24 +104,16 @@ class RobotAnswer(Answer):
 
 @dataclass(frozen=True)
 class RobotSelection:
-    """A selection on poses and its verdict.
-
-    Attributes
-    ----------
-    preparation : Preparation
-        Data, candidates and noise.
-    engine : PoseSelection
-        Engine of the selection.
-    file_engine : PoseSelection
-        Engine with the geometry of the file; the same object where the geometry was not free.
-    result : SelectionResult
-        Result of the selection, with the simplest laws.
-    """
+    """A selection on poses and its verdict."""
 
     preparation: Preparation
+    """Data, candidates and noise."""
     engine: PoseSelection
+    """Engine of the selection."""
     file_engine: PoseSelection
+    """Engine with the geometry of the file; the same object where the geometry was not free."""
     result: SelectionResult
+    """Result of the selection, with the simplest laws."""
 
     @classmethod
     def of(
@@ -248,10 +230,7 @@ class RobotSelection:
 
 
 def answer_of(selection: RobotSelection, geometry: str) -> RobotAnswer:
-    """Diagnosis of a selection.
-
-    ``geometry``: how the geometry was taken: ``file`` or ``refitted``.
-    """
+    """Diagnosis of a selection."""
     engine, preparation = selection.engine, selection.preparation
     added = range(engine.n_initial_terms, len(selection.result.final.hypothesis.terms))
     final, noise = selection.result.final, selection.result.noise
@@ -363,16 +342,16 @@ def _geometry_steps(selection: RobotSelection) -> Iterator[Step]:
     if not selection.geometry_is_free:
         return
     final, regression = selection.final, selection.engine.regression
-    geometry = regression.point.geometry
+    geometry, parameters = regression.point.geometry, regression.equations.parameters
     std = spread_of(regression, final.fit, final.noise, regression.blocks).std
     first = regression.nuisance_columns.shape[1] - len(geometry)
     values: dict[str, dict[str, Estimate]] = {}
-    for index, item in enumerate(geometry):
-        by = final.fit.vector[first + index]
-        unit = item.term.effect.parameter(item.parameter).unit
-        values.setdefault(item.term.effect.id, {})[item.parameter] = Estimate(
-            item.value + float(by) * item.std, float(std[first + index]) * item.std, unit
-        )
+    for column, number in enumerate(geometry, start=first):
+        prior = float(parameters.std[number.index])
+        change = (regression.point.state.values - parameters.nominal)[number.index]
+        value = float(change) + float(final.fit.vector[column]) * prior
+        own = values.setdefault(number.effect, {})
+        own[number.parameter] = Estimate(value, float(std[column]) * prior, "m")
     present = {name.partition("/")[0] for name in values}
     effects = tuple(name for name in GEOMETRY if name in present)
     of_file = selection.file_engine.regression

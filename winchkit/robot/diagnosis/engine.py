@@ -22,23 +22,11 @@ from winchkit.robot.diagnosis.candidates import BALANCING
 from winchkit.robot.diagnosis.errors import FittedModel, held_out_rms
 from winchkit.robot.diagnosis.regression import PoseRegression
 from winchkit.robot.diagnosis.trajectory_regression import TrajectoryRegression
-from winchkit.robot.diagnosis.variance_components import PoseNoise
+from winchkit.robot.identification.variance_components import PoseNoise
 
 
 class PoseSelection(SelectionEngine):
-    """Selection among hypotheses on a robot's poses.
-
-    Parameters
-    ----------
-    regression
-        The poses and the model.
-    initial_model
-        Initial model: the profile's own effects.
-    candidates
-        Effects that may be added, each at its places.
-    noise
-        Variance components of the measurements.
-    """
+    """Selection among hypotheses on a robot's poses."""
 
     regression: PoseRegression
 

@@ -23,11 +23,10 @@ from winchkit.diagnosis.regression.gls import Fit
 from winchkit.diagnosis.regression.noise import Noise
 from winchkit.diagnosis.results import OutputFit
 from winchkit.model.rotation import rotation_by, skew
-from winchkit.robot.diagnosis.data.dataset import RobotDataset
-from winchkit.robot.diagnosis.equations import POSED
+from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.diagnosis.regression import PoseRegression
-from winchkit.robot.diagnosis.variance_components import PoseNoise
 from winchkit.robot.geometry.kinematics import PLATFORM_DOF
+from winchkit.robot.identification.variance_components import PoseNoise
 
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
@@ -47,11 +46,7 @@ class FittedModel:
 
 
 def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Errors:
-    """Errors by output.
-
-    ``regression``: of p poses. ``residuals``: residuals by kind, (p, k), SI. Returns: by output
-    (p, n), (p, 3) or (p, k), SI; NaN where something was not measured.
-    """
+    """Errors by output."""
     if regression.dataset.hangs:
         return _errors_of_hanging(regression, residuals)
     at_pose, to_place = _maps(regression)
@@ -98,15 +93,15 @@ def _errors_of_hanging(regression: PoseRegression, residuals: Mapping[str, Array
 
 def _stacked(regression: PoseRegression, values: Mapping[str, Array]) -> Array:
     """All rows of a pose but those of the drums in standard deviations; zero where missing."""
-    sigma, kinds = regression.point.sigma, [k for k in POSED if k != "closure"]
+    sigma, kinds = regression.point.sigma, [k for k in regression.posed if k != "closure"]
     return np.concatenate([np.nan_to_num(values[k]) / sigma[k] for k in kinds], axis=1)
 
 
 def _hanging_maps(regression: PoseRegression) -> tuple[Array, Array]:
     """Projection of closures beside coordinates that nothing else determines (p, n, n), and the map
     from the other rows to closures, (p, n, r)."""
-    by, here = regression.slope(), regression.residuals(())
-    sigma, kinds = regression.point.sigma, [k for k in POSED if k != "closure"]
+    by, here = regression.slope, regression.residuals(())
+    sigma, kinds = regression.point.sigma, [k for k in regression.posed if k != "closure"]
     known = np.concatenate([np.isfinite(here[k]) for k in kinds], axis=1)
     slope = np.concatenate([by[k] / sigma[k] for k in kinds], axis=1)
     slope = np.where(known[..., None] & np.isfinite(slope), slope, 0.0)
@@ -190,7 +185,7 @@ def least_noise(model: FittedModel, noise: PoseNoise) -> dict[str, float]:
     regression, beyond = model.regression, model.noise.uncertainty(model.regression)
     here, out = regression.residuals(()), {}
     for output, size in model.noise.rms.items():
-        kinds = ["tension"] if output == "tension" else [k for k in POSED if k in noise.unexplained]
+        kinds = ["tension"] if output == "tension" else regression.posed
         shares = [(noise.least[kind] / noise.sigma[kind]) ** 2 for kind in kinds]
         share = np.average(shares, weights=[here[kind].shape[1] for kind in kinds])
         out[output] = size * float(np.sqrt(share * (1 + beyond[output])))
@@ -250,13 +245,10 @@ def signal_rms(regression: PoseRegression) -> dict[str, float]:
 def _signals(regression: PoseRegression) -> Errors:
     """Measured values of every output, (p, k), SI; lengths by the drums."""
     measured = regression.dataset.measured
-    length = regression.equations.residuals(regression.robot)[
-        "closure"
-    ] + regression.robot.lengths_at(
-        measured.motor_angle,
-        regression.equations.forces(regression.robot),
-        regression.equations.temperature,
-    )
+    robot, equations = regression.robot, regression.equations
+    force = equations.forces(regression.point.state.values, robot)
+    by_drum = robot.lengths_at(measured.motor_angle, force, equations.temperature)
+    length = regression.residuals(())["closure"] + by_drum
     return {
         "cable_length": length,
         "platform_position": measured.position,
@@ -292,10 +284,10 @@ def _slope(regression: PoseRegression) -> Array:
 
     The platform's origin is c = u − R o with the observed point u and its place o on the platform.
     """
-    by, tracker = regression.slope()["closure"], regression.tracker
+    by, tracker = regression.slope["closure"], regression.tracker
     if tracker is None or not np.any(tracker.offset):
         return by
-    lever = regression.equations.pose.rotation @ tracker.offset
+    lever = regression.point.pose.rotation @ tracker.offset
     out = by.copy()
     out[..., 3:] += by[..., :3] @ skew(lever)
     return out

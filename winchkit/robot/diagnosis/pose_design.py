@@ -19,12 +19,14 @@ from winchkit.diagnosis.results import NextRun
 from winchkit.effects.effect import told_apart
 from winchkit.effects.term import Term
 from winchkit.model.rotation import angles_of
-from winchkit.robot.diagnosis.data.dataset import RobotDataset
+from winchkit.robot.diagnosis.adjustment import equations_of
+from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.diagnosis.regression import PoseRegression
 from winchkit.robot.files.poses import Measured, joined
 from winchkit.robot.forces.force_distribution import approximate_forces
-from winchkit.robot.geometry.kinematics import Pose, lengths, swivel_angle
+from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
+from winchkit.robot.identification.bundle_adjustment import State
 from winchkit.robot.identification.pose_design import (
     chosen_in_turn,
     in_box,
@@ -33,6 +35,7 @@ from winchkit.robot.identification.pose_design import (
     noncentrality,
     pose_information,
     random_poses,
+    simulated,
 )
 
 _CANDIDATES = 60
@@ -88,10 +91,7 @@ def usable(kind: PoseCandidates, dataset: RobotDataset) -> bool:
 def simulated_poses(
     regression: PoseRegression, robot: Robot, kind: PoseCandidates
 ) -> tuple[Measured, Pose]:
-    """Simulate measurements at random poses of a kind, without noise.
-
-    Returns: NaN where nothing was measured so far.
-    """
+    """Simulate measurements at random poses of a kind, without noise."""
     rng = np.random.default_rng(_SEED)
     pose = _placed(regression, robot, kind, rng)
     force = _forces(regression, robot, kind, pose, rng)
@@ -99,7 +99,13 @@ def simulated_poses(
     if regression.dataset.has_tension:
         good &= np.isfinite(force).all(axis=1) & (force > 0).all(axis=1)
     pose, force = Pose(pose.position[good], pose.rotation[good]), force[good]
-    return _measured(regression.dataset, robot, kind, pose, force), pose
+    so_far = regression.dataset.measured
+    warm = np.nanmean(np.where(np.isfinite(so_far.temperature), so_far.temperature, 20.0))
+    warmth = np.full(force.shape, warm)
+    if kind.warmer:
+        colder = np.arange(len(force)) % 2 == 0
+        warmth += np.where(colder, -_TEMPERATURE_STEP, _TEMPERATURE_STEP)[:, None]
+    return simulated(so_far, robot, pose, force, warmth), pose
 
 
 def _placed(
@@ -136,35 +142,6 @@ def _forces(
     if kind.stronger:
         start = start * np.exp(rng.uniform(-1, 1, (many, 1)) * np.log(_FORCE_RATIO))
     return approximate_forces(robot.structure(pose), robot.weight(pose), start)
-
-
-def _measured(
-    dataset: RobotDataset, robot: Robot, kind: PoseCandidates, pose: Pose, force: Array
-) -> Measured:
-    measured, many = dataset.measured, len(pose.position)
-
-    def where_known(values: Array, there: Array) -> Array:
-        return np.where(np.isfinite(values).any(axis=0), there, np.nan)
-
-    warm = np.nanmean(np.where(np.isfinite(measured.temperature), measured.temperature, 20.0))
-    warmth = np.full((many, len(dataset.names)), warm)
-    if kind.warmer:
-        warmth += np.where(np.arange(many) % 2, _TEMPERATURE_STEP, -_TEMPERATURE_STEP)[:, None]
-    length = lengths(robot.geometry, pose.position, pose.rotation)
-    return replace(
-        measured,
-        motor_angle=robot.motor_angles(pose, tension=force),
-        position=where_known(measured.position, pose.position),
-        angles=where_known(measured.angles, angles_of(pose.rotation)),
-        swivel=where_known(
-            measured.swivel, swivel_angle(robot.geometry, pose.position, pose.rotation)
-        ),
-        cable_length=where_known(measured.cable_length, length),
-        tension=where_known(measured.tension, force),
-        temperature=where_known(measured.temperature, warmth),
-        run=np.zeros(many, dtype=np.intp),
-        place=np.full(many, "proposed"),
-    )
 
 
 Question = tuple[Term, Term | None]
@@ -296,7 +273,9 @@ def _with_all(
     )
     distinct = np.arange(len(measured), dtype=np.intp)
     extended = replace(dataset, measured=measured, pose=distinct, trajectory=None)
-    return PoseRegression(replace(point, dataset=extended, pose=pose))
+    equations = equations_of(extended, point.equations.parameters)
+    state = State(point.state.values, pose)
+    return PoseRegression(replace(point, dataset=extended, equations=equations, state=state))
 
 
 def _information(regression: PoseRegression, final: Hypothesis, question: Question) -> Array:

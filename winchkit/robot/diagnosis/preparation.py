@@ -6,7 +6,7 @@ so that the model is linearised at its best fit. The noise is estimated by varia
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -23,24 +23,23 @@ from winchkit.effects.effect import Effect
 from winchkit.effects.parametrization import Coordinates
 from winchkit.effects.placement import base_of
 from winchkit.effects.term import Term
-from winchkit.model.stages import Stage
-from winchkit.robot.diagnosis.adjustment import adjusted
-from winchkit.robot.diagnosis.candidates import BALANCING, candidates_at, priors_of_geometry
-from winchkit.robot.diagnosis.data.dataset import RobotDataset, prepare_poses
+from winchkit.model.rotation import rotation_of, rotation_vector
+from winchkit.robot.diagnosis.adjustment import fitted_point, geometry_parameters
+from winchkit.robot.diagnosis.candidates import BALANCING, candidates_at
+from winchkit.robot.diagnosis.dataset import RobotDataset, prepare_poses
 from winchkit.robot.diagnosis.engine import PoseSelection, TrajectorySelection
-from winchkit.robot.diagnosis.prior import GeometryPrior
 from winchkit.robot.diagnosis.registration import Registration, registration_of
-from winchkit.robot.diagnosis.regression import LinearizationPoint, PoseRegression
+from winchkit.robot.diagnosis.regression import PoseRegression
 from winchkit.robot.diagnosis.trajectory_regression import TrajectoryRegression, regression_at
-from winchkit.robot.diagnosis.variance_components import (
-    START,
-    PoseNoise,
-    Stack,
-    noise_of,
-    repeated_differences,
-)
 from winchkit.robot.effects.bind import robot_terms
 from winchkit.robot.geometry.robot import robot_of
+from winchkit.robot.identification.bundle_adjustment import Rows
+from winchkit.robot.identification.parameters import Parameters
+from winchkit.robot.identification.variance_components import (
+    START,
+    PoseNoise,
+    noise_of,
+)
 from winchkit.robot.mistakes.search import refuse_mistakes
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
@@ -55,49 +54,33 @@ def own_effects(terms: Sequence[Term]) -> Hypothesis:
     return Hypothesis(tuple(terms), (), ((),) * len(terms))
 
 
-def fitted_point(
-    dataset: RobotDataset,
-    terms: Sequence[Term],
-    sigma: Mapping[str, float],
-    geometry: Sequence[GeometryPrior] = (),
-) -> tuple[LinearizationPoint, tuple[Term, ...]]:
-    """Geometry, poses and the profile's own effects at their best fit under a given noise.
-
-    ``sigma``: standard deviation per type of measurement, SI.
-    """
-    found = adjusted(dataset, terms, sigma, geometry)
-    instruments = tuple(t for t in found.terms if t.effect.stage is Stage.TRACKER)
-    point = LinearizationPoint(dataset, found.pose, sigma, found.geometry, instruments)
-    return point, found.terms
-
-
 def estimated_noise(
     dataset: RobotDataset,
     terms: Sequence[Term],
-    geometry: Sequence[GeometryPrior],
+    geometry: Parameters,
     candidates: Iterable[Effect],
 ) -> PoseNoise:
-    """Variance components of the measurements beside all candidate effects.
-
-    ``candidates``: effects that may be missing; the noise is estimated beside all of them.
-    """
+    """Variance components of the measurements beside all candidate effects."""
     candidates = tuple(candidates)
     found = PoseNoise(START, {}, from_repeats=False, unexplained=START)
     for _ in range(2):
         point, own = fitted_point(dataset, terms, found.sigma, geometry)
         regression = regression_at(point)
         here = regression.residuals(own)
-        columns = _columns(regression, own, candidates, here)
+        columns, slope = _columns(regression, own, candidates, here), regression.slope
         kinds = [k for k, values in here.items() if np.isfinite(values).any()]
         if dataset.hangs:
             kinds.remove("tension")
-        slope = {k: v for k, v in regression.slope().items() if k in kinds}
-        kept = {k: here[k] for k in kinds}
-        stack = Stack(kept, slope, {k: columns[k] for k in kinds})
-        found = noise_of(stack, repeated_differences(Stack(kept, slope, {}), dataset.pose))
-        found = replace(found, sigma={**START, **found.sigma})
-        if dataset.hangs:
-            found = replace(found, sigma={**found.sigma, "tension": found.sigma["statics"]})
+        found = noise_of(
+            [
+                Rows(k, here[k], slope.get(k, np.zeros((*here[k].shape, 6))), columns[k])
+                for k in kinds
+            ],
+            dataset.pose,
+        )
+        same = "balance" if dataset.hangs else "tension"
+        force = found.sigma.get(same, START[same])
+        found = replace(found, sigma={**START, **found.sigma, "balance": force, "tension": force})
     return found
 
 
@@ -111,7 +94,7 @@ def balanced(dataset: RobotDataset, noise: PoseNoise) -> bool:
     if not dataset.has_tension:
         return True
     spread = float(np.nanstd(dataset.measured.tension))
-    kind = "statics" if dataset.hangs else "tension"
+    kind = "balance" if dataset.hangs else "tension"
     return noise.unexplained.get(kind, 0.0) <= _MOST_IMBALANCE * spread
 
 
@@ -134,7 +117,7 @@ def _columns(
             moved.append(there)
     geometry = regression.change_by_geometry()
     out = {k: [m[k] - v for m in moved] + [m[k] for m in geometry] for k, v in here.items()}
-    for kind in ("swivel", "gauge"):
+    for kind in ("swivel", "cable_length"):
         for i in range(len(regression.dataset.names)):
             column = np.zeros_like(here[kind])
             column[:, i] = 1.0
@@ -145,18 +128,6 @@ def _columns(
     return {k: np.nan_to_num(np.stack(v, axis=-1)) for k, v in out.items()}
 
 
-def _from(
-    prior: Sequence[GeometryPrior], now: Sequence[GeometryPrior]
-) -> tuple[GeometryPrior, ...]:
-    """Priors with their mean at the present values."""
-    there = {(b.term.effect.id, b.parameter): b.value for b in now}
-    out = []
-    for item in prior:
-        value = there.get((item.term.effect.id, item.parameter), 0.0)
-        out.append(replace(item.moved(value / item.std), at=value))
-    return tuple(out)
-
-
 _SHORT_LIST = 3
 """Candidates that are fitted beside a free geometry; computing cost, rule of thumb."""
 _GEOMETRY_LEVEL = 1e-3
@@ -165,33 +136,22 @@ _GEOMETRY_LEVEL = 1e-3
 
 @dataclass(frozen=True)
 class Preparation:
-    """Data, candidates and noise of a robot's identification, for any treatment of its geometry.
-
-    Attributes
-    ----------
-    dataset : RobotDataset
-        Poses of one robot.
-    catalogue : Catalogue
-        Effects.
-    candidates : tuple of Effect
-        Effects at their places that the poses could show.
-    noise : PoseNoise
-        Variance components.
-    prior : tuple of GeometryPrior
-        The geometry with the priors of a calibration.
-    guess : tuple of Term
-        The effect that explains most, beside which a free geometry is fitted.
-    registration : Registration, optional
-        Effects of the tracker in the initial model.
-    """
+    """Data, candidates and noise of a robot's identification, for any treatment of its geometry."""
 
     dataset: RobotDataset
+    """Poses of one robot."""
     catalogue: Catalogue
+    """Effects."""
     candidates: tuple[Effect, ...]
+    """Effects at their places that the poses could show."""
     noise: PoseNoise
-    prior: tuple[GeometryPrior, ...]
+    """Variance components."""
+    prior: Parameters
+    """The geometry with the priors of a calibration."""
     guess: tuple[Term, ...] = ()
+    """The effect that explains most, beside which a free geometry is fitted."""
     registration: Registration | None = None
+    """Effects of the tracker in the initial model."""
 
     @cached_property
     def of_file(self) -> tuple[Term, ...]:
@@ -209,9 +169,7 @@ class Preparation:
         count = len(self.registration.found) if self.registration else 0
         return range(len(self.of_file), len(self.of_file) + count)
 
-    def engine(
-        self, geometry: Sequence[GeometryPrior], beside: tuple[Term, ...] = ()
-    ) -> PoseSelection:
+    def engine(self, geometry: Parameters, beside: tuple[Term, ...] = ()) -> PoseSelection:
         """Selection engine with the given geometry as nuisance parameters."""
         terms = (*self.own, *beside)
         point, terms = fitted_point(self.dataset, terms, self.noise.sigma, geometry)
@@ -223,7 +181,8 @@ class Preparation:
 
     def file_geometry(self, beside: tuple[Term, ...] = ()) -> PoseSelection:
         """Selection engine with the geometry of the file and its calibration's uncertainty."""
-        geometry = priors_of_geometry(self.dataset, self.catalogue, fitted=True)
+        fitted = self.dataset.robot.fitted
+        geometry = geometry_parameters(self.dataset, fitted.std if fitted else {})
         return self.engine(geometry, beside)
 
     def free_geometry(self) -> PoseSelection:
@@ -233,7 +192,10 @@ class Preparation:
     def gain_of_geometry(self, engine: PoseSelection, model: Hypothesis, noise: Noise) -> float:
         """Decrease of χ² by a free geometry, beyond its calibration's uncertainty."""
         point = engine.regression.point
-        free = regression_at(replace(point, geometry=_from(self.prior, point.geometry)))
+        geometry = self.prior.about(point.state.values)
+        free = regression_at(
+            replace(point, equations=replace(point.equations, parameters=geometry))
+        )
         hypothesis = replace(model, nuisances=())
         chi_square = [
             fit(regression, hypothesis, noise.inverse_sigma(regression)).chi_square
@@ -247,7 +209,10 @@ class Preparation:
         F = (Δχ²/k)/1 with k numbers of the geometry and the degrees of freedom of the noise; level
         0.1 %.
         """
-        count, dof = len(self.prior), self.noise.dof.get("cable_length", 1.0)
+        count, dof = (
+            int(np.count_nonzero(self.prior.lasting)),
+            self.noise.dof.get("cable_length", 1.0),
+        )
         return gain / count > float(fdtri(count, max(dof, 1.0), 1 - _GEOMETRY_LEVEL))
 
     def with_guess(self) -> Preparation:
@@ -283,7 +248,7 @@ def prepare_selection(
     own = robot_terms(profile, catalogue, moving=dataset.moves)
     registration = registration_of(dataset, own, catalogue)
     dataset, own = registration.dataset, (*own, *registration.terms)
-    prior = tuple(priors_of_geometry(dataset, catalogue, fitted=False))
+    prior = geometry_parameters(dataset)
     there = {term.effect.id for term in own}
     candidates = tuple(candidates_at(dataset, catalogue))
     absent = tuple(effect for effect in candidates if effect.id not in there)
@@ -301,3 +266,55 @@ def calibrated_on(profile: RobotProfile, runs: Sequence[Run]) -> bool:
     """Whether the geometry was calibrated on some of these runs."""
     known = {Path(name).name for name in profile.fitted.runs} if profile.fitted else set()
     return any(Path(run.path or run.name).name in known for run in runs)
+
+
+_LEAST_ROTATION = np.radians(1.0)
+"""Rotation of the platform below which a note says that it never turned, rad; rule of thumb."""
+_LEAST_POSES = 40
+"""Distinct poses below which a note asks for more; rule of thumb."""
+
+
+def missing_pose_excitation(preparation: Preparation) -> list[str]:
+    """Sentences on missing repeats, tensions, temperatures, rotations, and on few poses."""
+    dataset, measured = preparation.dataset, preparation.dataset.measured
+    notes = []
+    if dataset.moves:
+        notes.append(
+            "a trajectory has no repeats: the noise is what neither geometry nor any known effect "
+            "explains, so an effect outside the catalogue cannot be excluded; record poses at "
+            "rest, some ten of them twice"
+        )
+    elif not preparation.noise.from_repeats:
+        notes.append(
+            "too few poses repeat another: the noise is what neither geometry nor any known effect "
+            "explains, so an effect outside the catalogue cannot be excluded; drive to some ten "
+            "poses twice"
+        )
+    if not dataset.has_tension:
+        notes.append(
+            "no tensions measured: what depends on the cables' force (elasticity, payload, cells) "
+            "cannot be seen; record LINE.tension [N]"
+        )
+    elif not dataset.has_balance:
+        notes.append(
+            "the tensions measured do not carry the platform's weight, whatever it is: payload and "
+            "cells cannot be judged; does something else pull at the platform?"
+        )
+    if not np.isfinite(measured.temperature).all():
+        notes.append("no temperature measured: thermal effects cannot be detected")
+    if not np.isfinite(measured.position).any():
+        notes.append("no position measured: the origin of the platform frame cannot be determined")
+    whole = measured.angles[np.isfinite(measured.angles).all(axis=1)]
+    if len(whole):
+        turned = rotation_vector(rotation_of(*whole.T) @ rotation_of(*whole[0]).T)
+        if float(np.max(np.linalg.norm(turned, axis=1))) < _LEAST_ROTATION:
+            notes.append(
+                "the platform never turned: exit and anchor points cannot be distinguished; "
+                "turn it between poses"
+            )
+    distinct = int(dataset.pose.max()) + 1
+    if distinct < _LEAST_POSES:
+        notes.append(
+            f"{distinct} distinct poses only; ninety, widely spread, are much more informative"
+        )
+    return notes

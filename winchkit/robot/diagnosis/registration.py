@@ -19,7 +19,7 @@ from winchkit.arrays import Array
 from winchkit.effects.catalogue import Catalogue
 from winchkit.effects.term import Term
 from winchkit.model.rotation import rotation_by, rotation_vector
-from winchkit.robot.diagnosis.data.dataset import RobotDataset
+from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.geometry.constraints import rotation_residual
 from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose
@@ -57,22 +57,15 @@ _SUBSETS: tuple[frozenset[str], ...] = (
 
 @dataclass(frozen=True)
 class Registration:
-    """Effects of the tracker that the initial model has beside those of the robot's file.
-
-    Attributes
-    ----------
-    dataset : RobotDataset
-        With a robot whose angles are declared those of an IMU where they do not turn with the
-        tracker's frame.
-    found : tuple of Term
-        Effects that the file does not declare, to be reported.
-    declared : tuple of Term
-        Effects whose numbers the file declares unknown.
-    """
+    """Effects of the tracker that the initial model has beside those of the robot's file."""
 
     dataset: RobotDataset
+    """With a robot whose angles are declared those of an IMU where they do not turn with the
+    tracker's frame."""
     found: tuple[Term, ...] = ()
+    """Effects that the file does not declare, to be reported."""
     declared: tuple[Term, ...] = ()
+    """Effects whose numbers the file declares unknown."""
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -83,10 +76,7 @@ class Registration:
 def registration_of(
     dataset: RobotDataset, own: tuple[Term, ...], catalogue: Catalogue
 ) -> Registration:
-    """Register readings that are far off, and numbers that are declared unknown.
-
-    Returns: without effects where positions were not measured or the robot's numbers suffice.
-    """
+    """Register readings that are far off, and numbers that are declared unknown."""
     measured, names = dataset.measured, {term.effect.id for term in own}
     if not np.isfinite(measured.position).all(axis=1).any():
         return Registration(dataset)

@@ -9,7 +9,7 @@ the prior adds rows, five copies of each that are distributed over the folds.
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -23,17 +23,15 @@ from winchkit.diagnosis.regression.hypothesis import Hypothesis
 from winchkit.effects.effect import Effect
 from winchkit.effects.term import Term
 from winchkit.model.stages import At, Stage
-from winchkit.robot.diagnosis.adjustment import STD_OF_ZERO, instrument_zeros
+from winchkit.robot.diagnosis.adjustment import LinearizationPoint
 from winchkit.robot.diagnosis.candidates import lacking, lacking_parts
-from winchkit.robot.diagnosis.data.dataset import LEAST_POSES, RobotDataset
-from winchkit.robot.diagnosis.equations import POSED, Equations
-from winchkit.robot.diagnosis.prior import GeometryPrior, profile_with_geometry
-from winchkit.robot.effects.term import robot_with_terms
-from winchkit.robot.geometry.constraints import mean_offset
-from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.diagnosis.dataset import LEAST_POSES, RobotDataset
+from winchkit.robot.forces.balance import force_basis
+from winchkit.robot.geometry.constraints import ZERO_STD, mean_offset
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import Tracker
-from winchkit.schema.profiles.robot import RobotProfile
+from winchkit.robot.identification.bundle_adjustment import State
+from winchkit.robot.identification.equations import KINDS, READING_OF
 
 COPIES = 5
 """Rows per number with a prior, distributed over the folds."""
@@ -45,40 +43,6 @@ _LEAST_SINGULAR_VALUE = 1e-9
 """Singular values of a pose's derivatives below this share of the largest are zero; numerical."""
 
 
-@dataclass(frozen=True)
-class LinearizationPoint:
-    """Values at which a pose regression is linearised.
-
-    Attributes
-    ----------
-    dataset : RobotDataset
-        Poses of one robot.
-    pose : Pose
-        Estimated pose of the platform in every row.
-    sigma : mapping of str to float
-        Standard deviation per type of measurement, SI.
-    geometry : tuple of GeometryPrior
-        Numbers of the geometry that are nuisance parameters.
-    instruments : tuple of Term
-        Effects of the tracker at which the derivatives by the pose are taken.
-    """
-
-    dataset: RobotDataset
-    pose: Pose
-    sigma: Mapping[str, float]
-    geometry: tuple[GeometryPrior, ...] = ()
-    instruments: tuple[Term, ...] = ()
-
-    @cached_property
-    def profile(self) -> RobotProfile:
-        """Robot profile with the geometry at its present values."""
-        return profile_with_geometry(self.dataset.robot, self.geometry)
-
-    def robot(self, terms: Sequence[Term] = ()) -> Robot:
-        """Robot model with effects, at the present geometry."""
-        return robot_with_terms(self.profile, terms)
-
-
 class PoseRegression(Regression):
     """Regression of a robot's poses on the effects of a hypothesis."""
 
@@ -87,13 +51,16 @@ class PoseRegression(Regression):
         self.dataset: RobotDataset = point.dataset
         self.robot = point.robot()
         self._at_slope = point.robot(point.instruments) if point.instruments else self.robot
-        self.equations = Equations(point.dataset, point.pose, self.robot)
-        self._start = self.equations.residuals(self.robot)
-        self._zeros = instrument_zeros(self._start, self.dataset)
-        self._posed = [k for k in POSED if np.isfinite(self._start[k]).any()]
+        self.equations = point.equations
+        self._start: dict[str, Array] = {}
+        self._start = self._residuals(point.state, self.robot)
+        self._zeros = self._mean_zeros()
+        self.posed = [k for k in KINDS if k in self._start and np.isfinite(self._start[k]).any()]
         self._project()
-        prior = [-(b.value - b.at) / b.std for b in point.geometry]
-        self._prior = np.tile(np.array(prior) / np.sqrt(COPIES), COPIES)
+        free = [number.index for number in point.geometry]
+        parameters = self.equations.parameters
+        prior = (parameters.nominal - point.state.values)[free] / parameters.std[free]
+        self._prior = np.tile(prior / np.sqrt(COPIES), COPIES)
         self._number_rows()
         self._here = self._rows_of(self._start)
         self.nominal_residual = self._beside(self._here, self._prior)
@@ -141,7 +108,7 @@ class PoseRegression(Regression):
     @property
     def nuisance_names(self) -> tuple[str, ...]:
         """Zero offsets of instruments, then numbers of the geometry in units of their prior."""
-        geometry = [f"{item.term.effect.id}.{item.parameter}" for item in self.point.geometry]
+        geometry = [f"{number.effect}.{number.parameter}" for number in self.point.geometry]
         zeros = self.nuisance_columns.shape[1] - len(geometry)
         return (*(f"instrument zero {index + 1}" for index in range(zeros)), *geometry)
 
@@ -240,46 +207,79 @@ class PoseRegression(Regression):
 
     def residuals(self, terms: Sequence[Term]) -> dict[str, Array]:
         """Model minus measurement by type of equation, zero offsets removed, SI."""
-        return self.residuals_at(self.point, terms)
+        return self._zeroed(self._residuals(self.point.state, self.point.robot(terms)))
 
-    def residuals_at(self, point: LinearizationPoint, terms: Sequence[Term]) -> dict[str, Array]:
-        """The same at another linearisation point."""
-        found = self.equations.residuals(point.robot(terms))
-        return {kind: self._zeroed(kind, values) for kind, values in found.items()}
+    def _zeroed(self, residuals: dict[str, Array]) -> dict[str, Array]:
+        return residuals | {kind: residuals[kind] + zero for kind, zero in self._zeros.items()}
+
+    def _residuals(self, state: State, robot: Robot) -> dict[str, Array]:
+        """Residuals by kind, with the tensions in one basis for all hypotheses."""
+        kinds = KINDS if self.dataset.hangs else tuple(READING_OF)
+        if self._start and robot.tracker is None and self.robot.tracker is None:
+            # Poses and their readings are the same.
+            kinds = tuple(kind for kind in kinds if kind not in ("position", "rotation"))
+        whiten = self._force_basis[0] if self.dataset.has_balance else None
+        return self._start | self.equations.residuals(state, robot, kinds, whiten)
+
+    @cached_property
+    def _force_basis(self) -> tuple[Array, Array]:
+        to_forces, to_cables = force_basis(self.robot.structure(self.point.pose))
+        if self.dataset.moves:
+            turn = continuous(to_cables)
+            return np.swapaxes(turn, 1, 2) @ to_forces, to_cables @ turn
+        return to_forces, to_cables
+
+    @property
+    def to_cables(self) -> Array:
+        """From whitened forces to the least change of cable forces, (p, n, k)."""
+        return self._force_basis[1]
 
     def at(self, hypothesis: Hypothesis) -> dict[str, Array]:
         """Residuals of a hypothesis with the geometry moved by its nuisance parameters, SI."""
-        geometry = self.point.geometry
-        first = self.nuisance_columns.shape[1] - len(geometry)
-        by = hypothesis.nuisances[first:] or (0.0,) * len(geometry)
-        moved = tuple(b.moved(x) for b, x in zip(geometry, by, strict=True))
-        found = self.residuals_at(replace(self.point, geometry=moved), hypothesis.terms)
+        free = [number.index for number in self.point.geometry]
+        first = self.nuisance_columns.shape[1] - len(free)
+        values = self.point.state.values.copy()
+        if hypothesis.nuisances:
+            moved_by = np.array(hypothesis.nuisances[first:])
+            values[free] += moved_by * self.equations.parameters.std[free]
+        moved = replace(self.point, state=State(values, self.point.pose))
+        found = self._residuals(moved.state, moved.robot(hypothesis.terms))
+        found = self._zeroed(found)
         for kind in self._zeros:
             # A zero is the mean reading beyond the model; the fit's own differs by its noise.
             found[kind] = found[kind] + mean_offset(found[kind], angles=kind == "swivel")
         return found
 
+    def _mean_zeros(self) -> dict[str, Array]:
+        """Mean readings of swivels and length instruments with an unknown zero, (n,) by kind."""
+        block = self.equations.parameters.block
+        unknown = {"swivel": "swivel_zero", "cable_length": "length_offset"}
+        return {
+            kind: mean_offset(self._start[kind], angles=kind == "swivel")
+            for kind, name in unknown.items()
+            if name in block
+        }
+
     def in_time(self, rows: Array) -> list[Array]:
         """Rows of each segment: poses have no time."""
         return [rows[s.rows] for s in self.segments]
 
+    @cached_property
     def slope(self) -> dict[str, Array]:
-        """Derivatives of the residuals by the pose."""
-        return self.equations.by_pose(self._at_slope)
+        """Derivatives of the residuals by the pose, (p, k, 6), by kind that was measured."""
+        found = self.equations.constraints(self.point.state, self._at_slope)
+        return {kind: constraint.by_pose for kind, constraint in found}
 
     @property
     def tracker(self) -> Tracker | None:
         """Tracker at which the derivatives by the pose are taken."""
         return self._at_slope.tracker
 
-    def _zeroed(self, kind: str, values: Array) -> Array:
-        return values + self._zeros[kind] if kind in self._zeros else values
-
     def _project(self) -> None:
         """Orthonormal basis of the complement of the pose's derivatives, per pose."""
-        sigma, by = self.point.sigma, self.slope()
-        known = np.concatenate([np.isfinite(self._start[k]) for k in self._posed], axis=1)
-        slope = np.concatenate([by[k] / sigma[k] for k in self._posed], axis=1)
+        sigma, by = self.point.sigma, self.slope
+        known = np.concatenate([np.isfinite(self._start[k]) for k in self.posed], axis=1)
+        slope = np.concatenate([by[k] / sigma[k] for k in self.posed], axis=1)
         slope = np.where(known[..., None], slope, 0.0)
         # Unmeasured coordinates get directions of their own, which are left out.
         left, size, _ = np.linalg.svd(slope, full_matrices=True)
@@ -302,7 +302,7 @@ class PoseRegression(Regression):
     def _projected(self, residuals: Mapping[str, Array]) -> dict[str, Array]:
         """Measured minus predicted, whitened and projected, (p, k) by output."""
         sigma = self.point.sigma
-        white = np.concatenate([residuals[k] / sigma[k] for k in self._posed], axis=1)
+        white = np.concatenate([residuals[k] / sigma[k] for k in self.posed], axis=1)
         white = np.where(np.isfinite(white), white, 0.0)
         out = {"cable_length": -(np.swapaxes(self._basis, 1, 2) @ white[..., None])[..., 0]}
         if "tension" in self._keep:
@@ -340,7 +340,7 @@ class PoseRegression(Regression):
         for kind in self._zeros:
             for i in range(len(self.dataset.names)):
                 moved = {k: np.zeros_like(v) for k, v in self._start.items()}
-                moved[kind][:, i] = STD_OF_ZERO[kind]
+                moved[kind][:, i] = ZERO_STD[kind]
                 column = -self._rows_of(moved)
                 if np.any(column):
                     columns.append(self._beside(column, np.zeros_like(self._prior)))
@@ -357,9 +357,23 @@ class PoseRegression(Regression):
         Linear in the number; its influence on the forces is neglected and updated with the
         linearisation point.
         """
-        by = self.equations.by_geometry(self.robot, self.point.geometry)
         nothing = {kind: np.zeros_like(values) for kind, values in self._start.items()}
+        by_values = {
+            rows.kind: rows.by_values * self.equations.parameters.std
+            for rows in self.equations.rows(self.point.state)
+            if rows.by_values is not None and rows.kind in nothing
+        }
         return [
-            nothing | {kind: part[..., index] * item.std for kind, part in by.items()}
-            for index, item in enumerate(self.point.geometry)
+            nothing | {kind: part[..., number.index] for kind, part in by_values.items()}
+            for number in self.point.geometry
         ]
+
+
+def continuous(basis: Array) -> Array:
+    """Rotations (p, k, k) of the columns of orthonormal bases that make them continuous in time.
+
+    Each basis (p, m, k) is turned within its subspace to be nearest to that of the middle sample
+    (orthogonal Procrustes problem), so that the rows of a trajectory have a spectrum.
+    """
+    left, _, right = np.linalg.svd(np.swapaxes(basis, 1, 2) @ basis[len(basis) // 2])
+    return np.asarray(left @ right)

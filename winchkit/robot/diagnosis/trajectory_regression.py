@@ -20,9 +20,9 @@ from scipy.fft import dct
 from winchkit.arrays import Array
 from winchkit.diagnosis.data.spectrum import Band, band_edges, to_time
 from winchkit.diagnosis.regression.base import Folds, Regression, Segment
-from winchkit.robot.diagnosis.data.trajectory import Trajectory
-from winchkit.robot.diagnosis.equations import continuous
-from winchkit.robot.diagnosis.regression import COPIES, LinearizationPoint, PoseRegression
+from winchkit.robot.diagnosis.adjustment import LinearizationPoint
+from winchkit.robot.diagnosis.regression import COPIES, PoseRegression, continuous
+from winchkit.robot.identification.trajectory import Trajectory
 
 _BLOCKS = 24
 """Blocks of time for the rank test and the jackknife; as for poses."""

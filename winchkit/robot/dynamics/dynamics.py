@@ -114,10 +114,7 @@ def motion_of(time: Array, pose: Pose) -> PlatformMotion:
 
 
 def mass_matrix(platform: PlatformSpec, rotation: Array) -> Array:
-    """Mass matrix M of the platform about its origin, base axes, (k, 6, 6).
-
-    ``rotation`` (k, 3, 3): from platform to base axes. Returns (k, 6, 6): kg, kg m and kg m².
-    """
+    """Mass matrix M of the platform about its origin, base axes, (k, 6, 6)."""
     lever = skew(rotation @ np.asarray(platform.center_of_mass, dtype=float))
     mass = platform.mass
     out = np.zeros((len(rotation), 6, 6))

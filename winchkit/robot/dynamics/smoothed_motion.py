@@ -30,10 +30,7 @@ class SmoothedMotion(NamedTuple):
 
 
 def smoothed_motion(spline: SmoothingSpline, pose: Pose) -> SmoothedMotion:
-    """Smooth sampled poses and differentiate them twice.
-
-    ``pose``: k poses. Returns: of k samples.
-    """
+    """Smooth sampled poses and differentiate them twice."""
     start = pose.rotation[0]
     raw = np.hstack([pose.position, rotation_vector(pose.rotation @ start.T)])
 

@@ -84,10 +84,7 @@ def declared_terms(profile: RobotProfile, catalogue: Catalogue) -> list[Term]:
 
 
 def check_robot(profile: RobotProfile, catalogue: Catalogue | None = None) -> list[Fault]:
-    """Every fault of the effects that a robot declares itself.
-
-    ``catalogue``: by default all. Returns: faults with the lines of the file.
-    """
+    """Every fault of the effects that a robot declares itself."""
     return _bind(profile, catalogue or load_catalogue())[1]
 
 

@@ -65,10 +65,7 @@ def holds_of(angle: Array) -> list[slice] | None:
 
 
 def is_log(angle: Array) -> bool:
-    """Whether rows are samples of a motion, whose noise is far below its spread.
-
-    ``angle`` (p, n): motor angles of n lines in the order of time, rad; NaN where missing.
-    """
+    """Whether rows are samples of a motion, whose noise is far below its spread."""
     return _tolerance(angle) is not None
 
 
@@ -126,10 +123,7 @@ def _stretches(angle: Array, tolerance: Array) -> list[slice]:
 
 
 def averaged(values: Array, holds: list[slice], *, angles: bool = False) -> Array:
-    """Means over holds of what was measured, (h, …); NaN where nothing was.
-
-    ``values`` (p, ...): NaN where missing.
-    """
+    """Means over holds of what was measured, (h, …); NaN where nothing was."""
     out = np.full((len(holds), *values.shape[1:]), np.nan)
     for number, rows in enumerate(holds):
         own = values[rows]

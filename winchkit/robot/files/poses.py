@@ -222,10 +222,7 @@ def _stands_still(measured: Measured, profile: RobotProfile) -> bool:
 
 
 def joined(parts: Sequence[Measured]) -> Measured:
-    """Concatenated poses of several parts.
-
-    Returns: all poses in order.
-    """
+    """Concatenated poses of several parts."""
     arrays: dict[str, Any] = {
         name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS
     }

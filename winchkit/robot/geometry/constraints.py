@@ -101,11 +101,7 @@ class Winding:
     """Groove pitch over 2π, (n,), m/rad."""
 
     def wound(self, radius: Array, growth: Array | float) -> Array:
-        """Cable wound in since home, (p, n), m.
-
-        ``radius`` (n,): winding radii, m. ``growth`` (n,): growth of the winding radius per turn,
-        m.
-        """
+        """Cable wound in since home, (p, n), m."""
         return np.hypot(radius, self.lead) * self.turned + growth * self.gain + self.rest
 
     def by_radius(self, radius: Array) -> Array:
@@ -129,11 +125,7 @@ class Strain:
 
 
 def winding_of(winches: Sequence[WinchProfile], motor_angle: Array) -> Winding:
-    """Separate the winding laws of a robot's drums into the terms of :class:`Winding`.
-
-    ``motor_angle`` (p, n): motor angles, rad. Returns: exact for any winding radius and growth of
-    the same law.
-    """
+    """Separate the winding laws of a robot's drums into the terms of :class:`Winding`."""
     turned, gain, rest = (np.zeros_like(motor_angle) for _ in range(3))
     lead = np.zeros(len(winches))
     for i, winch in enumerate(winches):
@@ -159,12 +151,7 @@ def winding_of(winches: Sequence[WinchProfile], motor_angle: Array) -> Winding:
 def closure_residual(
     length: Array, by_drum: Array, strain: Array | float = 0.0, dead_length: Array | float = 0.0
 ) -> Array:
-    """Residuals of the closure equations.
-
-    ``length`` (p, n): geometric lengths, m. ``by_drum`` (p, n): unstrained lengths by the drums, m;
-    strained ones where ``strain`` is left at zero. ``strain`` (p, n). ``dead_length`` (n,):
-    stressed cable between drum and exit point, m. Returns (p, n): m.
-    """
+    """Residuals of the closure equations."""
     return np.asarray(length - strain * (length + dead_length) - by_drum)
 
 
@@ -191,22 +178,6 @@ def closure(
     at_home = sensitivities(geometry, home.position, home.rotation)
     taken = 0.0 if strain is None else strain.value
     slack = np.asarray(1 - taken + np.zeros_like(length))
-    by_line, by_robot = closure_by_geometry(by, at_home, winding, radius, slack)
-    if strain is not None:
-        stressed = (length + dead_length)[..., None]
-        by_robot |= {name: -part * stressed for name, part in strain.by_robot.items()}
-    residual = closure_residual(length, by_drum, taken, dead_length)
-    return Constraint(residual, by_pose(by) * slack[..., None], by_line, by_robot)
-
-
-def closure_by_geometry(
-    by: Sensitivities, at_home: Sensitivities, winding: Winding, radius: Array, slack: Array
-) -> tuple[dict[str, Array], dict[str, Array]]:
-    """Derivatives of the closure equations by the numbers of each line and by those of all lines.
-
-    ``by``, ``at_home``: of the geometric lengths at the p poses and at the home pose. ``radius``
-    (n,): winding radii, m. ``slack`` (p, n).
-    """
     by_line = {
         "exit_point": by.exit_point * slack[..., None] - at_home.exit_point,
         "anchor_point": by.anchor_point * slack[..., None] - at_home.anchor_point,
@@ -214,37 +185,31 @@ def closure_by_geometry(
         "winding_radius": winding.by_radius(radius),
         "home_length": np.full_like(slack, -1.0),
     }
-    return by_line, {"layer_growth": winding.gain[..., None]}
+    by_robot = {"layer_growth": winding.gain[..., None]}
+    if strain is not None:
+        stressed = (length + dead_length)[..., None]
+        by_robot |= {name: -part * stressed for name, part in strain.by_robot.items()}
+    residual = closure_residual(length, by_drum, taken, dead_length)
+    return Constraint(residual, by_pose(by) * slack[..., None], by_line, by_robot)
 
 
 def position(pose: Pose, measured: Array) -> Constraint:
-    """Position of the platform less the measured one, (p, 3), m.
-
-    ``pose``: the p poses. ``measured`` (p, 3): measured positions, m; NaN where missing. Returns:
-    with residuals (p, 3), m.
-    """
+    """Position of the platform less the measured one, (p, 3), m."""
     by = np.zeros((len(measured), 3, 6))
     by[:, range(3), range(3)] = 1.0
     return Constraint(pose.position - measured, by)
 
 
 def rotation(pose: Pose, angles: Array) -> Constraint:
-    """Rotation of the platform less the measured one, (p, 3), rad.
-
-    ``pose``: the p poses. ``angles`` (p, 3): measured roll, pitch and yaw, rad; NaN where one was
-    not measured.
-    """
-    return Constraint(
-        rotation_residual(pose.rotation, angles), rotation_by_pose(pose.rotation, angles)
-    )
+    """Rotation of the platform less the measured one, (p, 3), rad."""
+    by = np.zeros((len(angles), 3, 6))
+    by[..., 3:] = angle_rates(pose.rotation)
+    by[np.all(np.isfinite(angles), axis=1), :, 3:] = np.eye(3)
+    return Constraint(rotation_residual(pose.rotation, angles), by)
 
 
 def rotation_residual(turned: Array, angles: Array) -> Array:
-    """Rotation vector where all three angles were measured, else angle by angle; (p, 3), rad.
-
-    ``turned`` (p, 3, 3): rotations R. ``angles`` (p, 3): measured roll, pitch and yaw, rad; NaN
-    where missing. Returns (p, 3): rad.
-    """
+    """Rotation vector where all three angles were measured, else angle by angle; (p, 3), rad."""
     whole = np.all(np.isfinite(angles), axis=1)
     out = wrapped(angles_of(turned) - angles)
     seen = np.swapaxes(rotation_of(*angles[whole].T), 1, 2)
@@ -252,38 +217,17 @@ def rotation_residual(turned: Array, angles: Array) -> Array:
     return out
 
 
-def rotation_by_pose(turned: Array, angles: Array) -> Array:
-    """Derivative of :func:`rotation_residual` by position and rotation vector, (p, 3, 6).
-
-    ``turned`` (p, 3, 3): rotations R. ``angles`` (p, 3): measured roll, pitch and yaw, rad; NaN
-    where missing. Returns: (p, 3, 6).
-    """
-    out = np.zeros((len(turned), 3, 6))
-    out[..., 3:] = angle_rates(turned)
-    out[np.all(np.isfinite(angles), axis=1), :, 3:] = np.eye(3)
-    return out
-
-
 def swivel_residual(
     geometry: Geometry, pose: Pose, measured: Array, zero: Array | float = 0.0
 ) -> Array:
-    """Angles of the swivel pulleys plus their instruments' zeros less readings, (p, n), rad.
-
-    ``geometry``: geometry of n lines. ``pose``: the p poses. ``measured`` (p, n): readings, rad;
-    NaN where missing. ``zero`` (n,): zeros of the instruments, rad. Returns (p, n): rad, within ±π.
-    """
+    """Angles of the swivel pulleys plus their instruments' zeros less readings, (p, n), rad."""
     return wrapped(swivel_angle(geometry, pose.position, pose.rotation) + zero - measured)
 
 
 def swivel(
     geometry: Geometry, pose: Pose, measured: Array, zero: Array | float = 0.0
 ) -> Constraint:
-    """:func:`swivel_residual` with derivatives by pose, geometry and ``swivel_zero``.
-
-    ``geometry``: geometry of n lines. ``pose``: the p poses. ``measured`` (p, n): readings, rad;
-    NaN where missing. ``zero`` (n,): zeros of the instruments, rad. Returns: with residuals (p, n),
-    rad.
-    """
+    """:func:`swivel_residual` with derivatives by pose, geometry and ``swivel_zero``."""
     by = swivel_sensitivities(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "swivel_zero": np.ones_like(measured)}
     return Constraint(swivel_residual(geometry, pose, measured, zero), by_pose(by), by_line)
@@ -295,10 +239,6 @@ def cable_length(
     """Geometric lengths plus offsets of their instruments less readings, (p, n), m.
 
     ``by_line`` has the geometry and ``length_offset``.
-
-    ``geometry``: geometry of n lines. ``pose``: the p poses. ``measured`` (p, n): readings, m; NaN
-    where missing. ``offset`` (n,): offsets of the instruments, m. Returns: with residuals (p, n),
-    m.
     """
     length, by = linearised(geometry, pose.position, pose.rotation)
     by_line = {**by_geometry(by), "length_offset": np.ones_like(measured)}
@@ -319,10 +259,7 @@ def mean_offset(residual: Array, *, angles: bool) -> Array:
 
 
 def by_pose(by: Sensitivities) -> Array:
-    """Derivatives by position and rotation vector beside each other, (p, n, 6).
-
-    ``by``: derivatives of a quantity per line. Returns: (p, n, 6).
-    """
+    """Derivatives by position and rotation vector beside each other, (p, n, 6)."""
     return np.concatenate([by.position, by.rotation], axis=-1)
 
 
@@ -332,11 +269,7 @@ def wrapped(angle: Array) -> Array:
 
 
 def by_geometry(by: Sensitivities) -> dict[str, Array]:
-    """Derivatives by each line's own points and swivel radius, by name.
-
-    ``by``: derivatives of a quantity per line. Returns: arrays by ``exit_point``, ``anchor_point``
-    and ``swivel_radius``.
-    """
+    """Derivatives by each line's own points and swivel radius, by name."""
     return {
         "exit_point": by.exit_point,
         "anchor_point": by.anchor_point,

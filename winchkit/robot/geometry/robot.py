@@ -312,10 +312,7 @@ def standing(
     tension: Array | None = None,
     temperature: Array | None = None,
 ) -> At:
-    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default.
-
-    ``motor_angle`` (n,): rad. ``tension`` (n,): N. ``temperature`` (n,).
-    """
+    """Samples of a line at rest, (n,); no tension and 20 degrees Celsius by default."""
     zero = np.zeros_like(motor_angle)
     pulled = zero if tension is None else tension
     warm = zero + 20.0 if temperature is None else temperature

@@ -176,11 +176,7 @@ def tracked_position(tracker: Tracker, pose: Pose, measured: Array) -> Constrain
 
 
 def tracked_rotation(tracker: Tracker, pose: Pose, angles: Array) -> Constraint:
-    """Rotation that the instrument should show less the measured one, (p, 3), rad.
-
-    ``pose``: the p poses. ``angles`` (p, 3): measured roll, pitch and yaw, rad; NaN where one was
-    not measured. Returns: ``by_robot`` has ``tracker_frame`` and ``mounting``.
-    """
+    """Rotation that the instrument should show less the measured one, (p, 3), rad."""
     turned = np.broadcast_to(rotation_by(tracker.turn), pose.rotation.shape)
     shown = _shown_rotation(tracker, pose, turned)
     whole = np.all(np.isfinite(angles), axis=1)

@@ -32,11 +32,7 @@ def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
 
 
 def weight_by_payload(platform: PlatformSpec, rotation: Array) -> Array:
-    """Derivatives of :func:`gravity_wrench` by mass and centre of mass, (p, 6, 4).
-
-    ``rotation`` (p, 3, 3): from platform to base axes. Returns (p, 6, 4): by mass, 1/kg, and centre
-    of mass, 1/m.
-    """
+    """Derivatives of :func:`gravity_wrench` by mass and centre of mass, (p, 6, 4)."""
     out = np.zeros((len(rotation), 6, 4))
     out[..., 0] = gravity_wrench(PlatformSpec(1.0, platform.center_of_mass), rotation)
     for k in range(3):

@@ -1,6 +1,7 @@
 """Identification of a cable robot: poses and parameters from measured lengths and poses.
 
-Shared by ``winchkit calibrate`` and ``winchkit diagnose``: the bundle adjustment of poses and
-parameters, the second derivatives of the cable lengths, the design of further poses, the estimated
-poses, the instrument that measures them, and the variance components of the readings.
+A robot as a function of its ``parameters`` (with those of ``instruments``, and effects), the
+``equations`` of its poses, their ``bundle_adjustment``, the ``variance_components`` of the readings
+and the design of further poses. A calibration fits geometry, winches and instruments; a diagnosis
+has effects for further parameters.
 """

@@ -20,7 +20,7 @@ B. Triggs et al., *Bundle Adjustment – A Modern Synthesis*, 2000. P. J. Huber,
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -237,8 +237,32 @@ def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
     zero.
     """
     scale = equations.parameters.std
+    stack = stacked(equations.rows(state), weights, scale)
+    prior = np.divide(
+        state.values - equations.parameters.nominal,
+        scale,
+        out=np.zeros_like(scale),
+        where=scale > 0,
+    )
+    loss = stack.residual**2
+    if weights.robust:
+        size = np.abs(stack.residual)
+        loss = np.where(size > HUBER, 2 * HUBER * size - HUBER**2, loss)
+        root = np.sqrt(HUBER / np.maximum(size, HUBER))
+        stack = replace(
+            stack,
+            residual=stack.residual * root,
+            by_pose=stack.by_pose * root[..., None],
+            by_values=stack.by_values * root[..., None],
+        )
+    cost = 0.5 * (float(np.sum(loss)) + float(prior @ prior))
+    return _reduced(cost, prior, stack)
+
+
+def stacked(equations: Iterable[Rows], weights: Weights, scale: Array) -> Stack:
+    """Equations of all kinds beside each other, whitened, by parameters in units of ``scale``."""
     kinds, parts, at = {}, [], 0
-    for rows in equations.rows(state):
+    for rows in equations:
         kinds[rows.kind] = slice(at, at + rows.residual.shape[1])
         at += rows.residual.shape[1]
         parts.append((rows, 1 / weights.sigma[rows.kind]))
@@ -252,21 +276,7 @@ def linearise(equations: Equations, state: State, weights: Weights) -> Linear:
     known &= np.all(np.isfinite(by_values), axis=2)
     if not np.all(known):
         residual[~known], by_pose[~known], by_values[~known] = 0.0, 0.0, 0.0
-    prior = np.divide(
-        state.values - equations.parameters.nominal,
-        scale,
-        out=np.zeros_like(scale),
-        where=scale > 0,
-    )
-    loss = residual**2
-    if weights.robust:
-        size = np.abs(residual)
-        loss = np.where(size > HUBER, 2 * HUBER * size - HUBER**2, loss)
-        root = np.sqrt(HUBER / np.maximum(size, HUBER))
-        residual, by_pose = residual * root, by_pose * root[..., None]
-        by_values = by_values * root[..., None]
-    cost = 0.5 * (float(np.sum(loss)) + float(prior @ prior))
-    return _reduced(cost, prior, Stack(kinds, known, residual, by_pose, by_values))
+    return Stack(kinds, known, residual, by_pose, by_values)
 
 
 def _reduced(cost: float, prior: Array, stack: Stack, damping: float = 0.0) -> Linear:

@@ -13,12 +13,14 @@ with the largest gain is added, then the next.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.model.rotation import rotation_of
+from winchkit.model.rotation import angles_of, rotation_of
+from winchkit.robot.files.poses import Measured
 from winchkit.robot.forces.force_distribution import ForceLimits, wrench_feasibility
 from winchkit.robot.geometry.kinematics import (
     PLATFORM_DOF,
@@ -26,7 +28,9 @@ from winchkit.robot.geometry.kinematics import (
     Pose,
     lengths,
     structure_matrix,
+    swivel_angle,
 )
+from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.wrench import gravity_wrench
 from winchkit.schema.profiles.robot import PlatformSpec
 
@@ -48,10 +52,7 @@ def middle_and_half(values: Array) -> Box:
 
 
 def in_box(box: Box, count: int, rng: np.random.Generator) -> Array:
-    """Points evenly distributed in a box, (count, 3).
-
-    Returns: (count, 3).
-    """
+    """Points evenly distributed in a box, (count, 3)."""
     middle, half = box
     return np.asarray(middle + half * rng.uniform(-1, 1, (count, 3)))
 
@@ -60,9 +61,6 @@ def random_poses(geometry: Geometry, position: Array, angles: Array) -> Pose:
     """Poses of positions (c, 3), m, and angles (c, 3), rad, without those that have no lengths.
 
     A pose has no lengths where an anchor point lies inside a swivel pulley.
-
-    ``geometry``: geometry of n lines. ``position`` (c, 3): m. ``angles`` (c, 3): roll, pitch and
-    yaw, rad. Returns: at most c poses.
     """
     rotation = rotation_of(*angles.T)
     sound = np.all(np.isfinite(lengths(geometry, position, rotation)), axis=1)
@@ -73,14 +71,37 @@ def is_held(geometry: Geometry, platform: PlatformSpec, pose: Pose) -> NDArray[n
     """Whether cables that only pull balance the platform's weight at poses, (p,).
 
     True for robots of fewer than six cables, whose platform hangs.
-
-    ``geometry``: geometry of n lines. ``pose``: the p poses. Returns: (p,) of bool.
     """
     if len(geometry.exit_point) < PLATFORM_DOF:
         return np.ones(len(pose.position), dtype=bool)
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     pairs = zip(structure, gravity_wrench(platform, pose.rotation), strict=True)
     return np.array([wrench_feasibility(a, w, _PULLING).margin > 0 for a, w in pairs], dtype=bool)
+
+
+def simulated(
+    measured: Measured, robot: Robot, pose: Pose, tension: Array, temperature: Array | float = 20.0
+) -> Measured:
+    """Measurements at poses without noise; NaN where nothing was measured so far."""
+    many = len(pose.position)
+
+    def where_known(values: Array, there: Array | float) -> Array:
+        known = np.isfinite(values).any(axis=0)
+        return np.where(known, np.broadcast_to(there, (many, values.shape[1])), np.nan)
+
+    swivel = swivel_angle(robot.geometry, pose.position, pose.rotation)
+    return replace(
+        measured,
+        motor_angle=robot.motor_angles(pose, tension=tension),
+        position=where_known(measured.position, pose.position),
+        angles=where_known(measured.angles, angles_of(pose.rotation)),
+        swivel=where_known(measured.swivel, swivel),
+        cable_length=where_known(measured.cable_length, robot.lengths(pose)),
+        tension=where_known(measured.tension, tension),
+        temperature=where_known(measured.temperature, temperature),
+        run=np.zeros(many, dtype=np.intp),
+        place=np.full(many, "proposed"),
+    )
 
 
 def pose_information(rows: Array, pose_of_row: NDArray[np.intp], count: int) -> Array:
@@ -97,21 +118,13 @@ def pose_information(rows: Array, pose_of_row: NDArray[np.intp], count: int) -> 
 
 
 def determinant_gain(parts: Array, information: Array) -> Array:
-    """Gain ln det(1 + X M⁻¹ Xᵀ) of each pose.
-
-    ``parts`` (c, r, q): whitened rows X of each candidate. ``information`` (q, q): M, positive
-    definite. Returns: (c,).
-    """
+    """Gain ln det(1 + X M⁻¹ Xᵀ) of each pose."""
     inner = parts @ np.linalg.inv(information) @ np.swapaxes(parts, 1, 2)
     return np.asarray(np.linalg.slogdet(np.eye(inner.shape[1]) + inner)[1])
 
 
 def noncentrality(information: Array) -> Array:
-    """Noncentrality λ of the first column where all other columns may take any size.
-
-    ``information`` (..., k, k): of whitened columns, the first that of interest. Returns (...): not
-    below zero.
-    """
+    """Noncentrality λ of the first column where all other columns may take any size."""
     rest = information[..., 1:, 1:] + _RIDGE * np.eye(information.shape[-1] - 1)
     across = information[..., 1:, :1]
     taken = np.swapaxes(across, -1, -2) @ np.linalg.solve(rest, across)

@@ -27,7 +27,7 @@ from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose, lengths, line
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import declared_tracker, registered
-from winchkit.robot.mistakes.adjustment import Adjustment, adjusted, misfit
+from winchkit.robot.mistakes.adjustment import adjusted, adjustment_of, misfit
 from winchkit.robot.mistakes.table import (
     MIRRORED,
     POSITION_UNITS,
@@ -312,10 +312,12 @@ class _Search:
         if not np.all(np.isfinite(closure)):
             return _Adjusted(mistakes, float("inf"), table, start, rotation_by(tracker.turn))
         tracker = registered(tracker, start, table.position, table.angles, {"frame"})
-        equations = Adjustment(self.robot, table, tracker)
+        equations = adjustment_of(self.robot, table, tracker)
         sigma = _SIGMA * self.motion
         solution = adjusted(equations, start, sigma)
-        turned = rotation_by(equations.tracker_at(solution.state.values).turn)
+        own = equations.instruments_at(solution.state.values)
+        assert own is not None, "they have the tracker"
+        turned = rotation_by(own.trackers[0].turn)
         error = misfit(equations, solution, sigma)
         return _Adjusted(mistakes, error, table, solution.state.pose, turned)
 

@@ -18,9 +18,9 @@ from winchkit.robot.calibration.results import candidate_lines, in_words, noise_
 
 if TYPE_CHECKING:
     from winchkit.robot.calibration.calibrate import Calibrated
-    from winchkit.robot.calibration.parameters import Estimated
     from winchkit.robot.calibration.pose_design import NextPose
     from winchkit.robot.calibration.prediction import PoseErrors
+    from winchkit.robot.identification.parameters import Estimated
 
 _MM = 1e3
 _MOST = 5
@@ -99,10 +99,7 @@ def _decides(following: Sequence[NextPose], blind: Sequence[str]) -> str:
 
 
 def largest_changes(found: Calibrated) -> list[list[str]]:
-    """Return the largest changes in multiples of their standard deviation.
-
-    Returns: parameter, value with standard deviation and unit, nominal value.
-    """
+    """Return the largest changes in multiples of their standard deviation."""
 
     def size(item: tuple[str, Estimated]) -> float:
         one = item[1]

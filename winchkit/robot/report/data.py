@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from winchkit.report.html.markup import Markup, table
-from winchkit.robot.diagnosis.data.dataset import RobotDataset
+from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.diagnosis.diagnose import RobotAnswer
-from winchkit.robot.diagnosis.excitation import missing_pose_excitation
+from winchkit.robot.diagnosis.preparation import missing_pose_excitation
 
 
 def size_text(dataset: RobotDataset) -> str:

@@ -62,10 +62,7 @@ def calibration_cell(found: Calibrated) -> str:
 
 
 def robot_figure(profile: RobotProfile, *, figsize: Size = None) -> Figure:
-    """Exit points, and the platform with its cables at the home pose.
-
-    ``figsize``: width and height, inches. Returns: one axis in three dimensions, m.
-    """
+    """Exit points, and the platform with its cables at the home pose."""
     robot = robot_of(profile)
     exits = robot.geometry.exit_point
     anchors = robot.home.position[0] + robot.geometry.anchor_point @ robot.home.rotation[0].T
@@ -87,10 +84,7 @@ def robot_figure(profile: RobotProfile, *, figsize: Size = None) -> Figure:
 
 
 def calibration_figure(found: Calibrated, *, figsize: Size = None) -> Figure:
-    """Pose errors before and after a robot's calibration, of fitted and of held-out poses.
-
-    ``figsize``: width and height, inches.
-    """
+    """Pose errors before and after a robot's calibration, of fitted and of held-out poses."""
     sides = [
         ("poses fitted", found.fit_before, found.fit_after),
         ("poses held out", found.validation_before, found.validation_after),

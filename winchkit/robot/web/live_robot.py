@@ -29,10 +29,7 @@ class LiveRobot:
         self._pause = 0
 
     def picture(self, status: Mapping[str, Any]) -> dict[str, Any] | None:
-        """Pose and cables at a status; None where a motor angle is not known or fits no pose.
-
-        Returns: as of ``winchkit.robot.web.robot.pose_picture``, with ``row`` "live".
-        """
+        """Pose and cables at a status; None where a motor angle is not known or fits no pose."""
         winches = [status.get("winch", {}).get(name, {}) for name in self._robot.names]
         angles, tension = (
             np.array([np.nan if one.get(key) is None else one[key] for one in winches], dtype=float)

@@ -127,11 +127,7 @@ class RobotWork:
         }
 
     def picture(self, row: int, limits: tuple[float, float] | None = None) -> dict[str, Any]:
-        """Cables and platform at a pose.
-
-        ``row``: pose of the recording; 0 is home, 1 the first recorded one. ``limits``: of the
-        cable forces, N.
-        """
+        """Cables and platform at a pose."""
         robot, pose, tension = self._at(row)
         low, high = limits or self._limits(robot)
         structure = robot.structure(pose)[0]

@@ -39,21 +39,14 @@ OF_LINES = ("cell_gain", "length_scale")
 
 @dataclass(frozen=True)
 class Instruments:
-    """Numbers of instruments: those that are estimated, and the values of the tracker's.
-
-    Attributes
-    ----------
-    free : frozenset of str
-        Of :data:`NUMBERS` and :data:`OF_LINES`; the latter start at zero.
-    sessions : tuple of str
-        Names of sessions, each with a frame of its own.
-    trackers : tuple of Tracker
-        One per session; they differ in the frame alone.
-    """
+    """Numbers of instruments: those that are estimated, and the values of the tracker's."""
 
     free: frozenset[str]
+    """Of :data:`NUMBERS` and :data:`OF_LINES`; the latter start at zero."""
     sessions: tuple[str, ...]
+    """Names of sessions, each with a frame of its own."""
     trackers: tuple[Tracker, ...]
+    """One per session; they differ in the frame alone."""
 
     @property
     def is_trivial(self) -> bool:
@@ -79,11 +72,7 @@ class Instruments:
 
 
 def declared_instruments(robot: Robot, measured: Measured) -> Instruments:
-    """Instruments as the robot's file declares them.
-
-    ``measured``: poses, whose sessions get a frame each. Returns: numbers of what was not measured
-    are not free.
-    """
+    """Instruments as the robot's file declares them."""
     spec = robot.profile.instrument
     tracker = robot.tracker or declared_tracker(robot.profile)
     free = {

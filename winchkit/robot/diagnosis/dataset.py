@@ -14,9 +14,9 @@ from winchkit.arrays import Array
 from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.errors import Fault, RunError
-from winchkit.robot.diagnosis.data.trajectory import Trajectory, trajectory_of
 from winchkit.robot.files.poses import Measured, read_poses, read_trajectory
 from winchkit.robot.geometry.kinematics import PLATFORM_DOF
+from winchkit.robot.identification.trajectory import Trajectory, trajectory_of
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 from winchkit.schema.profiles.winch import WinchProfile

@@ -1,4 +1,4 @@
-"""Parameters of a robot's calibration: names, units, priors and bounds, in one vector."""
+"""Parameters of a robot's identification: names, units, priors and bounds, in one vector."""
 
 from __future__ import annotations
 
@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
+from winchkit.effects.parametrization import Coordinates
+from winchkit.effects.term import Term
 from winchkit.errors import Fault, FileError, UsageError, suggest
 from winchkit.model.drum import drum_of
-from winchkit.robot.calibration.elongation import LAWS, LawParameter
-from winchkit.robot.calibration.instruments import LARGEST_SCALE, Instruments
+from winchkit.robot.files.poses import Measured
 from winchkit.robot.geometry.constraints import ZERO_STD
 from winchkit.robot.geometry.robot import Robot
+from winchkit.robot.identification.instruments import LARGEST_SCALE, Instruments
 from winchkit.schema.profiles.robot import PRIORS, PriorName, PriorSpec, RobotProfile
 from winchkit.schema.profiles.winch import LAYERED, EffectTable, WinchProfile
 from winchkit.units import dimension_of, parse
@@ -70,6 +72,48 @@ def _fault(table: EffectTable, message: str) -> Fault:
     return Fault(message, table.path, table.line, f"effect {table.id}")
 
 
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter in the unit that is fitted."""
+
+    name: str
+    """``LINE.exit_point.x``, ``layer_growth``, ``cable-elongation-linear.axial_stiffness`` …"""
+    unit: str
+    """Unit of the value in files."""
+    nominal: float
+    std: float
+    """Of the prior; zero for a parameter that is held."""
+    low: float = -np.inf
+    high: float = np.inf
+    reciprocal: bool = False
+    """Files have 1/value."""
+    zero: bool = False
+    """Whether it is the zero of an instrument and no part of the robot."""
+
+    def shown(self, value: float, std: float) -> tuple[float, float]:
+        """Value and standard deviation in the unit of files; NaN for an infinite stiffness's."""
+        if not self.reciprocal:
+            return value, std
+        return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
+
+
+LAWS: dict[str, tuple[Parameter, ...]] = {
+    "cable-elongation-linear": (
+        Parameter("axial_stiffness", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
+    ),
+    "cable-elongation-quartic": (
+        Parameter("k1", "N", 0.0, 2e-5, 0.0, 1e-3, reciprocal=True),
+        Parameter("b2", "1", 0.0, 100.0),
+        Parameter("b3", "1", 0.0, 3e4),
+        Parameter("b4", "1", 0.0, 1e7),
+    ),
+    "cable-elongation-exponential": (
+        Parameter("strain_scale", "1", 0.0, 2e-3, 0.0, 0.2),
+        Parameter("force_scale", "N", 200.0, 100.0, 1.0, 1e6),
+    ),
+}
+"""Laws of elongation that can be parameters, one for all cables."""
+
 Indices = NDArray[np.intp]
 
 GEOMETRY = ("exit-point", "anchor-point", "swivel-radius")
@@ -94,31 +138,8 @@ _OF_LINES_STD = {"cell_gain": 0.2, "length_scale": 0.02}
 of instruments in use, so that the data decide."""
 _REFLECTOR_STD = 0.1
 """Of a reflector's offset, m: the size of a platform."""
-
-
-@dataclass(frozen=True)
-class Parameter:
-    """One parameter in the unit that is fitted."""
-
-    name: str
-    """``LINE.exit_point.x``, ``layer_growth``, ``cable-elongation-linear.axial_stiffness`` …"""
-    unit: str
-    """Unit of the value in files."""
-    nominal: float
-    std: float
-    """Of the prior; zero for a parameter that is held."""
-    low: float = -np.inf
-    high: float = np.inf
-    reciprocal: bool = False
-    """Files have 1/value."""
-    zero: bool = False
-    """Whether it is the zero of an instrument and no part of the robot."""
-
-    def shown(self, value: float, std: float) -> tuple[float, float]:
-        """Value and standard deviation in the unit of files; NaN for an infinite stiffness's."""
-        if not self.reciprocal:
-            return value, std
-        return (1 / value, std / value**2) if value > 0 else (np.inf, np.nan)
+_FLAT = 1e3
+"""Standard deviation of the prior of an effect's coordinates."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +202,30 @@ class Parameters:
         for at, value in zip(self.block[block].ravel(), values.ravel(), strict=True):
             everything[at] = replace(everything[at], nominal=float(value))
         return replace(self, all=tuple(everything))
+
+    def about(self, values: Array) -> Parameters:
+        """The same parameters with other nominal values, (q,)."""
+        both = zip(self.all, values.tolist(), strict=True)
+        return replace(self, all=tuple(replace(own, nominal=value) for own, value in both))
+
+    def carried(self, values: NDArray[Any], wider: Parameters, others: Array) -> Array:
+        """Values of these parameters in the layout of wider ones, beside those of ``others``."""
+        out = others.copy()
+        for name, place in self.block.items():
+            out[wider.block[name]] = values[place]
+        return out
+
+    def with_terms(self, terms: Sequence[Term]) -> Parameters:
+        """These and the coordinates of effects, which are near one in size, with a flat prior."""
+        more: list[Parameter] = []
+        for term in terms:
+            own = Coordinates(term.effect)
+            start, low, high = own.vector(term.values), *own.bounds()
+            for name, *numbers in zip(own.names, start, low, high, strict=True):
+                at, least, most = map(float, numbers)
+                more.append(Parameter(f"{term.effect.id}.{name}", "1", at, _FLAT, least, most))
+        block = {**self.block, "terms": np.arange(len(self), len(self) + len(more))}
+        return replace(self, all=(*self.all, *more), block=block)
 
 
 class _Builder:
@@ -249,20 +294,16 @@ class _Builder:
 
 def parameters_of(
     robot: Robot,
+    measured: Measured,
     effects: Sequence[str] = (),
-    *,
-    swivel: bool = False,
-    length_offset: bool = False,
     instruments: Instruments | None = None,
 ) -> Parameters:
     """Parameters of geometry, winches, named effects and instruments.
 
-    ``robot``: of n lines; its numbers are the nominal values. ``effects``: beside those of the
-    robot's profile. A law of elongation adds home lengths, since the tension at home is unknown.
-    ``swivel``, ``length_offset``: whether the zeros of swivel angles and the offsets
-    of length instruments are unknown. ``instruments``: numbers of instruments that are unknown,
-    with their starting values. Raises UsageError for an effect that a calibration cannot fit, or
-    two laws of elongation.
+    ``measured``: readings, whose instruments have zeros where the robot's file does not know them.
+    ``effects``: beside those of the robot's profile. A law of elongation adds home lengths, since
+    the tension at home is unknown. ``instruments``: numbers that are unknown, with their starting
+    values. Raises UsageError for an effect that is no parameter, or two laws of elongation.
     """
     own = own_effects(robot.profile)
     effects = tuple(dict.fromkeys((*effects, *own)))
@@ -281,11 +322,12 @@ def parameters_of(
     if law or "home-length" in effects:
         build.zeros("home_length", "m", build.prior("home_length").std, zero=False)
     if law:
-        build.add("law", [_of_law(law, p, own.get(law, {})) for p in LAWS[law]])
+        build.add("law", _of_law(law, own.get(law, {})))
     _payload(build, effects)
-    if swivel:
+    unknown = isinstance(robot.profile.instrument.swivels.zero, str)
+    if unknown and np.any(np.isfinite(measured.swivel)):
         build.zeros("swivel_zero", "rad", ZERO_STD["swivel"], zero=True)
-    if length_offset:
+    if not measured.length_zeroed and np.any(np.isfinite(measured.cable_length)):
         build.zeros("length_offset", "m", ZERO_STD["cable_length"], zero=True)
     if instruments is not None:
         _tracker(build, instruments)
@@ -298,14 +340,15 @@ def parameters_of(
     return found
 
 
-def _of_law(law: str, spec: LawParameter, own: Mapping[str, float]) -> Parameter:
-    """Parameter of a law that starts at the value of the robot's file."""
-    start = spec.start
-    if spec.name in own:
-        start = 1 / own[spec.name] if spec.reciprocal else own[spec.name]
-    return Parameter(
-        f"{law}.{spec.name}", spec.unit, start, spec.std, spec.low, spec.high, spec.reciprocal
-    )
+def _of_law(law: str, own: Mapping[str, float]) -> list[Parameter]:
+    """Parameters of a law that start at the values of the robot's file."""
+    out = []
+    for spec in LAWS[law]:
+        start = own.get(spec.name, np.nan)
+        start = 1 / start if spec.reciprocal else start
+        at = start if spec.name in own else spec.nominal
+        out.append(replace(spec, name=f"{law}.{spec.name}", nominal=at))
+    return out
 
 
 def _known(effects: Sequence[str]) -> None:
@@ -325,20 +368,13 @@ def _known(effects: Sequence[str]) -> None:
 
 def _growth(build: _Builder, winches: Sequence[WinchProfile]) -> None:
     """One growth for all layered drums, which wind the same cable."""
-    growths = {
+    growths = [
         getattr(drum_of(winch), "growth", 0.0) for winch in winches if winch.drum.kind in LAYERED
-    }
-    if len(growths) > 1:
-        listed = ", ".join(f"{growth * 1e3:g} mm" for growth in sorted(growths))
-        raise UsageError(
-            f"the winches of '{build.robot.profile.name}' have the layer growths {listed}; the "
-            "lines of "
-            "one robot are calibrated with one, so give them the same cable"
-        )
+    ]
     prior = build.prior("layer_growth")
     low, high = prior.bounds or (0.0, np.inf)
-    value = growths.pop() if growths else 0.0
-    std = prior.std if any(winch.drum.kind in LAYERED for winch in winches) else 0.0
+    std = prior.std if growths else 0.0
+    value = growths[0] if growths else 0.0
     build.add("layer_growth", [Parameter("layer_growth", "m", value, std, low, high)])
 
 
