@@ -37,7 +37,7 @@ from winchkit.robot.geometry.constraints import (
     swivel,
     winding_of,
 )
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Geometry, Pose, lengths
+from winchkit.robot.geometry.kinematics import Geometry, Pose, lengths
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import Tracker, tracked_position, tracked_rotation
 from winchkit.robot.identification.bundle_adjustment import Rows, State
@@ -110,7 +110,7 @@ class Equations:
     @property
     def hangs(self) -> bool:
         """Whether measured cable forces and a known weight determine the pose of the platform."""
-        few = len(self.robot.names) < PLATFORM_DOF and self.robot.platform.mass > 0
+        few = self.robot.hangs and self.robot.platform.mass > 0
         return few and bool(np.any(np.all(np.isfinite(self.measured.tension), axis=1)))
 
     @property
@@ -139,7 +139,8 @@ class Equations:
         """Platform with the parameters' values."""
         block = self.parameters.block
         x, y, z = values[block["payload_centre"]].tolist()
-        return PlatformSpec(float(values[block["payload_mass"][0]]), (x, y, z))
+        mass = float(values[block["payload_mass"][0]])
+        return replace(self.robot.platform, mass=mass, center_of_mass=(x, y, z))
 
     def by_drum(self, values: Array) -> Array:
         """Unstrained cable lengths by drums, home pose and home lengths, (p, n), m."""
@@ -198,7 +199,9 @@ class Equations:
     def constraints(self, state: State) -> Iterator[tuple[str, Constraint]]:
         """All equations at a state, by kind, with derivatives by each line's own numbers."""
         for kind in self.kinds:
-            yield kind, self._constraint_of[kind](state)
+            found = self._constraint_of[kind](state)
+            # Guides hold the other coordinates, whatever a tracker shows of them.
+            yield kind, replace(found, by_pose=found.by_pose * self.robot.geometry.free)
 
     def rows(self, state: State) -> Iterator[Rows]:
         """All equations at a state with derivatives by the vector of parameters."""

@@ -216,20 +216,20 @@ def refuse_unfit(equations: Equations) -> None:
     """Raise UsageError for poses that are too few, too many, without redundancy or out of reach."""
     measured, many = equations.measured, len(equations.measured)
     known = equations.count
-    lines = measured.motor_angle.shape[1]
+    lines, degrees = measured.motor_angle.shape[1], equations.robot.geometry.degrees
     if many > _MOST:
         raise UsageError(
             f"{many} rows: each is a pose at rest, and at most {_MOST} can be fitted; keep the "
             "rows where the platform stood"
         )
     _refuse_out_of_reach(equations)
-    if many < _FEW or known <= 6 * many:
+    if many < _FEW or known <= degrees * many:
         cure = f"record more poses (90 is a good number, {_FEW} the least)"
-        if known <= 6 * many:
+        if known <= degrees * many:
             cure = "measure more at each: positions, rotations, swivel angles or cable lengths"
         raise UsageError(
             f"{many} poses with {known} measured values cannot calibrate a robot of {lines} lines: "
-            f"{6 * many} of them determine the poses themselves; {cure}"
+            f"{degrees * many} of them determine the poses themselves; {cure}"
         )
 
 

@@ -148,11 +148,10 @@ def start_of(equations: Equations, values: Array | None = None) -> Pose:
     angles = np.where(whole, measured.angles, np.nan)
     tracker = equations.tracker(equations.parameters.nominal if values is None else values)
     if tracker is None:
-        return start_pose(measured.position, angles, home)
+        return start_pose(measured.position, angles, home, equations.robot.geometry.free)
     # Without a measured rotation the platform is taken to stand as at home.
     turned = reading_of(tracker, Pose(np.zeros_like(measured.position), home.rotation)).rotation
     seen = np.where(whole[..., None], rotation_of(*np.nan_to_num(angles).T), turned)
     behind = pose_behind(tracker, Pose(measured.position, seen))
-    return Pose(
-        np.where(np.isfinite(behind.position), behind.position, home.position), behind.rotation
-    )
+    there = np.where(np.isfinite(behind.position), behind.position, home.position)
+    return equations.robot.guided(Pose(there, behind.rotation))

@@ -27,7 +27,7 @@ def faults_and_warnings(
     source, robot = open_source(file), robot_of(value)
     faults = _lengths(robot)
     warnings: Said = []
-    if not faults and len(value.line) < 6:
+    if not faults and robot.hangs:
         faults, warnings = _hanging(robot)
     elif not faults:
         faults, warnings = _held(robot)
@@ -55,7 +55,7 @@ def _lengths(robot: Robot) -> Said:
 
 
 def _held(robot: Robot) -> tuple[Said, Said]:
-    """Six lines or more: do pulling cables balance the weight?"""
+    """As many lines as degrees of freedom: do pulling cables balance the weight?"""
     from winchkit.robot.forces.force_distribution import ForceLimits, wrench_feasibility
 
     limits = ForceLimits(0.0, float("inf"))

@@ -184,8 +184,8 @@ class Equations:
             statics = self._statics(robot).by_pose
         return {
             "closure": length,
-            "position": place,
-            "rotation": turned,
+            "position": place * robot.geometry.free,
+            "rotation": turned * robot.geometry.free,
             "swivel": swivel,
             "gauge": length,
             "statics": statics,
@@ -308,7 +308,8 @@ def continuous(basis: Array) -> Array:
 def start_pose(dataset: RobotDataset) -> Pose:
     """Measured positions and angles, completed by those of the home pose."""
     measured = dataset.measured
-    return completed(measured.position, measured.angles, home_of(dataset.robot))
+    home, free = home_of(dataset.robot), np.array(dataset.robot.platform.free)
+    return completed(measured.position, measured.angles, home, free)
 
 
 def _force_behind(line: Line, at: At, shown: Array) -> Array:

@@ -27,7 +27,6 @@ from winchkit.robot.diagnosis.data.dataset import RobotDataset
 from winchkit.robot.diagnosis.equations import POSED
 from winchkit.robot.diagnosis.regression import PoseRegression
 from winchkit.robot.diagnosis.variance_components import PoseNoise
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF
 
 Errors = dict[str, Array]
 UNITS = {"cable_length": "m", "platform_position": "m", "tension": "N"}
@@ -63,7 +62,7 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
     out = {"cable_length": np.where(np.isfinite(closure), -length, np.nan)}
-    if regression.dataset.measured.motor_angle.shape[1] >= PLATFORM_DOF:
+    if regression.dataset.restrained:
         whole = np.isfinite(residuals["closure"]).all(axis=1, keepdims=True)
         known_closure = np.where(whole, np.nan_to_num(residuals["closure"]), np.nan)
         found = residuals["position"] - (to_place @ known_closure[..., None])[..., 0]

@@ -20,6 +20,7 @@ from winchkit.robot.geometry.kinematics import (
     Geometry,
     Pose,
     geometry_of,
+    guided,
     home_of,
     lengths,
     structure_matrix,
@@ -132,6 +133,26 @@ class Robot:
         """
         return gravity_wrench(self.platform, pose.rotation)
 
+    def guided(self, pose: Pose) -> Pose:
+        """Poses with those coordinates of home that guides hold.
+
+        Parameters
+        ----------
+        pose : Pose
+            The p poses.
+
+        Returns
+        -------
+        Pose
+            The same poses where the platform has all six degrees of freedom.
+        """
+        return guided(pose, self.home, self.geometry.free)
+
+    @property
+    def hangs(self) -> bool:
+        """Whether fewer cables than degrees of freedom leave the platform's pose to its weight."""
+        return len(self.profile.line) < self.geometry.degrees
+
     def motor_angles(
         self, pose: Pose, strain: Array | float = 0.0, tension: Array | float = 0.0
     ) -> Array:
@@ -235,7 +256,7 @@ class Robot:
         return forward(
             self.geometry,
             given,
-            start or self.home,
+            self.guided(start or self.home),
             self.platform,
             tolerance=tolerance,
             search=search,
@@ -287,7 +308,7 @@ def robot_of(
                 offset = modifier.apply(offset, rest)
         exits[i], anchors[i], radii[i] = place.exit_point, place.anchor_point, place.swivel_radius
         offsets[i] = offset
-    geometry = Geometry(exits, anchors, radii, geometry.swivel_axis)
+    geometry = replace(geometry, exit_point=exits, anchor_point=anchors, swivel_radius=radii)
     there = lengths(geometry, home.position, home.rotation)[0] + offsets
     platform = profile.platform
     for modifier in payload:
@@ -338,8 +359,14 @@ def cables_of(robot: Robot) -> list[CableLine]:
     Raises
     ------
     UsageError
-        For effects that the loops do not compute.
+        For effects that the loops do not compute, and for a platform that guides hold.
     """
+    if robot.geometry.degrees < len(robot.geometry.free):
+        raise UsageError(
+            "the loops of a control cycle move a platform in all six degrees of freedom, not in "
+            f"{', '.join(robot.platform.degrees_of_freedom)} alone; take Robot.motor_angles and "
+            "Robot.poses_at"
+        )
     return [_cable(robot, i, winch) for i, winch in enumerate(robot.winches)]
 
 

@@ -129,7 +129,8 @@ class Adjustment:
         yield "closure", found
         if np.any(np.isfinite(self.measured.position)):
             tracker = self.tracker_at(values)
-            yield "position", tracked_position(tracker, state.pose, self.measured.position)
+            seen = tracked_position(tracker, state.pose, self.measured.position)
+            yield "position", replace(seen, by_pose=seen.by_pose * geometry.free)
 
     def rows(self, state: State) -> Iterator[Rows]:
         """The same with derivatives by the vector of unknowns."""
@@ -173,6 +174,7 @@ def lengths_at_home(robot: Robot, measured: Measured, sigma: float) -> Array:
     """Cable at home beyond that of the geometry, (n,), m, of positions in a known frame."""
     tracker = declared_tracker(robot.profile)
     equations = Adjustment(robot, measured, tracker, frozenset({"tracker_frame", "reflector"}))
-    shown = start_pose(measured.position, np.full_like(measured.position, np.nan), robot.home)
-    found = adjusted(equations, pose_behind(tracker, shown), sigma)
+    angles = np.full_like(measured.position, np.nan)
+    shown = start_pose(measured.position, angles, robot.home, np.ones(6))
+    found = adjusted(equations, robot.guided(pose_behind(tracker, shown)), sigma)
     return np.asarray(found.state.values[equations.block["home_length"]])
