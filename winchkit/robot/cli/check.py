@@ -86,19 +86,25 @@ def _hanging(robot: Robot) -> tuple[Said, Said]:
     if platform.mass == 0:
         few = f"{len(robot.names)} lines leave the platform free, only its weight settles its pose"
         return [(("platform",), f"{few}; give mass")], []
+    warnings: Said = []
+    if names := robot.planar:
+        listed = ", ".join(f'"{name}"' for name in names)
+        words = f"all cables lie in one plane; is it planar, with degrees_of_freedom = [{listed}]?"
+        warnings.append((("platform",), words))
     found = forward(robot.geometry, robot.home_length[None], robot.home, platform)
     if not found.converged[0]:
         return [(("home",), "with the cables' lengths at home the platform hangs nowhere")], []
     there, turned = found.pose.position[0], angles_of(found.pose.rotation[0])
     moved = float(np.linalg.norm(there - robot.home.position[0]))
     if moved <= _NEAR and np.allclose(found.pose.rotation, robot.home.rotation, atol=_NEAR):
-        return [], []
+        return [], warnings
     place = ", ".join(f'"{x * 1e3:.4g} mm"' for x in there)
     angles = ", ".join(f'"{np.degrees(angle):.4g} deg"' for angle in turned)
     return [], [
+        *warnings,
         (
             ("home",),
             f"the platform does not rest there; with these cables it hangs at "
             f"position = [{place}], rotation = [{angles}]",
-        )
+        ),
     ]

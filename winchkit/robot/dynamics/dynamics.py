@@ -144,11 +144,14 @@ def dynamic_wrench(platform: PlatformSpec, motion: PlatformMotion) -> Array:
     """
     rotation = motion.pose.rotation
     inertial = (mass_matrix(platform, rotation) @ motion.acceleration[..., None])[..., 0]
-    return np.asarray(
-        gravity_wrench(platform, rotation)
-        - inertial
-        - _velocity_wrench(platform, rotation, motion.velocity)
-    ) * platform.free
+    return (
+        np.asarray(
+            gravity_wrench(platform, rotation)
+            - inertial
+            - _velocity_wrench(platform, rotation, motion.velocity)
+        )
+        * platform.free
+    )
 
 
 def accelerations(platform: PlatformSpec, rotation: Array, velocity: Array, wrench: Array) -> Array:

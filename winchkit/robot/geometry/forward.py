@@ -252,10 +252,10 @@ def _search_further(
     best, other = found
     begin = Pose(start.position[rows], start.rotation[rows])
     starts = _starts(geometry, given[rows], begin)
-    left, tried = np.arange(len(rows)), 0
-    while tried < _STARTS and len(left := left[~(best.worst[rows[left]] <= search)]):
+    left, tried, most = np.arange(len(rows)), 0, starts.position.shape[1]
+    while tried < most and len(left := left[~(best.worst[rows[left]] <= search)]):
         # In rounds of 1, 1, 2, 4 … starts: one suffices for most, and more at once cost less each.
-        round_ = slice(tried, max(1, 2 * tried))
+        round_ = slice(tried, min(max(1, 2 * tried), most))
         tried, count = round_.stop, round_.stop - round_.start
         at = Pose(
             starts.position[left, round_].reshape(-1, 3),

@@ -28,10 +28,17 @@ from winchkit.robot.geometry.kinematics import (
 from winchkit.robot.geometry.loops import CableLine
 from winchkit.robot.geometry.tracker import Tracker, declared_tracker
 from winchkit.robot.geometry.wrench import gravity_wrench
-from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
+from winchkit.schema.profiles.robot import (
+    COORDINATES,
+    Coordinate,
+    PlatformSpec,
+    RobotProfile,
+)
 from winchkit.schema.profiles.winch import WinchProfile
 
 _TURN = 2 * np.pi
+_FLAT = 1e-3
+"""Thickness of a plane that has all cables, as a share of the robot's size (rule of thumb)."""
 _NEWTON_STEPS = 5
 """As for one line (four reach 1e-7 of the start's error), and one more since the cable force, too,
 may be far from the reference's."""
@@ -147,6 +154,20 @@ class Robot:
             The same poses where the platform has all six degrees of freedom.
         """
         return guided(pose, self.home, self.geometry.free)
+
+    @property
+    def planar(self) -> tuple[Coordinate, ...]:
+        """Degrees of freedom in the plane of all cables at home; empty where they are in none."""
+        there = self.home.position + self.geometry.anchor_point @ self.home.rotation[0].T
+        points = np.concatenate([self.geometry.exit_point, there])
+        flat = np.ptp(points, axis=0) <= _FLAT * self.geometry.size
+        if np.count_nonzero(flat) != 1:
+            return ()
+        across = int(np.argmax(flat))
+        return (
+            *(name for k, name in enumerate(COORDINATES[:3]) if k != across),
+            COORDINATES[3 + across],
+        )
 
     @property
     def hangs(self) -> bool:

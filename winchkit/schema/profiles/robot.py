@@ -91,7 +91,9 @@ class PlatformSpec(Table):
 
 def _is_group(names: tuple[Coordinate, ...]) -> bool:
     """Whether these motions, one after the other, are motions of the same kind."""
-    moved, turned = ([name in names for name in part] for part in (COORDINATES[:3], COORDINATES[3:]))
+    moved, turned = (
+        [name in names for name in part] for part in (COORDINATES[:3], COORDINATES[3:])
+    )
     if len(set(names)) < len(names) or not any(moved):
         return False
     across = all(moved[k] for k in range(3) if not turned[k])
@@ -167,6 +169,9 @@ class RobotProfile(Plotted, Table):
         for key, name in self.instrument.lines():
             if name not in names:
                 yield f"instrument.{key}", f"no line '{name}'; the lines are {', '.join(names)}"
+        if self.instrument.tracker.datum == "tracker" and not all(self.platform.free):
+            message = "degrees_of_freedom are along base axes, which stay; use datum = 'robot'"
+            yield "instrument.tracker.datum", message
         seen: dict[Point, str] = {}
         for n, line in enumerate(self.line):
             other = seen.setdefault(line.exit_point, line.name)
