@@ -8,6 +8,7 @@ from winchkit.errors import Fault
 
 if TYPE_CHECKING:
     from winchkit.robot.geometry.robot import Robot
+    from winchkit.schema.bench import BenchSpec
     from winchkit.schema.profiles.robot import RobotProfile
     from winchkit.schema.reading.lines import Key
 
@@ -34,6 +35,23 @@ def faults_and_warnings(
     return (
         tuple(source.fault(key, message) for key, message in faults),
         tuple(source.fault(key, message) for key, message in warnings),
+    )
+
+
+def clearance_at_home(file: str, spec: BenchSpec) -> tuple[tuple[Fault, ...], tuple[Fault, ...]]:
+    """Warnings of a bench whose cables are too near to each other or to a body at home."""
+    from winchkit.robot.bench.wiring import robot_of_bench
+    from winchkit.robot.workspace.distances import distances
+    from winchkit.schema.reading.source import open_source
+
+    wiring, robot = spec.robot, robot_of_bench(spec)
+    if wiring is None or robot is None or wiring.clearance is None:
+        return (), ()
+    source = open_source(file)
+    found = distances(robot, wiring.body, robot.home, wiring.clearance)
+    near = (found.distance[0] < wiring.clearance).nonzero()[0].tolist()
+    return (), tuple(
+        source.fault(("robot", "clearance"), f"at home {found.text(0, column)}") for column in near
     )
 
 

@@ -216,6 +216,17 @@ def linearised(geometry: Geometry, position: Array, rotation: Array) -> tuple[Ar
     return length, _by_anchor(geometry, unit, t, rotation, t.wrap - sine)
 
 
+def straight_cables(geometry: Geometry, pose: Pose) -> tuple[Array, Array]:
+    """Ends of the cables between pulley and platform, (p, n, 3) each, m, in the base frame.
+
+    ``geometry``: of n lines. ``pose``: the p poses. NaN where an anchor lies inside its pulley.
+    """
+    t = _tangent(geometry, pose.position, pose.rotation)
+    away = -linearised(geometry, pose.position, pose.rotation)[1].exit_point
+    end = np.stack(t.arm, axis=-1) + pose.position[:, None]
+    return end - t.free[..., None] * away, end
+
+
 def swivel_angle(geometry: Geometry, position: Array, rotation: Array) -> Array:
     """Angle of the swivelling pulley about its axis, right-handed.
 
