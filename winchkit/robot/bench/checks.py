@@ -40,8 +40,9 @@ def require_within_limits(
     limits: Mapping[str, LimitSpec],
     wiring: RobotWiring,
 ) -> None:
-    """Raise NotPermitted where a motion, or a stop on its way, would exceed a limit. Raises NotPermitted with the place on the
-    path, the cable, its value and the limit.
+    """Raise NotPermitted where a motion, or a stop on its way, would exceed a limit.
+
+    The message has the place on the path, the cable, its value and the limit.
     """
     found = [
         *_length_faults(robot.names, planned, limits),

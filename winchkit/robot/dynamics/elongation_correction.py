@@ -98,8 +98,8 @@ class ElongationCorrection:
         count = len(robot.names)
         if robot.hangs:
             raise UsageError(
-                f"{count} lines: Eq. 8 needs at least {robot.geometry.degrees}; the forces of a hanging platform come "
-                "from winchkit.robot.geometry.forward"
+                f"{count} lines: Eq. 8 needs at least {robot.geometry.degrees}; the forces of a "
+                "hanging platform come from winchkit.robot.geometry.forward"
             )
         for name, found in (("laws", len(laws)), ("initial forces", len(initial))):
             if found != count:

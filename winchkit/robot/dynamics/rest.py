@@ -1,8 +1,8 @@
 """Poses at which a hanging platform rests in a wanted place, and its small oscillations there.
 
-The cables of a hanging platform do not determine its pose: at wanted positions and some rotation its
-rest is where cable forces f balance the weight w, w = Gᵀ f with the derivatives G of the lengths by
-the pose. Newton's method solves for the rotation and the forces at once,
+The cables of a hanging platform do not determine its pose: in a wanted position it rests in those
+rotations where cable forces f balance the weight w, w = Gᵀ f with the derivatives G of the lengths
+by the pose. Newton's method solves for the rotation and the forces at once,
 
     K_ω δω + Gᵀ δf = w − Gᵀ f,       K = ∂²(m g z)/∂q² + Σ fᵢ ∂²Lᵢ/∂q²,
 

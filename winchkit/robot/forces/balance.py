@@ -8,9 +8,9 @@ With the mass m and the centre of mass s of the platform
 
 The derivatives of V Aᵀ by pose and geometry are left out: the wrench that is left over is small.
 
-``hanging_balance``. A platform on fewer cables than degrees of freedom stands where their forces balance its
-weight. With the structure matrix Aᵀ, the measured cable forces f and the wrench w of the weight,
-six equations
+``hanging_balance``. A platform on fewer cables than degrees of freedom stands where their forces
+balance its weight. With the structure matrix Aᵀ, the measured cable forces f and the wrench w of
+the weight, six equations
 
     S (Aᵀ f + w) = 0,      S = diag(1, 1, 1, 1/ρ, 1/ρ, 1/ρ)
 

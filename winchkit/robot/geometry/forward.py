@@ -3,11 +3,11 @@
     found = forward(geometry, lengths, start, platform=PlatformSpec(mass=3.0))
     found.pose.position[found.converged]
 
-With as many cables as degrees of freedom, or more, that hold all of these, the pose is the least-squares solution
-of the lengths (Gauss-Newton, after twelve steps Newton). With fewer, the platform hangs where its
-potential energy is least under the constraint of the lengths (sequential quadratic programming;
-Lagrange's multipliers are the cable forces); a cable whose force would be negative is slack, and
-its length is a bound and not an equation (active set).
+With as many cables as degrees of freedom, or more, that hold all of these, the pose is the
+least-squares solution of the lengths (Gauss-Newton, after twelve steps Newton). With fewer, the
+platform hangs where its potential energy is least under the constraint of the lengths (sequential
+quadratic programming; Lagrange's multipliers are the cable forces); a cable whose force would be
+negative is slack, and its length is a bound and not an equation (active set).
 
 The squares of the lengths have local minima beside the pose. A pose whose lengths are not met is
 therefore searched from other starts: for each rotation of a lattice about the start, the position

@@ -50,16 +50,20 @@ class Wrenches:
     """Structure matrices Aᵀ, (p, m, n), moments divided by a lever, so that all rows are alike."""
     wrench: Array
     """w, (p, m), N; moments divided by the same lever."""
+    low: Array
+    """Least cable forces, (n,), N."""
+    high: Array
+    """Greatest ones, (n,), N."""
     force: tuple[float, float] = (0.0, 0.0)
     """Radii of further forces and of moments of any direction, N, the latter over the lever."""
     forces: int = 3
     """Number of rows of forces; those of moments follow."""
 
 
-def margins(given: Wrenches, low: Array, high: Array) -> tuple[Array, Array]:
+def margins(given: Wrenches) -> tuple[Array, Array]:
     """Levels of wrench feasibility and of wrench closure, (p,) each.
 
-    ``low``, ``high`` (n,): limits of the cable forces, N. Returns: largest distance of all forces
+    Returns: largest distance of all forces
     from their limits, N, negative where no forces within the limits balance all wrenches; and the
     least ratio of the smaller of the largest elements of either sign to Σ|y|, negative where some
     wrench needs a pushing cable. −inf at singular poses.
@@ -76,7 +80,7 @@ def margins(given: Wrenches, low: Array, high: Array) -> tuple[Array, Array]:
         which = left[regular]
         if len(which):
             inverse = np.linalg.inv(square[regular])
-            feasible[which], closed[which] = _levels(given, which, basis, inverse, low, high)
+            feasible[which], closed[which] = _levels(given, which, basis, inverse)
         # The first pose had the best of all bases of its own: no other suits it.
         left = left[~regular]
         left = left[1:] if not regular[0] else left
@@ -95,10 +99,9 @@ def _levels(
     which: NDArray[np.intp],
     basis: NDArray[np.intp],
     inverse: Array,
-    low: Array,
-    high: Array,
 ) -> tuple[Array, Array]:
     structure, (count, m) = given.structure[which], inverse.shape[:2]
+    low, high = given.low, given.high
     n = structure.shape[2]
     rest = np.setdiff1d(np.arange(n), basis)
     # Poses come last, so that cables and circuits are rows that are contiguous in memory.

@@ -180,8 +180,8 @@ def grid_of(
     robot : Robot
         The robot.
     step : float, optional
-        Edge of a cell, m; by default a fortieth of the longest edge of the box, of a hanging robot a
-        twentieth.
+        Edge of a cell, m; by default a fortieth of the longest edge of the box, of a hanging robot
+        a twentieth.
     box : tuple of two (3,) arrays, optional
         Lowest and highest corner, m; by default :func:`usual_box`.
     turn : float
@@ -333,10 +333,11 @@ def _of_wrenches(
     given = Wrenches(
         structure[:, free] / lever[:, None],
         robot.weight(pose)[:, free] / lever,
+        *limits,
         (demand.force, demand.moment / (spread or 1.0)),
         int(np.count_nonzero(free[:3])),
     )
-    return margins(given, *limits)
+    return margins(given)
 
 
 def _of_twists(structure: Array, demand: Demand) -> Array:
