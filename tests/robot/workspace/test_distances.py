@@ -82,7 +82,7 @@ def test_a_motion_into_an_obstacle_is_refused_with_its_place() -> None:
     cable = straight_cables(CABTIVE.geometry, CABTIVE.home)
     beside = (cable[0][0, 0] + cable[1][0, 0]) / 2 + np.array([0.0, 0.06, 0.0])
     post = BodySpec("post", tuple(beside.tolist()), radius=0.01, height=0.3)
-    goal = Waypoint(np.array(HOME) + [0.0, 0.15, 0.0], np.eye(3))
+    goal = Waypoint(np.add(HOME, [0.0, 0.15, 0.0]), np.eye(3))
     home = CABTIVE.home
     assert planner((), None).plan([goal], home)
     with pytest.raises(NotPermitted) as told:
@@ -91,7 +91,7 @@ def test_a_motion_into_an_obstacle_is_refused_with_its_place() -> None:
     assert "mm of the path of 150 mm" in words
     assert "cable 1 and post are 2" in words or "cable 1 and post are 1" in words
     assert "clearance of [robot] is 20 mm" in words
-    away = Waypoint(np.array(HOME) - [0.0, 0.05, 0.0], np.eye(3))
+    away = Waypoint(np.subtract(HOME, [0.0, 0.05, 0.0]), np.eye(3))
     assert planner((post,), 0.02).plan([away], home)
 
 
@@ -103,5 +103,5 @@ def test_a_planar_platform_is_moved_in_its_plane_alone() -> None:
     (motion,) = own.plan([goal], robot.home)
     np.testing.assert_allclose(motion.pose.position[:, 1], 0.0, atol=1e-12)
     assert np.isfinite(motion.force).all()
-    with pytest.raises(NotPermitted, match="guides hold y at 0, and the goal has 0.1"):
+    with pytest.raises(NotPermitted, match="guides hold y at 0, and the goal"):
         own.plan([replace(goal, position=np.array([0.3, 0.1, 1.2]))], robot.home)
