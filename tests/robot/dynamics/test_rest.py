@@ -89,7 +89,7 @@ def test_the_simulated_platform_in_guides_swings_as_often() -> None:
     assert period == pytest.approx(2 * pi * sqrt(1.8 / GRAVITY), rel=0.01)
 
 
-def test_what_a_rest_needs_is_told() -> None:
+def test_what_a_rest_needs_is_named() -> None:
     light = replace(HANGING, platform=replace(HANGING.platform, mass=0.0))
     with pytest.raises(UsageError, match=r"needs \[platform\] mass"):
         rest_poses(light, light.home)

@@ -85,9 +85,9 @@ def test_a_motion_into_an_obstacle_is_refused_with_its_place() -> None:
     goal = Waypoint(np.add(HOME, [0.0, 0.15, 0.0]), np.eye(3))
     home = CABTIVE.home
     assert planner((), None).plan([goal], home)
-    with pytest.raises(NotPermitted) as told:
+    with pytest.raises(NotPermitted) as refused:
         planner((post,), 0.02).plan([goal], home)
-    words = str(told.value)
+    words = str(refused.value)
     assert "mm of the path of 150 mm" in words
     assert "cable 1 and post are 2" in words or "cable 1 and post are 1" in words
     assert "clearance of [robot] is 20 mm" in words
