@@ -169,4 +169,5 @@ def _circuits(n: int, r: int) -> tuple[NDArray[np.intp], NDArray[np.intp], Array
     number = {rows: k for k, rows in enumerate(combinations(range(n), r))}
     members = list(combinations(range(n), r + 1))
     sources = [[number[(*one[:k], *one[k + 1 :])] for k in range(r + 1)] for one in members]
-    return np.array(members), np.array(sources), (-1.0) ** np.arange(r + 1)
+    signs = np.array([(-1.0) ** k for k in range(r + 1)])
+    return np.array(members, dtype=np.intp), np.array(sources, dtype=np.intp), signs
