@@ -171,7 +171,7 @@ def test_a_bench_has_all_conditions(tmp_path: Path) -> None:
     text = text.replace("sim-bench", "bench").replace("[robot]", '[robot]\nclearance = "20 mm"')
     tables = re.split(r"(?m)^(?=\[)", text)
     bench = tmp_path / "bench.toml"
-    of_simulation = re.compile(r"\[(platform|winch\.\d\.truth|\[)")
+    of_simulation = re.compile(r"\[(platform|noise|winch\.\d\.truth|\[)")
     bench.write_text("".join(t for t in tables if not of_simulation.match(t)), encoding="utf-8")
     csv = tmp_path / "cells.csv"
     found = CliRunner().invoke(

@@ -102,12 +102,12 @@ def _hanging(
     """
     rest = rest_poses(robot, motion.pose)
     low, high = limits.between(len(robot.names))
-    kept = rest.stable & np.all((low <= rest.force) & (rest.force <= high), axis=1)
+    within = np.asarray(np.all((low <= rest.force) & (rest.force <= high), axis=1))
     known = np.isfinite(rest.force).all(axis=1)[:, None]
     # Where there is no rest the plan is refused by its forces, at the pose that was wanted.
     rotation = np.where(known[..., None], rest.pose.rotation, motion.pose.rotation)
     pose = Pose(motion.pose.position, rotation)
-    return replace(motion, pose=pose), np.where(kept[:, None], rest.force, np.nan)
+    return replace(motion, pose=pose), np.where((rest.stable & within)[:, None], rest.force, np.nan)
 
 
 def motion_at(path: Path, distance: Array, rate: Array, change: Array) -> PlatformMotion:

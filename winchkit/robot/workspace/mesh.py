@@ -15,6 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +89,7 @@ def _vertices(level: Array, inside: NDArray[np.bool_]) -> tuple[NDArray[np.intp]
     cubes = tuple(n - 1 for n in level.shape)
     total, count = np.zeros((*cubes, 3)), np.zeros(cubes)
 
-    def part(values: Array, corner: tuple[int, ...]) -> Array:
+    def part(values: NDArray[Any], corner: tuple[int, ...]) -> NDArray[Any]:
         return values[tuple(slice(c, c + n) for c, n in zip(corner, cubes, strict=True))]
 
     for axis in range(3):
