@@ -103,7 +103,7 @@ def _hanging(
     rest = rest_poses(robot, motion.pose)
     low, high = limits.between(len(robot.names))
     within = np.asarray(np.all((low <= rest.force) & (rest.force <= high), axis=1))
-    known = np.isfinite(rest.force).all(axis=1)[:, None]
+    known = np.isfinite(rest.force[:, :1])
     # Where there is no rest the plan is refused by its forces, at the pose that was wanted.
     rotation = np.where(known[..., None], rest.pose.rotation, motion.pose.rotation)
     pose = Pose(motion.pose.position, rotation)
