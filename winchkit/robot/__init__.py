@@ -1,9 +1,9 @@
 """Cable robots: many winches that move one platform.
 
-``geometry``, ``forces`` and ``dynamics`` have the model, ``identification`` and ``mistakes`` (of
-tables) what ``calibration`` and ``diagnosis`` share; ``bench`` moves the platform, ``sim``
-simulates it; ``effects``, ``files``, ``report``, ``web`` and ``cli`` are the robot's parts of the
-packages of these names.
+``geometry``, ``forces`` and ``dynamics`` have the model, ``workspace`` where it holds the platform,
+``identification`` and ``mistakes`` (of tables) what ``calibration`` and ``diagnosis`` share;
+``bench`` moves the platform, ``sim`` simulates it; ``effects``, ``files``, ``report``, ``web`` and
+``cli`` are the robot's parts of the packages of these names.
 
     robot = robot_of(read_robot("cabtive"))
     angles = robot.motor_angles(Pose(position, rotation))
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from winchkit.robot.dynamics.dynamics_cycle import DynamicsCycle, DynamicTarget
     from winchkit.robot.dynamics.elongation_correction import ElongationCorrection
     from winchkit.robot.dynamics.kernels import PLAIN, RobotKernels, compiled, fastest
+    from winchkit.robot.dynamics.rest import Rest, pendulum_modes, rest_poses
     from winchkit.robot.effects.bind import robot_terms, robot_with_effects
     from winchkit.robot.effects.term import robot_with_terms
     from winchkit.robot.files.poses import read_poses
@@ -71,11 +72,18 @@ if TYPE_CHECKING:
     )
     from winchkit.robot.geometry.robot import Robot, cables_of, robot_of
     from winchkit.robot.geometry.wrench import gravity_wrench
+    from winchkit.robot.workspace.distances import Distances, distances
+    from winchkit.robot.workspace.mesh import Mesh, mesh_of, write_mesh
+    from winchkit.robot.workspace.workspace import Demand, Grid, Workspace, grid_of, workspace_of
     from winchkit.schema.read import read_robot
+    from winchkit.schema.robot_bench import BodySpec
 
 __all__ = [
     "PLAIN",
+    "BodySpec",
     "ComputationProcess",
+    "Demand",
+    "Distances",
     "DynamicTarget",
     "DynamicsCycle",
     "ElongationCorrection",
@@ -86,14 +94,17 @@ __all__ = [
     "Forces",
     "Found",
     "Geometry",
+    "Grid",
     "InverseDynamics",
     "Linear",
+    "Mesh",
     "Platform",
     "PlatformMotion",
     "Pose",
     "PosePlan",
     "PoseVolume",
     "Quartic",
+    "Rest",
     "Robot",
     "RobotAnswer",
     "RobotCycle",
@@ -101,12 +112,14 @@ __all__ = [
     "SelfCalibration",
     "Sensitivities",
     "Tracker",
+    "Workspace",
     "angles_of",
     "approximate_forces",
     "cables_of",
     "calibrate",
     "closed_form",
     "compiled",
+    "distances",
     "distributed_forces",
     "dynamic_wrench",
     "fastest",
@@ -114,15 +127,19 @@ __all__ = [
     "forward",
     "geometry_of",
     "gravity_wrench",
+    "grid_of",
     "home_of",
     "improved_closed_form",
     "inverse_dynamics",
     "lengths",
+    "mesh_of",
     "motion_of",
     "next_poses",
+    "pendulum_modes",
     "quadratic",
     "read_poses",
     "read_robot",
+    "rest_poses",
     "robot_of",
     "robot_terms",
     "robot_with_effects",
@@ -134,9 +151,11 @@ __all__ = [
     "structure_matrix",
     "swivel_angle",
     "swivel_sensitivities",
+    "workspace_of",
     "wrap_angle",
     "wrench_feasibility",
     "write_calibrated",
+    "write_mesh",
 ]
 
 _NAMES = {
@@ -162,6 +181,7 @@ _NAMES = {
     "winchkit.robot.dynamics.dynamics_cycle": ("DynamicTarget", "DynamicsCycle"),
     "winchkit.robot.dynamics.elongation_correction": ("ElongationCorrection",),
     "winchkit.robot.dynamics.kernels": ("PLAIN", "RobotKernels", "compiled", "fastest"),
+    "winchkit.robot.dynamics.rest": ("Rest", "pendulum_modes", "rest_poses"),
     "winchkit.robot.effects.bind": ("robot_terms", "robot_with_effects"),
     "winchkit.robot.effects.term": ("robot_with_terms",),
     "winchkit.robot.files.poses": ("read_poses",),
@@ -193,7 +213,17 @@ _NAMES = {
     ),
     "winchkit.robot.geometry.robot": ("Robot", "cables_of", "robot_of"),
     "winchkit.robot.geometry.wrench": ("gravity_wrench",),
+    "winchkit.robot.workspace.distances": ("Distances", "distances"),
+    "winchkit.robot.workspace.mesh": ("Mesh", "mesh_of", "write_mesh"),
+    "winchkit.robot.workspace.workspace": (
+        "Demand",
+        "Grid",
+        "Workspace",
+        "grid_of",
+        "workspace_of",
+    ),
     "winchkit.schema.read": ("read_robot",),
+    "winchkit.schema.robot_bench": ("BodySpec",),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 

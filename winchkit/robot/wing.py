@@ -26,6 +26,7 @@ WING = Wing(
             "plan_command": "winchkit.robot.cli.plan:tell_poses",
             "remove": "winchkit.robot.diagnosis.add:remove",
         },
+        "RobotWiring": {"check": "winchkit.robot.cli.check:clearance_at_home"},
         "RobotProgramme": {
             "execute": "winchkit.robot.bench.programme:run_robot_programme",
             "preview": "winchkit.robot.web.programmes:preview",
@@ -57,7 +58,11 @@ WING = Wing(
             "calibrate": (
                 "winchkit.robot.cli.calibrate",
                 "Calibrate a cable robot from measured poses.",
-            )
+            ),
+            "workspace": (
+                "winchkit.robot.cli.workspace",
+                "Compute where a cable robot's cables hold its platform.",
+            ),
         }
     },
     effects=("winchkit.robot.effects.on_robot",),

@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import pi
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 from urllib.parse import urlsplit
 
 from winchkit.schema.quantity import (
+    Angle,
+    Length,
     PositiveAcceleration,
     PositiveForce,
+    PositiveLength,
     PositiveSpeed,
     Quantity,
 )
@@ -42,8 +45,35 @@ class TrackerWiring(Table):
 
 
 @dataclass(frozen=True)
+class BodySpec(Table):
+    """A box or a cylinder that no cable may come near to."""
+
+    name: str
+    position: tuple[Length, Length, Length]
+    """Of its centre, m."""
+    on: Literal["base", "platform"] = "base"
+    """Frame of its numbers, with which it moves."""
+    rotation: tuple[Angle, Angle, Angle] = (0.0, 0.0, 0.0)
+    """Roll, pitch, yaw, from its own axes, rad."""
+    size: tuple[PositiveLength, PositiveLength, PositiveLength] | None = None
+    """Edges of a box, m."""
+    radius: PositiveLength | None = None
+    """Of a cylinder, m."""
+    height: PositiveLength | None = None
+    """Of a cylinder along its own z axis, m."""
+
+    def rules(self) -> Iterator[Rule]:
+        """It is either a box or a cylinder."""
+        given = self.size is not None, self.radius is not None, self.height is not None
+        if given not in ((True, False, False), (False, True, True)):
+            yield "", f"'{self.name}' has either size (a box), or radius and height (a cylinder)"
+
+
+@dataclass(frozen=True)
 class RobotWiring(Table):
     """The robot that a bench's winches move together, with the limits of its platform, SI."""
+
+    wing: ClassVar[str] = "robot"
 
     profile: str
     """Profile of kind ``robot``; the name of each line is that of a winch of the bench."""
@@ -64,9 +94,15 @@ class RobotWiring(Table):
     tension_trim: bool = False
     """Whether the cable forces are corrected at the end of each motion, by the load cells."""
     tracker: TrackerWiring | None = None
+    clearance: PositiveLength | None = None
+    """Least distance of the cables from each other and from bodies, m; the first two clearances of
+    a cable from its pulley and from its anchor do not count. None compares no distances."""
+    body: tuple[BodySpec, ...] = ()
 
     def rules(self) -> Iterator[Rule]:
-        """The lower tension limit lies below the upper one."""
+        """The lower tension limit lies below the upper one, and bodies have a clearance."""
+        if self.body and self.clearance is None:
+            yield "clearance", "is missing; it is the least distance of a cable from each body"
         low, high = self.tension
         if low >= high:
             yield "tension", f"the lower limit {low:g} N is not below the upper limit {high:g} N"

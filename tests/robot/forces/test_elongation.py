@@ -179,7 +179,7 @@ def test_numbers_that_do_not_fit_are_refused() -> None:
     with pytest.raises(UsageError, match="3 initial forces"):
         ElongationCorrection(robot, [LINEAR] * 8, robot.home, [500.0] * 3)
     four = robot_of(replace(robot.profile, line=robot.profile.line[:4]))
-    with pytest.raises(UsageError, match="at least six"):
+    with pytest.raises(UsageError, match="at least 6"):
         ElongationCorrection(four, [LINEAR] * 4, robot.home, [500.0] * 4)
     flat_one = replace(robot, geometry=replace(robot.geometry, anchor_point=np.zeros((8, 3))))
     with pytest.raises(UsageError, match="structure matrix is singular"):

@@ -172,7 +172,7 @@ def test_a_start_is_completed_by_the_home_pose() -> None:
     home = Pose(np.array([[1.0, 2.0, 3.0]]), rotation_of(0.1, 0.2, 0.3)[None])
     position = np.array([[np.nan, 5.0, np.nan], [7.0, 8.0, 9.0]])
     angles = np.array([[np.nan, np.nan, np.nan], [np.nan, np.nan, 0.5]])
-    found = completed(position, angles, home)
+    found = completed(position, angles, home, np.ones(6))
     assert found.position.tolist() == [[1.0, 5.0, 3.0], [7.0, 8.0, 9.0]]
     np.testing.assert_array_equal(found.rotation[0], home.rotation[0])
     np.testing.assert_allclose(found.rotation[1], rotation_of(0.1, 0.2, 0.5), atol=1e-15)

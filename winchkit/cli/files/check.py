@@ -182,8 +182,9 @@ def _declaration(file: str, effects: Sequence[str]) -> Verdict:
     declaration = load(file)
     bench = bench_of(declaration.value)
     drives = report_of(declaration.value)
-    by_wing = wings.call("check", declaration.value)
-    robot_faults, robot_warnings = ((), ()) if by_wing is None else by_wing(file, declaration.value)
+    of_wing = declaration.value if bench is None else bench.robot
+    by_wing = wings.call("check", of_wing)
+    robot_faults, robot_warnings = ((), ()) if by_wing is None else by_wing(file, bench or of_wing)
     effect_faults, effect_warnings = effect_faults_and_warnings(file, declaration.value, effects)
     faults = (*effect_faults, *drives.faults, *robot_faults)
     warnings = (

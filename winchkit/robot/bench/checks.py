@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
@@ -14,8 +15,13 @@ from winchkit.robot.dynamics.dynamics import dynamic_wrench
 from winchkit.robot.forces.force_distribution import ForceLimits, closed_form, distributed_forces
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
+from winchkit.robot.workspace.distances import distances
 from winchkit.schema.bench import LimitSpec
+from winchkit.schema.robot_bench import RobotWiring
 
+_NEARER = 1e-4
+"""Approach of cables that are within the clearance where a motion begins, m, that is none (rule of
+thumb): it may lead away from there."""
 _STATIONS = 200
 """Of a trajectory at which a stop is tested, at most."""
 
@@ -32,18 +38,17 @@ def require_within_limits(
     robot: Robot,
     planned: PlatformTrajectory,
     limits: Mapping[str, LimitSpec],
-    tension: ForceLimits,
-    deceleration: float,
+    wiring: RobotWiring,
 ) -> None:
     """Raise NotPermitted where a motion, or a stop on its way, would exceed a limit.
 
-    ``deceleration``: of a stop along the path, m/s^2. Raises NotPermitted with the place on the
-    path, the cable, its value and the limit.
+    The message has the place on the path, the cable, its value and the limit.
     """
     found = [
         *_length_faults(robot.names, planned, limits),
         *_rate_faults(robot.names, planned, limits),
-        *_force_faults(robot, planned, tension, deceleration),
+        *_force_faults(robot, planned, ForceLimits(*wiring.tension), wiring.acceleration),
+        *_clearance_faults(robot, planned, wiring),
     ]
     if not found:
         return
@@ -112,12 +117,17 @@ def _rate_faults(
 def _force_faults(
     robot: Robot, planned: PlatformTrajectory, tension: ForceLimits, deceleration: float
 ) -> list[_Exceeded]:
-    """The planned motion at every sample, and a stop at up to 200 of them."""
+    """The planned motion at every sample, and a stop at up to 200 of them.
+
+    A hanging platform is planned at rest in each pose; its swinging in a stop is not known.
+    """
     out = []
     without = np.flatnonzero(~np.isfinite(planned.force).all(axis=1))
     if len(without):
         wrench = dynamic_wrench(robot.platform, planned.motion)
         out.append(_without_forces(robot, planned, tension, wrench, int(without[0])))
+    if robot.hangs:
+        return out
     first, _ = planned.path.derivatives(planned.distance)
     moving = np.where(planned.speed[:, None] > 0, 1.0, 0.0)
     braked = planned.motion.acceleration - deceleration * moving * first
@@ -135,6 +145,29 @@ def _force_faults(
     return out
 
 
+def _clearance_faults(
+    robot: Robot, planned: PlatformTrajectory, wiring: RobotWiring
+) -> list[_Exceeded]:
+    """Cables that come nearer to each other or to a body than the clearance, and than they are.
+
+    No point of the platform moves by more than a quarter of the clearance between two samples.
+    """
+    if wiring.clearance is None:
+        return []
+    count = ceil(4 * planned.path.length / wiring.clearance) + 1
+    places = np.linspace(0.0, planned.path.length, max(count, 2))
+    stations = np.unique(np.searchsorted(planned.distance, places).clip(0, len(planned.time) - 1))
+    pose = Pose(planned.pose.position[stations], planned.pose.rotation[stations])
+    found = distances(robot, wiring.body, pose, wiring.clearance)
+    limit = np.minimum(wiring.clearance, found.distance[0] - _NEARER)
+    out = []
+    for column in np.flatnonzero(np.any(found.distance < limit, axis=0)).tolist():
+        row = int(np.argmax(found.distance[:, column] < limit[column]))
+        words = f"{found.text(row, column)}; choose another path"
+        out.append(_Exceeded(int(stations[row]), words))
+    return out
+
+
 def _without_forces(
     robot: Robot,
     planned: PlatformTrajectory,
@@ -145,6 +178,12 @@ def _without_forces(
     when: str = "",
 ) -> _Exceeded:
     """The cable that is farthest beyond its limits, of the forces nearest to their middle."""
+    if robot.hangs:
+        return _Exceeded(
+            k,
+            f"the platform has no stable rest there with cable forces from {tension.low:g} N to "
+            f"{tension.high:g} N; choose another path, or other limits `tension` of [robot]",
+        )
     nearest = closed_form(robot.structure(planned.pose)[k], wrench[k], tension).value
     low, high = tension.spread(len(robot.names))
     i = int(np.argmax(np.maximum(low - nearest, nearest - high)))

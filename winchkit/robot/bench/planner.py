@@ -22,6 +22,8 @@ from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.bench import BenchSpec, LimitSpec
 from winchkit.schema.robot_bench import RobotWiring
 
+_GUIDED = 1e-6
+"""Difference from a coordinate that guides hold, m and rad, that is rounding."""
 _COORDINATES = ("x", "y", "z", "roll", "pitch", "yaw")
 
 
@@ -64,11 +66,7 @@ class Planner:
         for waypoint in waypoints:
             if not all(np.isfinite(part).all() for part in (waypoint.position, waypoint.rotation)):
                 raise UsageError("move: a pose with numbers that are not finite is no goal")
-        if len(self.robot.names) < 6:
-            raise NotPermitted(
-                f"robot '{self.robot.profile.name}' has {len(self.robot.names)} cables, which do "
-                "not determine the rotation of its platform; moves along a path need at least 6"
-            )
+            self._require_free(Pose(waypoint.position[None], waypoint.rotation[None]))
         wiring = self.wiring
         fast = _within("speed", speed, wiring.speed, "m/s")
         ramp = _within("acceleration", acceleration, wiring.acceleration, "m/s^2")
@@ -78,9 +76,21 @@ class Planner:
         out = []
         for path in paths_through(start, waypoints, scale):
             one = plan_along(self.robot, path, self.tension, fast, min(ramp, turning))
-            require_within_limits(self.robot, one, self.limits, self.tension, wiring.acceleration)
+            require_within_limits(self.robot, one, self.limits, wiring)
             out.append(one)
         return out
+
+    def _require_free(self, goal: Pose) -> None:
+        """Raise NotPermitted for a goal that the platform's guides do not permit."""
+        robot = self.robot
+        held = coordinates_of(robot.guided(goal))
+        for name, value in coordinates_of(goal).items():
+            if abs(value - held[name]) > _GUIDED:
+                raise NotPermitted(
+                    f"the platform of '{robot.profile.name}' moves in "
+                    f"{', '.join(robot.platform.degrees_of_freedom)} alone; its guides hold {name} "
+                    f"at {held[name]:.4g}, and the goal has {value:.4g} (m, rad)"
+                )
 
 
 def moved(pose: Pose, change: Mapping[str, float], *, relative: bool) -> Pose:

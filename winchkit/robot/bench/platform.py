@@ -26,9 +26,10 @@ from winchkit.robot.bench.planner import Planner, coordinates_of, moved
 from winchkit.robot.bench.quick_stop import quick_stop_ramps
 from winchkit.robot.bench.tension_trim import CableTrim, ForceTrim, TrimSetting
 from winchkit.robot.bench.trajectory import PlatformTrajectory
+from winchkit.robot.dynamics.rest import rest_poses
 from winchkit.robot.forces.force_distribution import null_space, quadratic
 from winchkit.robot.geometry.forward import AGREEMENT, Found, distance
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose
+from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.schema.robot_bench import RobotWiring
 
@@ -72,7 +73,7 @@ class Platform:
     def permit_tension(self, winch: str) -> None:
         """Raise NotPermitted where a winch may not control its tension beside those that do.
 
-        The others hold its six degrees of freedom, one cable each at least.
+        The others hold its degrees of freedom, one cable each at least.
 
         Parameters
         ----------
@@ -82,7 +83,7 @@ class Platform:
         if winch not in self.robot.names:
             return
         count = len(self._winches)
-        free = max(0, count - PLATFORM_DOF)
+        free = max(0, count - self.robot.geometry.degrees)
         held = [one.name for one in self._winches if one.holds_tension and one.name != winch]
         if len(held) + 1 > free:
             beside = f" beside {', '.join(held)}" if held else ""
@@ -470,8 +471,9 @@ class Platform:
 
     def _forces(self, pose: Pose) -> Array:
         """Cable forces of the plan at a pose at rest, (1, n); zero where there are none."""
-        if len(self.robot.names) < 6:
-            return np.zeros((1, len(self.robot.names)))
+        if self.robot.hangs:
+            rest = rest_poses(self.robot, pose)
+            return np.where(rest.stable[:, None], rest.force, 0.0)
         found = quadratic(
             self.robot.structure(pose)[0], self.robot.weight(pose)[0], self.planner.tension
         )

@@ -300,6 +300,7 @@ class _Driver:
     def _go(self, goal: Pose) -> bool:
         """Move on a line; False where a limit forbids it."""
         platform = self.bench.robot
+        goal = platform.robot.guided(goal)
         planned = self._compute(self._look, _planned, self._planner, goal, self._here)
         if planned is None:
             return False

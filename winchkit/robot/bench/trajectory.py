@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, sqrt
 
 import numpy as np
@@ -12,6 +12,7 @@ from winchkit.bench.control.motion import JERK_TIME
 from winchkit.model.trajectory import Trajectory, plan
 from winchkit.robot.bench.path import Path
 from winchkit.robot.dynamics.dynamics import PlatformMotion, dynamic_wrench
+from winchkit.robot.dynamics.rest import rest_poses
 from winchkit.robot.forces.force_distribution import ForceLimits, distributed_forces
 from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
@@ -78,12 +79,32 @@ def plan_along(
     time = np.linspace(0.0, profile.duration, count)
     distance, rate, change = profile.at(time)
     motion = motion_at(path, distance, rate, change)
-    structure = robot.structure(motion.pose)
-    force = distributed_forces(structure, dynamic_wrench(robot.platform, motion), limits)
+    if robot.hangs:
+        motion, force = _hanging(robot, motion, limits)
+    else:
+        wrench = dynamic_wrench(robot.platform, motion)
+        force = distributed_forces(robot.structure(motion.pose), wrench, limits)
     tension = np.where(np.isfinite(force), force, 0.0)
     angle = robot.motor_angles(motion.pose, tension=tension)
     length = robot.lengths(motion.pose)
     return PlatformTrajectory(path, profile, time, distance, rate, motion, length, force, angle)
+
+
+def _hanging(
+    robot: Robot, motion: PlatformMotion, limits: ForceLimits
+) -> tuple[PlatformMotion, Array]:
+    """The motion in the poses of rest of a hanging platform, and the forces there; NaN without one.
+
+    Its swinging about them is no part of the plan.
+    """
+    rest = rest_poses(robot, motion.pose)
+    low, high = limits.between(len(robot.names))
+    within = np.asarray(np.all((low <= rest.force) & (rest.force <= high), axis=1))
+    known = np.isfinite(rest.force[:, :1])
+    # Where there is no rest the plan is refused by its forces, at the pose that was wanted.
+    rotation = np.where(known[..., None], rest.pose.rotation, motion.pose.rotation)
+    pose = Pose(motion.pose.position, rotation)
+    return replace(motion, pose=pose), np.where((rest.stable & within)[:, None], rest.force, np.nan)
 
 
 def motion_at(path: Path, distance: Array, rate: Array, change: Array) -> PlatformMotion:

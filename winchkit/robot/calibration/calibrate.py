@@ -358,10 +358,10 @@ def equations_of(robot: Robot, measured: Measured, options: Options) -> Equation
             f"--middle-force is {options.middle_force:g} N; cables only pull, so that it is above 0"
         )
     payload = [e for e in options.effects if e.startswith("payload")]
-    if payload and len(robot.names) < 6:
+    if payload and robot.hangs:
         raise UsageError(
-            f"{payload[0]} needs cables that hold all six degrees of freedom; the robot has "
-            f"{len(robot.names)} lines"
+            f"{payload[0]} needs cables that hold all {robot.geometry.degrees} degrees of freedom; "
+            f"the robot has {len(robot.names)} lines"
         )
     if payload and not tension and parameters.law is None:
         raise UsageError(
@@ -481,7 +481,8 @@ def _worse_rotation(before: PoseErrors, after: PoseErrors) -> list[str]:
 
 def _disagreements(equations: Equations, weights: Weights) -> list[str]:
     """Noise above the prior of the points: poses of another robot, or a wrong sign or order."""
-    prior_std, sigma = float(equations.parameters.std[0]), weights.sigma
+    exits = equations.parameters.std[equations.parameters.block["exit_point"]]
+    prior_std, sigma = float(exits.max()), weights.sigma
     checks = {
         "closure": "gearbox.direction, the lines' order, [home] and the motor angles there",
         "position": "that the poses are of this robot, in its base frame",

@@ -207,6 +207,9 @@ def _scaled(equations: Equations, shift: dict[str, Array]) -> Array:
 _FEW, _MOST = 3, 20_000
 """Rows: three poses determine a frame; more than 20 000 are the log of a motion and no poses at
 rest (rule of thumb)."""
+_ACROSS = 0.05
+"""Share of the same distance by which positions may differ from home across the guides (rule of
+thumb: 50 mm at 1 m make a cable 1 mm longer)."""
 _REACH = 2.0
 """In the largest distance of two exit points: a platform is between them, so that poses measured at
 twice that distance are in another unit or frame."""
@@ -216,20 +219,21 @@ def refuse_unfit(equations: Equations) -> None:
     """Raise UsageError for poses that are too few, too many, without redundancy or out of reach."""
     measured, many = equations.measured, len(equations.measured)
     known = equations.count
-    lines = measured.motor_angle.shape[1]
+    lines, degrees = measured.motor_angle.shape[1], equations.robot.geometry.degrees
     if many > _MOST:
         raise UsageError(
             f"{many} rows: each is a pose at rest, and at most {_MOST} can be fitted; keep the "
             "rows where the platform stood"
         )
     _refuse_out_of_reach(equations)
-    if many < _FEW or known <= 6 * many:
+    _refuse_other_motions(equations)
+    if many < _FEW or known <= degrees * many:
         cure = f"record more poses (90 is a good number, {_FEW} the least)"
-        if known <= 6 * many:
+        if known <= degrees * many:
             cure = "measure more at each: positions, rotations, swivel angles or cable lengths"
         raise UsageError(
             f"{many} poses with {known} measured values cannot calibrate a robot of {lines} lines: "
-            f"{6 * many} of them determine the poses themselves; {cure}"
+            f"{degrees * many} of them determine the poses themselves; {cure}"
         )
 
 
@@ -248,6 +252,29 @@ def _refuse_out_of_reach(equations: Equations) -> None:
             'the base frame? Of a tracker elsewhere declare frame = "unknown" in '
             "[instrument.tracker]"
         )
+
+
+def _refuse_other_motions(equations: Equations) -> None:
+    """Refuse positions that the declared degrees of freedom do not permit, and cables in a plane
+    of a platform that is said to move in space."""
+    robot = equations.robot
+    if robot.hangs and (names := robot.planar):
+        listed = ", ".join(f'"{name}"' for name in names)
+        raise UsageError(
+            f"all cables of '{robot.profile.name}' lie in one plane and say nothing of motions "
+            f"across it; of a planar robot declare degrees_of_freedom = [{listed}] in [platform]"
+        )
+    if equations.instruments is not None and "frame" in equations.instruments.free:
+        return
+    off = np.abs(equations.measured.position - robot.home.position) * (1 - robot.geometry.free[:3])
+    if not np.nanmax(off, initial=0.0) > _ACROSS * robot.geometry.size:
+        return
+    row, axis = np.unravel_index(int(np.nanargmax(off)), off.shape)
+    raise UsageError(
+        f"{equations.measured.place[row]}: the position measured is {off[row, axis] * 1e3:.3g} mm "
+        f"from home along {'xyz'[axis]}, which is none of the platform's degrees_of_freedom "
+        f"({', '.join(robot.platform.degrees_of_freedom)}); mend them, or [home], or the columns"
+    )
 
 
 def outside_bounds(parameters: Parameters) -> list[str]:

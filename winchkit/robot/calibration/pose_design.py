@@ -11,7 +11,7 @@ from winchkit.arrays import Array
 from winchkit.model.rotation import angles_of
 from winchkit.robot.calibration.calibrate import Calibrated
 from winchkit.robot.geometry.forward import forward
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose, lengths
+from winchkit.robot.geometry.kinematics import Pose, lengths
 from winchkit.robot.geometry.robot import robot_of
 from winchkit.robot.identification.bundle_adjustment import State, linearise
 from winchkit.robot.identification.pose_design import (
@@ -103,7 +103,8 @@ def _candidates(found: Calibrated) -> Pose:
     geometry = found.equations.geometry(found.values)
     position = spread(pose.position, _LEAST_BOX)
     pose = random_poses(geometry, position, spread(angles_of(pose.rotation), _LEAST_TILT))
-    if len(geometry.exit_point) >= PLATFORM_DOF:
+    pose = found.equations.robot.guided(pose)
+    if len(geometry.exit_point) >= geometry.degrees:
         return pose
     # A hanging platform comes to rest near these poses, not at them.
     length = lengths(geometry, pose.position, pose.rotation)

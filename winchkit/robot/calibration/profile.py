@@ -151,7 +151,9 @@ def _vector(values: Array, unit: str) -> list[str]:
 def _line(line: Any, source: Path, found: Calibrated) -> None:
     name, estimates = str(line["name"]), found.estimates
     for point in ("exit_point", "anchor_point"):
-        line[point] = [_written(estimates[f"{name}.{point}.{axis}"]) for axis in "xyz"]
+        fitted = [estimates.get(f"{name}.{point}.{axis}") for axis in "xyz"]
+        pairs = zip(fitted, line[point], strict=True)
+        line[point] = [known if own is None else _written(own) for own, known in pairs]
     if (radius := estimates.get(f"{name}.swivel_radius")) is not None:
         line["swivel_radius"] = _written(radius)
     if isinstance(line["winch"], str):

@@ -15,7 +15,6 @@ from winchkit.diagnosis.data.dataset import Dataset
 from winchkit.diagnosis.data.repeats import Repeats
 from winchkit.errors import Fault, RunError
 from winchkit.robot.files.poses import Measured, read_poses, read_trajectory
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF
 from winchkit.robot.identification.trajectory import Trajectory, trajectory_of
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
@@ -84,8 +83,12 @@ class RobotDataset(Dataset):
     @property
     def hangs(self) -> bool:
         """Whether cable forces and the weight determine where the platform stands."""
-        few = len(self.names) < PLATFORM_DOF and self.robot.platform.mass > 0
-        return few and self.has_balance
+        return not self.restrained and self.robot.platform.mass > 0 and self.has_balance
+
+    @property
+    def restrained(self) -> bool:
+        """Whether the robot has as many cables as its platform degrees of freedom, or more."""
+        return len(self.names) >= len(self.robot.platform.degrees_of_freedom)
 
     @property
     def has_balance(self) -> bool:
@@ -127,9 +130,10 @@ def prepare_poses(runs: Sequence[Run], robot: RobotProfile) -> RobotDataset:
             Fault(f"only {len(measured)} poses; at least {LEAST_POSES} are needed to judge", place)
         )
     kinds = (measured.motor_angle, measured.position, measured.angles)
-    spare = sum(int(np.isfinite(values).sum()) for values in kinds) - 6 * len(measured)
-    if len(robot.line) < PLATFORM_DOF and robot.platform.mass > 0:
-        spare += 6 * int(np.isfinite(measured.tension).all(axis=1).sum())
+    degrees = len(robot.platform.degrees_of_freedom)
+    spare = sum(int(np.isfinite(values).sum()) for values in kinds) - degrees * len(measured)
+    if len(robot.line) < degrees and robot.platform.mass > 0:
+        spare += degrees * int(np.isfinite(measured.tension).all(axis=1).sum())
     for values in (measured.swivel, measured.cable_length):
         # Each line's instrument has a zero of its own.
         spare += max(0, int(np.isfinite(values).sum()) - values.shape[1])

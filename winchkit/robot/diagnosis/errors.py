@@ -25,7 +25,6 @@ from winchkit.diagnosis.results import OutputFit
 from winchkit.model.rotation import rotation_by, skew
 from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.diagnosis.regression import PoseRegression
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF
 from winchkit.robot.identification.variance_components import PoseNoise
 
 Errors = dict[str, Array]
@@ -58,7 +57,7 @@ def errors_of(regression: PoseRegression, residuals: Mapping[str, Array]) -> Err
     rows = np.where(np.isfinite(closure), closure, 0.0)
     length = (at_pose @ rows[..., None])[..., 0]
     out = {"cable_length": np.where(np.isfinite(closure), -length, np.nan)}
-    if regression.dataset.measured.motor_angle.shape[1] >= PLATFORM_DOF:
+    if regression.dataset.restrained:
         whole = np.isfinite(residuals["closure"]).all(axis=1, keepdims=True)
         known_closure = np.where(whole, np.nan_to_num(residuals["closure"]), np.nan)
         found = residuals["position"] - (to_place @ known_closure[..., None])[..., 0]

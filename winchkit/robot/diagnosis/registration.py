@@ -22,7 +22,7 @@ from winchkit.model.rotation import rotation_by, rotation_vector
 from winchkit.robot.diagnosis.dataset import RobotDataset
 from winchkit.robot.effects.term import robot_with_terms
 from winchkit.robot.geometry.constraints import rotation_residual
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose
+from winchkit.robot.geometry.kinematics import Pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import (
     Tracker,
@@ -146,7 +146,7 @@ def _predicted(dataset: RobotDataset, robot: Robot) -> Pose:
     measured = dataset.measured
     tension = np.where(np.isfinite(measured.tension), measured.tension, 0.0)
     warm = np.where(np.isfinite(measured.temperature), measured.temperature, 20.0)
-    if len(robot.names) < PLATFORM_DOF and not robot.platform.mass > 0:
+    if robot.hangs and not robot.platform.mass > 0:
         nothing = np.full((len(measured), 3), np.nan)
         return Pose(nothing, np.full((len(measured), 3, 3), np.nan))
     return robot.poses_at(

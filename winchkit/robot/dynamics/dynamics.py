@@ -141,10 +141,13 @@ def dynamic_wrench(platform: PlatformSpec, motion: PlatformMotion) -> Array:
     """
     rotation = motion.pose.rotation
     inertial = (mass_matrix(platform, rotation) @ motion.acceleration[..., None])[..., 0]
-    return np.asarray(
-        gravity_wrench(platform, rotation)
-        - inertial
-        - _velocity_wrench(platform, rotation, motion.velocity)
+    return (
+        np.asarray(
+            gravity_wrench(platform, rotation)
+            - inertial
+            - _velocity_wrench(platform, rotation, motion.velocity)
+        )
+        * platform.free
     )
 
 
@@ -163,7 +166,10 @@ def accelerations(platform: PlatformSpec, rotation: Array, velocity: Array, wren
         )
     load = wrench + gravity_wrench(platform, rotation)
     load = load - _velocity_wrench(platform, rotation, velocity)
-    return np.asarray(np.linalg.solve(mass_matrix(platform, rotation), load[..., None])[..., 0])
+    # In coordinates that guides hold: acceleration 0.
+    free = np.array(platform.free)
+    mass = mass_matrix(platform, rotation) * np.outer(free, free) + np.diag(1 - free)
+    return np.asarray(np.linalg.solve(mass, (load * free)[..., None])[..., 0])
 
 
 def inverse_dynamics(

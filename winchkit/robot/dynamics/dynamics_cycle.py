@@ -16,7 +16,6 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 from winchkit.robot.dynamics.kernels import PLAIN, RobotKernels
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF
 from winchkit.robot.geometry.robot import Robot, cables_of
 from winchkit.units import GRAVITY
 
@@ -86,7 +85,7 @@ class DynamicsCycle:
         kernels: RobotKernels = PLAIN,
     ) -> None:
         count = len(robot.names)
-        if count < PLATFORM_DOF:
+        if robot.hangs:
             raise UsageError(
                 f"{count} lines do not constrain the platform; its forces and motion come from "
                 "winchkit.robot.geometry.forward and winchkit.robot.dynamics.integration"

@@ -93,13 +93,13 @@ class ElongationCorrection:
         Raises
         ------
         UsageError
-            For fewer than six lines, or where a law has no strain for a force at the reference.
+            For a hanging platform, or where a law has no strain for a force at the reference.
         """
         count = len(robot.names)
-        if count < 6:
+        if robot.hangs:
             raise UsageError(
-                f"{count} lines: Eq. 8 needs at least six; the forces of a hanging platform come "
-                "from winchkit.robot.geometry.forward"
+                f"{count} lines: Eq. 8 needs at least {robot.geometry.degrees}; the forces of a "
+                "hanging platform come from winchkit.robot.geometry.forward"
             )
         for name, found in (("laws", len(laws)), ("initial forces", len(initial))):
             if found != count:

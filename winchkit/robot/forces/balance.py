@@ -8,9 +8,9 @@ With the mass m and the centre of mass s of the platform
 
 The derivatives of V Aᵀ by pose and geometry are left out: the wrench that is left over is small.
 
-``hanging_balance``. A platform on fewer than six cables stands where their forces balance its
-weight. With the structure matrix Aᵀ, the measured cable forces f and the wrench w of the weight,
-six equations
+``hanging_balance``. A platform on fewer cables than degrees of freedom stands where their forces
+balance its weight. With the structure matrix Aᵀ, the measured cable forces f and the wrench w of
+the weight, six equations
 
     S (Aᵀ f + w) = 0,      S = diag(1, 1, 1, 1/ρ, 1/ρ, 1/ρ)
 
@@ -49,16 +49,17 @@ def balance(geometry: Geometry, pose: Pose, tension: Array, platform: PlatformSp
     """Whitened wrench of measured cable forces and weight, (p, 6), N.
 
     V is the inverse of the Cholesky factor of Aᵀ A, so that the rows are NaN at poses where a force
-    is missing or the cables do not hold all six degrees of freedom.
+    is missing or the cables do not hold all degrees of freedom.
 
     ``geometry``: geometry of n lines. ``pose``: the p poses. ``tension`` (p, n): measured cable
     forces, N. Returns: ``by_robot`` has ``payload``: by mass and centre of mass, (p, 6, 4), and
     ``tension``: by cable forces, (p, 6, n).
     """
     structure = structure_matrix(geometry, pose.position, pose.rotation)
-    spread = structure @ np.swapaxes(structure, 1, 2)
+    spread = structure @ np.swapaxes(structure, 1, 2) + np.diag(1 - geometry.free)
     whiten = np.full_like(spread, np.nan)
-    good = np.all(np.isfinite(spread), axis=(1, 2)) & (np.linalg.matrix_rank(structure) == 6)
+    good = np.all(np.isfinite(spread), axis=(1, 2))
+    good &= np.linalg.matrix_rank(structure) == geometry.degrees
     whiten[good] = np.linalg.inv(np.linalg.cholesky(spread[good]))
     left = wrench_residual(structure, tension, gravity_wrench(platform, pose.rotation))
     residual = (whiten @ left[..., None])[..., 0]
@@ -82,7 +83,7 @@ def force_basis(structure: Array) -> tuple[Array, Array]:
     ``structure`` (p, 6, n): structure matrices Aᵀ = U S Wᵀ (singular value decomposition). Returns:
     ``to_forces`` (p, k, 6): V = S⁻¹ Uᵀ with k = min(6, n): a whitening as in :func:`balance`, from
     which it differs by an orthogonal matrix. A row is NaN where the cables cannot carry its wrench,
-    so that robots of fewer than six cables keep the rows that they do carry. ``to_cables``
+    so that hanging and guided platforms keep the rows that they do carry. ``to_cables``
     (p, n, k): W: the least change of cable forces that carries each of these forces.
     """
     good = np.all(np.isfinite(structure), axis=(1, 2))
@@ -146,7 +147,7 @@ def hanging_balance(
     by_pose = np.empty((len(pose.position), 6, 6))
     for index in range(6):
         step = np.zeros((len(pose.position), 6))
-        step[:, index] = _STEP
+        step[:, index] = _STEP * geometry.free[index]
         ends = [wrench(moved_pose(pose, sign * step)) for sign in (1.0, -1.0)]
         by_pose[..., index] = (ends[0] - ends[1]) / (2 * _STEP)
     by = {

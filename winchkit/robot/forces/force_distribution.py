@@ -157,13 +157,13 @@ def improved_closed_form(structure: Array, wrench: Array, limits: ForceLimits) -
     """
     low, high = limits.between(structure.shape[1])
     value = np.array((low + high) / 2)
-    free = np.ones(len(value), dtype=bool)
+    free, held = np.ones(len(value), dtype=bool), np.linalg.matrix_rank(structure)
     while True:
         known = wrench + structure[:, ~free] @ value[~free]
         value[free] = _nearest(structure[:, free], known, ((low + high) / 2)[free])
         beyond = np.where(free, np.maximum(low - value, value - high), -np.inf)
         worst = int(np.argmax(beyond))
-        if beyond[worst] <= _WITHIN * (high[worst] - low[worst]) or np.sum(free) <= 6:
+        if beyond[worst] <= _WITHIN * (high[worst] - low[worst]) or np.sum(free) <= held:
             return _judge(value, structure, wrench, low, high)
         value[worst] = low[worst] if value[worst] < low[worst] else high[worst]
         free[worst] = False

@@ -3,11 +3,11 @@
     found = forward(geometry, lengths, start, platform=PlatformSpec(mass=3.0))
     found.pose.position[found.converged]
 
-With six cables or more that hold all six degrees of freedom the pose is the least-squares solution
-of the lengths (Gauss-Newton, after twelve steps Newton). With fewer, the platform hangs where its
-potential energy is least under the constraint of the lengths (sequential quadratic programming;
-Lagrange's multipliers are the cable forces); a cable whose force would be negative is slack, and
-its length is a bound and not an equation (active set).
+With as many cables as degrees of freedom, or more, that hold all of these, the pose is the
+least-squares solution of the lengths (Gauss-Newton, after twelve steps Newton). With fewer, the
+platform hangs where its potential energy is least under the constraint of the lengths (sequential
+quadratic programming; Lagrange's multipliers are the cable forces); a cable whose force would be
+negative is slack, and its length is a bound and not an equation (active set).
 
 The squares of the lengths have local minima beside the pose. A pose whose lengths are not met is
 therefore searched from other starts: for each rotation of a lattice about the start, the position
@@ -100,8 +100,8 @@ class Found:
     other: Pose
     """A second pose that meets the lengths as well; NaN where the search met none."""
     forces: Array
-    """Cable forces of a hanging platform, (p, n), N, zero in a slack cable; NaN with six or
-    more cables, which may be tight to any degree."""
+    """Cable forces of a hanging platform, (p, n), N, zero in a slack cable; NaN where cables hold
+    all degrees of freedom, since they may be tight to any degree."""
     steps: int
 
 
@@ -124,9 +124,9 @@ def forward(
     given : (p, n) array
         Cable lengths, m.
     start : Pose
-        Where the iteration starts, one pose or p.
+        Where the iteration starts, one pose or p; coordinates that guides hold keep its values.
     platform : PlatformSpec, optional
-        Mass and centre of mass, needed for fewer than six cables.
+        Mass and centre of mass, needed for fewer cables than degrees of freedom.
     steps : int
         Most steps.
     tolerance : float
@@ -135,7 +135,7 @@ def forward(
         Largest residual without a search from other starts, m: ``tolerance`` where the start is
         near the pose, negative for a search that also finds other solutions of every pose.
         "outlying", for many poses of measured lengths, is ten times the residual that a tenth of
-        them have. Fewer than six cables are not searched.
+        them have. Hanging platforms are not searched.
 
     Returns
     -------
@@ -145,17 +145,17 @@ def forward(
     Raises
     ------
     UsageError
-        For fewer than six cables without a platform's mass.
+        For fewer cables than degrees of freedom without a platform's mass.
     """
     count = len(geometry.exit_point)
     given = np.atleast_2d(np.asarray(given, dtype=float))
     if given.shape[1] != count:
         raise UsageError(f"{given.shape[1]} lengths were given for a robot of {count} lines")
-    hanging = count < 6
+    hanging = count < geometry.degrees
     if hanging and (platform is None or platform.mass <= 0):
         raise UsageError(
-            f"{count} lines leave the platform {6 - count} degrees of freedom, whose rest position "
-            "depends on its weight; give [platform] mass"
+            f"{count} lines leave the platform {geometry.degrees - count} degrees of freedom, "
+            "whose rest position depends on its weight; give [platform] mass"
         )
     many = len(given)
     begin = Pose(
@@ -252,10 +252,10 @@ def _search_further(
     best, other = found
     begin = Pose(start.position[rows], start.rotation[rows])
     starts = _starts(geometry, given[rows], begin)
-    left, tried = np.arange(len(rows)), 0
-    while tried < _STARTS and len(left := left[~(best.worst[rows[left]] <= search)]):
+    left, tried, most = np.arange(len(rows)), 0, starts.position.shape[1]
+    while tried < most and len(left := left[~(best.worst[rows[left]] <= search)]):
         # In rounds of 1, 1, 2, 4 … starts: one suffices for most, and more at once cost less each.
-        round_ = slice(tried, max(1, 2 * tried))
+        round_ = slice(tried, min(max(1, 2 * tried), most))
         tried, count = round_.stop, round_.stop - round_.start
         at = Pose(
             starts.position[left, round_].reshape(-1, 3),
@@ -285,12 +285,13 @@ def _outlying(worst: Array) -> float:
     return max(_OUTLYING * usual, RESOLUTION) if np.isfinite(usual) else RESOLUTION
 
 
-@lru_cache(maxsize=1)
-def _lattice() -> Array:
-    """Rotations of the starts relative to the given one, (k, 3, 3)."""
+@lru_cache(maxsize=8)
+def _lattice(free: tuple[float, ...]) -> Array:
+    """Rotations of the starts relative to the given one, (k, 3, 3), about the free base axes."""
     count = int(_WIDEST / _SPACING) + 1
     vectors = _SPACING * (np.indices((2 * count + 1,) * 3).reshape(3, -1).T - count)
-    return rotation_by(vectors[np.linalg.norm(vectors, axis=1) <= _WIDEST])
+    kept = ~np.any(vectors * (1 - np.array(free)), axis=1)
+    return rotation_by(vectors[kept & (np.linalg.norm(vectors, axis=1) <= _WIDEST)])
 
 
 def _starts(geometry: Geometry, given: Array, start: Pose) -> Pose:
@@ -300,17 +301,20 @@ def _starts(geometry: Geometry, given: Array, start: Pose) -> Pose:
     Gauss-Newton steps with fixed exit points, from either side of the plane that is nearest to the
     exit points: where they lie in it, lengths say nothing of the side.
     """
-    rotation = np.tile(_lattice() @ start.rotation[:, None], (1, 2, 1, 1))
+    moved = geometry.free[:3] > 0
+    lattice = _lattice(tuple(geometry.free[3:].tolist()))
+    rotation = np.tile(lattice @ start.rotation[:, None], (1, 2, 1, 1))
     arm = np.swapaxes(rotation @ geometry.anchor_point.T, 2, 3) - geometry.exit_point
     middle = geometry.exit_point.mean(axis=0)
-    normal = np.linalg.svd(geometry.exit_point - middle)[2][2]
+    normal = np.zeros(3)
+    normal[moved] = np.linalg.svd((geometry.exit_point - middle)[:, moved])[2][-1]
     behind = start.position - 2 * ((start.position - middle) @ normal)[:, None] * normal
     sides = np.stack([start.position, behind], axis=1)
     position = np.repeat(sides, rotation.shape[1] // 2, axis=1)
     for _ in range(_PLACING):
         cable = position[:, :, None] + arm
         length = np.maximum(np.linalg.norm(cable, axis=3), np.finfo(float).tiny)
-        unit = cable / length[..., None]
+        unit = cable / length[..., None] * moved
         turned = np.swapaxes(unit, 2, 3)
         right = turned @ (given[:, None] - length)[..., None]
         position = position + np.linalg.solve(turned @ unit + _PULLED * np.eye(3), right)[..., 0]
@@ -485,8 +489,9 @@ def _balanced(matrix: Array) -> tuple[Array, Array]:
 
 
 def _holds(geometry: Geometry, at: Pose) -> NDArray[np.bool_]:
-    """Whether the cables hold all six degrees of freedom, (p,)."""
+    """Whether the cables hold all degrees of freedom, (p,)."""
     by = linearised(geometry, at.position, at.rotation)[1]
     slope = np.concatenate([by.position, by.rotation], axis=-1)
-    stiff = np.linalg.eigvalsh(_balanced(np.swapaxes(slope, 1, 2) @ slope)[0])
+    normal = np.swapaxes(slope, 1, 2) @ slope + np.diag(1 - geometry.free)
+    stiff = np.linalg.eigvalsh(_balanced(normal)[0])
     return np.asarray(stiff[:, 0] > _LOOSE)

@@ -17,7 +17,7 @@ def length_hessian(geometry: Geometry, position: Array, rotation: Array) -> Arra
     vector's own second order is ½ ω × (ω × R b).
     """
     by = sensitivities(geometry, position, rotation)
-    unit, axis = by.position, geometry.swivel_axis
+    unit, axis = -by.exit_point, geometry.swivel_axis
     arm = np.einsum("pij,nj->pni", rotation, geometry.anchor_point)
     wrap = wrap_angle(geometry, position, rotation)[..., None]
     seen = arm + position[:, None] - geometry.exit_point
@@ -40,7 +40,7 @@ def length_hessian(geometry: Geometry, position: Array, rotation: Array) -> Arra
     product = arm[..., :, None] * unit[..., None, :]
     inner = np.sum(arm * unit, axis=-1)[..., None, None]
     out[..., 3:, 3:] += (product + np.swapaxes(product, -1, -2)) / 2 - inner * np.eye(3)
-    return np.asarray(out)
+    return np.asarray(out * _outer(geometry.free))
 
 
 def _outer(vector: Array) -> Array:

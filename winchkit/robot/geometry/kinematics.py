@@ -12,20 +12,18 @@ the exit point is fixed. All is in SI and in batches of p poses of a robot with 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.model.rotation import rotation_of
+from winchkit.model.rotation import rotation_by, rotation_of, rotation_vector
 from winchkit.robot.geometry.loops import LEAST_WRAP
 
 if TYPE_CHECKING:
     from winchkit.schema.profiles.robot import RobotProfile
 
-PLATFORM_DOF = 6
-"""Degrees of freedom of a platform; fewer cables leave it hanging."""
 _CHUNK = 1024
 """Poses: an array of eight cables is then 64 KB, and a dozen of them fit the second-level cache (1
 MB)."""
@@ -43,6 +41,15 @@ class Geometry:
     """(n,), m; zero is a fixed exit point."""
     swivel_axis: Array
     """Unit vectors of the cable's direction when it reaches the pulley, base frame, (n, 3)."""
+    free: Array = field(default_factory=lambda: np.ones(6))
+    """1 for each degree of freedom of the platform, by position and rotation vector in base axes, 0
+    for a coordinate that guides hold; (6,). Derivatives by the latter are zero, since the platform
+    cannot move there, and so are their rows of structure matrices, where guides balance."""
+
+    @property
+    def degrees(self) -> int:
+        """Number of degrees of freedom of the platform; fewer cables leave it hanging."""
+        return int(np.count_nonzero(self.free))
 
     @property
     def size(self) -> float:
@@ -100,6 +107,7 @@ def geometry_of(profile: RobotProfile) -> Geometry:
         np.array([line.anchor_point for line in profile.line], dtype=float),
         np.array([line.swivel_radius for line in profile.line], dtype=float),
         axis / np.linalg.norm(axis, axis=1, keepdims=True),
+        np.array(profile.platform.free),
     )
 
 
@@ -118,6 +126,18 @@ def home_of(profile: RobotProfile) -> Pose:
     """
     rotation = rotation_of(*profile.home.rotation)
     return Pose(np.array([profile.home.position], dtype=float), rotation[None])
+
+
+def guided(pose: Pose, home: Pose, free: Array) -> Pose:
+    """Poses with those coordinates of home that guides hold, and all others as they are.
+
+    ``pose``: the p poses. ``home``: one pose. ``free`` (6,): of :class:`Geometry`.
+    """
+    if free.all():
+        return pose
+    turned = rotation_vector(pose.rotation @ home.rotation[0].T) * free[3:]
+    place = np.where(free[:3] > 0, pose.position, home.position)
+    return Pose(place, rotation_by(turned) @ home.rotation)
 
 
 def _tangent(geometry: Geometry, position: Array, rotation: Array) -> _Tangent:
@@ -193,7 +213,18 @@ def linearised(geometry: Geometry, position: Array, rotation: Array) -> tuple[Ar
     unit = np.stack([sine * h for h in _unit(t)], axis=-1)
     unit += cosine[..., None] * geometry.swivel_axis
     length = geometry.swivel_radius * t.wrap + t.free
-    return length, _by_anchor(unit, t, rotation, t.wrap - sine)
+    return length, _by_anchor(geometry, unit, t, rotation, t.wrap - sine)
+
+
+def straight_cables(geometry: Geometry, pose: Pose) -> tuple[Array, Array]:
+    """Ends of the cables between pulley and platform, (p, n, 3) each, m, in the base frame.
+
+    ``geometry``: of n lines. ``pose``: the p poses. NaN where an anchor lies inside its pulley.
+    """
+    t = _tangent(geometry, pose.position, pose.rotation)
+    away = -linearised(geometry, pose.position, pose.rotation)[1].exit_point
+    end = np.stack(t.arm, axis=-1) + pose.position[:, None]
+    return end - t.free[..., None] * away, end
 
 
 def swivel_angle(geometry: Geometry, position: Array, rotation: Array) -> Array:
@@ -241,7 +272,8 @@ def swivel_sensitivities(geometry: Geometry, position: Array, rotation: Array) -
     t = _tangent(geometry, position, rotation)
     across = np.cross(geometry.swivel_axis, np.stack(_unit(t), axis=-1))
     distance = np.where(t.distance > 0, t.distance, np.nan)
-    return _by_anchor(across / distance[..., None], t, rotation, np.zeros_like(t.wrap))
+    by_anchor = across / distance[..., None]
+    return _by_anchor(geometry, by_anchor, t, rotation, np.zeros_like(t.wrap))
 
 
 def structure_matrix(geometry: Geometry, position: Array, rotation: Array) -> Array:
@@ -260,7 +292,7 @@ def structure_matrix(geometry: Geometry, position: Array, rotation: Array) -> Ar
     -------
     (p, 6, n) array
         Forces first, then moments about the platform's origin, base axes; Aᵀ f + w = 0 at rest
-        (IPAnema paper, Eq. 7).
+        (IPAnema paper, Eq. 7). Rows of coordinates that guides hold are zero.
     """
     by = sensitivities(geometry, position, rotation)
     return -np.concatenate([by.position, by.rotation], axis=-1).transpose(0, 2, 1)
@@ -272,11 +304,14 @@ def _unit(t: _Tangent) -> list[Array]:
     return [h / distance for h in t.outward]
 
 
-def _by_anchor(gradient: Array, t: _Tangent, rotation: Array, radius: Array) -> Sensitivities:
+def _by_anchor(
+    geometry: Geometry, gradient: Array, t: _Tangent, rotation: Array, radius: Array
+) -> Sensitivities:
     """Derivatives of a quantity whose gradient by the anchor's place in the base is known."""
     arm = np.stack(t.arm, axis=-1)
     turned = gradient @ rotation
-    return Sensitivities(gradient, np.cross(arm, gradient), -gradient, turned, radius)
+    by_rotation = np.cross(arm, gradient) * geometry.free[3:]
+    return Sensitivities(gradient * geometry.free[:3], by_rotation, -gradient, turned, radius)
 
 
 def _swivel_frame(axis: Array) -> tuple[Array, Array]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.model.rotation import angles_of, rotation_by, rotation_of
-from winchkit.robot.geometry.kinematics import Pose
+from winchkit.robot.geometry.kinematics import Pose, guided
 
 _STRIDE = 0.3
 """Longest step of a coordinate, m or rad: rule of thumb, within which lengths are nearly linear."""
@@ -65,16 +65,18 @@ def moved_pose(pose: Pose, step: Array) -> Pose:
     return Pose(pose.position + step[:, :3], rotation_by(step[:, 3:]) @ pose.rotation)
 
 
-def start_pose(position: Array, angles: Array, home: Pose) -> Pose:
+def start_pose(position: Array, angles: Array, home: Pose, free: Array) -> Pose:
     """Measured positions and rotations, completed by those of the home pose.
+
+    Coordinates that guides hold are those of home.
 
     ``position`` (p, 3): m; NaN where a coordinate was not measured. ``angles`` (p, 3): roll, pitch
     and yaw, rad; NaN where one was not measured. ``home``: the home pose, from which missing
-    coordinates and angles are taken.
+    coordinates and angles are taken. ``free`` (6,): of the robot's geometry.
     """
     place = np.where(np.isfinite(position), position, home.position)
     some = np.any(np.isfinite(angles), axis=1)
     rotation = np.repeat(home.rotation, len(position), axis=0)
     filled = np.where(np.isfinite(angles), angles, angles_of(home.rotation))
     rotation[some] = rotation_of(*filled[some].T)
-    return Pose(place, rotation)
+    return guided(Pose(place, rotation), home, free)

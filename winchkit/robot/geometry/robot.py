@@ -20,6 +20,7 @@ from winchkit.robot.geometry.kinematics import (
     Geometry,
     Pose,
     geometry_of,
+    guided,
     home_of,
     lengths,
     structure_matrix,
@@ -27,10 +28,17 @@ from winchkit.robot.geometry.kinematics import (
 from winchkit.robot.geometry.loops import CableLine
 from winchkit.robot.geometry.tracker import Tracker, declared_tracker
 from winchkit.robot.geometry.wrench import gravity_wrench
-from winchkit.schema.profiles.robot import PlatformSpec, RobotProfile
+from winchkit.schema.profiles.robot import (
+    COORDINATES,
+    Coordinate,
+    PlatformSpec,
+    RobotProfile,
+)
 from winchkit.schema.profiles.winch import WinchProfile
 
 _TURN = 2 * np.pi
+_FLAT = 1e-3
+"""Thickness of a plane that has all cables, as a share of the robot's size (rule of thumb)."""
 _NEWTON_STEPS = 5
 """As for one line (four reach 1e-7 of the start's error), and one more since the cable force, too,
 may be far from the reference's."""
@@ -131,6 +139,40 @@ class Robot:
             Force and torque about the platform frame's origin, N and N m.
         """
         return gravity_wrench(self.platform, pose.rotation)
+
+    def guided(self, pose: Pose) -> Pose:
+        """Poses with those coordinates of home that guides hold.
+
+        Parameters
+        ----------
+        pose : Pose
+            The p poses.
+
+        Returns
+        -------
+        Pose
+            The same poses where the platform has all six degrees of freedom.
+        """
+        return guided(pose, self.home, self.geometry.free)
+
+    @property
+    def planar(self) -> tuple[Coordinate, ...]:
+        """Degrees of freedom in the plane of all cables at home; empty where they are in none."""
+        there = self.home.position + self.geometry.anchor_point @ self.home.rotation[0].T
+        points = np.concatenate([self.geometry.exit_point, there])
+        flat = np.ptp(points, axis=0) <= _FLAT * self.geometry.size
+        if np.count_nonzero(flat) != 1:
+            return ()
+        across = int(np.argmax(flat))
+        return (
+            *(name for k, name in enumerate(COORDINATES[:3]) if k != across),
+            COORDINATES[3 + across],
+        )
+
+    @property
+    def hangs(self) -> bool:
+        """Whether fewer cables than degrees of freedom leave the platform's pose to its weight."""
+        return len(self.profile.line) < self.geometry.degrees
 
     def motor_angles(
         self, pose: Pose, strain: Array | float = 0.0, tension: Array | float = 0.0
@@ -235,7 +277,7 @@ class Robot:
         return forward(
             self.geometry,
             given,
-            start or self.home,
+            self.guided(start or self.home),
             self.platform,
             tolerance=tolerance,
             search=search,
@@ -287,7 +329,7 @@ def robot_of(
                 offset = modifier.apply(offset, rest)
         exits[i], anchors[i], radii[i] = place.exit_point, place.anchor_point, place.swivel_radius
         offsets[i] = offset
-    geometry = Geometry(exits, anchors, radii, geometry.swivel_axis)
+    geometry = replace(geometry, exit_point=exits, anchor_point=anchors, swivel_radius=radii)
     there = lengths(geometry, home.position, home.rotation)[0] + offsets
     platform = profile.platform
     for modifier in payload:
@@ -335,8 +377,14 @@ def cables_of(robot: Robot) -> list[CableLine]:
     Raises
     ------
     UsageError
-        For effects that the loops do not compute.
+        For effects that the loops do not compute, and for a platform that guides hold.
     """
+    if robot.geometry.degrees < len(robot.geometry.free):
+        raise UsageError(
+            "the loops of a control cycle move a platform in all six degrees of freedom, not in "
+            f"{', '.join(robot.platform.degrees_of_freedom)} alone; take Robot.motor_angles and "
+            "Robot.poses_at"
+        )
     return [_cable(robot, i, winch) for i, winch in enumerate(robot.winches)]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from winchkit.arrays import Array
@@ -13,6 +15,8 @@ _DOWN = np.array([0.0, 0.0, -GRAVITY])
 
 def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
     """Weight of the platform on its origin, (p, 6), N and N m in base axes; gravity is −z.
+
+    Guides carry the components of the coordinates that they hold: these are zero.
 
     Parameters
     ----------
@@ -28,15 +32,15 @@ def gravity_wrench(platform: PlatformSpec, rotation: Array) -> Array:
     """
     lever = np.asarray(rotation @ np.asarray(platform.center_of_mass, dtype=float))
     force = np.broadcast_to(platform.mass * _DOWN, lever.shape)
-    return np.concatenate([force, np.cross(lever, force)], axis=-1)
+    return np.concatenate([force, np.cross(lever, force)], axis=-1) * platform.free
 
 
 def weight_by_payload(platform: PlatformSpec, rotation: Array) -> Array:
     """Derivatives of :func:`gravity_wrench` by mass and centre of mass, (p, 6, 4)."""
     out = np.zeros((len(rotation), 6, 4))
-    out[..., 0] = gravity_wrench(PlatformSpec(1.0, platform.center_of_mass), rotation)
+    out[..., 0] = gravity_wrench(replace(platform, mass=1.0), rotation)
     for k in range(3):
-        out[:, 3:, 1 + k] = np.cross(rotation[:, :, k], platform.mass * _DOWN)
+        out[:, 3:, 1 + k] = np.cross(rotation[:, :, k], platform.mass * _DOWN) * platform.free[3:]
     return out
 
 
@@ -48,4 +52,4 @@ def weight_hessian(platform: PlatformSpec, rotation: Array) -> Array:
     product = lever[:, :, None] * lift
     inner = (lever @ lift)[:, None, None]
     out[:, 3:, 3:] = (product + np.swapaxes(product, 1, 2)) / 2 - inner * np.eye(3)
-    return out
+    return out * np.outer(platform.free, platform.free)

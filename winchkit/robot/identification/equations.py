@@ -53,7 +53,7 @@ from winchkit.robot.geometry.constraints import (
     swivel_residual,
     winding_of,
 )
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose, lengths
+from winchkit.robot.geometry.kinematics import Pose, lengths
 from winchkit.robot.geometry.pose_estimation import moved_pose, start_pose
 from winchkit.robot.geometry.robot import Robot, standing
 from winchkit.robot.geometry.tracker import (
@@ -110,13 +110,14 @@ class Equations(ParametrizedRobot):
         angles = np.where(whole, measured.angles, np.nan)
         tracker = self.robot_at(values).tracker
         if tracker is None:
-            return start_pose(measured.position, angles, home)
+            return start_pose(measured.position, angles, home, self.robot.geometry.free)
         # Without a measured rotation the platform is taken to stand as at home.
         turned = reading_of(tracker, Pose(np.zeros_like(measured.position), home.rotation)).rotation
         seen = np.where(whole[..., None], rotation_of(*np.nan_to_num(angles).T), turned)
         behind = pose_behind(tracker, Pose(measured.position, seen))
         known = np.isfinite(behind.position)
-        return Pose(np.where(known, behind.position, home.position), behind.rotation)
+        there = np.where(known, behind.position, home.position)
+        return self.robot.guided(Pose(there, behind.rotation))
 
     def of(self, poses: NDArray[np.bool_]) -> Equations:
         """The equations of some of the poses, (p,)."""
@@ -154,7 +155,7 @@ class Equations(ParametrizedRobot):
     @property
     def hangs(self) -> bool:
         """Whether measured cable forces and a known weight determine the pose of the platform."""
-        few = len(self.robot.names) < PLATFORM_DOF and self.robot.platform.mass > 0
+        few = self.robot.hangs and self.robot.platform.mass > 0
         known = np.any(np.all(np.isfinite(self.measured.tension), axis=1))
         return few and self.balanced is not False and bool(known)
 
@@ -262,7 +263,9 @@ class Equations(ParametrizedRobot):
             "balance": self._balance,
         }
         for kind in self.kinds:
-            yield kind, of_kind[kind](state.values, robot, state.pose)
+            found = of_kind[kind](state.values, robot, state.pose)
+            # Guides hold the other coordinates, whatever a tracker shows of them.
+            yield kind, replace(found, by_pose=found.by_pose * robot.geometry.free)
 
     def rows(self, state: State) -> Iterator[Rows]:
         """All equations at a state with derivatives by the vector of parameters."""

@@ -124,6 +124,9 @@ EFFECTS = (*LAWS, "home-length", "gear-ratio", "payload-mass", "payload-centre")
 _MASS_SHARE, _MASS_LEAST = 0.2, 0.1
 """Standard deviation of the prior: a fifth of the mass, at least 0.1 kg for a tool or cable carrier
 that is in no drawing (rule of thumb)."""
+_ALONG = 1e-3
+"""Share of an axis of the platform that lies along a guide's axis from which on it is held
+(numerical: axes are parallel up to rounding)."""
 _CENTRE = 20e-3
 """Standard deviation of the prior, m: a centre of mass is known from a drawing to some centimetres
 (rule of thumb; the data decide where it can be identified)."""
@@ -246,13 +249,13 @@ class _Builder:
         """Prior of the robot's file, else of the paper."""
         return self.robot.profile.prior.get(name, PriorSpec(PRIORS[name]))
 
-    def points(self, name: PriorName, values: Array) -> None:
-        """Three coordinates a line."""
+    def points(self, name: PriorName, values: Array, fitted: NDArray[np.bool_]) -> None:
+        """Three coordinates a line; those that are not ``fitted`` (3,) have no prior's width."""
         std = self.prior(name).std
         found = [
-            Parameter(f"{line}.{name}.{axis}", "m", float(value), std)
+            Parameter(f"{line}.{name}.{axis}", "m", float(value), std * free)
             for line, point in zip(self.robot.names, values, strict=True)
-            for axis, value in zip("xyz", point, strict=True)
+            for axis, value, free in zip("xyz", point, fitted.tolist(), strict=True)
         ]
         self.add(name, found, -1, 3)
 
@@ -310,8 +313,12 @@ def parameters_of(
     _known(effects)
     law = next((effect for effect in effects if effect in LAWS), None)
     build = _Builder(robot)
-    build.points("exit_point", robot.geometry.exit_point)
-    build.points("anchor_point", robot.geometry.anchor_point)
+    # Nothing is measured across a guide, and without rotation exit and anchor points are the same.
+    moved = robot.geometry.free[:3]
+    across = np.abs((1 - moved) @ robot.home.rotation[0])
+    turns = bool(robot.geometry.free[3:].any())
+    build.points("exit_point", robot.geometry.exit_point, moved > 0)
+    build.points("anchor_point", robot.geometry.anchor_point, turns & (across < _ALONG))
     winches = robot.winches
     radii = [winch.drum.winding_radius for winch in winches]
     build.lengths("winding_radius", radii, [True] * len(winches))

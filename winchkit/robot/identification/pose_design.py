@@ -23,7 +23,6 @@ from winchkit.model.rotation import angles_of, rotation_of
 from winchkit.robot.files.poses import Measured
 from winchkit.robot.forces.force_distribution import ForceLimits, wrench_feasibility
 from winchkit.robot.geometry.kinematics import (
-    PLATFORM_DOF,
     Geometry,
     Pose,
     lengths,
@@ -70,9 +69,9 @@ def random_poses(geometry: Geometry, position: Array, angles: Array) -> Pose:
 def is_held(geometry: Geometry, platform: PlatformSpec, pose: Pose) -> NDArray[np.bool_]:
     """Whether cables that only pull balance the platform's weight at poses, (p,).
 
-    True for robots of fewer than six cables, whose platform hangs.
+    True for robots of fewer cables than degrees of freedom, whose platform hangs.
     """
-    if len(geometry.exit_point) < PLATFORM_DOF:
+    if len(geometry.exit_point) < geometry.degrees:
         return np.ones(len(pose.position), dtype=bool)
     structure = structure_matrix(geometry, pose.position, pose.rotation)
     pairs = zip(structure, gravity_wrench(platform, pose.rotation), strict=True)

@@ -96,6 +96,7 @@ def lengths_at_home(robot: Robot, measured: Measured, sigma: float) -> Array:
     """Cable at home beyond that of the geometry, (n,), m, of positions in a known frame."""
     tracker = declared_tracker(robot.profile)
     equations = adjustment_of(robot, measured, tracker, frozenset({"tracker_frame", "reflector"}))
-    shown = start_pose(measured.position, np.full_like(measured.position, np.nan), robot.home)
-    found = adjusted(equations, pose_behind(tracker, shown), sigma)
+    angles = np.full_like(measured.position, np.nan)
+    shown = start_pose(measured.position, angles, robot.home, np.ones(6))
+    found = adjusted(equations, robot.guided(pose_behind(tracker, shown)), sigma)
     return np.asarray(found.state.values[equations.parameters.block["home_length"]])

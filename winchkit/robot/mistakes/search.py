@@ -23,7 +23,7 @@ from winchkit.errors import Fault, RunError
 from winchkit.model.rotation import mean_rotation, rotation_by, rotation_of, rotation_vector
 from winchkit.robot.files.poses import Measured
 from winchkit.robot.geometry.constraints import by_pose
-from winchkit.robot.geometry.kinematics import PLATFORM_DOF, Pose, lengths, linearised
+from winchkit.robot.geometry.kinematics import Pose, lengths, linearised
 from winchkit.robot.geometry.pose_estimation import Iteration, estimated_pose
 from winchkit.robot.geometry.robot import Robot
 from winchkit.robot.geometry.tracker import declared_tracker, registered
@@ -134,9 +134,9 @@ def refuse_mistakes(robot: Robot, measured: Measured) -> None:
 
 
 def mistakes_in(robot: Robot, measured: Measured) -> tuple[Named, ...]:
-    """Mistakes of each run of a robot with six lines or more and twelve poses or more."""
+    """Mistakes of each run of twelve poses or more of a robot whose cables hold its platform."""
     out: list[Named] = []
-    if len(robot.names) < PLATFORM_DOF:
+    if robot.hangs:
         return ()
     for run in np.unique(measured.run):
         own = _whole(measured[measured.run == run])

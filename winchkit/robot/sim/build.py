@@ -56,6 +56,7 @@ def build_robot(bench: SimBench, truth: PlatformTruth, *, compiled: bool = False
         np.array(truth.center_of_mass or profile.platform.center_of_mass, dtype=float),
         np.diag(truth.inertia),
         anchors,
+        profile.platform.free,
     )
     home = rotation(*profile.home.rotation)
     position = np.array(profile.home.position, dtype=float)

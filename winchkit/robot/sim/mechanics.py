@@ -102,8 +102,9 @@ def step(  # noqa: PLR0917 - numba takes no keywords
 ) -> None:
     """Advance pose and velocity by ``dt`` s, and the cables with them.
 
-    ``body`` is mass and inertia (9), ``load`` weight and wrench (6), ``springs`` has for each
-    cable unstrained length at the end of the step, its rate, and stiffness; ``work`` has ``WORK``.
+    ``body`` is mass, inertia (9), and for each coordinate 1, or 0 where guides hold it (6);
+    ``load`` weight and wrench (6); ``springs`` has for each cable unstrained length at the end of
+    the step, its rate, and stiffness; ``work`` has ``WORK``.
     Results: ``center``, ``rotation`` and ``velocity`` (linear, angular; m/s, rad/s) after the step,
     ``rows`` there, and force (N) and rate of the length (m/s) of each cable in ``forces``.
     """
@@ -128,6 +129,10 @@ def step(  # noqa: PLR0917 - numba takes no keywords
                 right[k] -= pull * lever
                 for j in range(k + 1):
                     matrix[6 * k + j] += change * lever * rows[g + j]
+    for k in range(6):
+        right[k] *= body[10 + k]
+        for j in range(k):
+            matrix[6 * k + j] *= body[10 + k] * body[10 + j]
     solve(matrix, right)
     for k in range(6):
         before = velocity[k]

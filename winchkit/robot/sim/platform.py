@@ -37,6 +37,8 @@ class Body:
     """About the centre of mass, body axes, (3, 3), kg m²."""
     anchor_point: Array
     """(n, 3), m."""
+    free: tuple[float, ...] = (1.0,) * 6
+    """1 for each coordinate in base axes in which it moves, 0 where guides hold it."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,16 @@ class CablePlatform:
         """Ratio of damping to stiffness of the cables, s."""
         self.wrench = np.zeros(6)
         """External force and moment about the centre of mass beside the weight, N and N m."""
-        self._weight = np.array([0.0, 0.0, -body.mass * GRAVITY, 0.0, 0.0, 0.0])
+        self._weight = np.array([0.0, 0.0, -body.mass * GRAVITY, 0.0, 0.0, 0.0]) * body.free
         count = len(body.anchor_point)
         arms = body.anchor_point - body.center_of_mass
         lines = np.column_stack([pulleys.exit_point, pulleys.axis, pulleys.radius, arms])
         self._step: Callable[..., None] = compiled_step() if compiled else step
         floats = self._floats = np.array if compiled else _plain
-        self._lines, self._body = floats(lines.ravel()), floats([body.mass, *body.inertia.flat])
+        self._lines, self._body = (
+            floats(lines.ravel()),
+            floats([body.mass, *body.inertia.flat, *body.free]),
+        )
         self._center = floats(position + attitude @ body.center_of_mass)
         self._rotation = floats(np.asarray(attitude, dtype=float).ravel())
         self._velocity = floats(np.zeros(6))
@@ -167,8 +172,8 @@ class CablePlatform:
 
     @property
     def _jacobian(self) -> Array:
-        """Gradient of the cable lengths by the pose of the centre of mass, (n, 6)."""
-        return np.array(self._rows).reshape(-1, ROW)[:, 1:7]
+        """Gradient of the cable lengths by the motions of the centre of mass, (n, 6)."""
+        return np.array(self._rows).reshape(-1, ROW)[:, 1:7] * self.body.free
 
     def advance(
         self, to: float, start: Sequence[float], end: Sequence[float], stiffness: Sequence[float]

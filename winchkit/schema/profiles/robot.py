@@ -23,6 +23,9 @@ from winchkit.schema.quantity import (
 from winchkit.schema.table import Rule, Table
 
 Point = tuple[Length, Length, Length]
+Coordinate = Literal["x", "y", "z", "roll", "pitch", "yaw"]
+COORDINATES: tuple[Coordinate, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
+"""Of a pose. As degrees of freedom the angles are rotations about the base axes x, y and z."""
 
 PriorName = Literal[
     "exit_point", "anchor_point", "winding_radius", "swivel_radius", "layer_growth", "home_length"
@@ -62,12 +65,39 @@ class PlatformSpec(Table):
     center_of_mass: Point = (0.0, 0.0, 0.0)
     inertia: tuple[Inertia, Inertia, Inertia] | None = None
     """Principal moments about the centre of mass, in platform axes, kg m²; None where unknown."""
+    degrees_of_freedom: tuple[Coordinate, ...] = COORDINATES
+    """Motions that the platform can make; guides, or the way it is made, hold the others at their
+    values of home. A planar platform has two translations and the rotation about the normal of
+    their plane, such as x, z, pitch; a point mass has translations only."""
+
+    @property
+    def free(self) -> tuple[float, ...]:
+        """1 for each coordinate of a pose that is a degree of freedom, 0 for the others, (6,)."""
+        return tuple(float(name in self.degrees_of_freedom) for name in COORDINATES)
 
     def rules(self) -> Iterator[Rule]:
-        """Principal moments satisfy the triangle inequality."""
+        """Degrees of freedom form a group; principal moments satisfy the triangle inequality."""
+        if not _is_group(self.degrees_of_freedom):
+            yield (
+                "degrees_of_freedom",
+                f"[{', '.join(self.degrees_of_freedom)}] are no motions of a rigid body by "
+                "themselves; write translations, alone or with the rotation about the normal of "
+                "two of them (x, z, pitch), or all six",
+            )
         a, b, c = sorted(self.inertia or (0.0, 0.0, 0.0))
         if c > (a + b) * (1 + 1e-9):
             yield "inertia", f"{c:g} kg m^2 is above the sum of the two others; no body has these"
+
+
+def _is_group(names: tuple[Coordinate, ...]) -> bool:
+    """Whether these motions, one after the other, are motions of the same kind."""
+    moved, turned = (
+        [name in names for name in part] for part in (COORDINATES[:3], COORDINATES[3:])
+    )
+    if len(set(names)) < len(names) or not any(moved):
+        return False
+    across = all(moved[k] for k in range(3) if not turned[k])
+    return not any(turned) or (sum(turned) == 1 and across) or all(moved + turned)
 
 
 @dataclass(frozen=True)
@@ -139,6 +169,9 @@ class RobotProfile(Plotted, Table):
         for key, name in self.instrument.lines():
             if name not in names:
                 yield f"instrument.{key}", f"no line '{name}'; the lines are {', '.join(names)}"
+        if self.instrument.tracker.datum == "tracker" and not all(self.platform.free):
+            message = "degrees_of_freedom are along base axes, which stay; use datum = 'robot'"
+            yield "instrument.tracker.datum", message
         seen: dict[Point, str] = {}
         for n, line in enumerate(self.line):
             other = seen.setdefault(line.exit_point, line.name)
