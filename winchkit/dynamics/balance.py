@@ -203,7 +203,7 @@ def needs_a_step(profile: WinchProfile, term: Term) -> bool:
     line = Line(profile, modifiers_of([term]))
     try:
         kinematics = line.kinematics(at)
-        drum_side = line._over_the_pulleys(at.tension, at) if profile.pulley else at.tension
+        drum_side = line.drum_tension(at.tension, at)
         outputs = (
             kinematics.free_length, line.indicated_length(at, kinematics), drum_side,
             line.indicated_tension(at, drum_side),

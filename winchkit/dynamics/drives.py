@@ -72,6 +72,6 @@ def cascade(control: ControlSpec, holding: float) -> Drive:
     torque = wanted if limit is None else np.clip(wanted, -limit, limit)
     if duration is None:
         return Drive(expression(torque))
-    free = (torque == wanted) | (error * wanted < 0.0)
+    free = (torque == wanted) | (traced(error) * wanted < 0.0)
     growth = np.where(free, traced(proportional) / duration, 0.0)
     return Drive(expression(torque), {"integral": holding}, {"integral": expression(growth)})

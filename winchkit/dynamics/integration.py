@@ -263,10 +263,14 @@ class Integrator:
         self, time: float, y: Numbers, mode: _Mode, row: Numbers, event: int
     ) -> tuple[Numbers, _Mode]:
         """States and mode behind an event; a speed of zero and a bound are made exact."""
+        if mode.is_still:
+            # The acceleration is zero here, and grows in the direction of the event.
+            direction = 1.0 if event == 0 else -1.0
+            return y, _Mode(direction, False, self._openings(time, y, row, direction))
         new = list(y)
-        if not mode.is_still and event == 0:
+        if event == 0:
             new[1] = 0.0
-        elif not mode.is_still:
+        else:
             state = self.balance.states[event - 1]
             new[1 + event] = state.high if y[1 + event] > 0 else state.low
             held = tuple(0.0 if i == event - 1 else o for i, o in enumerate(mode.open))

@@ -150,7 +150,7 @@ class Effect:
     memory: bool = False
     """Has an initial state that may be fitted per run: parameter ``start`` of role ``fixed``,
     null 0."""
-    carry: Callable[[Any, Any, At, Values], float] | None = None
+    carry: Callable[[Any, Any, At, Values], Any] | None = None
     """Computes the ``start`` of the next samples from the last values after and before the stage,
     for control, which processes single samples."""
     dynamics: Dynamics | None = None

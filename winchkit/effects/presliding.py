@@ -10,6 +10,7 @@ import numpy as np
 from winchkit.arrays import Array
 from winchkit.effects.effect import Dynamics, Parameter, Values
 from winchkit.model.friction import dahl
+from winchkit.model.recurrence import share
 from winchkit.model.stages import At
 
 START = Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed")
@@ -56,7 +57,6 @@ class Presliding:
         bent = np.sign(left) * np.abs(left) ** values.get("shape", 1.0)
         return np.where(limit > 0, self.stiffness(values) * speed * bent / limit, 0.0)
 
-    def carried(self, after: Array, before: Array, at: At, values: Values) -> float:
+    def carried(self, after: Array, before: Array, at: At, values: Values) -> Array:
         """F/F_c at the last sample, the ``start`` of the next ones."""
-        limit = float(self.limit(before[-1:], at, values)[0])
-        return float((after[-1] - before[-1]) / limit) if limit else 0.0
+        return share(after[-1] - before[-1], self.limit(before[-1:], at, values)[0])

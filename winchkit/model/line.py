@@ -225,9 +225,9 @@ class Line:
         at = motion.at
         if motion.load is None:
             return np.zeros_like(at.time) if motion.drum_tension is None else motion.drum_tension
-        return self._over_the_pulleys(self._load(motion, kinematics), at)
+        return self.drum_tension(self._load(motion, kinematics), at)
 
-    def _over_the_pulleys(self, load: Array, at: At) -> Array:
+    def drum_tension(self, load: Array, at: At) -> Array:
         """Tension at the drum from the tension at the platform, N."""
         tension = self._through(Stage.CABLE_WEIGHT, load, at)
         if Stage.PULLEY in self._stages:
@@ -293,7 +293,7 @@ class Line:
 
     def readings(self, load: Array, at: At) -> Array:
         """Readings of the load cell under tensions at the platform end, N, shape (n,)."""
-        return self.indicated_tension(at, self._over_the_pulleys(load, at))
+        return self.indicated_tension(at, self.drum_tension(load, at))
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""

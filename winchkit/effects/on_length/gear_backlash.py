@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Dynamics, Effect, Parameter, Plausible, Values
-from winchkit.model.recurrence import play
+from winchkit.model.recurrence import play, share
 from winchkit.model.stages import At, Path, Stage
 
 _ON_THE_FLANK = 0.98
@@ -44,10 +44,10 @@ def impacts(at: At, values: Values) -> NDArray[np.bool_]:
     return np.diff(meshes, prepend=meshes[0])
 
 
-def carried(after: Path, before: Path, _at: At, values: Values) -> float:
+def carried(after: Path, before: Path, _at: At, values: Values) -> Array:
     """Position in the gap at the last sample."""
     gap = values["gap"]
-    return float((after.value[-1] - before.value[-1]) / gap) if gap else values["start"]
+    return share(after.value[-1] - before.value[-1], gap, values["start"])
 
 
 def _at_state(path: Path, at: At, values: Values) -> Path:
