@@ -98,12 +98,12 @@ def refitted(names: Sequence[tuple[str, str]], start: Values, run: Run) -> Value
     measured = run["motor_angle"][::EVERY]
 
     def residual(shares: Values) -> Values:
-        motion = motion_of(PROFILE, terms_of(names, scale * shares), setup, 1e-6)
+        motion = motion_of(PROFILE, terms_of(names, scale * shares), setup, 1e-7)
         return (motion.angle - measured)[DROPPED // EVERY :]
 
     found = least_squares(
-        residual, np.ones(len(start)), bounds=(0.02, 50.0), diff_step=1e-3, max_nfev=15,
-        ftol=1e-5, xtol=1e-5,
+        residual, np.ones(len(start)), bounds=(0.02, 50.0), diff_step=1e-4, max_nfev=25,
+        x_scale="jac", ftol=1e-6, xtol=1e-6,
     )  # fmt: skip
     return scale * found.x
 
@@ -113,10 +113,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--starts", type=int, default=20)
+    parser.add_argument("--models", type=int, nargs="*", default=[0, 1, 2])
     asked = parser.parse_args()
     train, test = (read_run(asked.folder / f"{name}.csv") for name in ("train", "test"))
     random = np.random.default_rng(46)
-    for label, model in MODELS.items():
+    for label, model in [list(MODELS.items())[k] for k in asked.models]:
         names, usual = list(model), np.array(list(model.values()))
         rows = []
         for index in range(asked.starts):
@@ -136,7 +137,9 @@ def main() -> None:
             print(f"  {effect} {name} = {value:.4g}")
     print("authors' values: ", end="")
     names, values = list(PUBLISHED), np.array(list(PUBLISHED.values()))
-    print(f"train {error(names, values, train) * 1e3:.2f}, test {error(names, values, test) * 1e3:.2f} mm")
+    print(
+        f"train {error(names, values, train) * 1e3:.2f}, test {error(names, values, test) * 1e3:.2f} mm"
+    )
 
 
 if __name__ == "__main__":

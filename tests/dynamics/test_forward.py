@@ -2,64 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from winchkit import forward, read_profile, read_programme, read_simbench, simulate
+from winchkit import find, forward, load_catalogue, read_programme, read_simbench, simulate
+from winchkit.effects import Values
+from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import RunError, UsageError
-from winchkit.runs import Channel, Run
-from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.model.stages import At
+from winchkit.schema.programme import Programme, Step
+from winchkit.schema.simbench import NoiseSpec
+from winchkit.sim.bench import hiding, profiles_of
 
-AXIS = """\
-schema = 1
-kind = "axis"
-name = "axis"
-
-[motor]
-inertia = "0.5 kg m^2"
-"""
-WINCH = """\
-schema = 1
-kind = "winch"
-name = "winch"
-
-[drum]
-kind = "grooved"
-winding_radius = "50 mm"
-groove_pitch = "0 mm"
-
-[gearbox]
-ratio = 10
-
-[motor]
-inertia = "0.0004 kg m^2"
-
-[reference]
-cable_length = "4 m"
-"""
-INERTIA, MASS, ARM, ROTOR, GRAVITY = 0.5, 10.0, 5e-3, 4e-4, 9.80665
-
-
-def profile_of(folder: Path, text: str, *effects: tuple[str, str]) -> WinchProfile:
-    tables = "".join(f'\n[[effect]]\nid = "{name}"\n{values}\n' for name, values in effects)
-    path = folder / "machine.toml"
-    path.write_text(text + tables)
-    return read_profile(path)
-
-
-def torque_run(
-    torque: NDArray[np.float64], rate: float = 100.0, angle: float = 0.0, **metadata: str
-) -> Run:
-    time = np.arange(len(torque)) / rate
-    channels = {
-        "motor_angle": Channel(np.full(len(time), angle), "rad"),
-        "motor_torque": Channel(torque, "N m"),
-    }
-    return Run("pushed", time, channels, metadata)
+from simulated_profiles import (
+    ARM, AXIS, GRAVITY, INERTIA, MASS, ROTOR, WINCH, profile_of, torque_run,
+)  # fmt: skip
+from snippets import ROOT
 
 
 def test_a_mass_on_a_spring_oscillates_as_in_closed_form(tmp_path: Path) -> None:
@@ -91,7 +55,9 @@ def pendulum(_: float, y: NDArray[np.float64], friction: float, sign: float) -> 
     return [y[1], (-2.0 * np.sin(y[0]) - sign * friction) / INERTIA]
 
 
-def by_scipy(times: NDArray[np.float64], start: list[float], friction: float) -> NDArray[np.float64]:
+def by_scipy(
+    times: NDArray[np.float64], start: list[float], friction: float
+) -> NDArray[np.float64]:
     """A pendulum with dry friction by scipy's solver, restarted at every reversal, to 1e-12."""
 
     def reversal(t: float, y: NDArray[np.float64], *_: float) -> float:
@@ -158,16 +124,102 @@ def test_a_weight_moves_only_beyond_the_friction_of_every_part(tmp_path: Path) -
 
 def test_backlash_closes_with_the_momentum_of_the_rotor(tmp_path: Path) -> None:
     """In the gap only the rotor moves; at the flank both continue with its momentum."""
-    gap = 0.02
+    gap, speed = 0.02, 10.0
     profile = profile_of(
-        tmp_path, WINCH, ("gear-backlash", f'gap = "{gap} rad"\nheld = 0\nstart = 0.5')
+        tmp_path, WINCH, ("gear-backlash", f'gap = "{gap} rad"\nheld = 0\nstart = 0.4')
     )
-    run = forward(profile, torque=torque_run(np.full(400, 0.1), 1000.0), load_mass=0.0001,
-                  initial_speed=0.0)  # fmt: skip
-    # The gap is at the drum, ten times larger at the motor.
-    distance, pushed = gap * 10, 0.1 / ROTOR
-    closed = np.sqrt(2 * distance / pushed)
-    before = run.time < closed
-    np.testing.assert_allclose(run["motor_angle"][before], pushed * run.time[before] ** 2 / 2,
-                               rtol=1e-8)  # fmt: skip
-    assert np.all(run["cable_length"][before] == pytest.approx(4.0 + 0.5 * gap * -0.05, abs=1e-9))
+    run = forward(profile, torque=torque_run(np.zeros(60), 1000.0), load_mass=MASS,
+                  initial_speed=speed)  # fmt: skip
+    # The gap is at the drum, ten times as wide at the motor; in its last fiftieth the weight acts.
+    weight = MASS * GRAVITY * ARM
+    free, near = 0.89 * gap * 10, 0.01 * gap * 10
+    struck = np.sqrt(speed**2 - 2 * weight / ROTOR * near)
+    closed = free / speed + 2 * near / (speed + struck)
+    both = ROTOR + MASS * ARM**2
+    before, after = run.time < free / speed, run.time > closed
+    np.testing.assert_allclose(run["motor_velocity"][before], speed, rtol=1e-12)
+    np.testing.assert_allclose(run["cable_length"][before], run["cable_length"][0], atol=1e-12)
+    expected = struck * ROTOR / both - weight / both * (run.time[after] - closed)
+    np.testing.assert_allclose(run["motor_velocity"][after], expected, atol=1e-6)
+
+
+def test_the_simulated_bench_moves_alike_to_one_percent(tmp_path: Path) -> None:
+    """The simulator's code is independent: its torque, with grease and a rotor that it hides."""
+    declared = hiding(read_simbench(find("sim", "demo-motor-grease")), ("none",))
+    declared = hiding(replace(declared, noise=NoiseSpec()), (
+        "motor grease, viscosity=3 mN m s", "heavy rotor, inertia=2 kg cm^2",
+    ))  # fmt: skip
+    source = (ROOT / "profiles" / "bench-spiral.toml").read_text()
+    profile = profile_of(
+        tmp_path, source, ("motor-viscous", 'viscosity = "3 mN m s"'),
+        ("rotor-inertia", 'inertia = "2 kg cm^2"'),
+    )  # fmt: skip
+    programme = read_programme(ROOT / "sim" / "programme-demo.toml")
+    true = next(iter(simulate(declared, profiles_of(declared), programme, rate=1000.0)))
+    run = forward(profile, torque=true, initial_speed=0.0)
+    for name in ("motor_angle", "cable_length", "tension"):
+        error = np.max(np.abs(run[name] - true[name]))
+        assert error < 0.01 * np.ptp(true[name]), name
+
+
+def test_the_loops_follow_a_programme_and_its_torque_repeats_the_motion(tmp_path: Path) -> None:
+    control = """
+[control]
+position_gain = "25 1/s"
+velocity_gain = "0.05 N m s"
+integral_time = "20 ms"
+"""
+    profile = profile_of(tmp_path, WINCH + control, ("motor-coulomb", 'torque = "20 mN m"'))
+    programme = Programme("up", (
+        Step(hold=0.2), Step(to=3.0, speed=0.5, acceleration=0.8), Step(hold=0.5),
+    ))  # fmt: skip
+    run = forward(profile, programme=programme, load_mass=MASS, rate=1000.0)
+    assert run["cable_length"][-1] == pytest.approx(3.0, abs=1e-4)
+    assert np.all(run["motor_velocity"][:200] == 0.0)
+    again = forward(profile, torque=run)
+    np.testing.assert_allclose(again["cable_length"], run["cable_length"], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("effects", "arguments", "said"),
+    [
+        ((), {}, "gives no initial speed"),
+        ((), {"reference": True}, "has no gains"),
+        ((("cell-lag", ""),), {"initial_speed": 0.0}, ""),
+        ((("torque-lag", 'time_constant = "5 ms"'),), {"initial_speed": 0.0}, ""),
+    ],
+)
+def test_wrong_inputs_have_one_sentence(
+    tmp_path: Path, effects: tuple[tuple[str, str], ...], arguments: dict[str, Any], said: str
+) -> None:
+    profile, run = profile_of(tmp_path, AXIS, *effects), torque_run(np.zeros(10))
+    if arguments.pop("reference", False):
+        arguments |= {"reference": run}
+    else:
+        arguments |= {"torque": run}
+    if not said:
+        assert len(forward(profile, **arguments)) == 10
+        return
+    with pytest.raises((RunError, UsageError), match=said) as raised:
+        forward(profile, **arguments)
+    assert "\n" not in str(raised.value)
+
+
+def stepless(torque: NDArray[np.float64], at: At, values: Values) -> NDArray[np.float64]:
+    return torque + values["torque"] * np.sign(np.cumsum(at.motor_rate))
+
+
+def test_an_effect_without_a_step_is_refused_by_name(tmp_path: Path) -> None:
+    base = load_catalogue()["motor-coulomb"]
+    catalogue = Catalogue(
+        [*load_catalogue().of_winches(), replace(base, id="mine", apply=stepless)]
+    )
+    profile = profile_of(tmp_path, AXIS, ("mine", 'torque = "0.1 N m"'))
+    with pytest.raises(UsageError, match=r"^mine: no step is declared"):
+        forward(profile, torque=torque_run(np.zeros(10)), catalogue=catalogue, initial_speed=0.0)
+
+
+def test_a_slack_cable_ends_the_simulation(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="the cable is slack at"):
+        forward(profile_of(tmp_path, WINCH), torque=torque_run(np.full(50, -3.0)),
+                load_mass=MASS, initial_speed=0.0)  # fmt: skip

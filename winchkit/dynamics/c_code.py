@@ -120,7 +120,9 @@ def _struct(p: str, kind: str, members: dict[str, tuple[str, str]]) -> str:
 
 
 def _literal(value: float, p: str) -> str:
-    text = "NAN" if isnan(value) else f"{'-' * (value < 0)}INFINITY" if isinf(value) else repr(value)
+    text = (
+        "NAN" if isnan(value) else f"{'-' * (value < 0)}INFINITY" if isinf(value) else repr(value)
+    )
     return f"(({p}_real){text})"
 
 

@@ -139,9 +139,7 @@ OPERATIONS: Mapping[str, Operation] = {
     "negative": Operation(operator.neg, "(-{})", "(-{})", lambda x: (number(-1),)),
     "absolute": Operation(abs, "abs({})", "F(fabs)({})", lambda x: (apply("sign", x[0]),)),
     "sign": Operation(_sign, "sign({})", "(real)(({0} > 0) - ({0} < 0))", _flat(1)),
-    "floor": Operation(
-        lambda x: float(math.floor(x)), "floor({})", "F(floor)({})", _flat(1)
-    ),
+    "floor": Operation(lambda x: float(math.floor(x)), "floor({})", "F(floor)({})", _flat(1)),
     "sqrt": Operation(
         _root,
         "root({})",
@@ -231,9 +229,7 @@ def known_value(x: Expression) -> float:
         if one.arguments:
             of = [values[id(a)] for a in one.arguments]
             unknown = any(map(math.isnan, of))
-            values[id(one)] = (
-                math.nan if unknown else OPERATIONS[one.operation].evaluate(*of)
-            )
+            values[id(one)] = math.nan if unknown else OPERATIONS[one.operation].evaluate(*of)
         else:
             values[id(one)] = one.value
     return values[id(x)]
@@ -289,9 +285,7 @@ def _derivative(x: Expression, of_symbol: Callable[[Expression], Expression]) ->
     return slopes[id(x)]
 
 
-def substituted(
-    roots: Sequence[Expression], values: Mapping[str, Expression]
-) -> list[Expression]:
+def substituted(roots: Sequence[Expression], values: Mapping[str, Expression]) -> list[Expression]:
     """Expressions with other expressions in place of symbols."""
     new: dict[int, Expression] = {}
     for one in ordered(roots):

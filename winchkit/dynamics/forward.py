@@ -32,6 +32,8 @@ _REFERENCE_STEP = 1e-3
 """s: between the points of a programme's reference, whose acceleration builds up in 0.3 s."""
 _TEMPERATURE = 20.0
 """°C: at which every thermal effect is zero."""
+GOAL = "reference_angle"
+"""Channel with the reference that a drive followed, rad, or m on a linear axis."""
 _NEWTON_STEPS = 4
 """As of :mod:`winchkit.model.line`."""
 
@@ -60,7 +62,8 @@ def forward(
     torque : Run, optional
         Run whose motor torque drives the motor, open loop.
     reference : Run, optional
-        Run whose motor angle is the reference of the loops of ``profile.control``.
+        Run whose channel ``reference_angle``, else motor angle, the loops of ``profile.control``
+        follow.
     catalogue : Catalogue, optional
         Effects; by default all that are installed.
     load_mass : float, optional
@@ -104,7 +107,7 @@ def forward(
     else:
         run = torque if torque is not None else reference
         assert run is not None
-        setup = _of_run(profile, run, load_mass, initial_speed, is_torque=torque is not None)
+        setup = setup_of(profile, run, load_mass, initial_speed, is_torque=torque is not None)
     return simulated(profile, terms, setup, tolerance)
 
 
@@ -168,7 +171,7 @@ def motion_of(
     return Integrator(law, drive, inputs, tolerance).run(setup.time, setup.angle, setup.speed)
 
 
-def _of_run(
+def setup_of(
     profile: WinchProfile,
     run: Run,
     load_mass: float | None,
@@ -176,10 +179,14 @@ def _of_run(
     *,
     is_torque: bool,
 ) -> Setup:
+    """The setup of a run whose torque drives the motor, or whose motion the loops follow.
+
+    Raises RunError as :func:`forward`.
+    """
     require_type(run, Run, "torque" if is_torque else "reference")
     (run,) = rotary_runs([run], is_linear_axis=profile.is_linear)
     place, time = run.path or run.name, run.time
-    driving = "motor_torque" if is_torque else "motor_angle"
+    driving = "motor_torque" if is_torque else GOAL if GOAL in run else "motor_angle"
     values = _complete(run, driving)
     speed = initial_speed
     if speed is None and "motor_velocity" in run:
@@ -204,7 +211,7 @@ def _of_run(
         signals["torque"] = values
     else:
         signals["goal"] = values
-        is_measured = "motor_velocity" in run
+        is_measured = driving == "motor_angle" and "motor_velocity" in run
         signals["goal_speed"] = run["motor_velocity"] if is_measured else np.gradient(values, time)
     return Setup(f"{run.name}-forward", time, angle, speed, Inputs(time, signals), mass)
 
@@ -268,7 +275,9 @@ def _of_programme(
     angle, arm = _angles(profile, terms, length, (mass or 0.0) * GRAVITY)
     every = np.arange(0.0, time[-1], 1 / rate)
     if len(every) < 2:
-        raise UsageError(f"programme '{programme.name}' has no move and no hold under its first load")
+        raise UsageError(
+            f"programme '{programme.name}' has no move and no hold under its first load"
+        )
     inputs = Inputs(time, {"goal": angle, "goal_speed": -paid_out / arm})
     return Setup(f"{programme.name}-forward", every, float(angle[0]), 0.0, inputs, mass)
 
@@ -277,7 +286,10 @@ def _angles(
     profile: WinchProfile, terms: Sequence[Term], length: Array, weight: float
 ) -> tuple[Array, Array]:
     """Motor angles at cable lengths under a weight at rest, and cable per motor angle there."""
-    line = Line(profile, modifiers_of(t for t in terms if not t.effect.not_in_control and not t.effect.memory))
+    line = Line(
+        profile,
+        modifiers_of(t for t in terms if not t.effect.not_in_control and not t.effect.memory),
+    )
     zero = np.zeros_like(length)
     angle = line.nominal_motor_angle(length)
     for _ in range(_NEWTON_STEPS):

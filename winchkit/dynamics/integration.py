@@ -68,9 +68,7 @@ def runge_kutta(rates: Mapping[str, Expression], tolerance: float) -> list[Expre
     error = number(0.0)
     for i, name in enumerate(names):
         off = apply("absolute", step * _weighted(i, _ERRORS, k))
-        size = apply(
-            "maximum", apply("absolute", symbol(name)), apply("absolute", moved[name])
-        )
+        size = apply("maximum", apply("absolute", symbol(name)), apply("absolute", moved[name]))
         error = apply("maximum", error, off / (number(tolerance) * (size + number(_FLOOR))))
     return [*moved.values(), error]
 
@@ -135,9 +133,7 @@ class Integrator:
     def _rates(self) -> dict[str, Expression]:
         b, torque = self.balance, {"torque": self.drive.torque}
         acceleration, *own = substituted([b.acceleration, *b.rates], torque)
-        opened = {
-            s.name: symbol(s.open) * rate for s, rate in zip(b.states, own, strict=True)
-        }
+        opened = {s.name: symbol(s.open) * rate for s, rate in zip(b.states, own, strict=True)}
         return {"angle": symbol("speed"), "speed": acceleration, **opened, **self.drive.rates}
 
     @cached_property

@@ -96,7 +96,8 @@ def mjcf(
     listed = "".join(f"\n  {escape(line)}" for line in (
         *comments, *(f"no counterpart here: {one}" for one in missing)))  # fmt: skip
     gear = ratio * profile.gearbox.direction
-    return f"""\
+    return (
+        f"""\
 <!-- {escape(profile.name)}: written by winchkit export-model; SI units, the control is the motor's torque.{listed}
 -->
 <mujoco model={quoteattr(profile.name)}>
@@ -112,7 +113,9 @@ def mjcf(
     <motor name="motor" joint="machine" gear="{gear:.17g}"/>
   </actuator>
 </mujoco>
-""", missing
+""",
+        missing,
+    )
 
 
 def _std(fitted: object) -> object:

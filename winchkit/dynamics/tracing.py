@@ -104,9 +104,7 @@ class Traced(np.ndarray[Any, Any]):
             return out[0]
         return result
 
-    def __array_function__(
-        self, func: Any, types: Any, args: Any, kwargs: Any
-    ) -> Any:
+    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
         """Record the functions that are no ufuncs; numpy's own code runs on the others."""
         if func is np.gradient:
             return _elementwise(rate, [args[0]])
@@ -140,4 +138,3 @@ def traced(value: object) -> Any:
     """An array of expressions from one, from several, or from numbers."""
     array: NDArray[Any] = np.array(value, dtype=object)
     return _elementwise(lambda x: x, [array])
-

@@ -24,8 +24,11 @@ from winchkit.cli.model.options import (
     write_page,
 )
 
+from winchkit.errors import UsageError
+
 if TYPE_CHECKING:
     from winchkit.diagnosis.results import Comparison
+    from winchkit.dynamics.comparison import SimulatedError
 
 
 @click.command(
@@ -41,18 +44,35 @@ if TYPE_CHECKING:
 @json_option
 @html_option
 @figures_option
+@click.option(
+    "--forward", "is_simulated", is_flag=True, help="Also simulate the motion and compare it."
+)
 def command(
-    runs: Sequence[str], asked: Asked, as_json: bool, html: str | None, figures: str | None
+    *,
+    runs: Sequence[str],
+    asked: Asked,
+    as_json: bool,
+    html: str | None,
+    figures: str | None,
+    is_simulated: bool,
 ) -> None:
-    """Compare runs with a profile at its file values; only the length offset is fitted."""
+    """Compare runs with a profile at its file values; only the length offset is fitted.
+
+    With --forward the motion is simulated from the measured torque (open loop), and from a channel
+    reference_angle by the loops of [control].
+    """
     from winchkit.cli.model.options import declared_profile, refuse_options
-    from winchkit.diagnosis.compare import compared
+    from winchkit.diagnosis.compare import WinchCompared, compared
+    from winchkit.dynamics.comparison import simulated_errors
     from winchkit.report.pages.pages import comparison_figures, comparison_html
     from winchkit.report.reproducibility import Command
+    from winchkit.report.simulated import simulated_figures
     from winchkit.schema.profiles.winch import WinchProfile
 
     declared = declared_profile(asked.source)
     refuse_options(declared, asked.band, asked.winch)
+    if is_simulated and (asked.each or not isinstance(declared, WinchProfile)):
+        raise UsageError("--forward simulates one winch or axis; choose one with --winch")
     if asked.each and isinstance(declared, WinchProfile):
         wings.part("fleet", "compare_command")(runs, declared, asked, as_json, html, figures)
         return
@@ -60,20 +80,30 @@ def command(
         own = asked.runs(runs, declared)
         progress("comparing", None)
         answer = compared(own, declared, asked.catalogue, asked.band)
-    _tell(answer.comparison, as_json)
+        errors: list[SimulatedError] = []
+        if is_simulated and isinstance(declared, WinchProfile):
+            progress("simulating the motion", None)
+            errors = simulated_errors(own, declared, asked.catalogue)
+    _tell(answer.comparison, errors, as_json)
     if html:
         title = page_title(declared.name, runs)
         write_page(html, comparison_html(answer, title, asked.profile, options=asked.options))
     if figures:
         source = Command(answer.regression.dataset, asked.profile).source
-        write_figures(figures, comparison_figures(answer, source))
+        more = simulated_figures(answer, errors) if isinstance(answer, WinchCompared) else []
+        write_figures(figures, [*comparison_figures(answer, source), *more])
     suggest_with("diagnose", asked, runs)
 
 
-def _tell(comparison: Comparison, as_json: bool) -> None:
+def _tell(comparison: Comparison, errors: Sequence[SimulatedError], as_json: bool) -> None:
     if as_json:
-        echo_json(comparison.to_json())
+        simulated = {"simulated": [error.to_json() for error in errors]} if errors else {}
+        echo_json({**comparison.to_json(), **simulated})
         return
     from winchkit.report.text import compare_text
 
     click.echo(compare_text(comparison))
+    if errors:
+        from winchkit.report.simulated import simulated_text
+
+        click.echo("\n" + simulated_text(errors))

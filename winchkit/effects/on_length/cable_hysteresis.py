@@ -31,7 +31,9 @@ def apply(length: Array, at: At, values: Values) -> Array:
 
 def carried(after: Array, before: Array, at: At, values: Values) -> Array:
     """F/F_c at the last sample."""
-    limit = values["fraction"] * np.abs(at.tension[-1]) * at.stressed_length[-1] / values["stiffness"]
+    limit = (
+        values["fraction"] * np.abs(at.tension[-1]) * at.stressed_length[-1] / values["stiffness"]
+    )
     return share(before[-1] - after[-1], limit)
 
 
