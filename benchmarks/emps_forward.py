@@ -74,7 +74,7 @@ def terms_of(names: Sequence[tuple[str, str]], values: Values) -> list[Term]:
 
 
 def setup_of(run: Run, every: int = 1) -> Setup:
-    """The force of a run and its initial state; with ``every`` averaged between the samples kept."""
+    """Force and initial state of a run; with ``every`` averaged between the samples kept."""
     force, time = run["motor_torque"], run.time
     if every > 1:
         weights = np.concatenate([np.arange(1, every + 1), np.arange(every - 1, 0, -1)])
@@ -135,11 +135,9 @@ def main() -> None:
               f"{errors[:, 1].max():.2f} mm")  # fmt: skip
         for (effect, name), value in zip(names, best[2], strict=True):
             print(f"  {effect} {name} = {value:.4g}")
-    print("authors' values: ", end="")
     names, values = list(PUBLISHED), np.array(list(PUBLISHED.values()))
-    print(
-        f"train {error(names, values, train) * 1e3:.2f}, test {error(names, values, test) * 1e3:.2f} mm"
-    )
+    for run in (train, test):
+        print(f"authors' values: {run.name} {error(names, values, run) * 1e3:.2f} mm")
 
 
 if __name__ == "__main__":

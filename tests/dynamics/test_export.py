@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from simulated_profiles import AXIS, MASS, WINCH, profile_of, torque_run
 from winchkit import forward, load_catalogue
 from winchkit.dynamics.c_code import as_json, c_header, identifier
 from winchkit.dynamics.mjcf import mjcf
@@ -25,10 +26,8 @@ from winchkit.model.line import Line
 from winchkit.model.stages import At
 from winchkit.schema.profiles.winch import WinchProfile
 
-from simulated_profiles import AXIS, MASS, WINCH, profile_of, torque_run
-
 GCC = shutil.which("gcc")
-FLAGS = "-std=c99 -O1 -Wall -Wextra -Werror -fsanitize=address,undefined".split()
+FLAGS = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
 MAIN = """\
 #include "model.h"
 #include <stdio.h>

@@ -12,10 +12,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
-from winchkit.effects.term import Term, modifiers_of
-from winchkit.errors import UsageError
 from winchkit.dynamics.drives import signal
 from winchkit.dynamics.expression import (
     Expression,
@@ -27,6 +23,8 @@ from winchkit.dynamics.expression import (
     symbols_of,
 )
 from winchkit.dynamics.tracing import expression, traced
+from winchkit.effects.term import Term, modifiers_of
+from winchkit.errors import UsageError
 from winchkit.model.line import Line, Motion
 from winchkit.model.stages import At, Modifier, Stage
 from winchkit.schema.profiles.axis import AxisProfile
@@ -186,8 +184,8 @@ def _refuse(profile: WinchProfile, terms: Iterable[Term]) -> None:
     stuck = [t.effect.id for t in terms if t.effect.dynamics is None and needs_a_step(profile, t)]
     if stuck:
         raise UsageError(
-            f"{', '.join(stuck)}: no step is declared, so that the motion cannot be integrated with "
-            "it; declare Effect.dynamics, or remove it from the profile"
+            f"{', '.join(stuck)}: no step is declared, so that the motion cannot be integrated "
+            "with it; declare Effect.dynamics, or remove it from the profile"
         )
 
 
@@ -216,5 +214,6 @@ def needs_a_step(profile: WinchProfile, term: Term) -> bool:
 
 
 _CHANNELS = (
-    "time", "angle", "speed", "tension", "temperature", "acceleration", "direction", "cable", "torque",
+    "time", "angle", "speed", "tension", "temperature", "acceleration", "direction", "cable",
+    "torque",
 )  # fmt: skip

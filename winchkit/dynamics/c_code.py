@@ -10,7 +10,7 @@ import re
 from collections.abc import Sequence
 from math import isinf, isnan
 
-from winchkit.dynamics.expression import Expression, statements
+from winchkit.dynamics.expression import Expression, Operation, ordered, statements
 from winchkit.dynamics.step import BEFORE, INPUTS, OUTPUTS, Step, step_of
 from winchkit.effects.term import Term
 from winchkit.schema.profiles.winch import WinchProfile
@@ -57,14 +57,14 @@ static inline void {p}_batch({p}_state *state, const {p}_input *inputs, {p}_outp
         {p}_step(state, &inputs[i], &outputs[i]);
 }}
 
-/* At rest, without memory: cable length (m) and arm (m/rad) at a motor angle (rad) and a load (N). */
+/* At rest, without memory: length (m) and arm (m/rad) at a motor angle (rad) and a load (N). */
 static inline void {p}_at_rest({p}_real motor_angle, {p}_real load, {p}_real *length, {p}_real *arm)
 {{
     (void)motor_angle;
     (void)load;
 {rest}}}
 
-/* Motor angle (rad) at a cable length (m) under a load (N), at rest: Newton from the nominal line. */
+/* At rest: motor angle (rad) at a length (m) under a load (N), by Newton from the nominal line. */
 static inline {p}_real {p}_motor_angle({p}_real length, {p}_real load)
 {{
 {nominal}    for (int i = 0; i < 4; ++i) {{
@@ -134,10 +134,11 @@ def _body(
     names: dict[str, str],
 ) -> str:
     names = {c.name: f"{p.upper()}_{c.name.upper()}" for c in step.constants} | names
-    lines, results = statements(
-        roots, names, lambda o: o.c.replace("F(", f"{p.upper()}_F(").replace("(real)", f"({p}_real)"),
-        lambda value: _literal(value, p),
-    )  # fmt: skip
+
+    def text(operation: Operation) -> str:
+        return operation.c.replace("F(", f"{p.upper()}_F(").replace("(real)", f"({p}_real)")
+
+    lines, results = statements(roots, names, text, lambda value: _literal(value, p))
     # Every result is computed before the first target, which may be an input of another.
     body = "".join(f"    const {p}_real {name} = {right};\n" for name, right in lines)
     body += "".join(f"    const {p}_real r{i} = {one};\n" for i, one in enumerate(results))
@@ -150,8 +151,6 @@ def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
     roots = [*step.outputs.values(), *(m.after for m in step.memories)]
     names = {id(x): "" for x in roots}
     assignments: list[list[object]] = []
-    from winchkit.dynamics.expression import ordered
-
     for x in ordered(roots):
         if not x.arguments:
             names[id(x)] = x.name or repr(x.value)

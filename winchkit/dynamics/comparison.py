@@ -67,8 +67,8 @@ def _of_run(
     (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
     measured = own["motor_angle"]
     clock = Line(profile).motion(Signals(own.time, measured)).clock
-    velocity = own["motor_velocity"] if "motor_velocity" in own else clock.rate
-    speed = float(velocity[0])
+    is_measured = "motor_velocity" in own
+    speed = float((own["motor_velocity"] if is_measured else clock.rate)[0])
     for driven_by in ("torque", "reference"):
         if driven_by == "reference" and (profile.control is None or GOAL not in own):
             continue

@@ -193,7 +193,7 @@ OPERATIONS: Mapping[str, Operation] = {
 """Operations by the name of their numpy function."""
 
 
-def apply(operation: str, *arguments: Expression) -> Expression:
+def apply(operation: str, *arguments: Expression) -> Expression:  # noqa: PLR0911 - one for each rule
     """An operation on expressions; constants are evaluated, and neutral elements left out."""
     if all(x.operation == "number" for x in arguments):
         return number(OPERATIONS[operation].evaluate(*(x.value for x in arguments)))

@@ -259,8 +259,8 @@ def _of_programme(
             gone, speed = np.zeros(count), np.zeros(count)
         elif step.acceleration is None:
             raise UsageError(
-                f"programme '{programme.name}', step {number}: gives no acceleration, which a bench "
-                'would limit; add acceleration = "0.8 m/s^2"'
+                f"programme '{programme.name}', step {number}: gives no acceleration, which a "
+                'bench would limit; add acceleration = "0.8 m/s^2"'
             )
         else:
             ramp = step.acceleration

@@ -14,7 +14,7 @@ ratio of the inertias.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import copysign, isfinite
 
@@ -111,6 +111,16 @@ class _Mode:
 
 
 @dataclass(frozen=True)
+class _Point:
+    """A time with the states, the mode and the inputs from there on."""
+
+    time: float
+    states: Numbers
+    mode: _Mode
+    inputs: Numbers
+
+
+@dataclass(frozen=True)
 class Integrator:
     """Integrates one balance under one drive and given inputs."""
 
@@ -161,56 +171,48 @@ class Integrator:
         y: Numbers = (
             angle, speed, *(s.start for s in self.balance.states), *self.drive.states.values()
         )  # fmt: skip
-        samples = time.tolist()
-        now, length = samples[0], samples[1] - samples[0]
         rows: list[Numbers] = []
-        mode, due = None, iter(samples)
-        until = next(due)
-        breaks = self.inputs.time.tolist()
-        for row, end in zip(self.inputs.rows(), breaks[1:], strict=True):
-            mode = mode if mode is not None else self._decided(now, y, row)
-            while now < end or until <= end:
-                while until is not None and until <= now:
-                    rows.append(self._row(now, y, mode, row))
-                    until = next(due, None)
-                if until is None:
-                    break
-                goal = min(until, end)
-                if now >= goal:
-                    break
-                now, y, mode, length = self._advance(now, y, mode, row, length, goal)
-            if until is None:
-                break
+        intervals, breaks = self.inputs.rows(), self.inputs.time.tolist()
+        row = intervals[0]
+        at = _Point(breaks[0], y, self._decided(breaks[0], y, row), row)
+        rows.append(self._row(at))
+        length, k = breaks[1] - breaks[0], 0
+        for sample in time.tolist()[1:]:
+            while at.time < sample:
+                while k < len(intervals) - 1 and at.time >= breaks[k + 1]:
+                    k += 1
+                    at = replace(at, inputs=intervals[k])
+                end = breaks[k + 1] if k < len(intervals) - 1 else sample
+                at, length = self._advance(at, length, min(sample, end))
+            rows.append(self._row(at))
         return Motion(time, *np.array(rows).T)
 
-    def _advance(
-        self, now: float, y: Numbers, mode: _Mode, row: Numbers, length: float, goal: float
-    ) -> tuple[float, Numbers, _Mode, float]:
-        """One step at most; returns time, states, mode and the length of the next step."""
-        h = min(length, goal - now)
-        new, error = self._step(now, y, mode, row, h)
+    def _advance(self, at: _Point, length: float, goal: float) -> tuple[_Point, float]:
+        """One step at most; returns where it ends and the length of the next step."""
+        h = min(length, goal - at.time)
+        new, error = self._step(at, h)
         if not error <= 1.0:
             shorter = h * max(_LEAST, _SAFETY * error**-0.2) if isfinite(error) else h * _LEAST
             if shorter < _SHORTEST:
                 raise UsageError(
-                    f"the motion cannot be integrated from {now:.6g} s on: the step would be below "
-                    f"{_SHORTEST:g} s; a gain or a stiffness is too large, or a value is not finite"
+                    f"the motion cannot be integrated from {at.time:.6g} s on: the step would be "
+                    f"below {_SHORTEST:g} s; a gain or a stiffness is too large, or a value is not "
+                    "finite"
                 )
-            return now, y, mode, shorter
+            return at, shorter
         longer = max(length, h * min(_MOST, _SAFETY * max(error, 1e-10) ** -0.2))
-        event = self._first_event(now, y, mode, row, h, new)
+        event = self._first_event(at, h, new)
         if event is None:
-            return (goal if now + h >= goal - _ROOT else now + h), new, mode, longer
+            time = goal if at.time + h >= goal - _ROOT else at.time + h
+            return replace(at, time=time, states=new), longer
         h, which = event
-        new, _ = self._step(now, y, mode, row, h)
-        new, mode = self._switched(now + h, new, mode, row, which)
-        return now + h, new, mode, length
+        there = replace(at, time=at.time + h, states=self._step(at, h)[0])
+        return self._switched(there, which), length
 
-    def _step(
-        self, now: float, y: Numbers, mode: _Mode, row: Numbers, h: float
-    ) -> tuple[Numbers, float]:
-        step = self._still if mode.is_still else self._moving
-        *new, error = step(h, now, *y, mode.direction, *mode.open, *row)
+    def _step(self, at: _Point, h: float) -> tuple[Numbers, float]:
+        step = self._still if at.mode.is_still else self._moving
+        mode = at.mode
+        *new, error = step(h, at.time, *at.states, mode.direction, *mode.open, *at.inputs)
         return tuple(new), error if isfinite(sum(new)) else float("inf")
 
     # Events: functions that are above zero behind the event.
@@ -230,17 +232,15 @@ class Integrator:
             ),
         ]
 
-    def _first_event(
-        self, now: float, y: Numbers, mode: _Mode, row: Numbers, h: float, new: Numbers
-    ) -> tuple[float, int] | None:
+    def _first_event(self, at: _Point, h: float, new: Numbers) -> tuple[float, int] | None:
         """Length of the step to the first event, and its number; None without one."""
 
         def behind(length: float, i: int) -> float:
-            there = self._step(now, y, mode, row, length)[0] if length else y
-            return self._events(now + length, there, mode, row)[i]
+            there = self._step(at, length)[0] if length else at.states
+            return self._events(at.time + length, there, at.mode, at.inputs)[i]
 
         found = []
-        for i, value in enumerate(self._events(now + h, new, mode, row)):
+        for i, value in enumerate(self._events(at.time + h, new, at.mode, at.inputs)):
             if value <= 0.0:
                 continue
             inner = 0.0
@@ -250,25 +250,25 @@ class Integrator:
                 while behind(inner, i) > 0.0 and inner > _SHORTEST:
                     inner /= 2
                 if inner <= _SHORTEST:
-                    found.append((_SHORTEST if mode.is_still else h, i))
+                    found.append((_SHORTEST if at.mode.is_still else h, i))
                     continue
             found.append((float(brentq(behind, inner, h, args=(i,), xtol=_ROOT)), i))
         return min(found) if found else None
 
-    def _switched(
-        self, time: float, y: Numbers, mode: _Mode, row: Numbers, event: int
-    ) -> tuple[Numbers, _Mode]:
+    def _switched(self, at: _Point, event: int) -> _Point:
         """States and mode behind an event; a speed of zero and a bound are made exact."""
+        time, mode, row = at.time, at.mode, at.inputs
         if mode.is_still:
             # The acceleration is zero here, and grows in the direction of the event.
             direction = 1.0 if event == 0 else -1.0
-            return y, _Mode(direction, False, self._openings(time, y, row, direction))
-        new = list(y)
+            opened = self._openings(time, at.states, row, direction)
+            return replace(at, mode=_Mode(direction, False, opened))
+        new = list(at.states)
         if event == 0:
             new[1] = 0.0
         else:
             state = self.balance.states[event - 1]
-            new[1 + event] = state.high if y[1 + event] > 0 else state.low
+            new[1 + event] = state.high if new[1 + event] > 0 else state.low
             held = tuple(0.0 if i == event - 1 else o for i, o in enumerate(mode.open))
             before, after = (
                 self._at(time, *new, mode.direction, *opened, *row)[1]
@@ -280,7 +280,8 @@ class Integrator:
                     "the parts are apart; add the effect rotor-inertia"
                 )
             new[1] *= before / after
-        return tuple(new), self._decided(time, tuple(new), row)
+        states = tuple(new)
+        return replace(at, states=states, mode=self._decided(time, states, row))
 
     def _decided(self, time: float, y: Numbers, row: Numbers) -> _Mode:
         """The mode in which a state continues."""
@@ -315,9 +316,11 @@ class Integrator:
             for v, s, r in zip(y[2:], states, rates, strict=False)
         )
 
-    def _row(self, time: float, y: Numbers, mode: _Mode, row: Numbers) -> Numbers:
+    def _row(self, at: _Point) -> Numbers:
         """Angle, speed, acceleration, torque, load and direction."""
-        acceleration, _, torque, load, *_ = self._at(time, *y, mode.direction, *mode.open, *row)
+        time, y, mode = at.time, at.states, at.mode
+        inputs = (time, *y, mode.direction, *mode.open, *at.inputs)
+        acceleration, _, torque, load, *_ = self._at(*inputs)
         if mode.is_still:
             # At rest nothing accelerates the load.
             acceleration, load = 0.0, self.balance.load_at_rest or load

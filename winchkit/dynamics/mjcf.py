@@ -93,12 +93,13 @@ def mjcf(
     load, equality = ("", "")
     if not is_axis:
         load, equality = _load(profile, load_mass or 0.0, missing)
+    head = f"{escape(profile.name)}: written by winchkit export-model; SI units, the control is"
     listed = "".join(f"\n  {escape(line)}" for line in (
         *comments, *(f"no counterpart here: {one}" for one in missing)))  # fmt: skip
     gear = ratio * profile.gearbox.direction
     return (
         f"""\
-<!-- {escape(profile.name)}: written by winchkit export-model; SI units, the control is the motor's torque.{listed}
+<!-- {head} the motor's torque.{listed}
 -->
 <mujoco model={quoteattr(profile.name)}>
   <compiler angle="radian" autolimits="true"/>

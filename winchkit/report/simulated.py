@@ -36,9 +36,7 @@ def simulated_text(errors: Sequence[SimulatedError]) -> str:
     return "\n".join(lines)
 
 
-def simulated_figures(
-    compared: WinchCompared, errors: Sequence[SimulatedError]
-) -> list[Figure]:
+def simulated_figures(compared: WinchCompared, errors: Sequence[SimulatedError]) -> list[Figure]:
     """For each simulated motion the measured and the simulated one, above the predicted torque."""
     torques = {t.run: t for t in compared.comparison.traces if t.output in _TORQUES}
     found = []

@@ -23,7 +23,6 @@ from winchkit.cli.model.options import (
     write_figures,
     write_page,
 )
-
 from winchkit.errors import UsageError
 
 if TYPE_CHECKING:
