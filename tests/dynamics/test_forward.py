@@ -24,8 +24,13 @@ from simulated_profiles import (
 )  # fmt: skip
 from snippets import ROOT
 from winchkit import find, forward, load_catalogue, read_programme, read_simbench, simulate
-from winchkit.effects import Values
+from winchkit.dynamics.balance import ON_MOTION
+from winchkit.dynamics.drives import Inputs
+from winchkit.dynamics.forward import Setup, motion_of
+from winchkit.effects import Effect, Values
+from winchkit.effects.bind import terms_of
 from winchkit.effects.catalogue import Catalogue
+from winchkit.effects.term import Term
 from winchkit.errors import RunError, UsageError
 from winchkit.model.stages import At
 from winchkit.schema.programme import Programme, Step
@@ -233,3 +238,17 @@ def test_a_slack_cable_ends_the_simulation(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="the cable is slack at"):
         forward(profile_of(tmp_path, WINCH), torque=torque_run(np.full(50, -3.0)),
                 load_mass=MASS, initial_speed=0.0)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "effect", [e for e in load_catalogue().of_winches() if e.stage in ON_MOTION], ids=lambda e: e.id
+)
+def test_every_shipped_effect_on_the_motion_has_a_step(tmp_path: Path, effect: Effect) -> None:
+    guide = '\n[[pulley]]\nradius = "40 mm"\n\n[guide]\nscrew_lead = "4 mm"\n'
+    profile = profile_of(tmp_path, WINCH + guide)
+    values = {p.name: p.typical if p.role == "amplitude" else p.null for p in effect.parameters}
+    terms = [*terms_of(profile), Term(effect, values)]
+    inputs = Inputs(np.array([0.0, 0.1]), {"torque": np.array([0.52, 0.52])})
+    setup = Setup("pushed", inputs.time, 3.0, 2.0, inputs, MASS)
+    motion = motion_of(profile, terms, setup)
+    assert np.all(np.isfinite(motion.acceleration))

@@ -34,7 +34,7 @@ from winchkit.units import GRAVITY
 _PIECES = 3
 """Newton steps for a torque that is piecewise linear in the acceleration, as friction by the load:
 one for each sign of the load and one to reach the right piece."""
-_ON_MOTION = frozenset(
+ON_MOTION = frozenset(
     {Stage.DRUM_ANGLE, Stage.DRUM, Stage.WOUND, Stage.CABLE_WEIGHT, Stage.PULLEY, Stage.GEARBOX}
 ) | {Stage.TORQUE_CONSTANT, Stage.MOTOR, Stage.TORQUE_SIGNAL}
 """Stages between the motor's torque and its motion; the others change readings only."""
@@ -126,7 +126,7 @@ def balance(
     axis, there is none. Raises UsageError with the
     names of effects that no step is known of, and for a profile without inertia.
     """
-    acting = [t for t in terms if t.effect.stage in _ON_MOTION and t.effect.undo is None]
+    acting = [t for t in terms if t.effect.stage in ON_MOTION and t.effect.undo is None]
     _refuse(profile, acting)
     tracer = _Tracer()
     line = Line(profile, [tracer.modifier(term) for term in acting])
