@@ -30,7 +30,7 @@ from winchkit.schema.profiles.axis import LinearAxisProfile
 
 Values = NDArray[np.float64]
 DROPPED = 20
-EVERY = 5
+EVERY = 10
 """Samples of which one is simulated in the fit, whose force is the mean around it; the errors that
 are printed are those of all samples."""
 PUBLISHED = {
@@ -98,7 +98,7 @@ def refitted(names: Sequence[tuple[str, str]], start: Values, run: Run) -> Value
     measured = run["motor_angle"][::EVERY]
 
     def residual(shares: Values) -> Values:
-        motion = motion_of(PROFILE, terms_of(names, scale * shares), setup, 1e-7)
+        motion = motion_of(PROFILE, terms_of(names, scale * shares), setup, 1e-6)
         return (motion.angle - measured)[DROPPED // EVERY :]
 
     found = least_squares(
