@@ -33,6 +33,8 @@ DROPPED = 20
 EVERY = 10
 """Samples of which one is simulated in the fit, whose force is the mean around it; the errors that
 are printed are those of all samples."""
+CORRECTIONS = 3
+"""Fits of a start, each with the difference between few and all samples computed anew."""
 PUBLISHED = {
     ("rotor-inertia", "mass"): 95.11,
     ("motor-viscous", "viscosity"): 203.5,
@@ -93,19 +95,29 @@ def error(names: Sequence[tuple[str, str]], values: Values, run: Run) -> float:
 
 
 def refitted(names: Sequence[tuple[str, str]], start: Values, run: Run) -> Values:
-    """Values with the least position error, from a start; each is positive or negative for good."""
-    setup, scale = setup_of(run, EVERY), start.copy()
+    """Values with the least position error, from a start; none changes its sign.
+
+    Few samples are simulated, and what they differ by from all of them is added to the motion; it
+    is computed again with the values that are found.
+    """
+    setup, whole, values = setup_of(run, EVERY), setup_of(run), start
     measured = run["motor_angle"][::EVERY]
 
-    def residual(shares: Values) -> Values:
-        motion = motion_of(PROFILE, terms_of(names, scale * shares), setup, 1e-6)
-        return (motion.angle - measured)[DROPPED // EVERY :]
+    def position(values: Values, of: Setup) -> Values:
+        return motion_of(PROFILE, terms_of(names, values), of, 1e-6).angle
 
-    found = least_squares(
-        residual, np.ones(len(start)), bounds=(0.02, 50.0), diff_step=1e-4, max_nfev=25,
-        x_scale="jac", ftol=1e-6, xtol=1e-6,
-    )  # fmt: skip
-    return scale * found.x
+    for _ in range(CORRECTIONS):
+        added = position(values, whole)[::EVERY] - position(values, setup) - measured
+
+        def residual(shares: Values, scale: Values = values, added: Values = added) -> Values:
+            return (position(scale * shares, setup) + added)[DROPPED // EVERY :]
+
+        found = least_squares(
+            residual, np.ones(len(start)), bounds=(0.05, 20.0), diff_step=1e-4, max_nfev=12,
+            x_scale="jac", ftol=1e-5, xtol=1e-5,
+        )  # fmt: skip
+        values = values * found.x
+    return values
 
 
 def main() -> None:

@@ -176,13 +176,14 @@ def test_the_compiled_header_is_the_line(tmp_path: Path, drum: str) -> None:
 
 
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")
-def test_a_million_states_differ_by_rounding_only(tmp_path: Path) -> None:
+@pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=pytest.mark.campaign)])
+def test_random_states_differ_by_rounding_only(tmp_path: Path, count: int) -> None:
     """Friction with memory, elongation, a layered drum; double to 1e-12, float to 1e-5."""
     profile = machine(tmp_path, "archimedean")
     names = ("pulley-dahl", "motor-dahl", "cable-elongation-linear", "cable-creep",
              "drum-eccentricity", "motor-viscous", "rotor-inertia", "cell-gain")  # fmt: skip
     terms = [used(EFFECTS[name]) for name in names]
-    states = random_states(20_000, 2)
+    states = random_states(count, 2)
     outputs, _ = by_c(tmp_path, profile, terms, states)
     assert np.max(differences(outputs, predicted(profile, terms, states))) < 1e-12
     states = random_states(200, 3).astype(np.float32).astype(float)

@@ -200,6 +200,7 @@ integral_time = "20 ms"
     [
         ((), {}, "gives no initial speed"),
         ((), {"reference": True}, "has no gains"),
+        ((), {"load_mass": 10.0, "initial_speed": 0.0}, "is an axis without a cable"),
         ((("cell-lag", ""),), {"initial_speed": 0.0}, ""),
         ((("torque-lag", 'time_constant = "5 ms"'),), {"initial_speed": 0.0}, ""),
     ],

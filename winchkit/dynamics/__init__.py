@@ -2,5 +2,6 @@
 
 ``tracing`` turns the line and the effects of a profile into expressions (``expression``),
 ``balance`` solves them for the acceleration, ``integration`` integrates it with events under one of
-the ``drives``. The package knows nothing of the simulated benches.
+the ``drives``. The package imports nothing of the simulated
+benches.
 """

@@ -96,6 +96,11 @@ def forward(
     the unstrained cable, as in the prediction.
     """
     require_type(profile, WinchProfile, "profile")
+    if load_mass is not None and isinstance(profile, AxisProfile):
+        raise UsageError(
+            f"profile '{profile.name}' is an axis without a cable, and a load of {load_mass:g} kg "
+            "would hang on it: leave the load out, or add its inertia to the effect rotor-inertia"
+        )
     sources = {"programme": programme, "torque": torque, "reference": reference}
     given = [name for name, source in sources.items() if source is not None]
     if len(given) != 1:
@@ -204,9 +209,11 @@ def setup_of(
     angle = profile.reference.motor_angle
     if "motor_angle" in run:
         angle = float(_complete(run, "motor_angle")[0])
-    mass, signals = load_mass if load_mass is not None else run.load_mass, {}
-    if mass is None and "load" in run and not isinstance(profile, AxisProfile):
-        signals["load"] = _complete(run, "load")
+    mass, signals = None, {}
+    if not isinstance(profile, AxisProfile):
+        mass = load_mass if load_mass is not None else run.load_mass
+        if mass is None and "load" in run:
+            signals["load"] = _complete(run, "load")
     if is_torque:
         signals["torque"] = values
     else:
