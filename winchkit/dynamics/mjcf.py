@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from math import cos, pi, sin
 from xml.sax.saxutils import escape, quoteattr
 
+import numpy as np
+
 from winchkit.effects.term import Term
 from winchkit.effects.transition import TRANSITION
 from winchkit.errors import UsageError
@@ -142,7 +144,7 @@ def _pendulum(gravity: float, phase: float, inertia: float) -> tuple[str, float]
 
 def _load(profile: WinchProfile, mass: float, missing: list[str]) -> tuple[str, str]:
     """The load on a slide downwards, and the equality that pays out the cable."""
-    drum, wound = drum_of(profile), 2 * pi * profile.reference.wound_turns
+    drum, wound = drum_of(profile), np.asarray(2 * pi * profile.reference.wound_turns)
     match drum:
         case Grooved():
             arm, growth = float(drum.arm(wound)), 0.0
@@ -152,7 +154,10 @@ def _load(profile: WinchProfile, mass: float, missing: list[str]) -> tuple[str, 
             arm, growth = float(drum.arm(wound)), pi * drum.build_up
         case Spiral():
             missing.append("spiral drum, whose steps of the radius are an even growth here")
-            arm, growth = float(drum.winding_radius + drum.growth * wound / (2 * pi)), drum.growth
+            arm, growth = (
+                drum.winding_radius + drum.growth * profile.reference.wound_turns,
+                drum.growth,
+            )
     body = f"""\
     <body name="load">
       <joint name="cable" type="slide" axis="0 0 -1"/>

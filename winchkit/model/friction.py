@@ -45,7 +45,7 @@ def tension_after(
     return np.asanyarray((pulled - square * cosine * first + root) / (1 - square))
 
 
-def coulomb_ratio(friction: Array, wrap: float) -> Array:
+def coulomb_ratio(friction: ArrayLike, wrap: float) -> Array:
     """T1/T0 over a pulley with Coulomb friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1.
 
     ``friction``: coefficient μ, signed. ``wrap``: wrap angle α, rad. Returns: T1/T0, of the shape
