@@ -66,9 +66,12 @@ def _of_run(
     terms = terms_of(profile, catalogue)
     (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
     measured = own["motor_angle"]
-    clock = Line(profile).motion(Signals(own.time, measured)).clock
-    is_measured = "motor_velocity" in own
-    speed = float((own["motor_velocity"] if is_measured else clock.rate)[0])
+    velocity = own.channels.get("motor_velocity")
+    signals = Signals(
+        own.time, measured, motor_velocity=None if velocity is None else velocity.values
+    )
+    clock = Line(profile).motion(signals).clock
+    speed = float(clock.rate[0])
     for driven_by in ("torque", "reference"):
         if driven_by == "reference" and (profile.control is None or GOAL not in own):
             continue

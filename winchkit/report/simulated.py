@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from winchkit.diagnosis.compare import WinchCompared
+from winchkit.diagnosis.residuals.traces import Trace
 from winchkit.dynamics.comparison import SimulatedError
 from winchkit.quantity_text import quantity
 from winchkit.report.figures.figure import Axis, Figure, Panel, Series
@@ -38,7 +39,8 @@ def simulated_text(errors: Sequence[SimulatedError]) -> str:
 
 def simulated_figures(compared: WinchCompared, errors: Sequence[SimulatedError]) -> list[Figure]:
     """For each simulated motion the measured and the simulated one, above the predicted torque."""
-    torques = {t.run: t for t in compared.comparison.traces if t.output in _TORQUES}
+    traces = (t for t in compared.comparison.traces if isinstance(t, Trace))
+    torques = {t.run: t for t in traces if t.output in _TORQUES}
     found = []
     for e in errors:
         kept = decimated([e.measured, e.simulated], _INTERVALS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -36,7 +37,12 @@ from winchkit.cli.core.quantity_type import Quantity
 @effects_option
 @output_option("File to write; by default standard output.")
 def command(
-    *, profile: str, form: str, load_mass: str | None, effects: Sequence[str], output: str | None
+    *,
+    profile: str,
+    form: Literal["c", "mjcf", "json"],
+    load_mass: str | None,
+    effects: Sequence[str],
+    output: str | None,
 ) -> None:
     """Write PROFILE for other programs, with its effects as they stand in it.
 
@@ -44,33 +50,23 @@ def command(
     the effects, and the motor angle at a cable length. It needs math.h only. The MuJoCo model moves
     like 'winchkit forward'; effects without a counterpart are listed.
     """
-    import json
-
     from winchkit.catalog import find
     from winchkit.cli.core.quantities import quantity
-    from winchkit.dynamics.c_code import as_json, c_header
-    from winchkit.dynamics.mjcf import mjcf
+    from winchkit.dynamics.export import export_model
     from winchkit.effects import load_catalogue
-    from winchkit.effects.bind import terms_of
     from winchkit.errors import Fault, FileError
     from winchkit.schema.read import read_profile
 
+    mass = None if load_mass is None else quantity(load_mass, "mass")
     declared = read_profile(find("profiles", profile))
-    terms = terms_of(declared, load_catalogue(effects))
-    if form == "mjcf":
-        mass = None if load_mass is None else quantity(load_mass, "mass")
-        text, missing = mjcf(declared, terms, mass)
-        for one in missing:
-            note(f"no counterpart in MuJoCo: {one}")
-    elif form == "json":
-        text = json.dumps(as_json(declared, terms), indent=1, ensure_ascii=False) + "\n"
-    else:
-        text = c_header(declared, terms)
+    exported = export_model(declared, form, load_catalogue(effects), mass)
+    for one in exported.missing:
+        note(f"no counterpart in MuJoCo: {one}")
     if output is None:
-        click.echo(text, nl=False)
+        click.echo(exported.text, nl=False)
         return
     try:
-        Path(output).write_text(text, encoding="utf-8")
+        Path(output).write_text(exported.text, encoding="utf-8")
     except OSError as error:
         raise FileError(Fault(f"cannot be written: {error.strerror}", output)) from error
     note(f"written: {output}")
