@@ -278,7 +278,7 @@ def _of_programme(
         speeds.append(speed)
         here = goal
     length, paid_out = np.concatenate(lengths), np.concatenate(speeds)
-    time: Array = np.arange(len(length)) * _REFERENCE_STEP
+    time = np.linspace(0.0, (len(length) - 1) * _REFERENCE_STEP, len(length))
     angle, arm = _angles(profile, terms, length, (mass or 0.0) * GRAVITY)
     every = np.arange(0.0, time[-1], 1 / rate)
     if len(every) < 2:
