@@ -35,7 +35,7 @@ SECTIONS = {
         *("decode_trace", "DecodedTrace"),
     ),
     "Diagnosis": (
-        *("compare", "diagnose", "plan", "add", "remove"),
+        *("compare", "diagnose", "plan", "add", "remove", "forward", "export_model"),
         *("write_addition", "write_removal", "extended_name", "undo", "ladder"),
         *("load_catalogue", "new_effect", "Effect", "Parameter", "sized"),
     ),

@@ -58,6 +58,8 @@ if TYPE_CHECKING:
     from winchkit.diagnosis.plan import plan
     from winchkit.diagnosis.write import write_addition, write_removal
     from winchkit.drivers.can.tools.decoded_trace import DecodedTrace, decode_trace
+    from winchkit.dynamics.export import export_model
+    from winchkit.dynamics.forward import forward
     from winchkit.effects.catalogue import load_catalogue
     from winchkit.effects.effect import Effect, Parameter
     from winchkit.errors import (
@@ -148,9 +150,11 @@ __all__ = [
     "diagnose",
     "drive_info",
     "export",
+    "export_model",
     "extended_name",
     "find",
     "fit_cell",
+    "forward",
     "identify_dahl",
     "info_of",
     "ladder",
@@ -235,6 +239,8 @@ _NAMES = {
     "winchkit.diagnosis.plan": ("plan",),
     "winchkit.diagnosis.write": ("write_addition", "write_removal"),
     "winchkit.drivers.can.tools.decoded_trace": ("DecodedTrace", "decode_trace"),
+    "winchkit.dynamics.export": ("export_model",),
+    "winchkit.dynamics.forward": ("forward",),
     "winchkit.effects.catalogue": ("load_catalogue",),
     "winchkit.effects.effect": ("Effect", "Parameter"),
     "winchkit.errors": (

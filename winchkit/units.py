@@ -25,6 +25,7 @@ UNITS: dict[str, dict[str, float]] = {
     "angular speed": {"rad/s": 1.0, "deg/s": _DEG, "rpm": _TURN / 60, "turn/s": _TURN},
     "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEG},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
+    "gain": {"1/s": 1.0},
     "frequency": {"Hz": 1.0, "kHz": 1e3},
     "force": {"N": 1.0, "kN": 1e3, "mN": 1e-3},
     "torque": {"N m": 1.0, "mN m": 1e-3, "N mm": 1e-3, "kN m": 1e3},

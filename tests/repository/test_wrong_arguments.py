@@ -98,7 +98,7 @@ def accepted(annotation: str, kind: str) -> bool:
         or (kind == "path" and one is not None)
         or (kind == "paths" and (one is not None or "Sequence[str" in annotation))
         or (kind == "runs" and annotation == "Sequence[Run]")
-        or (kind == "run" and annotation == "Run")
+        or (kind == "run" and annotation in {"Run", "Run | None"})
         or (kind == "empty" and several and annotation != "Sequence[Run]")
     )
 

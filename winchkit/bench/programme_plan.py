@@ -9,9 +9,9 @@ from math import isfinite
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.bench.control.motion import JERK_TIME, within_limits
+from winchkit.bench.control.motion import within_limits
 from winchkit.errors import NotPermitted, UsageError
-from winchkit.model.trajectory import plan
+from winchkit.model.trajectory import JERK_TIME, plan
 from winchkit.schema.bench import LimitSpec
 from winchkit.schema.programme import ALL, Programme, Step
 

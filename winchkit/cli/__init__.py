@@ -37,6 +37,9 @@ SECTIONS: dict[str, dict[str, At]] = {
             "winchkit.cli.model.diagnose", "Name the physical effect that the model lacks."
         ),
         "add": At("winchkit.cli.model.add", "Fit an effect and write it into a profile."),
+        "forward": At(
+            "winchkit.cli.model.forward", "Simulate a profile's motion under a torque or loops."
+        ),
         "remove": At("winchkit.cli.model.add", "Remove an effect from a profile.", "remove"),
         "undo": At(
             "winchkit.cli.model.ledger", "Undo the last add or remove of a profile.", "undo"
@@ -96,6 +99,9 @@ SECTIONS: dict[str, dict[str, At]] = {
             "Import recordings of other programs: channels and units.",
         ),
         "export": At("winchkit.cli.files.export", "Convert a run to CSV, MCAP, Parquet or MF4."),
+        "export-model": At(
+            "winchkit.cli.files.export_model", "Write a profile as C, for MuJoCo, or as JSON."
+        ),
         "sim": At("winchkit.cli.sim.group", "Simulated benches: record, serve, list."),
         "completion": At(
             "winchkit.cli.files.completion", "Print the completion script of a shell."

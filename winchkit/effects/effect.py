@@ -93,6 +93,19 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Dynamics:
+    """Memory in continuous time, for simulation: the state is the parameter ``start`` at any time.
+
+    A state at a bound of ``start`` remains there while its rate leads outwards.
+    """
+
+    value: Callable[[Any, At, Values], Any]
+    """Value of the stage at a state, from the value before."""
+    rate: Callable[[Any, At, Values], Any]
+    """Derivative of the state by time; ``numpy.gradient(x, at.time)`` is exact here."""
+
+
+@dataclass(frozen=True)
 class Effect:
     """A physical effect that a model may contain."""
 
@@ -137,9 +150,14 @@ class Effect:
     memory: bool = False
     """Has an initial state that may be fitted per run: parameter ``start`` of role ``fixed``,
     null 0."""
-    carry: Callable[[Any, Any, At, Values], float] | None = None
+    carry: Callable[[Any, Any, At, Values], Any] | None = None
     """Computes the ``start`` of the next samples from the last values after and before the stage,
     for control, which processes single samples."""
+    dynamics: Dynamics | None = None
+    """Its memory in simulation, by :func:`winchkit.forward`."""
+    undo: Callable[[Any, Any, Values], Any] | None = None
+    """Signal before the stage from the signal after it and its times, (n,); for a delay or a filter
+    of a reading, which changes no motion."""
     rested: float = 0.0
     """``start`` of a machine after a long rest under its load."""
     left_out: str = ""

@@ -11,7 +11,7 @@ from functools import wraps
 from typing import Any
 
 from winchkit.effects.catalogue import Catalogue
-from winchkit.effects.effect import Effect, Parameter
+from winchkit.effects.effect import Dynamics, Effect, Parameter
 from winchkit.schema.linear_axis import PARAMETERS, UNITS
 from winchkit.schema.profiles.winch import WinchProfile
 
@@ -37,6 +37,10 @@ def linear_effect(effect: Effect) -> Effect:
         parameters=parameters,
         apply=_with_names(effect.apply),
         carry=None if effect.carry is None else _with_names(effect.carry),
+        dynamics=None
+        if (law := effect.dynamics) is None
+        else Dynamics(_with_names(law.value), _with_names(law.rate)),
+        undo=None if effect.undo is None else _with_names(effect.undo),
         impacts=None if effect.impacts is None else _with_names(effect.impacts),
         possible=None if effect.possible is None else _with_names(effect.possible),
         probes=tuple(

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from winchkit.arrays import Array
-from winchkit.effects.effect import Parameter, Values
+from winchkit.effects.effect import Dynamics, Parameter, Values
 from winchkit.model.friction import dahl
+from winchkit.model.recurrence import share
 from winchkit.model.stages import At
 
 START = Parameter("start", "1", null=0.0, typical=0.5, low=-1.0, high=1.0, role="fixed")
@@ -39,7 +42,21 @@ class Presliding:
             values["start"],
         )
 
-    def carried(self, after: Array, before: Array, at: At, values: Values) -> float:
+    @property
+    def dynamics(self) -> Dynamics:
+        """The same law in continuous time; its state is F/F_c."""
+        return Dynamics(self._at_state, self._rate)
+
+    def _at_state(self, value: Array, at: At, values: Values) -> Array:
+        return value + values["start"] * self.limit(value, at, values)
+
+    def _rate(self, value: Array, at: At, values: Values) -> Array:
+        """σ x'/F_c |u|^β sgn u with u = 1 − sgn(x') F/F_c."""
+        speed, limit = np.gradient(self.displacement(at), at.time), self.limit(value, at, values)
+        left = 1.0 - np.sign(speed) * values["start"]
+        bent = np.sign(left) * np.abs(left) ** values.get("shape", 1.0)
+        return np.where(limit > 0, self.stiffness(values) * speed * bent / limit, 0.0)
+
+    def carried(self, after: Array, before: Array, at: At, values: Values) -> Array:
         """F/F_c at the last sample, the ``start`` of the next ones."""
-        limit = float(self.limit(before[-1:], at, values)[0])
-        return float((after[-1] - before[-1]) / limit) if limit else 0.0
+        return share(after[-1] - before[-1], self.limit(before[-1:], at, values)[0])

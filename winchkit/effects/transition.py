@@ -43,7 +43,7 @@ def cable_direction(at: At, values: Values) -> Array:
 def _rounded(direction: Array, rate: Array, transition: float) -> Array:
     if transition == 0.0:
         return direction
-    return np.asarray(direction * np.tanh(np.abs(rate) / transition))
+    return np.asanyarray(direction * np.tanh(np.abs(rate) / transition))
 
 
 def with_transitions(effect: Effect, transitions: Mapping[str, float]) -> Effect:

@@ -325,6 +325,8 @@ def with_turning_points(x: Array) -> tuple[Array, NDArray[np.intp]]:
     depends on its extremum. The extremum is that of the parabola through the three samples about
     it.
     """
+    if len(x) < 3:
+        return x, np.arange(len(x))
     step = np.diff(x)
     turns = 1 + np.flatnonzero(step[:-1] * step[1:] < 0)
     slope, bend = (step[turns] + step[turns - 1]) / 2, step[turns] - step[turns - 1]

@@ -110,7 +110,7 @@ class Grooved:
 
     def arm(self, angle: Array) -> Array:
         """Constant."""
-        return np.full_like(np.asarray(angle, dtype=float), self._per_radian)
+        return np.full_like(angle, self._per_radian, dtype=float)
 
     def angle(self, length: Array) -> Array:
         """Inverse."""

@@ -36,16 +36,16 @@ def tension_after(
     -----
     Squaring gives a quadratic in T1; the root that is smooth at μ = 0 is taken.
     """
-    first, m = np.asarray(before, dtype=float), np.asarray(friction, dtype=float)
-    pulled, square, cosine = first + np.asarray(drag, dtype=float), m**2, np.cos(wrap)
+    first, m = np.asanyarray(before), np.asanyarray(friction)
+    pulled, square, cosine = first + np.asanyarray(drag), m**2, np.cos(wrap)
     inside = (pulled - first) ** 2 + first * (1 - cosine) * (
         2 * pulled - square * first * (1 + cosine)
     )
     root = m * np.sqrt(inside)
-    return np.asarray((pulled - square * cosine * first + root) / (1 - square))
+    return np.asanyarray((pulled - square * cosine * first + root) / (1 - square))
 
 
-def coulomb_ratio(friction: Array, wrap: float) -> Array:
+def coulomb_ratio(friction: ArrayLike, wrap: float) -> Array:
     """T1/T0 over a pulley with Coulomb friction μ N (Eq. 20–23); ``friction`` signed, |μ| < 1.
 
     ``friction``: coefficient μ, signed. ``wrap``: wrap angle α, rad. Returns: T1/T0, of the shape
@@ -60,7 +60,7 @@ def capstan_ratio(friction: Array, wrap: float) -> Array:
     ``friction``: coefficient μ, signed. ``wrap``: wrap angle α, rad. Returns: T1/T0, of the shape
     of ``friction``.
     """
-    return np.asarray(np.exp(friction * wrap))
+    return np.asanyarray(np.exp(friction * wrap))
 
 
 def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float) -> Array:
@@ -69,7 +69,7 @@ def stribeck(speed: Array, coulomb: float, static: float, stribeck_speed: float)
     ``speed``: m/s, any shape. ``stribeck_speed``: vs, m/s. Returns: of the shape of ``speed``.
     """
     fallen = np.exp(-((speed / stribeck_speed) ** 2))
-    return np.asarray(coulomb * (1 - fallen) + static * fallen)
+    return np.asanyarray(coulomb * (1 - fallen) + static * fallen)
 
 
 def dahl_step(force: float, moved: float, limit: float, stiffness: float, shape: float) -> float:

@@ -89,7 +89,7 @@ class Line:
     def _nominal_arm(self, motor_angle: Array) -> Array:
         """Cable wound in per motor angle on the nominal profile, m/rad."""
         gear = self._gear(motor_angle)
-        return np.asarray(self._drum.arm(self._reference_wound + gear.value) * gear.slope)
+        return np.asanyarray(self._drum.arm(self._reference_wound + gear.value) * gear.slope)
 
     def _gear(self, motor_angle: Array) -> Path:
         gearbox = self.profile.gearbox
@@ -204,20 +204,20 @@ class Line:
         at = motion.at
         if motion.load is None:
             return np.zeros_like(at.time) if motion.drum_tension is None else motion.drum_tension
-        return self._over_the_pulleys(self._load(motion, kinematics), at)
+        return self.drum_tension(self._load(motion, kinematics), at)
 
-    def _over_the_pulleys(self, load: Array, at: At) -> Array:
+    def drum_tension(self, load: Array, at: At) -> Array:
         """Tension at the drum from the tension at the platform, N."""
         tension = self._through(Stage.CABLE_WEIGHT, load, at)
         if Stage.PULLEY in self._stages:
             for index in reversed(range(len(self.profile.pulley))):
                 here = replace(at, pulley=index, wrap=self.profile.pulley[index].wrap)
                 tension = self._through(Stage.PULLEY, tension, here)
-        return np.asarray(tension)
+        return np.asanyarray(tension)
 
     def indicated_tension(self, at: At, drum_side: Array) -> Array:
         """Reading of the load cell, N."""
-        return np.asarray(self._through(Stage.CELL, drum_side, at))
+        return np.asanyarray(self._through(Stage.CELL, drum_side, at))
 
     def indicated_torque(self, at: At, kinematics: WinchKinematics, drum_side: Array) -> Array:
         """Reported torque by virtual work: cable force times derivative of wound length, N m."""
@@ -266,7 +266,7 @@ class Line:
 
     def readings(self, load: Array, at: At) -> Array:
         """Readings of the load cell under tensions at the platform end, N, shape (n,)."""
-        return self.indicated_tension(at, self._over_the_pulleys(load, at))
+        return self.indicated_tension(at, self.drum_tension(load, at))
 
     def cable_length(self, motor_angle: float, tension: float = 0.0) -> float:
         """Cable length at rest at a motor angle under a tension, effects included, m."""
@@ -284,7 +284,7 @@ class Line:
         total = self._drum.angle(self._drum.wound(np.asarray(phi)) + wound)
         gear = profile.gearbox
         turned = gear.direction * gear.ratio * (total - phi)
-        return np.asarray(profile.reference.motor_angle + turned)
+        return np.asanyarray(profile.reference.motor_angle + turned)
 
     def motor_angle(self, cable_length: float, tension: float = 0.0) -> float:
         """Motor angle at a cable length (m) under a tension (N), rad.

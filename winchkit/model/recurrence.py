@@ -7,6 +7,7 @@ log₂ n passes over the arrays give all partial compositions (Hillis and Steele
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from winchkit.arrays import Array
 
@@ -26,10 +27,16 @@ def linear(decay: Array, drive: Array, start: float) -> Array:
     while step < len(b):
         b[step:] += a[step:] * b[:-step].copy()
         a[step:] *= a[:-step].copy()
-        if np.max(np.abs(a)) < _FORGOTTEN:
-            break
         step *= 2
+        if step < len(b) and np.max(np.abs(a)) < _FORGOTTEN:
+            break
     return b
+
+
+def share(part: ArrayLike, whole: ArrayLike, otherwise: ArrayLike = 0.0) -> Array:
+    """Part/whole, and ``otherwise`` where the whole is zero; shapes broadcast."""
+    is_some = np.asanyarray(whole) != 0
+    return np.where(is_some, part / np.where(is_some, whole, 1.0), otherwise)
 
 
 def play(x: Array, gap: float, start: float = 0.0) -> Array:

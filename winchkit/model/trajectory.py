@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike
 from winchkit.arrays import Array
 from winchkit.errors import UsageError
 
+JERK_TIME = 0.3
+"""Time in which a move's acceleration builds up, s."""
+
 
 @dataclass(frozen=True)
 class Trajectory:

@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 from winchkit.bench.control.cable import CableMap, LineModel
 from winchkit.bench.control.dead_man import DeadMan
 from winchkit.errors import NotPermitted
-from winchkit.model.trajectory import Trajectory, plan
+from winchkit.model.trajectory import JERK_TIME, Trajectory, plan
 from winchkit.schema.bench import LimitSpec
 
 _new = tuple.__new__
@@ -75,8 +75,6 @@ class Trim:
         self._plan = plan(missing, min(_SPEED, limits.speed), ramp, _JERK)
 
 
-JERK_TIME = 0.3
-"""Time in which a move's acceleration builds up, s."""
 GAIN = 8.0
 """Gain of the position loop around a speed-controlled drive, 1/s."""
 _MARGIN = 2e-3

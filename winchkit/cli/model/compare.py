@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
@@ -23,6 +24,10 @@ from winchkit.cli.model.options import (
     write_figures,
     write_page,
 )
+from winchkit.errors import UsageError
+
+if TYPE_CHECKING:
+    from winchkit.dynamics.comparison import SimulatedError
 
 
 @click.command(
@@ -38,16 +43,34 @@ from winchkit.cli.model.options import (
 @json_flag("Print the answer as JSON.")
 @html_option
 @figures_option
-def command(runs: Sequence[str], asked: Asked, html: str | None, figures: str | None) -> None:
-    """Compare runs with a profile at its file values; only the length offset is fitted."""
-    from winchkit.diagnosis.compare import compared
+@click.option(
+    "--forward", "is_simulated", is_flag=True, help="Also simulate the motion and compare it."
+)
+def command(
+    *,
+    runs: Sequence[str],
+    asked: Asked,
+    html: str | None,
+    figures: str | None,
+    is_simulated: bool,
+) -> None:
+    """Compare runs with a profile at its file values; only the length offset is fitted.
+
+    With --forward the motion is simulated from the measured torque (open loop), and from a channel
+    reference_angle by the loops of [control].
+    """
+    from winchkit.diagnosis.compare import WinchCompared, compared
+    from winchkit.dynamics.comparison import simulated_errors
     from winchkit.report.pages.pages import comparison_figures, comparison_html
     from winchkit.report.reproducibility import Command
+    from winchkit.report.simulated import simulated_figures, simulated_text
     from winchkit.report.text import compare_text
     from winchkit.schema.profiles.winch import WinchProfile
 
     declared = declared_profile(asked.source)
     refuse_options(declared, asked.band, asked.winch)
+    if is_simulated and (asked.each or not isinstance(declared, WinchProfile)):
+        raise UsageError("--forward simulates one winch or axis; choose one with --winch")
     if asked.each and isinstance(declared, WinchProfile):
         wings.part("fleet", "compare_command")(runs, declared, asked, is_json(), html, figures)
         return
@@ -55,11 +78,20 @@ def command(runs: Sequence[str], asked: Asked, html: str | None, figures: str | 
         own = asked.runs(runs, declared)
         progress("comparing", None)
         answer = compared(own, declared, asked.catalogue, asked.band)
-    tell(answer.comparison.to_json(), [compare_text(answer.comparison)])
+        errors: list[SimulatedError] = []
+        if is_simulated and isinstance(declared, WinchProfile):
+            progress("simulating the motion", None)
+            errors = simulated_errors(own, declared, asked.catalogue)
+    simulated = {"simulated": [error.to_json() for error in errors]} if errors else {}
+    lines = [compare_text(answer.comparison)]
+    if errors:
+        lines.append("\n" + simulated_text(errors))
+    tell({**answer.comparison.to_json(), **simulated}, lines)
     if html:
         title = page_title(declared.name, runs)
         write_page(html, comparison_html(answer, title, asked.profile, options=asked.options))
     if figures:
         source = Command(answer.regression.dataset, asked.profile).source
-        write_figures(figures, comparison_figures(answer, source))
+        more = simulated_figures(answer, errors) if isinstance(answer, WinchCompared) else []
+        write_figures(figures, [*comparison_figures(answer, source), *more])
     suggest_with("diagnose", asked, runs)

@@ -4,22 +4,22 @@ import numpy as np
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Values
-from winchkit.model.recurrence import first_order_lag
+from winchkit.model.recurrence import first_order_lag, share
 from winchkit.model.stages import At, Stage
 
 
 def apply(length: Array, at: At, values: Values) -> Array:
     """Length with the creep strain over free and dead length; it starts at zero strain."""
     settled = at.tension / values["creep_stiffness"]
-    begun = values["start"] * float(settled[0])
+    begun = values["start"] * settled[0]
     strain = first_order_lag(settled, at.time, values["time_constant"], begun)
     return length + at.stressed_length * strain
 
 
-def carried(after: Array, before: Array, at: At, values: Values) -> float:
+def carried(after: Array, before: Array, at: At, values: Values) -> Array:
     """Strain over T/EA_c at the last sample; unchanged at zero tension."""
     settled = at.stressed_length[-1] * at.tension[-1] / values["creep_stiffness"]
-    return float((after[-1] - before[-1]) / settled) if settled else values["start"]
+    return share(after[-1] - before[-1], settled, values["start"])
 
 
 EFFECT = Effect(

@@ -6,6 +6,7 @@ from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.derivatives import with_turning_points
 from winchkit.model.friction import dahl
+from winchkit.model.recurrence import share
 from winchkit.model.stages import At, Stage
 
 _STUCK = 0.5
@@ -28,10 +29,12 @@ def apply(length: Array, at: At, values: Values) -> Array:
     return length - at.stressed_length * held / values["stiffness"]
 
 
-def carried(after: Array, before: Array, at: At, values: Values) -> float:
+def carried(after: Array, before: Array, at: At, values: Values) -> Array:
     """F/F_c at the last sample."""
-    limit = values["fraction"] * abs(at.tension[-1]) * at.stressed_length[-1] / values["stiffness"]
-    return float((before[-1] - after[-1]) / limit) if limit else 0.0
+    limit = (
+        values["fraction"] * np.abs(at.tension[-1]) * at.stressed_length[-1] / values["stiffness"]
+    )
+    return share(before[-1] - after[-1], limit)
 
 
 EFFECT = Effect(

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Plausible, Values
-from winchkit.model.recurrence import play
+from winchkit.effects.effect import Dynamics, Effect, Parameter, Plausible, Values
+from winchkit.model.recurrence import play, share
 from winchkit.model.stages import At, Path, Stage
 
 _ON_THE_FLANK = 0.98
@@ -32,7 +32,7 @@ def apply(path: Path, at: At, values: Values) -> Path:
 
 def _meshes(turned: Array, drum_angle: Array, gap: float) -> NDArray[np.bool_]:
     """Samples at which the teeth are in contact."""
-    return np.asarray(np.abs(drum_angle - turned) >= gap / 2 * _ON_THE_FLANK)
+    return np.asanyarray(np.abs(drum_angle - turned) >= gap / 2 * _ON_THE_FLANK)
 
 
 def impacts(at: At, values: Values) -> NDArray[np.bool_]:
@@ -44,10 +44,21 @@ def impacts(at: At, values: Values) -> NDArray[np.bool_]:
     return np.diff(meshes, prepend=meshes[0])
 
 
-def carried(after: Path, before: Path, _at: At, values: Values) -> float:
+def carried(after: Path, before: Path, _at: At, values: Values) -> Array:
     """Position in the gap at the last sample."""
     gap = values["gap"]
-    return float((after.value[-1] - before.value[-1]) / gap) if gap else values["start"]
+    return share(after.value[-1] - before.value[-1], gap, values["start"])
+
+
+def _at_state(path: Path, at: At, values: Values) -> Path:
+    drum_angle = path.value + values["gap"] * values["start"]
+    meshes = _meshes(path.value, drum_angle, values["gap"])
+    return Path(drum_angle, path.slope * np.where(meshes, 1.0, values["held"]))
+
+
+def _rate(path: Path, at: At, values: Values) -> Array:
+    """Within the gap the drum stands still."""
+    return np.asanyarray(-np.gradient(path.value, at.time) / values["gap"])
 
 
 EFFECT = Effect(
@@ -81,6 +92,7 @@ EFFECT = Effect(
     order=2,
     memory=True,
     carry=carried,
+    dynamics=Dynamics(_at_state, _rate),
     impacts=impacts,
     probes=(
         {"gap": 1e-3},

@@ -2,21 +2,21 @@
 
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
-from winchkit.model.recurrence import first_order_lag
+from winchkit.model.recurrence import first_order_lag, share
 from winchkit.model.stages import At, Stage
 
 
 def apply(tension: Array, at: At, values: Values) -> Array:
     """Reading plus a creeping share of it; creep starts at zero."""
-    begun = values["start"] * float(tension[0])
+    begun = values["start"] * tension[0]
     crept = first_order_lag(tension, at.time, values["time_constant"], begun)
     return tension + values["fraction"] * crept
 
 
-def carried(after: Array, before: Array, _at: At, values: Values) -> float:
+def carried(after: Array, before: Array, _at: At, values: Values) -> Array:
     """c/T at the last sample; unchanged without a tension or a creep."""
     settled = values["fraction"] * before[-1]
-    return float((after[-1] - before[-1]) / settled) if settled else values["start"]
+    return share(after[-1] - before[-1], settled, values["start"])
 
 
 EFFECT = Effect(

@@ -6,6 +6,7 @@ from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.derivatives import with_turning_points
 from winchkit.model.friction import dahl
+from winchkit.model.recurrence import share
 from winchkit.model.stages import At, Stage
 
 _REACH = 0.1
@@ -23,10 +24,10 @@ def apply(tension: Array, at: At, values: Values) -> Array:
     return tension - dahl(turned, limit, fraction / _REACH, start=values["start"])[own]
 
 
-def carried(after: Array, before: Array, _at: At, values: Values) -> float:
+def carried(after: Array, before: Array, _at: At, values: Values) -> Array:
     """F/F_c at the last sample."""
-    limit = values["fraction"] * abs(before[-1])
-    return float((before[-1] - after[-1]) / limit) if limit else 0.0
+    limit = values["fraction"] * np.abs(before[-1])
+    return share(before[-1] - after[-1], limit)
 
 
 EFFECT = Effect(

@@ -11,8 +11,7 @@ from winchkit.model.stages import At, Stage
 
 def _limit(tension: Array, at: At, values: Values) -> Array:
     """F_c = μ N, the Coulomb friction of this pulley, N."""
-    ratio = float(coulomb_ratio(np.asarray(values["friction"]), at.wrap))
-    return np.abs(tension) * (ratio - 1.0)
+    return np.abs(tension) * (coulomb_ratio(values["friction"], at.wrap) - 1.0)
 
 
 def _wound_in(at: At) -> Array:
@@ -57,4 +56,5 @@ EFFECT = Effect(
     needs=("pulley", "load"),
     memory=True,
     carry=FRICTION.carried,
+    dynamics=FRICTION.dynamics,
 )

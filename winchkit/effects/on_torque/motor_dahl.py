@@ -56,4 +56,5 @@ EFFECT = Effect(
     contains=("motor-coulomb",),
     memory=True,
     carry=FRICTION.carried,
+    dynamics=FRICTION.dynamics,
 )

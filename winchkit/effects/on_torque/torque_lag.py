@@ -1,5 +1,7 @@
 """torque-lag: low-pass filter of the drive's reported torque."""
 
+import numpy as np
+
 from winchkit.arrays import Array
 from winchkit.effects.effect import Effect, Parameter, Plausible, Values
 from winchkit.model.recurrence import first_order_lag
@@ -9,6 +11,11 @@ from winchkit.model.stages import At, Stage
 def apply(torque: Array, at: At, values: Values) -> Array:
     """Torque signal after a first-order filter that starts at the first value."""
     return first_order_lag(torque, at.time, values["time_constant"])
+
+
+def undo(reported: Array, time: Array, values: Values) -> Array:
+    """The torque before the filter, m + τ_f m'."""
+    return reported + values["time_constant"] * np.gradient(reported, time)
 
 
 EFFECT = Effect(
@@ -28,6 +35,7 @@ EFFECT = Effect(
         ),
     ),
     apply=apply,
+    undo=undo,
     outputs=("motor_torque",),
     what="The drive low-passes its torque signal, which delays and smooths it.",
     formula="τ_f m' + m = τ",

@@ -11,6 +11,11 @@ def apply(torque: Array, at: At, values: Values) -> Array:
     return shifted(torque, at.time, values["lead"])
 
 
+def undo(reported: Array, time: Array, values: Values) -> Array:
+    """The motor's torque follows the command."""
+    return shifted(reported, time, -values["lead"])
+
+
 EFFECT = Effect(
     id="torque-lead",
     stage=Stage.TORQUE_SIGNAL,
@@ -26,6 +31,7 @@ EFFECT = Effect(
         ),
     ),
     apply=apply,
+    undo=undo,
     outputs=("motor_torque",),
     what="The record has the commanded torque (0x6074), not the actual one (0x6077), which follows "
     "with the delay of bus and control loop.",

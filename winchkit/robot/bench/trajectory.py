@@ -8,8 +8,7 @@ from math import ceil, sqrt
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.bench.control.motion import JERK_TIME
-from winchkit.model.trajectory import Trajectory, plan
+from winchkit.model.trajectory import JERK_TIME, Trajectory, plan
 from winchkit.robot.bench.path import Path
 from winchkit.robot.dynamics.dynamics import PlatformMotion, dynamic_wrench
 from winchkit.robot.dynamics.rest import rest_poses

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
+from winchkit.schema.profiles.control import LinearControlSpec
 from winchkit.schema.profiles.winch import (
     CableSpec,
     DrumSpec,
@@ -82,5 +83,6 @@ class LinearAxisProfile(AxisProfile):
     """
 
     motor: LinearMotorSpec = field(default_factory=LinearMotorSpec)
+    control: LinearControlSpec | None = None
     gearbox: GearboxSpec = field(default_factory=GearboxSpec, init=False, compare=False)
     reference: ReferenceSpec = field(default_factory=ReferenceSpec, init=False, compare=False)

@@ -9,6 +9,7 @@ from math import pi
 from typing import Annotated, Any, Literal
 
 from winchkit.rendering import Plotted
+from winchkit.schema.profiles.control import ControlSpec
 from winchkit.schema.quantity import (
     Angle,
     Count,
@@ -186,6 +187,7 @@ class WinchProfile(Plotted, Table):
     cable: CableSpec = field(default_factory=CableSpec)
     path: PathSpec = field(default_factory=PathSpec)
     motor: MotorSpec = field(default_factory=MotorSpec)
+    control: ControlSpec | None = None
     guide: GuideSpec | None = None
     pulley: tuple[PulleySpec, ...] = ()
     effect: tuple[EffectTable, ...] = ()

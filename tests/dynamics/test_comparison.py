@@ -1,0 +1,56 @@
+"""Errors of simulated motions beside those of the prediction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from simulated_profiles import AXIS, INERTIA, profile_of, torque_run
+from winchkit import forward
+from winchkit.dynamics.comparison import simulated_errors
+from winchkit.report.simulated import simulated_text
+from winchkit.runs import Channel
+
+CONTROL = """
+[control]
+position_gain = "20 1/s"
+velocity_gain = "5 N m s"
+"""
+NOISE = 1e-4
+
+
+def test_open_loop_it_shows_nothing_once_the_initial_speed_errs_as_much(tmp_path: Path) -> None:
+    """A true model errs by that speed alone, a wrong inertia by more, to the end."""
+    true = profile_of(tmp_path, AXIS)
+    run = forward(true, torque=torque_run(np.full(5000, 0.01)), initial_speed=0.0)
+    random = np.random.default_rng(1)
+    noisy = run["motor_angle"] + NOISE * random.standard_normal(len(run))
+    channels = {**run.channels, "motor_angle": Channel(noisy, "rad")}
+    channels.pop("motor_velocity")
+    run = replace(run, channels=channels)
+    (found,) = simulated_errors([run], true)
+    assert found.driven_by == "torque"
+    assert found.meaningful_until is not None
+    assert 0.0 < found.meaningful_until < run.time[-1]
+    assert "the comparison means nothing" in simulated_text([found])
+    coarse = profile_of(tmp_path, AXIS.replace("0.5 kg m^2", "5 kg m^2"))
+    (found,) = simulated_errors([run], coarse)
+    assert found.meaningful_until is None
+    lacking = 0.01 * run.time**2 / 2 * (1 / INERTIA - 1 / 5)
+    assert found.rms == pytest.approx(np.sqrt(np.mean(lacking**2)), rel=0.05)
+
+
+def test_under_loops_the_reference_channel_is_followed(tmp_path: Path) -> None:
+    profile = profile_of(tmp_path, AXIS + CONTROL)
+    goal = torque_run(np.zeros(500))
+    path = 0.3 * np.sin(goal.time) ** 2
+    goal = replace(goal, channels={"motor_angle": Channel(path, "rad")})
+    run = forward(profile, reference=goal, initial_speed=0.0)
+    followed = replace(run, channels={**run.channels, "reference_angle": Channel(path, "rad")})
+    errors = {e.driven_by: e for e in simulated_errors([followed], profile)}
+    assert set(errors) == {"torque", "reference"}
+    assert errors["reference"].rms < 1e-4
+    assert errors["reference"].meaningful_until is None

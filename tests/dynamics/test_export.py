@@ -1,0 +1,292 @@
+"""The exported C is the line model to rounding, and the MuJoCo model moves as ``forward``."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from simulated_profiles import AXIS, MASS, WINCH, profile_of, torque_run
+from winchkit import forward, load_catalogue
+from winchkit.dynamics.c_code import as_json, c_header, identifier
+from winchkit.dynamics.mjcf import mjcf
+from winchkit.dynamics.step import INPUTS, OUTPUTS
+from winchkit.effects import Effect, Values
+from winchkit.effects.bind import terms_of
+from winchkit.effects.term import Term, modifiers_of
+from winchkit.errors import UsageError
+from winchkit.estimation.cable_state import CableEstimator, Sample
+from winchkit.model.line import Line
+from winchkit.model.stages import At
+from winchkit.schema.profiles.winch import WinchProfile
+
+GCC = shutil.which("gcc")
+FLAGS = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-fsanitize=address,undefined"]
+MAIN = """\
+#include "model.h"
+#include <stdio.h>
+#include <stdlib.h>
+
+int main(void)
+{
+    size_t count;
+    if (fread(&count, sizeof count, 1, stdin) != 1)
+        return 1;
+    NAME_input *inputs = malloc(count * sizeof *inputs);
+    NAME_output *outputs = malloc(count * sizeof *outputs);
+    if (!inputs || !outputs || fread(inputs, sizeof *inputs, count, stdin) != count)
+        return 1;
+    NAME_state state;
+    NAME_start(&state);
+    NAME_batch(&state, inputs, outputs, count);
+    for (size_t i = 0; i < count; ++i)
+        inputs[i].time = NAME_motor_angle(outputs[i].cable_length, inputs[i].load);
+    fwrite(outputs, sizeof *outputs, count, stdout);
+    fwrite(inputs, sizeof *inputs, count, stdout);
+    free(inputs);
+    free(outputs);
+    return 0;
+}
+"""
+ROOMS = {
+    "spiral": 'kind = "spiral"\nwinding_radius = "60 mm"\nlayer_growth = "0.4 mm"',
+    "archimedean": 'kind = "archimedean"\nwinding_radius = "60 mm"\nlayer_growth = "0.4 mm"',
+    "grooved": 'kind = "grooved"\nwinding_radius = "60 mm"\ngroove_pitch = "5 mm"',
+    "squared": 'kind = "squared"\nwinding_radius = "60 mm"\nbuild_up = "0.1 mm"',
+}
+MACHINE = """\
+schema = 1
+kind = "winch"
+name = "machine"
+
+[drum]
+{drum}
+
+[gearbox]
+ratio = 10
+
+[guide]
+screw_lead = "4 mm"
+
+[cable]
+diameter = "4 mm"
+dead_length = "1 m"
+
+[[pulley]]
+radius = "40 mm"
+wrap = "90 deg"
+
+[[pulley]]
+radius = "40 mm"
+wrap = "60 deg"
+
+[reference]
+cable_length = "4 m"
+wound_turns = 6.0
+"""
+REFUSED = {
+    "cable-elongation-quartic", "cell-lag", "drum-winding-tension", "length-time-offset",
+    "torque-lag", "torque-lead",
+}  # fmt: skip
+"""Effects of the catalogue whose function is none of one sample."""
+BETWEEN = {"cable-hysteresis", "cell-hysteresis", "pulley-inertia"}
+"""Effects that use samples on both sides in a run, and differ from it by their step."""
+
+
+def used(effect: Effect) -> Term:
+    """An effect of its typical size, with memory at a third of its range."""
+    values = {p.name: p.typical if p.role == "amplitude" else p.null for p in effect.parameters}
+    if effect.id == "cable-elongation-quartic":
+        values["b2"] = 100.0
+    return Term(effect, values | ({"start": 0.3} if "start" in values else {}))
+
+
+EFFECTS = {e.id: e for e in load_catalogue().of_winches()}
+
+
+def random_states(count: int, seed: int) -> NDArray[np.float64]:
+    random = np.random.default_rng(seed)
+    time = np.cumsum(random.uniform(1e-3, 2e-2, count))
+    low_high = [(-150, 150), (-40, 40), (-50, 50), (20, 400), (0, 40), (-2, 2)]
+    return np.column_stack([time, *(random.uniform(a, b, count) for a, b in low_high)])
+
+
+def predicted(
+    profile: WinchProfile, terms: list[Term], states: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The line along the states as one run, from a sample 0.1 ms before the first."""
+    rows = np.vstack([states[:1], states])
+    rows[0, 0] -= 1e-4
+    time, angle, rate, acceleration, load, temperature, torque = rows.T
+    line = Line(profile, modifiers_of(terms))
+    at = line.moments(time, angle, rate, load, temperature)
+    at = replace(at, motor_acceleration=acceleration, motor_torque=torque)
+    kinematics = line.kinematics(at)
+    drum_side = line.drum_tension(load, at)
+    out = [line.indicated_length(at, kinematics), line.indicated_tension(at, drum_side),
+           line.indicated_torque(at, kinematics, drum_side), kinematics.arm]  # fmt: skip
+    return np.column_stack(out)[1:]
+
+
+def by_c(
+    folder: Path, profile: WinchProfile, terms: list[Term], states: NDArray[np.float64],
+    real: str = "double", flags: list[str] = FLAGS,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # fmt: skip
+    """Outputs of the compiled header, and the motor angles at their lengths."""
+    (folder / "model.h").write_text(c_header(profile, terms))
+    (folder / "main.c").write_text(MAIN.replace("NAME", identifier(profile.name)))
+    defined = ["-DWINCHKIT_FLOAT"] if real == "float" else []
+    command = ["gcc", *flags, *defined, "main.c", "-lm", "-o", "model"]
+    subprocess.run(command, cwd=folder, check=True)
+    kind = np.dtype(np.float32 if real == "float" else np.float64)
+    count = len(states).to_bytes(8, "little")
+    sent = count + states.astype(kind).tobytes()
+    found = subprocess.run([folder / "model"], input=sent, capture_output=True, check=True)
+    numbers = np.frombuffer(found.stdout, kind).astype(float)
+    outputs, inputs = np.split(numbers, [len(states) * len(OUTPUTS)])
+    return outputs.reshape(-1, len(OUTPUTS)), inputs.reshape(-1, len(INPUTS))[:, 0]
+
+
+def differences(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest difference of each output as a share of its largest value."""
+    return np.asarray(np.max(np.abs(a - b), axis=0) / np.max(np.abs(b), axis=0))
+
+
+def machine(folder: Path, drum: str = "spiral") -> WinchProfile:
+    return profile_of(folder, MACHINE.format(drum=ROOMS[drum]))
+
+
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+@pytest.mark.parametrize("drum", ROOMS)
+def test_the_compiled_header_is_the_line(tmp_path: Path, drum: str) -> None:
+    """All effects that have a step, at once: their memory passes from sample to sample."""
+    profile = machine(tmp_path, drum)
+    terms = [used(e) for name, e in EFFECTS.items() if name not in REFUSED | BETWEEN]
+    states = random_states(2000, 1)
+    outputs, _ = by_c(tmp_path, profile, terms, states)
+    expected = predicted(profile, terms, states)
+    assert np.all(np.isfinite(expected))
+    assert np.max(differences(outputs, expected)) < 1e-12
+
+
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+@pytest.mark.parametrize("count", [20_000, pytest.param(1_000_000, marks=pytest.mark.campaign)])
+def test_random_states_differ_by_rounding_only(tmp_path: Path, count: int) -> None:
+    """Friction with memory, elongation, a layered drum; double to 1e-12, float to 1e-5."""
+    profile = machine(tmp_path, "archimedean")
+    names = ("pulley-dahl", "motor-dahl", "cable-elongation-linear", "cable-creep",
+             "drum-eccentricity", "motor-viscous", "rotor-inertia", "cell-gain")  # fmt: skip
+    terms = [used(EFFECTS[name]) for name in names]
+    states = random_states(count, 2)
+    outputs, _ = by_c(tmp_path, profile, terms, states)
+    assert np.max(differences(outputs, predicted(profile, terms, states))) < 1e-12
+    states = random_states(200, 3).astype(np.float32).astype(float)
+    outputs, _ = by_c(tmp_path, profile, terms, states, "float")
+    assert np.max(differences(outputs, predicted(profile, terms, states))) < 1e-5
+
+
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+def test_hysteresis_continues_as_in_control(tmp_path: Path) -> None:
+    """The true length is that of the estimator of the control, which steps in Python."""
+    profile, terms = machine(tmp_path), [used(EFFECTS["cable-hysteresis"])]
+    terms = [Term(t.effect, {**t.values, "start": t.effect.rested}) for t in terms]
+    states = random_states(200, 5)
+    states[:, 0] = np.arange(200) * 0.01
+    estimator = CableEstimator(profile, terms)
+    tension, lengths = [], []
+    for time, angle, rate, _, load, *_ in states.tolist():
+        found = estimator.update(Sample(time, angle, rate, load=load))
+        tension.append(found.tension)
+        lengths.append(found.length)
+    states[:, 4] = tension
+    outputs, _ = by_c(tmp_path, profile, terms, states)
+    np.testing.assert_allclose(outputs[:, 0], lengths, atol=1e-12)
+
+
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+@pytest.mark.parametrize("drum", ROOMS)
+def test_the_inverse_finds_the_motor_angle(tmp_path: Path, drum: str) -> None:
+    profile = machine(tmp_path, drum)
+    terms = [used(EFFECTS["cable-elongation-linear"]), used(EFFECTS["drum-eccentricity"])]
+    states = random_states(500, 4)
+    _, angles = by_c(tmp_path, profile, terms, states)
+    np.testing.assert_allclose(angles, states[:, 1], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", sorted(REFUSED))
+def test_an_effect_without_a_step_is_refused_by_name(tmp_path: Path, name: str) -> None:
+    with pytest.raises(UsageError, match=rf"^{name}: .*\n.*static inline real"):
+        c_header(machine(tmp_path), [used(EFFECTS[name])])
+
+
+def branching(tension: NDArray[np.float64], at: At, values: Values) -> NDArray[np.float64]:
+    return tension if at.tension[0] > 5 else tension + values["gain_error"]
+
+
+def test_a_user_effect_is_exported_or_refused_with_the_template(tmp_path: Path) -> None:
+    base = EFFECTS["cell-gain"]
+    mine = replace(base, id="mine", apply=lambda v, at, p: v * (1 + p["gain_error"] * np.sin(v)))
+    assert "sin" in c_header(machine(tmp_path), [used(mine)])
+    with pytest.raises(UsageError, match="fill in"):
+        c_header(machine(tmp_path), [used(replace(base, id="mine", apply=branching))])
+
+
+def test_the_json_has_every_formula(tmp_path: Path) -> None:
+    found = json.loads(json.dumps(as_json(machine(tmp_path), [used(EFFECTS["motor-viscous"])])))
+    assert found["constants"]["motor_viscous_viscosity"]["unit"] == "N m s"
+    known = {*found["inputs"], *found["constants"]}
+    for name, _, *arguments in found["assignments"]:
+        assert all(not isinstance(a, str) or a in known for a in arguments)
+        known.add(name)
+    assert {one["value"] for one in found["outputs"].values()} <= known
+
+
+@pytest.mark.parametrize("case", ["pendulum", "winch"])
+def test_mujoco_moves_as_forward(tmp_path: Path, case: str) -> None:
+    """A pendulum with dry friction, and a hanging load on a layered drum: 0.5 % of the motion."""
+    mujoco = pytest.importorskip("mujoco")
+    if case == "pendulum":
+        profile = profile_of(
+            tmp_path, AXIS,
+            ("joint-gravity", 'amplitude = "2 N m"\nphase = "0.3 rad"'),
+            ("motor-coulomb", 'torque = "0.05 N m"'),
+            ("motor-viscous", 'viscosity = "0.02 N m s"'),
+        )  # fmt: skip
+        torque, mass = 0.8 * np.sin(2 * np.arange(0, 5, 0.01)), None
+    else:
+        drum = 'kind = "archimedean"\nwinding_radius = "50 mm"\nlayer_growth = "2 mm"'
+        text = WINCH.replace(
+            'kind = "grooved"\nwinding_radius = "50 mm"\ngroove_pitch = "0 mm"', drum
+        )
+        profile = profile_of(
+            tmp_path, text,
+            ("motor-coulomb", 'torque = "0.02 N m"'), ("motor-viscous", 'viscosity = "1 mN m s"'),
+        )  # fmt: skip
+        torque, mass = 0.5 + 0.1 * np.sin(2 * np.arange(0, 4, 0.01)), MASS
+    run = forward(profile, torque=torque_run(torque), load_mass=mass, initial_speed=0.0)
+    text, missing = mjcf(profile, terms_of(profile), mass)
+    assert not missing
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    angle = [0.0]
+    for now in run.time[1:]:
+        while data.time < now - model.opt.timestep / 2:
+            data.ctrl[0] = np.interp(data.time, run.time, torque)
+            mujoco.mj_step(model, data)
+        angle.append(data.joint("machine").qpos[0] * profile.gearbox.ratio)
+    assert np.max(np.abs(angle - run["motor_angle"])) < 5e-3 * np.ptp(run["motor_angle"])
+
+
+def test_a_profile_without_masses_is_refused(tmp_path: Path) -> None:
+    bare = profile_of(tmp_path, AXIS.partition("[motor]")[0])
+    with pytest.raises(UsageError, match="no mass that MuJoCo could move"):
+        mjcf(bare, [])
+    winch = profile_of(tmp_path, WINCH)
+    with pytest.raises(UsageError, match="give --load-mass"):
+        mjcf(winch, terms_of(winch))

@@ -1,0 +1,72 @@
+"""``winchkit export-model``: a profile with its effects for controllers and simulators."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import PROFILE, effects_option, output_option
+from winchkit.cli.core.quantity_type import Quantity
+
+
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit export-model better.toml --to c -o better.h",
+        "winchkit export-model joint-axis --to mjcf -o joint.xml",
+    ),
+)
+@click.argument("profile", type=PROFILE)
+@click.option(
+    "--to",
+    "form",
+    required=True,
+    type=click.Choice(["c", "mjcf", "json"]),
+    help="A header in C99, a model of MuJoCo, or the formulas as JSON.",
+)
+@click.option(
+    "--load-mass",
+    type=Quantity("mass", example="10 kg"),
+    help="Mass on the cable, for MuJoCo.",
+)
+@effects_option
+@output_option("File to write; by default standard output.")
+def command(
+    *,
+    profile: str,
+    form: Literal["c", "mjcf", "json"],
+    load_mass: str | None,
+    effects: Sequence[str],
+    output: str | None,
+) -> None:
+    """Write PROFILE for other programs, with its effects as they stand in it.
+
+    The header has a step and a batch of cable length, tension and motor torque, with the memory of
+    the effects, and the motor angle at a cable length. It needs math.h only. The MuJoCo model moves
+    like 'winchkit forward'; effects without a counterpart are listed.
+    """
+    from winchkit.catalog import find
+    from winchkit.cli.core.quantities import quantity
+    from winchkit.dynamics.export import export_model
+    from winchkit.effects import load_catalogue
+    from winchkit.errors import Fault, FileError
+    from winchkit.schema.read import read_profile
+
+    mass = None if load_mass is None else quantity(load_mass, "mass")
+    declared = read_profile(find("profiles", profile))
+    exported = export_model(declared, form, load_catalogue(effects), mass)
+    for one in exported.missing:
+        note(f"no counterpart in MuJoCo: {one}")
+    if output is None:
+        click.echo(exported.text, nl=False)
+        return
+    try:
+        Path(output).write_text(exported.text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(Fault(f"cannot be written: {error.strerror}", output)) from error
+    note(f"written: {output}")

@@ -1,0 +1,94 @@
+"""``winchkit forward``: the motion of a profile under a torque, a reference or a programme."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+
+from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import note
+from winchkit.cli.core.options import PROFILE, PROGRAMME, RUN, effects_option, output_option
+from winchkit.cli.core.output import echo_json
+from winchkit.cli.core.quantity_type import Quantity
+from winchkit.cli.core.terminal import progress_bar
+
+
+@click.command(
+    cls=Command,
+    examples=(
+        "winchkit forward better.toml --programme programme-demo -o forward.csv",
+        "winchkit forward better.toml --torque demo-10kg-1.csv -o forward.csv",
+    ),
+)
+@click.argument("profile", type=PROFILE)
+@click.option("--programme", type=PROGRAMME, help="Motion programme that [control] follows.")
+@click.option("--torque", type=RUN, metavar="RUN", help="Run whose motor torque drives it.")
+@click.option(
+    "--reference", type=RUN, metavar="RUN", help="Run whose motor angle [control] follows."
+)
+@click.option(
+    "--load-mass",
+    type=Quantity("mass", example="10 kg"),
+    help="Mass on the cable; by default that of the run or the programme.",
+)
+@click.option(
+    "--initial-speed", metavar="SPEED", help="Speed at the start; by default that of the run."
+)
+@click.option(
+    "--rate",
+    type=Quantity("frequency", example="100 Hz"),
+    default="100 Hz",
+    show_default=True,
+    help="Sampling rate of a programme.",
+)
+@effects_option
+@output_option("The simulated run: a .csv or .mcap file.", required=True)
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
+def command(
+    *,
+    profile: str,
+    programme: str | None,
+    torque: str | None,
+    reference: str | None,
+    load_mass: str | None,
+    initial_speed: str | None,
+    rate: str,
+    effects: Sequence[str],
+    output: str,
+    as_json: bool,
+) -> None:
+    """Simulate the motion of PROFILE with its effects and write it as a run, without noise.
+
+    The motor is driven by a recorded torque, or by the position and velocity loop of the profile's
+    table [control]. Friction sticks and slips, and backlash opens and closes, at exact times.
+    """
+    from winchkit.catalog import find
+    from winchkit.cli.core.quantities import quantity
+    from winchkit.dynamics.forward import forward
+    from winchkit.effects import load_catalogue
+    from winchkit.runs import read_run, write_run
+    from winchkit.runs.info import summary_of
+    from winchkit.schema.read import read_profile, read_programme
+    from winchkit.sim.bench import programme_path
+    from winchkit.units import parse
+
+    declared = read_profile(find("profiles", profile))
+    dimension = "speed" if declared.is_linear else "angular speed"
+    with progress_bar() as progress:
+        progress("integrating", None)
+        run = forward(
+            declared,
+            programme=None if programme is None else read_programme(programme_path(programme)),
+            torque=None if torque is None else read_run(torque),
+            reference=None if reference is None else read_run(reference),
+            catalogue=load_catalogue(effects),
+            load_mass=None if load_mass is None else quantity(load_mass, "mass"),
+            initial_speed=None if initial_speed is None else parse(initial_speed, dimension),
+            rate=quantity(rate, "frequency"),
+        )
+    write_run(run, output)
+    summary = summary_of(run)
+    note(f"{output}: {summary.text}")
+    if as_json:
+        echo_json({"schema": 1, "profile": profile, "output": output, "summary": summary})

@@ -1,0 +1,172 @@
+"""A profile as one header in C99: a step, a batch, and the inverse kinematics.
+
+It needs math.h only and allocates nothing. Numbers are double, or float where ``WINCHKIT_FLOAT`` is
+defined before the header is included.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from math import isinf, isnan
+
+from winchkit.dynamics.expression import Expression, Operation, ordered, statements
+from winchkit.dynamics.step import BEFORE, INPUTS, OUTPUTS, Step, step_of
+from winchkit.effects.term import Term
+from winchkit.schema.profiles.winch import WinchProfile
+
+_HEAD = """\
+/* {name}: written by winchkit export-model.
+
+   C99, no library but math.h, no allocation; SI units. Define WINCHKIT_FLOAT before this header for
+   float in place of double. Call {p}_start once, then {p}_step for each sample in order of time. */
+#ifndef {P}_H
+#define {P}_H
+#include <math.h>
+#include <stddef.h>
+
+#ifdef WINCHKIT_FLOAT
+typedef float {p}_real;
+#define {P}_F(name) name##f
+#else
+typedef double {p}_real;
+#define {P}_F(name) name
+#endif
+
+"""
+_FOOT = """\
+static inline void {p}_start({p}_state *state)
+{{
+    state->is_started = 0;
+{starts}}}
+
+static inline void {p}_step({p}_state *state, const {p}_input *input, {p}_output *output)
+{{
+    if (!state->is_started) {{
+        state->before = *input;
+        state->before.time -= ({p}_real)1e-4;
+        state->is_started = 1;
+    }}
+{body}    state->before = *input;
+}}
+
+static inline void {p}_batch({p}_state *state, const {p}_input *inputs, {p}_output *outputs,
+                            size_t count)
+{{
+    for (size_t i = 0; i < count; ++i)
+        {p}_step(state, &inputs[i], &outputs[i]);
+}}
+
+/* At rest, without memory: length (m) and arm (m/rad) at a motor angle (rad) and a load (N). */
+static inline void {p}_at_rest({p}_real motor_angle, {p}_real load, {p}_real *length, {p}_real *arm)
+{{
+    (void)motor_angle;
+    (void)load;
+{rest}}}
+
+/* At rest: motor angle (rad) at a length (m) under a load (N), by Newton from the nominal line. */
+static inline {p}_real {p}_motor_angle({p}_real length, {p}_real load)
+{{
+{nominal}    for (int i = 0; i < 4; ++i) {{
+        {p}_real there, arm;
+        {p}_at_rest(angle, load, &there, &arm);
+        angle += (there - length) / arm;
+    }}
+    return angle;
+}}
+
+#endif
+"""
+
+
+def c_header(profile: WinchProfile, terms: Sequence[Term]) -> str:
+    """The header of a profile; raises UsageError as :func:`~winchkit.dynamics.step.step_of`."""
+    p = identifier(profile.name)
+    step = step_of(profile, terms, p)
+    fields = {"p": p, "P": p.upper(), "name": profile.name}
+    out = [_HEAD.format(**fields)]
+    for c in step.constants:
+        value = _literal(c.value, p)
+        out.append(f"#define {p.upper()}_{c.name.upper()} {value} /* {c.unit}; {c.source} */\n")
+    out += [_struct(p, "input", INPUTS), _struct(p, "output", OUTPUTS)]
+    memory = {m.name: ("1", "memory of the effect") for m in step.memories}
+    state = _struct(p, "state", memory).replace(
+        "{\n", f"{{\n    int is_started;\n    {p}_input before;\n", 1
+    )
+    out.append(state)
+    starts = "".join(f"    state->{m.name} = {_literal(m.start, p)};\n" for m in step.memories)
+    names = {n: f"input->{n}" for n in INPUTS} | {BEFORE + n: f"state->before.{n}" for n in INPUTS}
+    names |= {m.name: f"state->{m.name}" for m in step.memories}
+    targets = [f"output->{n}" for n in step.outputs] + [f"state->{m.name}" for m in step.memories]
+    roots = [*step.outputs.values(), *(m.after for m in step.memories)]
+    body = _body(step, p, roots, targets, names)
+    rest = _body(step, p, step.at_rest, ["*length", "*arm"], {})
+    nominal = _body(step, p, [step.nominal_angle], [f"{p}_real angle"], {})
+    out.append(_FOOT.format(**fields, starts=starts, body=body, rest=rest, nominal=nominal))
+    return "".join(out)
+
+
+def identifier(name: str) -> str:
+    """A name of C from a name of a profile."""
+    found = re.sub(r"\W", "_", name, flags=re.ASCII).lower()
+    return found if found[:1].isalpha() else f"model_{found}"
+
+
+def _struct(p: str, kind: str, members: dict[str, tuple[str, str]]) -> str:
+    lines = "".join(
+        f"    {p}_real {name}; /* {unit}, {text} */\n" for name, (unit, text) in members.items()
+    )
+    return f"\ntypedef struct {{\n{lines}}} {p}_{kind};\n"
+
+
+def _literal(value: float, p: str) -> str:
+    text = (
+        "NAN" if isnan(value) else f"{'-' * (value < 0)}INFINITY" if isinf(value) else repr(value)
+    )
+    return f"(({p}_real){text})"
+
+
+def _body(
+    step: Step,
+    p: str,
+    roots: Sequence[Expression],
+    targets: Sequence[str],
+    names: dict[str, str],
+) -> str:
+    names = {c.name: f"{p.upper()}_{c.name.upper()}" for c in step.constants} | names
+
+    def text(operation: Operation) -> str:
+        return operation.c.replace("F(", f"{p.upper()}_F(").replace("(real)", f"({p}_real)")
+
+    lines, results = statements(roots, names, text, lambda value: _literal(value, p))
+    # Every result is computed before the first target, which may be an input of another.
+    body = "".join(f"    const {p}_real {name} = {right};\n" for name, right in lines)
+    body += "".join(f"    const {p}_real r{i} = {one};\n" for i, one in enumerate(results))
+    return body + "".join(f"    {target} = r{i};\n" for i, target in enumerate(targets))
+
+
+def as_json(profile: WinchProfile, terms: Sequence[Term]) -> dict[str, object]:
+    """The same step as plain data: constants, and assignments ``[name, operation, arguments]``."""
+    step = step_of(profile, terms)
+    roots = [*step.outputs.values(), *(m.after for m in step.memories)]
+    names = {id(x): "" for x in roots}
+    assignments: list[list[object]] = []
+    for x in ordered(roots):
+        if not x.arguments:
+            names[id(x)] = x.name or repr(x.value)
+            continue
+        names[id(x)] = f"t{len(assignments)}"
+        arguments = [names[id(a)] if a.name or a.arguments else a.value for a in x.arguments]
+        assignments.append([names[id(x)], x.operation, *arguments])
+    return {
+        "schema": 1,
+        "profile": profile.name,
+        "inputs": {n: {"unit": u, "what": w} for n, (u, w) in INPUTS.items()},
+        "before": f"the same of the sample before, with the prefix {BEFORE}",
+        "constants": {c.name: {"value": c.value, "unit": c.unit, "source": c.source}
+                      for c in step.constants},
+        "assignments": assignments,
+        "outputs": {n: {"value": names[id(x)], "unit": OUTPUTS[n][0]}
+                    for n, x in step.outputs.items()},
+        "memory": {m.name: {"start": m.start, "next": names[id(m.after)]} for m in step.memories},
+    }  # fmt: skip

@@ -1,0 +1,92 @@
+"""Comparison of a simulated motion with the measured one: open loop, and under the loops.
+
+Open loop an error of the initial speed grows with time. The comparison says when it alone makes an
+error as large as that of the model: from then on the motion shows nothing of the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from winchkit.arrays import Array
+from winchkit.dynamics.forward import GOAL, Setup, motion_of, setup_of
+from winchkit.effects.bind import terms_of
+from winchkit.effects.catalogue import Catalogue
+from winchkit.model.line import Line
+from winchkit.model.stages import Signals
+from winchkit.runs.linear_axis import rotary_runs
+from winchkit.runs.run import Run
+from winchkit.schema.profiles.winch import WinchProfile
+
+
+@dataclass(frozen=True)
+class SimulatedError:
+    """Error of one simulated motion of the motor."""
+
+    run: str
+    driven_by: str
+    """``torque`` as measured, or ``reference`` that the loops of the profile follow."""
+    unit: str
+    """rad, or m on a linear axis."""
+    rms: float
+    largest: float
+    motion_rms: float
+    """Of the measured motion about its mean."""
+    meaningful_until: float | None
+    """Time at which the uncertain initial speed alone makes an error of ``rms``, s; None if never
+    within the run, or under loops."""
+    time: Array = field(compare=False)
+    """(n,), s, and at it:"""
+    measured: Array = field(compare=False)
+    simulated: Array = field(compare=False)
+
+    def to_json(self) -> dict[str, Any]:
+        """All but the motions."""
+        arrays = {"time", "measured", "simulated"}
+        return {name: value for name, value in vars(self).items() if name not in arrays}
+
+
+def simulated_errors(
+    runs: Sequence[Run], profile: WinchProfile, catalogue: Catalogue | None = None
+) -> list[SimulatedError]:
+    """Errors of the motions that the measured torque, and a recorded reference, would make.
+
+    Raises RunError and UsageError as :func:`winchkit.forward`.
+    """
+    return [error for run in runs for error in _of_run(run, profile, catalogue)]
+
+
+def _of_run(
+    run: Run, profile: WinchProfile, catalogue: Catalogue | None
+) -> Iterator[SimulatedError]:
+    terms = terms_of(profile, catalogue)
+    (own,) = rotary_runs([run], is_linear_axis=profile.is_linear)
+    measured = own["motor_angle"]
+    velocity = own.channels.get("motor_velocity")
+    signals = Signals(
+        own.time, measured, motor_velocity=None if velocity is None else velocity.values
+    )
+    clock = Line(profile).motion(signals).clock
+    speed = float(clock.rate[0])
+    for driven_by in ("torque", "reference"):
+        if driven_by == "reference" and (profile.control is None or GOAL not in own):
+            continue
+        setup = setup_of(profile, run, None, speed, is_torque=driven_by == "torque")
+        simulated = motion_of(profile, terms, setup).angle
+        error = simulated - measured
+        rms = float(np.sqrt(np.mean(error**2)))
+        until = None
+        if driven_by == "torque":
+            faster: Setup = replace(setup, speed=speed + clock.rate_noise)
+            grown = np.abs(motion_of(profile, terms, faster).angle - simulated)
+            beyond = np.flatnonzero(grown > rms)
+            until = float(own.time[beyond[0]]) if len(beyond) else None
+        yield SimulatedError(
+            run.name, driven_by, "m" if profile.is_linear else "rad", rms,
+            float(np.max(np.abs(error))), float(np.std(measured)), until,
+            own.time, measured, simulated,
+        )  # fmt: skip

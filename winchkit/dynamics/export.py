@@ -1,0 +1,67 @@
+"""A profile for other programs: C, a model of MuJoCo, or formulas."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Literal
+
+from winchkit.arguments import require_type
+from winchkit.dynamics.c_code import as_json, c_header
+from winchkit.dynamics.mjcf import mjcf
+from winchkit.effects.bind import terms_of
+from winchkit.effects.catalogue import Catalogue
+from winchkit.errors import UsageError
+from winchkit.schema.profiles.winch import WinchProfile
+
+
+@dataclass(frozen=True)
+class ExportedModel:
+    """A profile as a text of another program."""
+
+    text: str
+    missing: tuple[str, ...] = ()
+    """Parts of the profile without a counterpart there."""
+
+
+def export_model(
+    profile: WinchProfile,
+    to: Literal["c", "mjcf", "json"],
+    catalogue: Catalogue | None = None,
+    load_mass: float | None = None,
+) -> ExportedModel:
+    """Write a profile with its effects for a controller or a simulator.
+
+    Parameters
+    ----------
+    profile : WinchProfile
+        The winch or the axis.
+    to : {"c", "mjcf", "json"}
+        A header in C99 that needs ``math.h`` only, a model of MuJoCo, or the formulas as JSON.
+    catalogue : Catalogue, optional
+        Effects; by default all that are installed.
+    load_mass : float, optional
+        Mass on the cable of a winch, kg, for MuJoCo.
+
+    Returns
+    -------
+    ExportedModel
+        The text, and what it lacks of the profile.
+
+    Raises
+    ------
+    UsageError
+        For an unknown form, effects that have no formula of one sample (C and JSON), and a profile
+        without masses (MuJoCo).
+    """
+    require_type(profile, WinchProfile, "profile")
+    terms = terms_of(profile, catalogue)
+    if to == "c":
+        return ExportedModel(c_header(profile, terms))
+    if to == "json":
+        found = json.dumps(as_json(profile, terms), indent=1, ensure_ascii=False)
+        return ExportedModel(f"{found}\n")
+    if to == "mjcf":
+        text, missing = mjcf(profile, terms, load_mass)
+        return ExportedModel(text, tuple(missing))
+    raise UsageError(f"'{to}' is no form of a model; give c, mjcf or json")

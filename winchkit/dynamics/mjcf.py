@@ -1,0 +1,174 @@
+"""A profile as a model of MuJoCo: an axis as one joint, a winch as a drum and a hanging load.
+
+An effect becomes an attribute of the joint where MuJoCo has the same law; the others are listed.
+The cable of a winch is an equality of both joints, whose polynomial is the drum's wound length, so
+that the load follows the unstrained cable as in :func:`winchkit.forward`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from math import cos, pi, sin
+from xml.sax.saxutils import escape, quoteattr
+
+import numpy as np
+
+from winchkit.effects.term import Term
+from winchkit.effects.transition import TRANSITION
+from winchkit.errors import UsageError
+from winchkit.model.drum import Archimedean, Grooved, Spiral, Squared, drum_of
+from winchkit.schema.profiles.axis import AxisProfile
+from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.units import GRAVITY
+
+_STEP = 2.5e-4
+"""s: of the integration; the stiffest part is the equality of the cable, of twice this time."""
+_SMALL = 1e-9
+"""kg and kg m²: of a body whose inertia is the armature of its joint; MuJoCo refuses zero."""
+_Attributes = Mapping[str, float]
+Law = Callable[[Mapping[str, float], float], _Attributes]
+"""Attributes of the joint from the values of an effect (rotary names) and the gear ratio."""
+
+
+def _damping(v: Mapping[str, float], i: float) -> _Attributes:
+    return {"damping": v["viscosity"] * i * i}
+
+
+def _spring(v: Mapping[str, float], i: float) -> _Attributes:
+    reference = -v["torque"] / v["stiffness"] if v["stiffness"] else 0.0
+    return {"stiffness": v["stiffness"] * i, "springref": reference}
+
+
+COUNTERPARTS: Mapping[str, Law] = {
+    "rotor-inertia": lambda v, i: {"armature": v["inertia"] * i * i},
+    "motor-viscous": _damping,
+    "motor-coulomb": lambda v, i: {"frictionloss": v["torque"] * i},
+    "spring-balancer": _spring,
+    "joint-gravity": lambda v, i: {"gravity": v["amplitude"] * i, "phase": v["phase"]},
+    "drum-unbalance": lambda v, i: {"gravity": v["amplitude"] * i, "phase": v["phase"]},
+}
+"""Effects with the same law in MuJoCo; ``gravity`` and ``phase`` are those of a body that hangs on
+the joint."""
+_ROTARY = {"mass": "inertia", "force": "torque"}
+
+
+def mjcf(
+    profile: WinchProfile, terms: Sequence[Term], load_mass: float | None = None
+) -> tuple[str, list[str]]:
+    """The model, and what it lacks of the profile.
+
+    ``load_mass``: on the cable of a winch, kg. Raises UsageError for a profile without masses, and
+    for a winch without a load.
+    """
+    found: dict[str, float] = {}
+    missing: list[str] = []
+    comments: list[str] = []
+    ratio = profile.gearbox.ratio
+    fitted = {table.id: table.values.get("fitted") for table in profile.effect}
+    for term in terms:
+        law = COUNTERPARTS.get(term.effect.id)
+        values = {_ROTARY.get(name, name): value for name, value in term.values.items()}
+        if law is None or values.get(TRANSITION, 0.0) != 0.0:
+            more = " with a transition" if law is not None else ""
+            missing.append(f"{term.label}{more}")
+            continue
+        for name, value in law(values, ratio).items():
+            found[name] = found.get(name, 0.0) + value
+        if (std := _std(fitted.get(term.effect.id))) is not None:
+            comments.append(f"{term.label}: std {std}")
+    inertia = found.pop("armature", 0.0)
+    is_axis = isinstance(profile, AxisProfile)
+    if inertia <= 0.0:
+        raise UsageError(
+            f"profile '{profile.name}' has no mass that MuJoCo could move: add the effect "
+            "rotor-inertia"
+        )
+    if not is_axis and load_mass is None:
+        raise UsageError(
+            f"profile '{profile.name}' is a winch, and no load hangs on its cable: give --load-mass"
+        )
+    gravity, phase = found.pop("gravity", 0.0), found.pop("phase", 0.0)
+    body, inertia = _pendulum(gravity, phase, inertia)
+    attributes = {"armature": inertia, **found}
+    joint = " ".join(f'{name}="{value:.17g}"' for name, value in attributes.items() if value)
+    kind = 'type="slide" axis="1 0 0"' if profile.is_linear else 'type="hinge" axis="0 1 0"'
+    load, equality = ("", "")
+    if not is_axis:
+        load, equality = _load(profile, load_mass or 0.0, missing)
+    head = f"{escape(profile.name)}: written by winchkit export-model; SI units, the control is"
+    listed = "".join(f"\n  {escape(line)}" for line in (
+        *comments, *(f"no counterpart here: {one}" for one in missing)))  # fmt: skip
+    gear = ratio * profile.gearbox.direction
+    return (
+        f"""\
+<!-- {head} the motor's torque.{listed}
+-->
+<mujoco model={quoteattr(profile.name)}>
+  <compiler angle="radian" autolimits="true"/>
+  <option timestep="{_STEP}" integrator="implicitfast" gravity="0 0 -{GRAVITY}"/>
+  <worldbody>
+    <body name="machine">
+      <joint name="machine" {kind} {joint}/>
+      {body}
+    </body>
+{load}  </worldbody>
+{equality}  <actuator>
+    <motor name="motor" joint="machine" gear="{gear:.17g}"/>
+  </actuator>
+</mujoco>
+""",
+        missing,
+    )
+
+
+def _std(fitted: object) -> object:
+    """Standard deviations of fitted values, as the profile has them."""
+    return dict(fitted).get("std") if isinstance(fitted, Mapping) else None
+
+
+def _pendulum(gravity: float, phase: float, inertia: float) -> tuple[str, float]:
+    """The body of a joint whose weight has the torque ``gravity`` sin(φ + phase), N m.
+
+    Any mass m at a distance l with m g l of this torque is the same; half of the inertia is taken
+    from the armature for it. Returns: the body's inertial element, and the armature.
+    """
+    small = f'diaginertia="{_SMALL} {_SMALL} {_SMALL}"'
+    if gravity == 0.0:
+        return f'<inertial pos="0 0 0" mass="{_SMALL}" {small}/>', inertia
+    length = inertia * GRAVITY / (2 * abs(gravity))
+    mass = abs(gravity) / (GRAVITY * length)
+    turn = phase if gravity > 0 else phase + pi
+    place = f"{-length * sin(turn):.17g} 0 {-length * cos(turn):.17g}"
+    return f'<inertial pos="{place}" mass="{mass:.17g}" {small}/>', inertia - mass * length**2
+
+
+def _load(profile: WinchProfile, mass: float, missing: list[str]) -> tuple[str, str]:
+    """The load on a slide downwards, and the equality that pays out the cable."""
+    drum, wound = drum_of(profile), np.asarray(2 * pi * profile.reference.wound_turns)
+    match drum:
+        case Grooved():
+            arm, growth = float(drum.arm(wound)), 0.0
+        case Archimedean():
+            arm, growth = float(drum.arm(wound)), drum.growth
+        case Squared():
+            arm, growth = float(drum.arm(wound)), pi * drum.build_up
+        case Spiral():
+            missing.append("spiral drum, whose steps of the radius are an even growth here")
+            arm, growth = (
+                drum.winding_radius + drum.growth * profile.reference.wound_turns,
+                drum.growth,
+            )
+    body = f"""\
+    <body name="load">
+      <joint name="cable" type="slide" axis="0 0 -1"/>
+      <inertial pos="0 0 0" mass="{mass:.17g}" diaginertia="{_SMALL} {_SMALL} {_SMALL}"/>
+    </body>
+"""
+    polynomial = f"0 {-arm:.17g} {-growth / (4 * pi):.17g} 0 0"
+    equality = f"""\
+  <equality>
+    <joint joint1="cable" joint2="machine" polycoef="{polynomial}" solref="{2 * _STEP} 1" \
+solimp="0.999 0.9999 0.001"/>
+  </equality>
+"""
+    return body, equality

@@ -1,0 +1,83 @@
+"""Text and figures of simulated motions beside the prediction of the same runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from winchkit.diagnosis.compare import WinchCompared
+from winchkit.diagnosis.residuals.traces import Trace
+from winchkit.dynamics.comparison import SimulatedError
+from winchkit.quantity_text import quantity
+from winchkit.report.figures.figure import Axis, Figure, Panel, Series
+from winchkit.report.figures.reduction import decimated
+from winchkit.report.words.columns import aligned, paragraph
+
+_INTERVALS = 1000
+"""Intervals of a drawing, two per pixel of its width."""
+_HEAD = ["simulated motion", "driven by", "error, rms", "largest", "measured, rms"]
+
+
+def simulated_text(errors: Sequence[SimulatedError]) -> str:
+    """A table of the errors, and the times after which an open loop shows nothing of the model."""
+    rows = [
+        [e.run, e.driven_by, *(quantity(x, e.unit) for x in (e.rms, e.largest, e.motion_rms))]
+        for e in errors
+    ]
+    lines = aligned([_HEAD, *rows], 2)
+    for e in errors:
+        if e.meaningful_until is not None:
+            text = (
+                f"{e.run}: after {quantity(e.meaningful_until, 's')} the comparison means nothing: "
+                "the uncertain initial speed alone makes an error as large as that of the model"
+            )
+            lines += paragraph(text, "  ", "    ")
+    if all(e.meaningful_until is None for e in errors if e.driven_by == "torque"):
+        text = "the uncertain initial speed makes a smaller error than the model, to the end"
+        lines += paragraph(text, "  ", "    ")
+    return "\n".join(lines)
+
+
+def simulated_figures(compared: WinchCompared, errors: Sequence[SimulatedError]) -> list[Figure]:
+    """For each simulated motion the measured and the simulated one, above the predicted torque."""
+    traces = (t for t in compared.comparison.traces if isinstance(t, Trace))
+    torques = {t.run: t for t in traces if t.output in _TORQUES}
+    found = []
+    for e in errors:
+        kept = decimated([e.measured, e.simulated], _INTERVALS)
+        time, name = e.time[kept], "position" if e.unit == "m" else "motor angle"
+        panels = [
+            Panel(
+                Axis(name, e.unit),
+                (
+                    Series("measured", "measured", time, e.measured[kept]),
+                    Series("simulated", "with", time, e.simulated[kept]),
+                ),
+            ),
+            Panel(
+                Axis("error of the simulation", e.unit, zero=True),
+                (Series("simulated − measured", "with", time, (e.simulated - e.measured)[kept]),),
+            ),
+        ]
+        if (torque := torques.get(e.run)) is not None:
+            panels.append(
+                Panel(
+                    Axis(torque.output.replace("_", " "), torque.unit),
+                    (
+                        Series("measured", "measured", torque.time, torque.measured),
+                        Series("predicted", "today", torque.time, torque.predicted),
+                    ),
+                )
+            )
+        found.append(
+            Figure(
+                f"simulated-{e.run}-{e.driven_by}",
+                f"{e.run}: motion simulated from the {e.driven_by}",
+                f"Measured and simulated {name}: the error is {quantity(e.rms, e.unit)} rms.",
+                Axis("time", "s"),
+                tuple(panels),
+            )
+        )
+    return found
+
+
+_TORQUES = ("motor_torque", "force")
