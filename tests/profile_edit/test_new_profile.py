@@ -83,7 +83,8 @@ def test_the_terminal_asks_until_the_answer_can_be_read(
     monkeypatch.setattr("winchkit.cli.model.profile._may_ask", lambda _: True)
     answers = ["grooved", "60", "60 mm", "5 mm", "", "20.4", *[""] * 9, "4 m", "", "40 mm", ""]
     target = tmp_path / "asked.toml"
-    found = CliRunner().invoke(main, ["profile", "new", str(target)], input="\n".join(answers))
+    typed = "\n".join([*answers, ""])
+    found = CliRunner().invoke(main, ["profile", "new", str(target)], input=typed)
     assert found.exit_code == 0, found.output
     assert "'60' has no unit" in found.output
     own = read_profile(target)

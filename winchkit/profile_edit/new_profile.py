@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from winchkit.arguments import path_of
 from winchkit.errors import UsageError, suggest
-from winchkit.profile_edit.drawing import DRUMS, FIELDS, NO_PULLEY, PULLEY_EXAMPLE, Field, asked
+from winchkit.profile_edit.drawing import (
+    DRUMS,
+    FIELDS,
+    NO_PULLEY,
+    PULLEY,
+    PULLEY_EXAMPLE,
+    Field,
+    asked,
+)
+from winchkit.runs.overwriting import refuse_existing
 from winchkit.schema.profiles.winch import WinchProfile
 from winchkit.schema.reading.source import Source
 from winchkit.schema.reading.tables import marker_at, read_table, type_at
@@ -19,6 +30,13 @@ def choices(field: Field) -> tuple[str, ...]:
     """Permitted values of a field, where these are few."""
     kind = type_at(WinchProfile, field.place)
     return tuple(map(str, get_args(kind))) if get_origin(kind) is Literal else ()
+
+
+def drawing() -> dict[str, Any]:
+    """What is asked for a new profile, as JSON."""
+    fields = [{**asdict(field), "choices": choices(field)} for field in FIELDS]
+    own = {"words": PULLEY, "example": PULLEY_EXAMPLE, "without": NO_PULLEY}
+    return {"drums": DRUMS, "fields": fields, "pulley": own}
 
 
 def read_field(field: Field, text: str) -> str | float:
@@ -49,19 +67,25 @@ def read_pulley(text: str) -> dict[str, str]:
 
 
 def new_profile(
-    path: str | Path, values: Mapping[str, str], pulleys: Sequence[str] = ()
+    path: str | Path,
+    values: Mapping[str, str],
+    pulleys: Sequence[str] = (),
+    *,
+    replace: bool = False,
 ) -> dict[str, str]:
     """Write the profile of a winch from the values of its drawing.
 
     Parameters
     ----------
     path : str or Path
-        File to write, which must not exist.
+        File to write.
     values : mapping of str to str
         Text of a value with its unit by its key in the profile, such as
         ``{"drum.winding_radius": "60 mm"}``; an empty text is unknown.
     pulleys : sequence of str
         Radius and wrap angle of each, from the drum to the load: ``"40 mm, 90 deg"``.
+    replace : bool
+        Whether an earlier file may be replaced.
 
     Returns
     -------
@@ -75,6 +99,7 @@ def new_profile(
         quantity, a needed one that is missing, or values that contradict each other.
     """
     file = path_of(path, "path")
+    refuse_existing(file, replace)
     given = {key: str(text).strip() for key, text in values.items() if str(text).strip()}
     fields = asked(given)
     tree = _tree(given, fields)
@@ -87,13 +112,19 @@ def new_profile(
     if isinstance(found, list):
         raise UsageError("\n".join(f"{fault.key}: {fault.message}" for fault in found))
     try:
-        with file.open("x", encoding="utf-8") as stream:
-            stream.write(_text(name, tree, fields, unknown))
-    except FileExistsError:
-        raise UsageError(f"{path}: exists already; choose another name") from None
+        file.write_text(_text(name, tree, fields, unknown), encoding="utf-8")
     except OSError as error:
         raise UsageError(f"{path}: cannot be written: {error.strerror}") from None
     return unknown
+
+
+def profile_command(file: str, values: Mapping[str, str], pulleys: Sequence[str]) -> str:
+    """Command that writes the profile, also over an earlier one."""
+    words = ["winchkit", "profile", "new", file, "--replace"]
+    for field in FIELDS:
+        if text := values.get(field.key, "").strip():
+            words += [field.option, text]
+    return shlex.join([*words, *(word for text in pulleys for word in ("--pulley", text))])
 
 
 def _tree(given: Mapping[str, str], fields: Sequence[Field]) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -102,6 +103,20 @@ def imported(path: Path, answers: Mapping[str, Any]) -> Run:
     if mass := str(answers.get("load_mass", "")).strip():
         metadata["load_mass"] = f"{parse(mass, 'mass'):.12g} kg"
     return replace(whole_run(streams_of(guess), metadata), name=path.stem)
+
+
+def import_command(file: str, answers: Mapping[str, Any], folder: str) -> str:
+    """Command that imports a file as the page did.
+
+    ``answers``: as for :func:`imported`. ``folder``: of the run.
+    """
+    words = ["winchkit", "import", file, "-y", "--replace", "-o", folder]
+    for column in answers.get("columns", ()):
+        words += ["--column", str(column)]
+    for key in (*CONSTANTS, "load_mass"):
+        if text := str(answers.get(key, "")).strip():
+            words += [f"--{key.replace('_', '-')}", text]
+    return " ".join([shlex.join(words), *map(str, answers.get("options", ()))])
 
 
 def _answers(given: Mapping[str, Any]) -> Answers:

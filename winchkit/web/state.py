@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -56,6 +57,10 @@ class LoadedRun:
     used: bool = True
     folder: str = ""
     """Name of its folder, where another file has the same name."""
+    file: str = ""
+    """As the user's commands name it."""
+    origin: str = ""
+    """Command that writes the file; empty for one of the user's."""
 
     @property
     def name(self) -> str:
@@ -91,6 +96,8 @@ class State:
     runs: tuple[LoadedRun, ...] = ()
     source: str = ""
     """Profile as the user named it."""
+    origin: str = ""
+    """Command that writes the profile; empty for one of the user's."""
     versions: tuple[Version, ...] = ()
     """The profile and what it became by additions, the present one last."""
     winch: str = ""
@@ -156,13 +163,16 @@ class State:
 
     def commands(self) -> list[str]:
         """The user's actions as commands."""
-        runs = " ".join(item.name for item in self.used)
-        lines = [f"winchkit diagnose {runs} -p {self.source}"]
-        profile = self.source
+        runs = shlex.join(item.file or item.name for item in self.used)
+        profile = shlex.quote(self.source)
+        origins = dict.fromkeys([*(item.origin for item in self.used), self.origin])
+        lines = [line for line in origins if line]
+        lines.append(f"winchkit diagnose {runs} -p {profile}")
         for version, name in zip(self.versions[1:], self.names[1:], strict=True):
-            lines.append(f"winchkit add {version.added} --fit {runs} -p {profile} -o {name}")
-            lines.append(f"winchkit diagnose {runs} -p {name}")
-            profile = name
+            better = shlex.quote(name)
+            lines.append(f"winchkit add {version.added} --fit {runs} -p {profile} -o {better}")
+            lines.append(f"winchkit diagnose {runs} -p {better}")
+            profile = better
         return lines
 
     def winch_runs(self) -> tuple[str, list[Run]]:

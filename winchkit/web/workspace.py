@@ -1,7 +1,8 @@
 """State of the Diagnose view: run files, a profile with its history, and the last diagnosis.
 
 All work runs in one thread, in the order of the requests; a cancelled request leaves the state as
-it was. Files are kept in a folder of the server's own: nothing of the user's is written to.
+it was. Dropped files are kept in a folder of the server's own. Files that the page makes and its
+commands name are in the user's: imported runs, runs of a hidden effect, a new profile.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any, Protocol
 
 from winchkit.catalog import find
@@ -21,7 +23,8 @@ from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose_prepared
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.catalogue import Catalogue, load_catalogue
-from winchkit.errors import FileError, UsageError, WinchkitError
+from winchkit.errors import Fault, FileError, UsageError, WinchkitError
+from winchkit.profile_edit.new_profile import new_profile, profile_command
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
@@ -30,7 +33,7 @@ from winchkit.schema.read import read_profile
 from winchkit.web.candidate import candidate_card
 from winchkit.web.curves import OutputCurves, curves_of, recorded_curves
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
-from winchkit.web.foreign import imported
+from winchkit.web.foreign import import_command, imported
 from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, State, Version
 
@@ -40,8 +43,11 @@ _READERS = 2
 """Files that are read at once: a parser of large files runs beside the interpreter."""
 _LONG = 200_000
 """Samples above which runs are drawn before they are compared, which takes seconds."""
+INTERNAL = "failed by a fault of winchkit; the terminal that serves this page has the details"
+"""In place of what an exception of Python says."""
 _LOGGER = logging.getLogger(__name__)
-_NO_NAME = re.compile(r"[^\w.-]+")
+_NO_NAME = re.compile(r'[\x00-\x1f<>:"/\\|?*]+')
+"""Characters that a name of a file lacks on one of the systems."""
 
 
 def _read(path: str | Path) -> Run | FileError:
@@ -76,13 +82,19 @@ class StoredRun(Protocol):
 class Workspace:
     """State of the Diagnose view and the one thread that changes it.
 
-    ``changed``: called, from the working thread, whenever there is something new to show.
+    ``folder``: of the server's own. ``changed``: called, from the working thread, whenever there is
+    something new to show. ``work``: the user's folder, by default one within ``folder``.
     """
 
     def __init__(
-        self, folder: Path, effects: Sequence[str] = (), changed: Callable[[], None] = lambda: None
+        self,
+        folder: Path,
+        effects: Sequence[str] = (),
+        changed: Callable[[], None] = lambda: None,
+        work: Path | None = None,
     ) -> None:
         self.folder = folder
+        self.work = folder / "work" if work is None else work
         self.effects = tuple(effects)
         self.changed = changed
         self.catalogue: Catalogue = load_catalogue(effects)
@@ -91,6 +103,9 @@ class Workspace:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="workspace")
         self._cards: dict[str, dict[str, Any]] = {}
         self._prepared: Dataset | None = None
+        self._written: set[Path] = set()
+        self._refusals = 0
+        """Number of refusals so far: the same words twice are two of them."""
         self.judged: dict[Path, Judgement] = {}
         """Latest verdict on each run."""
 
@@ -138,15 +153,29 @@ class Workspace:
 
     def example(self, name: str) -> Future[None]:
         """Simulate runs of a bench of the catalogue, and open them with its profile."""
-        return self.task("simulating runs", lambda: self._simulate(name, example_runs(name)))
+        return self.task("simulating runs", lambda: self._example(name))
 
     def mystery(self, seed: int) -> Future[None]:
-        """Simulate runs of a bench whose hidden effect is shown on request only."""
-        return self.task("simulating runs", lambda: self._simulate("mystery", mystery_runs(seed)))
+        """Simulate runs of a bench whose hidden effect is shown on request only.
+
+        No command makes them without its name: they are written into the user's folder.
+        """
+        return self.task("simulating runs", lambda: self._mystery(seed))
 
     def take(self, file: str, answers: Mapping[str, Any]) -> Future[None]:
         """Import a dropped file of another program with the answers to its questions."""
         return self.task("importing", lambda: self._take(file, answers))
+
+    def new_profile(self, name: str, values: Mapping[str, str], pulleys: Sequence[str]) -> None:
+        """Write the profile of a winch into the user's folder, and open it; raises UsageError."""
+        plain = f"{_NO_NAME.sub('-', name.strip()).removesuffix('.toml').strip('. ')}.toml"
+        if plain == ".toml":
+            raise UsageError("the profile has no name; type one, for example my-winch")
+        self._made(self.work)
+        path = self.work / plain
+        new_profile(path, values, pulleys)
+        origin = profile_command(self.named(path), values, pulleys)
+        self.task("reading files", lambda: self._opened_new(str(path), origin))
 
     def undo(self) -> Future[None]:
         """Take the last addition back, and diagnose again."""
@@ -170,7 +199,7 @@ class Workspace:
         """The state as the page shows it."""
         work = self._work
         busy = None if work is None else {"what": work.what, "share": work.share}
-        return self._state.to_json() | {"busy": busy}
+        return self._state.to_json() | {"busy": busy, "refusals": self._refusals}
 
     def side(self, beside: bool = False) -> State:
         """The present state or that beside it; raises UsageError without one."""
@@ -218,20 +247,32 @@ class Workspace:
 
     def dropped(self, name: str) -> Path:
         """A file in the server's folder; raises UsageError for another name."""
-        path = self.folder / Path(name).name
-        if not path.is_file():
+        path = (self.folder / name).resolve()
+        if not (path.is_file() and path.is_relative_to(self.folder.resolve())):
             raise UsageError(f"there is no file '{name}'; drop it again")
         return path
 
     def keep(self, name: str, content: bytes) -> Path:
-        """Write a dropped file into the server's folder, under a harmless name."""
-        plain = _NO_NAME.sub("-", Path(name).name).lstrip(".-") or "run.csv"
-        target, number = self.folder / plain, 2
-        while target.exists():
-            target = self.folder / f"{Path(plain).stem}-{number}{Path(plain).suffix}"
-            number += 1
+        """Write a dropped file under its name into a folder of its own within the server's."""
+        plain = _NO_NAME.sub("-", name.replace("\\", "/").rpartition("/")[2]).strip(". ")
+        target = Path(mkdtemp(prefix="", dir=self.folder)) / (plain or "run.csv")
         target.write_bytes(content)
         return target
+
+    def named(self, path: str | Path) -> str:
+        """A file as the user's commands name it: a dropped one by name, others by their place."""
+        file = Path(path).resolve()
+        if not file.is_file() and not file.is_dir():
+            return str(path)  # a shipped profile
+        if file.is_relative_to(self.folder.resolve()):
+            return file.name
+        here = Path.cwd().resolve()
+        return str(file.relative_to(here) if file.is_relative_to(here) else file)
+
+    def words(self, text: str) -> str:
+        """A message without the paths of the server's folder."""
+        own = {re.escape(str(folder)) for folder in (self.folder, self.folder.resolve())}
+        return re.sub(rf"(?:{'|'.join(own)})/(?:[^/\s]+/)?", "", text)
 
     # The work.
 
@@ -245,14 +286,14 @@ class Workspace:
         try:
             call()
         except Cancelled:
-            self._set(faults=(f"{what}: cancelled",))
+            self._refuse(f"{what}: cancelled")
         except FileError as error:
-            self._set(faults=tuple(str(fault) for fault in error.faults))
+            self._refuse(*map(str, error.faults))
         except WinchkitError as error:
-            self._set(faults=(str(error),))
-        except Exception as error:
+            self._refuse(str(error))
+        except Exception:
             _LOGGER.exception("%s failed", what)
-            self._set(faults=(f"{what}: internal error: {type(error).__name__}: {error}",))
+            self._refuse(f"{what}: {INTERNAL}")
         finally:
             self._work = None
             self.changed()
@@ -268,15 +309,22 @@ class Workspace:
             work.what, work.share = what, share
             self.changed()
 
+    def _refuse(self, *faults: str) -> None:
+        self._refusals += 1
+        self._set(faults=faults)
+
     def _set(self, **changes: Any) -> None:
         if changes.keys() & {"answer", "runs", "versions"}:
             self._cards = {}
         if changes.keys() & {"runs", "source"}:
             changes = {"before": None, **changes}
             self._prepared = None
-        self._state = replace(self._state, **{"faults": (), **changes})
+        faults = tuple(map(self.words, changes.get("faults", ())))
+        self._state = replace(self._state, **{**changes, "faults": faults})
 
-    def _open(self, paths: Sequence[str | Path], profile: str | None) -> None:
+    def _open(
+        self, paths: Sequence[str | Path], profile: str | None = None, origin: str = ""
+    ) -> None:
         if profile is not None:
             self._open_profile(profile)
         runs, faults = [*self._state.runs], []
@@ -289,7 +337,8 @@ class Workspace:
             file = Path(path).resolve()
             runs = [item for item in runs if item.path != file]
             twin = any(item.path.name == file.name for item in runs)
-            runs.append(LoadedRun(file, run, folder=file.parent.name if twin else ""))
+            folder = file.parent.name if twin else ""
+            runs.append(LoadedRun(file, run, folder=folder, file=self.named(file), origin=origin))
         self._loaded(runs, faults)
 
     def _show(self, chosen: Sequence[StoredRun], profile: str | None) -> None:
@@ -299,11 +348,13 @@ class Workspace:
         for item in chosen:
             twin = any(run.path.name == item.path.name for run in runs)
             folder = item.path.parent.name if twin else ""
-            runs.append(LoadedRun(item.path, item.read(), folder=folder))
+            file = self.named(item.path)
+            runs.append(LoadedRun(item.path, item.read(), folder=folder, file=file))
         self._set(winch="", truth=None, beside=None)
         self._loaded(runs, [])
 
     def _loaded(self, runs: Sequence[LoadedRun], faults: Sequence[str]) -> None:
+        self._refusals += bool(faults)
         self._set(runs=tuple(runs), answer=None, curves={}, faults=tuple(faults))
         if runs and self._state.versions:
             if sum(len(item.run.time) for item in runs) > _LONG:
@@ -312,27 +363,56 @@ class Workspace:
                 self.changed()
             self._diagnose(faults)
 
-    def _open_profile(self, profile: str) -> None:
+    def _opened_new(self, path: str, origin: str) -> None:
+        self._open_profile(path, origin)
+        self._loaded(self._state.runs, ())
+
+    def _open_profile(self, profile: str, origin: str = "") -> None:
         path = find("profiles", profile)
         read_profile(path)
         copy = self.keep(path.name, path.read_bytes())
-        self._set(source=profile, versions=(Version(copy),), rungs=(), answer=None, curves={})
+        named = self.named(profile)
+        self._set(source=named, origin=origin, versions=(Version(copy),), rungs=())
+        self._set(answer=None, curves={})
 
-    def _simulate(self, name: str, simulated: Simulated) -> None:
+    def _simulate(self, simulated: Simulated, folder: Path, place: str, origin: str) -> None:
         runs = []
         for run in simulated.runs:
-            path = self.keep(f"{run.name}.csv", b"")
+            path = folder / f"{run.name}.csv"
             write_run(run, path)
-            runs.append(LoadedRun(path, read_run(path)))
+            file = f"{place}/{path.name}"
+            runs.append(LoadedRun(path, read_run(path), file=file, origin=origin))
         self._open_profile(simulated.profile)
         self._set(runs=tuple(runs), winch="", truth=simulated.truth, beside=None)
         self._diagnose()
 
+    def _example(self, name: str) -> None:
+        found = example_runs(name)
+        folder = Path(mkdtemp(dir=self.folder))
+        self._simulate(found, folder, Path(name).stem, found.command(name))
+
+    def _mystery(self, seed: int) -> None:
+        folder = self._made(self.work / f"mystery-{seed}")
+        self._simulate(mystery_runs(seed), folder, self.named(folder), "")
+
     def _take(self, file: str, answers: Mapping[str, Any]) -> None:
-        run = imported(self.dropped(file), answers)
-        path = self.keep(f"{Path(file).stem}-imported.csv", b"")
+        source = self.dropped(file)
+        run = imported(source, answers)
+        path, number = self.work / "imported" / f"{source.stem}.csv", 2
+        while path.exists() and path not in self._written:
+            path, number = self.work / f"imported-{number}" / path.name, number + 1
+        folder = self._made(path.parent)
         write_run(run, path)
-        self._open([path], None)
+        self._written.add(path)
+        self._open([path], origin=import_command(source.name, answers, self.named(folder)))
+
+    @staticmethod
+    def _made(folder: Path) -> Path:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
+        return folder
 
     def _use(self, name: str, *, used: bool) -> None:
         runs = tuple(

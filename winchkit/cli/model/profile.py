@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import click
@@ -76,8 +77,11 @@ def _options(function: Callable[..., Any]) -> Callable[..., Any]:
     metavar="RADIUS,WRAP",
     help=f"{PULLEY[0].upper()}{PULLEY[1:]}, such as '{PULLEY_EXAMPLE}'.",
 )
+@click.option("--replace", is_flag=True, help="Write over an earlier file.")
 @json_option
-def new(file: str, pulleys: Sequence[str], as_json: bool, **given: str | None) -> None:
+def new(
+    *, file: str, pulleys: Sequence[str], replace: bool, as_json: bool, **given: str | None
+) -> None:
     """Write FILE.toml, the profile of a winch from the values of its drawing.
 
     What is unknown is left out: the file and the command list it, with what the model does without
@@ -91,7 +95,7 @@ def new(file: str, pulleys: Sequence[str], as_json: bool, **given: str | None) -
     lacking = any(not field.without and not values[field.key] for field in asked(values))
     if lacking and _may_ask(as_json):
         pulleys = _ask(values, pulleys)
-    unknown = new_profile(file, values, pulleys)
+    unknown = new_profile(file, values, pulleys, replace=replace)
     note(f"written: {file}")
     if as_json:
         echo_json({"schema": 1, "profile": file, "unknown": unknown})
@@ -117,7 +121,7 @@ def _ask(values: dict[str, str], pulleys: Sequence[str]) -> Sequence[str]:
         click.echo(f"  {kind}: {words}", err=True)
     for field in FIELDS:
         if field in asked(values) and not values[field.key]:
-            values[field.key] = _until(field, lambda text, own=field: read_field(own, text))
+            values[field.key] = _until(field, partial(read_field, field))
     found = list(pulleys)
     while not pulleys and (text := _until(None, read_pulley)):
         found.append(text)

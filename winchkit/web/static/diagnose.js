@@ -4,6 +4,7 @@ import { exporter } from "./figures.js";
 import { importFile } from "./import.js";
 import { counted, ladderFigure, ladderGrid, place, presentName, reach } from "./ladder.js";
 import { morph, slideRails } from "./motion.js";
+import { newProfile } from "./profile.js";
 import { both, drawSides } from "./sides.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
@@ -17,7 +18,7 @@ export function update(state) {
   const same = root.dataset.signature === signature && root.firstChild;
   if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
   view = state;
-  if (same) { busy(); faults(); return; }
+  if (same) { busy(); return; }
   root.dataset.signature = signature;
   cards = {}; span = null;
   if (state.said) say(state.said);
@@ -34,7 +35,7 @@ const source = () => sourceOf(`profile ${[view.profile.name, ...view.profile.add
 
 function render() {
   const d = view.diagnosis;
-  fill(root, context(), el("div", { id: "busy" }), el("div", { id: "faults" }));
+  fill(root, context(), el("div", { id: "busy" }));
   if (!view.runs.length) root.append(empty());
   else if (d && view.beside) {
     if (!both(view).includes(shown.output)) shown.output = both(view).includes(d.ladder.focus) ? d.ladder.focus : both(view)[0];
@@ -58,10 +59,10 @@ function render() {
     const heads = view.outputs.map((output) => el("button", { "aria-pressed": String(output === shown.output), onclick: () => { shown.output = output; shown.chosen = true; span = null; render(); } }, output.replaceAll("_", " ")));
     root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, el("span", { class: "row segments" }, heads), view.busy ? null : el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })));
     drawTime();
-  } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with.")));
+  } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with: drum, gearbox, cable and pulleys."),
+    el("div", { class: "row" }, el("button", { class: "primary", onclick: () => newProfile() }, "New profile…"), el("button", { onclick: chooseProfile }, "Choose a profile…"))));
   else if (!view.busy) root.append(el("div", { class: "panel" }, el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")));
   busy();
-  faults();
 }
 
 function context() {
@@ -92,21 +93,13 @@ function busy() {
     el("span", { class: "label" }, view.busy.what), el("button", { class: "plain", onclick: () => attempt(() => order("cancel")) }, "Cancel")));
 }
 
-// Refused files and requests change nothing else of the state.
-function faults() {
-  const box = root.querySelector("#faults"), text = view.faults.join("\n");
-  if (box.dataset.text === text) return;
-  box.dataset.text = text;
-  fill(box, text ? el("div", { class: "alert", role: "alert" }, el("div", {}, view.faults.slice(0, 8).map((words) => el("p", {}, words)),
-    view.faults.length > 8 ? el("p", { class: "note" }, `and ${view.faults.length - 8} more`) : null)) : null);
-}
-
 function empty() {
   const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "files", "aria-label": "Run files", tabindex: -1, onchange: (event) => drop(filesOf(event.target)) });
-  return el("div", { class: "drop" }, el("h1", {}, "Drop run files here"),
-    el("p", { class: "note" }, "CSV, MCAP, Parquet, MF4 of winchkit, or a file of another program: it opens a table of its columns."),
-    el("div", { class: "row" }, input, el("button", { class: "primary", onclick: () => input.click() }, "Choose files"),
-      el("button", { onclick: openExample }, "Open an example")));
+  const way = (title, words, ...buttons) => el("section", { class: "w4 way" }, el("h2", {}, title), el("p", { class: "note" }, words), el("div", { class: "row" }, buttons));
+  return el("div", { class: "drop" }, el("h1", {}, view.profile ? `Runs to compare with ${view.profile.name}` : "Which effect does the model of your winch lack?"), el("div", { class: "grid" },
+    way("Open the demo", "Simulated runs with an effect that the profile lacks: see it found, add it, see the error fall.", el("button", { class: view.profile ? "" : "primary", onclick: () => attempt(() => order("example", { name: DEMO })) }, "Open the demo"), el("button", { onclick: openExample }, "Open an example…")),
+    way("Drop runs", "Recordings of your winch, dropped anywhere on this page: files of winchkit, or of another program (CSV, XLSX, MAT, HDF5 …), whose columns are then shown.", input, el("button", { class: view.profile ? "primary" : "", onclick: () => input.click() }, "Choose files"), el("button", { onclick: () => newProfile() }, "New profile…")),
+    way("Connect a bench", "Move a winch, record runs, watch the model live.", el("a", { class: "button", href: "#bench" }, "Connect a bench"))));
 }
 
 export async function drop(files) {
@@ -118,22 +111,24 @@ export async function drop(files) {
   }
 }
 
-async function openExample() {
+const DEMO = "demo-eccentric-drum";
+const openExample = () => attempt(async () => {
   const choices = await ask("/api/choices");
   const list = el("select", { "aria-label": "Example" }, choices.examples.filter((name) => !name.startsWith("programme")).map((name) => el("option", {}, name)));
   list.value = "demo-fat-drum";
   dialog("Open an example", el("p", { class: "note" }, "Two programmes under two loads, each twice, are simulated with the effect that the name says."),
     el("div", { class: "row", style: { marginTop: "12px" } }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("example", { name: list.value }); document.getElementById("dialog").close(); }) }, "Open"),
       el("button", { onclick: () => attempt(async () => { await order("mystery", { seed: 1 + Math.floor(Math.random() * 1e6) }); document.getElementById("dialog").close(); }) }, "Hide the effect")));
-}
+});
 
-async function chooseProfile() {
+const chooseProfile = () => attempt(async () => {
   const choices = await ask("/api/choices");
   const list = el("select", { "aria-label": "Profile" }, choices.profiles.map((name) => el("option", {}, name)));
   const file = el("input", { type: "file", accept: ".toml", "aria-label": "Profile file", onchange: () => attempt(async () => { await drop(filesOf(file)); document.getElementById("dialog").close(); }) });
   dialog("Profile", el("div", { class: "row" }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("profile", { name: list.value }); document.getElementById("dialog").close(); }) }, "Use")),
-    el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or a file"), file);
-}
+    el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or a file"), file,
+    el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or from the drawing of your winch"), el("button", { onclick: () => newProfile() }, "New profile…"));
+});
 
 function chooseRuns() {
   const input = el("input", { type: "file", multiple: true, "aria-label": "Run files", onchange: () => { document.getElementById("dialog").close(); drop(input.files); } });
@@ -144,7 +139,7 @@ function chooseRuns() {
   el("p", { class: "note", style: { margin: "12px 0 4px" } }, "Add files"), input);
 }
 
-async function chooseBeside() {
+const chooseBeside = () => attempt(async () => {
   const choices = await ask("/api/choices"), { name, added } = view.profile;
   const versions = ["", ...added].map((effect, i) => el("option", { value: i, selected: i === Math.max(0, added.length - 1) }, i ? `${name} + ${added.slice(0, i).join(" + ")}` : `${name} as loaded`));
   const list = el("select", { "aria-label": "Profile beside" }, el("optgroup", { label: "This profile" }, versions), el("optgroup", { label: "Others" }, choices.profiles.map((own) => el("option", {}, own))));
@@ -156,7 +151,7 @@ async function chooseBeside() {
       await order("compare", { profile: version, runs: boxes.filter(([, box]) => box.checked).map(([own]) => own) });
       document.getElementById("dialog").close();
     }) }, "Show beside"));
-}
+});
 
 function showCommands() {
   const text = view.commands.join("\n");
