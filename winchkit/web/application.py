@@ -181,6 +181,7 @@ class _Work:
                 str(asked["name"]), dict(asked["values"]), list(asked["pulleys"])
             ),
             "diagnose": work.diagnose,
+            "use-effect": lambda: work.use_effect(str(asked["file"])),
             "add": lambda: work.add(str(asked["effect"])),
             "undo": work.undo,
             "compare": lambda: work.compare(_version(asked["profile"]), list(asked["runs"])),
@@ -223,7 +224,7 @@ class _Work:
 
 
 class _Drawings:
-    """Routes that read: curves, cards, and files to save."""
+    """Routes that read or write files: curves, cards, plans, an effect of the user's."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
@@ -234,6 +235,9 @@ class _Drawings:
             Route("/api/curve", self._curve),
             Route("/api/multiples", self._multiples),
             Route("/api/card", self._card),
+            Route("/api/pattern", self._pattern),
+            Route("/api/plan", self._plan, methods=["POST"]),
+            Route("/api/effect", self._effect, methods=["POST"]),
             Route("/api/truth", self._truth),
             Route("/api/profile", self._profile),
             Route("/api/report", self._report),
@@ -256,6 +260,16 @@ class _Drawings:
     async def _card(self, request: Request) -> Response:
         effect = request.query_params.get("effect", "")
         return JSONResponse(await asyncio.to_thread(self.workspace.card, effect))
+
+    async def _pattern(self, request: Request) -> Response:
+        number = int(request.query_params.get("number", "0"))
+        return JSONResponse(await asyncio.to_thread(self.workspace.pattern, number))
+
+    async def _plan(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self.workspace.plan))
+
+    async def _effect(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self.workspace.new_effect))
 
     async def _truth(self, request: Request) -> Response:
         return JSONResponse({"truth": self.workspace.truth()})

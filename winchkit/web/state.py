@@ -15,6 +15,7 @@ from winchkit.diagnosis.steps import place_text
 from winchkit.errors import UsageError
 from winchkit.model.variables import ANGLES
 from winchkit.profile_edit.naming import extended_name
+from winchkit.report.words.vocabulary import effect_name
 from winchkit.runs.run import Run
 from winchkit.web.curves import OutputCurves
 from winchkit.web.ladder import VERDICT_WORDS, Rung, ladder, refitted, verdict
@@ -87,6 +88,8 @@ class Version:
 
     path: Path
     added: str = ""
+    own: tuple[tuple[str, str], ...] = ()
+    """File of every effect of the user's that was made for it, and its command."""
 
 
 @dataclass(frozen=True)
@@ -96,8 +99,8 @@ class State:
     runs: tuple[LoadedRun, ...] = ()
     source: str = ""
     """Profile as the user named it."""
-    origin: str = ""
-    """Command that writes the profile; empty for one of the user's."""
+    made: tuple[str, ...] = ()
+    """Command that writes the profile; none for one of the user's."""
     versions: tuple[Version, ...] = ()
     """The profile and what it became by additions, the present one last."""
     winch: str = ""
@@ -161,18 +164,26 @@ class State:
                 return where.variable, where.order
         return None
 
+    def selection(self) -> tuple[str, str]:
+        """The used runs and the present profile, as commands name them."""
+        runs = shlex.join(item.file or item.name for item in self.used)
+        return runs, shlex.quote([self.source, *self.names[1:]][-1])
+
     def commands(self) -> list[str]:
         """The user's actions as commands."""
-        runs = shlex.join(item.file or item.name for item in self.used)
-        profile = shlex.quote(self.source)
-        origins = dict.fromkeys([*(item.origin for item in self.used), self.origin])
-        lines = [line for line in origins if line]
-        lines.append(f"winchkit diagnose {runs} -p {profile}")
-        for version, name in zip(self.versions[1:], self.names[1:], strict=True):
-            better = shlex.quote(name)
-            lines.append(f"winchkit add {version.added} --fit {runs} -p {profile} -o {better}")
-            lines.append(f"winchkit diagnose {runs} -p {better}")
-            profile = better
+        runs = self.selection()[0]
+        origins = dict.fromkeys([*(item.origin for item in self.used), *self.made])
+        lines, effects, before = [line for line in origins if line], "", ""
+        for version, named in zip(self.versions, [self.source, *self.names[1:]], strict=True):
+            profile = shlex.quote(named)
+            if version.added:
+                fitted = f"--fit {runs} -p {before}{effects} -o {profile}"
+                lines.append(f"winchkit add {version.added} {fitted}")
+            lines.append(f"winchkit diagnose {runs} -p {profile}{effects}")
+            for file, command in version.own:
+                effects += f" --effects {shlex.quote(file)}"
+                lines += [command, f"winchkit diagnose {runs} -p {profile}{effects}"]
+            before = profile
         return lines
 
     def winch_runs(self) -> tuple[str, list[Run]]:
@@ -203,7 +214,8 @@ class State:
         }
         if self.versions:
             added = [version.added for version in self.versions[1:]]
-            out["profile"] = {"name": self.source, "added": added}
+            names = [effect_name(effect) for effect in added]
+            out["profile"] = {"name": self.source, "added": added, "names": names}
         if self.answer is not None:
             known = None if other is None else other.answer
             beside = None if known is None else known.diagnosis
@@ -211,10 +223,6 @@ class State:
             words = in_units_of(self.answer.engine.regression.dataset.profile, words)
             out["diagnosis"] = words | {
                 "ladder": ladder(self.answer, self.rungs, beside),
-                "next": [
-                    {"separates": list(run.separates), "programme": run.programme}
-                    for run in self.answer.diagnosis.next_runs
-                ],
             }
             out["commands"] = self.commands()
         return out

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 import re
+import shlex
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -21,19 +22,24 @@ from winchkit.catalog import find
 from winchkit.diagnosis.compare import initial_residual
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose_prepared
+from winchkit.diagnosis.new_effect import new_effect, order_of_drum
+from winchkit.diagnosis.plan import plan
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.catalogue import Catalogue, load_catalogue
+from winchkit.effects.effect_template import write_wave_on_drum
 from winchkit.errors import Fault, FileError, UsageError, WinchkitError
 from winchkit.profile_edit.new_profile import new_profile, profile_command
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.schema.programme import write_programme
 from winchkit.schema.read import read_profile
 from winchkit.web.candidate import candidate_card
 from winchkit.web.curves import OutputCurves, curves_of, recorded_curves
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
 from winchkit.web.foreign import import_command, imported
+from winchkit.web.pattern import pattern
 from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, State, Version
 
@@ -227,6 +233,50 @@ class Workspace:
             self._cards[effect] = candidate_card(self._state, effect)
         return self._cards[effect]
 
+    def pattern(self, number: int) -> dict[str, Any]:
+        """An open law or unexplained pattern with its curve."""
+        return pattern(self._state, number)
+
+    def plan(self) -> dict[str, str]:
+        """Write the best programme for the next run; its file, text and purpose.
+
+        Raises UsageError without a diagnosis.
+        """
+        found = plan(self._state.diagnosed, self.catalogue)
+        path = self._free("next.toml")
+        write_programme(found.programme(path.stem), path)
+        best = found.offers[0]
+        shows = ", ".join(best.shows) or "no further effect"
+        runs, profile = self._state.selection()
+        return {
+            "file": self.named(path),
+            "text": path.read_text(encoding="utf-8"),
+            "words": f"{best.kind.name}, {best.minutes:.1f} minutes; it would show {shows}",
+            "command": f"winchkit plan {runs} -p {profile} -o {shlex.quote(self.named(path))}",
+        }
+
+    def new_effect(self) -> dict[str, str]:
+        """Write an effect of the user's from the main pattern; its file and text.
+
+        Raises UsageError where nothing unexplained was located.
+        """
+        state, path = self._state, self._free("my-effect.py")
+        found = state.diagnosed.diagnosis
+        name = path.stem
+        if not found.empirical:
+            raise UsageError("nothing unexplained was located that an effect could begin from")
+        order = order_of_drum(found)
+        if order is not None:
+            write_wave_on_drum(order, name, path)
+        else:
+            profile, runs = read_profile(state.profile), state.winch_runs()[1]
+            new_effect(path, runs, profile, self.catalogue, curve=found.empirical[0])
+        return {"file": self.named(path), "text": path.read_text(encoding="utf-8")}
+
+    def use_effect(self, file: str) -> Future[None]:
+        """Read an effect of the user's, and diagnose with it."""
+        return self.task("diagnosing", lambda: self._use_effect(file))
+
     def profile_text(self) -> tuple[str, str]:
         """File name and text of the present profile."""
         text = self._state.profile.read_text(encoding="utf-8")
@@ -372,7 +422,8 @@ class Workspace:
         read_profile(path)
         copy = self.keep(path.name, path.read_bytes())
         named = self.named(profile)
-        self._set(source=named, origin=origin, versions=(Version(copy),), rungs=())
+        made = (origin,) if origin else ()
+        self._set(source=named, made=made, versions=(Version(copy),), rungs=())
         self._set(answer=None, curves={})
 
     def _simulate(self, simulated: Simulated, folder: Path, place: str, origin: str) -> None:
@@ -405,6 +456,25 @@ class Workspace:
         write_run(run, path)
         self._written.add(path)
         self._open([path], origin=import_command(source.name, answers, self.named(folder)))
+
+    def _use_effect(self, file: str) -> None:
+        path = (Path.cwd() / file).resolve()
+        self.effects = tuple(dict.fromkeys([*self.effects, str(path)]))
+        self.catalogue, self._prepared = load_catalogue(self.effects), None
+        *earlier, last = self._state.versions
+        runs, profile = self._state.selection()
+        named = self.named(path)
+        command = f"winchkit effects new {shlex.quote(named)} --fit {runs} -p {profile}"
+        own = tuple(dict.fromkeys([*last.own, (named, command)]))
+        self._set(versions=(*earlier, replace(last, own=own)))
+        self._diagnose()
+
+    def _free(self, name: str) -> Path:
+        """A new file in the user's folder."""
+        path, number = self._made(self.work) / name, 2
+        while path.exists():
+            path, number = path.with_stem(f"{Path(name).stem}-{number}"), number + 1
+        return path
 
     @staticmethod
     def _made(folder: Path) -> Path:

@@ -9,6 +9,7 @@ import click
 
 from winchkit import wings
 from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import is_verbose
 from winchkit.cli.core.output import echo_json
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
@@ -76,4 +77,4 @@ def _tell(comparison: Comparison, as_json: bool) -> None:
         return
     from winchkit.report.text import compare_text
 
-    click.echo(compare_text(comparison))
+    click.echo(compare_text(comparison, verbose=is_verbose()))

@@ -1,5 +1,5 @@
 // The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
-import { alarm, ask, attempt, colour, dialog, download, el, filesOf, fill, icon, number, order, say, sourceOf, svg } from "./page.js";
+import { ask, attempt, closeDialog, dialog, download, el, filesOf, fill, icon, number, order, say, sourceOf } from "./page.js";
 import { exporter } from "./figures.js";
 import { importFile } from "./import.js";
 import { counted, ladderFigure, ladderGrid, place, presentName, reach } from "./ladder.js";
@@ -45,15 +45,19 @@ function render() {
     shown.output = focus;
     const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
     if (!candidates.some((row) => row.effect === shown.effect)) shown.effect = candidates.length && d.verdict !== "adequate" ? candidates[0].effect : null;
+    const open = d.patterns.length > 0;
     root.append(head(d), el("div", { class: "grid" },
-      el("section", { class: `panel ${shown.effect ? "w8" : "w12"}`, id: "ladder", "aria-label": "Held-out error of each candidate" }),
+      el("section", { class: `panel ${shown.effect || open ? "w8" : "w12"}`, id: "ladder", "aria-label": "Held-out error of each candidate" }),
       shown.effect && el("section", { class: "panel w4 card", id: "card", "aria-label": "Candidate" }),
+      open && el("section", { class: `panel w4 card next ${shown.effect ? "" : "tall"}`, id: "next", "aria-label": "What to do next" }),
+      open && el("section", { class: "panel w8", id: "pattern", "aria-label": "The curve to explain" }),
       el("section", { class: "panel w7", id: "time", "aria-label": "Measured and predicted" }),
       el("section", { class: "panel w5", id: "over", "aria-label": "Residual against each variable" }),
       el("section", { class: "panel w12", id: "data" })));
     drawLadder(); drawTime(); drawMultiples(); drawData();
     if (earlier) slideRails(root.querySelector("#ladder"), earlierRails());
     if (shown.effect) drawCard();
+    if (open) drawPattern();
   } else if (view.outputs.length) {
     if (!view.outputs.includes(shown.output)) shown.output = view.outputs[0];
     const heads = view.outputs.map((output) => el("button", { "aria-pressed": String(output === shown.output), onclick: () => { shown.output = output; shown.chosen = true; span = null; render(); } }, output.replaceAll("_", " ")));
@@ -68,7 +72,7 @@ function render() {
 function context() {
   const used = view.runs.filter((run) => run.used), loads = [...new Set(used.map((run) => run.load).filter(Boolean))];
   const profile = el("button", { onclick: chooseProfile }, el("b", {}, view.profile ? view.profile.name : "choose…"),
-    view.profile && view.profile.added.length ? el("span", { class: "note" }, `+ ${view.profile.added.join(", ")}`) : null);
+    view.profile && view.profile.added.length ? el("span", { class: "note" }, `+ ${view.profile.names.join(", ")}`) : null);
   return el("div", { class: "row context of-runs" },
     el("span", { class: "label" }, "Runs"), el("button", { onclick: chooseRuns }, el("b", {}, `${used.length} run${used.length === 1 ? "" : "s"}`), el("span", { class: "note" }, loads.join(", "))),
     el("span", { class: "label" }, "Profile"), profile,
@@ -117,25 +121,25 @@ const openExample = () => attempt(async () => {
   const list = el("select", { "aria-label": "Example" }, choices.examples.filter((name) => !name.startsWith("programme")).map((name) => el("option", {}, name)));
   list.value = "demo-fat-drum";
   dialog("Open an example", el("p", { class: "note" }, "Two programmes under two loads, each twice, are simulated with the effect that the name says."),
-    el("div", { class: "row", style: { marginTop: "12px" } }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("example", { name: list.value }); document.getElementById("dialog").close(); }) }, "Open"),
-      el("button", { onclick: () => attempt(async () => { await order("mystery", { seed: 1 + Math.floor(Math.random() * 1e6) }); document.getElementById("dialog").close(); }) }, "Hide the effect")));
+    el("div", { class: "row", style: { marginTop: "12px" } }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("example", { name: list.value }); closeDialog(); }) }, "Open"),
+      el("button", { onclick: () => attempt(async () => { await order("mystery", { seed: 1 + Math.floor(Math.random() * 1e6) }); closeDialog(); }) }, "Hide the effect")));
 });
 
 const chooseProfile = () => attempt(async () => {
   const choices = await ask("/api/choices");
   const list = el("select", { "aria-label": "Profile" }, choices.profiles.map((name) => el("option", {}, name)));
-  const file = el("input", { type: "file", accept: ".toml", "aria-label": "Profile file", onchange: () => attempt(async () => { await drop(filesOf(file)); document.getElementById("dialog").close(); }) });
-  dialog("Profile", el("div", { class: "row" }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("profile", { name: list.value }); document.getElementById("dialog").close(); }) }, "Use")),
+  const file = el("input", { type: "file", accept: ".toml", "aria-label": "Profile file", onchange: () => attempt(async () => { await drop(filesOf(file)); closeDialog(); }) });
+  dialog("Profile", el("div", { class: "row" }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("profile", { name: list.value }); closeDialog(); }) }, "Use")),
     el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or a file"), file,
     el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or from the drawing of your winch"), el("button", { onclick: () => newProfile() }, "New profile…"));
 });
 
 function chooseRuns() {
-  const input = el("input", { type: "file", multiple: true, "aria-label": "Run files", onchange: () => { document.getElementById("dialog").close(); drop(input.files); } });
+  const input = el("input", { type: "file", multiple: true, "aria-label": "Run files", onchange: () => { closeDialog(); drop(input.files); } });
   dialog("Runs", el("div", { class: "runs" }, view.runs.map((run) => el("label", {},
     el("input", { type: "checkbox", checked: run.used, style: { minHeight: "auto" }, onchange: (event) => attempt(() => order("use", { name: run.name, used: event.target.checked })) }),
     el("span", {}, run.name), el("span", { class: "note" }, `${run.load} · ${number(run.seconds, 3)} s · ${run.samples} samples`),
-    el("button", { class: "plain", "aria-label": `Remove ${run.name}`, onclick: () => attempt(async () => { await order("remove", { name: run.name }); document.getElementById("dialog").close(); }) }, "Remove")))),
+    el("button", { class: "plain", "aria-label": `Remove ${run.name}`, onclick: () => attempt(async () => { await order("remove", { name: run.name }); closeDialog(); }) }, "Remove")))),
   el("p", { class: "note", style: { margin: "12px 0 4px" } }, "Add files"), input);
 }
 
@@ -149,7 +153,7 @@ const chooseBeside = () => attempt(async () => {
     el("button", { class: "primary", onclick: () => attempt(async () => {
       const version = list.selectedIndex <= added.length ? Number(list.value) : list.value;
       await order("compare", { profile: version, runs: boxes.filter(([, box]) => box.checked).map(([own]) => own) });
-      document.getElementById("dialog").close();
+      closeDialog();
     }) }, "Show beside"));
 });
 
@@ -210,17 +214,49 @@ async function drawCard() {
     const card = cards[effect] || (cards[effect] = await ask(`/api/card?effect=${encodeURIComponent(effect)}`));
     if (effect !== shown.effect || !box.isConnected) return;
     const host = el("div", { class: "plot" });
-    const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}.`) : el("p", { class: "note" }, "✓ Distinguishable from every other candidate.");
+    const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}. To decide: ${card.told_apart}`) : null;
     fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
       host, card.signature ? el("div", { class: "row" }, legend(["today", "residual, mean"], ["with", "signature"], ["band", "±1σ", true]), exporter(`signature-${card.effect}`, () => signatureFigure(card))) : null,
       el("p", { class: "note" }, card.what), el("div", { class: "formula" }, subscripted(card.formula)),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
       equal, card.next ? el("p", { class: "note" }, card.next) : null,
       el("div", { class: "buttons" }, el("button", { class: "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
-        el("button", { onclick: () => dialog(`How to tell ${card.name} apart`, el("p", {}, card.told_apart), view.diagnosis.next.map((n) => el("p", { class: "note" }, `${n.programme}: separates ${n.separates.join(" and ")}`))) }, "Plan a run")));
+        el("button", { onclick: planRun }, "Plan a run")));
     if (card.signature) drawSignature(host, card.signature);
   });
 }
+
+// The curve that no law explains, large, with the closest law on it, and what can be done about it.
+async function drawPattern() {
+  const box = root.querySelector("#pattern"), next = root.querySelector("#next"), [title] = view.diagnosis.patterns;
+  fill(box, el("header", {}, el("h2", {}, title)));
+  fill(next, el("h2", {}, "What to do next"));
+  await attempt(async () => {
+    const found = await ask("/api/pattern?number=0");
+    if (!box.isConnected) return;
+    const host = el("div", { class: "plot" }), law = found.signature ? { name: `closest law: ${found.closest}`, values: found.signature } : null;
+    fill(box, el("header", {}, el("h2", {}, found.title), legend(["today", "to explain, mean"], ...(law ? [["with", law.name]] : []), ["band", "±1σ", true]), exporter("pattern", () => signatureFigure({ name: found.title, signature: { ...found, signature: found.signature || [] } }))), host);
+    const { columns } = sorted(found.x, found.residual);
+    plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 260, left: 58, noise: found.noise, xLabel: unitOf(found.label), range: sym(found.residual), logarithmic: found.logarithmic,
+      traces: [{ x: found.bins, y: found.means, tone: "today", width: 2 }, ...(law ? [{ x: found.bins, y: law.values, tone: "with", width: 3 }] : [])], label: `${found.title}: residual over ${found.label}` });
+    const way = (head, words, button) => el("li", {}, el("b", {}, head), el("p", { class: "note" }, words), button), busy = Boolean(view.busy);
+    fill(next, el("h2", {}, "What to do next"), el("ol", { class: "ways" },
+      found.curve ? way("Take the curve as it is", "The profile then predicts it, without a cause.", el("button", { class: "primary", disabled: busy, onclick: () => add(found.curve) }, "Add the curve")) : null,
+      way("Look for the cause", "A new file has a formula with the shape of this curve. Put in the physics that you recognise.", el("button", { disabled: busy, onclick: ownEffect }, "Make an effect of my own")),
+      way("Record what isolates it", view.diagnosis.changes, el("button", { disabled: busy, onclick: planRun }, "Plan a run"))));
+  });
+}
+
+const ownEffect = () => attempt(async () => {
+  const { file, text } = await ask("/api/effect", "{}");
+  dialog(`An effect of your own: ${file}`, el("p", { class: "note" }, "The file is in the folder of this page. Edit it there; the page reads it again at every diagnosis with it."), el("pre", { tabindex: 0 }, text),
+    el("button", { class: "primary", onclick: () => attempt(async () => { await order("use-effect", { file }); closeDialog(); }) }, "Diagnose with it"));
+});
+
+const planRun = () => attempt(async () => {
+  const { file, text, words, command } = await ask("/api/plan", "{}");
+  dialog(`A programme for the next run: ${file}`, el("p", {}, `${words[0].toUpperCase()}${words.slice(1)}.`), el("pre", { tabindex: 0 }, text), el("p", { class: "note" }, "As a command:"), el("pre", { tabindex: 0 }, command));
+});
 
 // Two sets of points over one x, sorted.
 function mixed(x, y, others, marks) {
