@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from winchkit.diagnosis.results import Comparison, OutputError
-from winchkit.quantity_text import percent, quantity, scale_for, signed
-from winchkit.report.figures.maps import largest_text, map_text
+from winchkit.quantity_text import percent, quantity, scale_for
+from winchkit.report.figures.maps import largest_text, map_text, signed
 from winchkit.report.words.headline import at_noise, worst_outputs
 from winchkit.report.words.sentence import CLEAR_ORDER, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed

@@ -40,6 +40,7 @@ from winchkit.report.words.sentence import (
     remaining_patterns,
     remaining_text,
     where_text,
+    wrong_channels,
 )
 from winchkit.report.words.steps import alike, doubt_texts, step_text
 from winchkit.report.words.vocabulary import (
@@ -89,7 +90,7 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
             offsets=diagnosis.run_offsets,
         ),
         _remaining(answer, verbose=verbose),
-        paragraph(changes_text(diagnosis)) if not diagnosis.interrupted else [],
+        _changes(diagnosis),
         *_data(diagnosis, all_shares=verbose),
         _notes(notes),
     ]
@@ -110,6 +111,14 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
     if not isinstance(answer, WinchAnswer):
         return text
     return in_units_of(answer.engine.regression.dataset.profile, text)
+
+
+def _changes(diagnosis: Diagnosis) -> list[str]:
+    """What to record or to do next."""
+    if diagnosis.interrupted:
+        return []
+    option = " (--as-recorded)" if wrong_channels(diagnosis) else ""
+    return paragraph(f"{changes_text(diagnosis).removesuffix('.')}{option}.")
 
 
 def _limits(answer: Answer) -> list[str]:

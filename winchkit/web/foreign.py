@@ -28,6 +28,7 @@ from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.schema.mapping import CHANNELS
 from winchkit.units import parse
+from winchkit.web.words import page_text
 
 _FIRST = 5
 _POINTS = 120
@@ -66,7 +67,7 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
                 "channel": item.channel,
                 "unit": item.unit,
                 "confidence": item.confidence if item.channel else "",
-                "reason": item.reason,
+                "reason": page_text(item.reason),
                 "first": texts or values,
                 "plot": drawn,
             }
@@ -78,13 +79,13 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
         "channels": list(CHANNELS),
         "questions": [
             {
-                "text": question.text,
+                "text": page_text(question.text),
                 "key": question.key,
                 "options": question.options if question.key in STORAGE else (),
             }
             for question in guess.questions
         ],
-        "notes": [*guess.table.notes, *guess.notes],
+        "notes": [page_text(note) for note in (*guess.table.notes, *guess.notes)],
         "certain": guess.is_certain and not guess.questions,
     }
 

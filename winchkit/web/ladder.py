@@ -30,6 +30,7 @@ from winchkit.report.words.steps import (
     step_title,
 )
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, effect_name, parameter_name
+from winchkit.web.words import page_text
 
 _SHOWN = 8
 """Candidates in the ladder; the others have less evidence."""
@@ -74,7 +75,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
         "patterns": [title for title, _ in patterns_of(diagnosis)],
         "unexplained": [where_text(where) for where in diagnosis.where],
         "empirical": list(diagnosis.empirical),
-        "notes": list(diagnosis.notes),
+        "notes": [page_text(note) for note in diagnosis.notes],
         "caveats": list(diagnosis.caveats),
         "sanity": [finding.to_json() for finding in diagnosis.sanity],
         "used_share": dict(diagnosis.used_share),

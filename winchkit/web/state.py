@@ -99,8 +99,6 @@ class State:
     runs: tuple[LoadedRun, ...] = ()
     source: str = ""
     """Profile as the user named it."""
-    made: tuple[str, ...] = ()
-    """Command that writes the profile; none for one of the user's."""
     versions: tuple[Version, ...] = ()
     """The profile and what it became by additions, the present one last."""
     winch: str = ""
@@ -119,6 +117,8 @@ class State:
     """What a simulated bench hides; None for measured runs."""
     faults: tuple[str, ...] = ()
     """Why files were not loaded, or the last request was refused."""
+    made: tuple[str, ...] = ()
+    """Command that writes the profile; none for one of the user's."""
     beside: State | None = None
     """Another profile or other runs, shown beside these."""
 

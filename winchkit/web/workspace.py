@@ -42,6 +42,7 @@ from winchkit.web.foreign import import_command, imported
 from winchkit.web.pattern import pattern
 from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, State, Version
+from winchkit.web.words import page_text
 
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
@@ -320,9 +321,9 @@ class Workspace:
         return str(file.relative_to(here) if file.is_relative_to(here) else file)
 
     def words(self, text: str) -> str:
-        """A message without the paths of the server's folder."""
+        """A message of the command line without the paths of the server's folder, and options."""
         own = {re.escape(str(folder)) for folder in (self.folder, self.folder.resolve())}
-        return re.sub(rf"(?:{'|'.join(own)})/(?:[^/\s]+/)?", "", text)
+        return page_text(re.sub(rf"(?:{'|'.join(own)})/(?:[^/\s]+/)?", "", text))
 
     # The work.
 
@@ -459,6 +460,8 @@ class Workspace:
 
     def _use_effect(self, file: str) -> None:
         path = (Path.cwd() / file).resolve()
+        if not (path.is_file() and path.is_relative_to(self.work.resolve())):
+            raise UsageError(f"there is no file '{file}' with an effect in the folder of this page")
         self.effects = tuple(dict.fromkeys([*self.effects, str(path)]))
         self.catalogue, self._prepared = load_catalogue(self.effects), None
         *earlier, last = self._state.versions
