@@ -34,7 +34,7 @@ from winchkit.web.application import application
 from winchkit.web.examples import example_runs
 from winchkit.web.state import Judgement
 from winchkit.web.views import views_of
-from winchkit.web.workspace import Workspace
+from winchkit.web.workspace import INTERNAL, Workspace
 
 TOKEN = "t0ken"
 HEADERS = {"x-winchkit-token": TOKEN}
@@ -387,7 +387,7 @@ def test_an_unexpected_error_of_a_task_is_shown_and_not_lost(tmp_path: Path) -> 
     workspace.task("calibrating", [].pop).result(60.0)
     view = workspace.view()
     assert view["busy"] is None
-    assert view["faults"] == ["calibrating: internal error: IndexError: pop from empty list"]
+    assert view["faults"] == [f"calibrating: {INTERNAL}"]
     workspace.close()
 
 

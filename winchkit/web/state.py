@@ -88,8 +88,8 @@ class Version:
 
     path: Path
     added: str = ""
-    own: tuple[tuple[str, str], ...] = ()
-    """File of every effect of the user's that was made for it, and its command."""
+    own: tuple[str, ...] = ()
+    """Files of effects of the user's own that were made for it."""
 
 
 @dataclass(frozen=True)
@@ -180,9 +180,9 @@ class State:
                 fitted = f"--fit {runs} -p {before}{effects} -o {profile}"
                 lines.append(f"winchkit add {version.added} {fitted}")
             lines.append(f"winchkit diagnose {runs} -p {profile}{effects}")
-            for file, command in version.own:
+            for file in version.own:
                 effects += f" --effects {shlex.quote(file)}"
-                lines += [command, f"winchkit diagnose {runs} -p {profile}{effects}"]
+                lines.append(f"winchkit diagnose {runs} -p {profile}{effects}")
             before = profile
         return lines
 

@@ -465,10 +465,7 @@ class Workspace:
         self.effects = tuple(dict.fromkeys([*self.effects, str(path)]))
         self.catalogue, self._prepared = load_catalogue(self.effects), None
         *earlier, last = self._state.versions
-        runs, profile = self._state.selection()
-        named = self.named(path)
-        command = f"winchkit effects new {shlex.quote(named)} --fit {runs} -p {profile}"
-        own = tuple(dict.fromkeys([*last.own, (named, command)]))
+        own = tuple(dict.fromkeys([*last.own, self.named(path)]))
         self._set(versions=(*earlier, replace(last, own=own)))
         self._diagnose()
 
