@@ -47,15 +47,16 @@ def logged(folder: Path) -> list[Path]:
 def test_the_commands_of_the_page_repeat_its_work(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for name in ("work", "again", "logger"):
+    for name in ("work", "again", "logger", "server"):
         (tmp_path / name).mkdir()
     logs = logged(tmp_path / "logger")
     monkeypatch.chdir(tmp_path / "work")
-    page = Workspace(tmp_path, work=Path())
+    server = tmp_path / "server"
+    page = Workspace(server, work=Path())
     page.new_profile("my winch", DRAWING, PULLEYS)
     for log in logs:
         kept = page.keep(log.name, log.read_bytes()).resolve()
-        file = kept.relative_to(tmp_path.resolve()).as_posix()
+        file = kept.relative_to(server.resolve()).as_posix()
         page.take(file, ANSWERS).result(PATIENCE)
     page.diagnose().result(PATIENCE)
     view = page.view()

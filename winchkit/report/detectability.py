@@ -16,8 +16,9 @@ from winchkit.report.words.vocabulary import parameter_name, parameter_unit
 
 _FEW = 4
 """Effects that a sentence lists; the table has all."""
-_LOWERED = 0.99
-"""Ratio of the excess over the noise with a candidate and without it below which it lowers it."""
+_LOWERED = 0.9
+"""Ratio of the excess over the noise with a candidate and without it below which it is useful: less
+than the tenth that a verdict may leave is nothing to add."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def untestable(answer: Answer) -> list[tuple[str, list[str]]]:
 
 
 def useful_candidates(diagnosis: Diagnosis) -> list[CandidateScore]:
-    """Candidates with evidence that lower the errors above the noise by 1 %, best first.
+    """Candidates with evidence that lower the errors above the noise by a tenth, best first.
 
     One that was not fitted is judged by its evidence alone.
     """

@@ -124,7 +124,7 @@ def ladder(
     same = {effect for step in diagnosis.steps[:1] for effect in alike(step)}
     equal = {*named[:1], *same} if same else set()
     scores = [c for c in useful_candidates(diagnosis) if c.heldout_rms]
-    known = {c.effect: c for c in scores}
+    known = {c.effect: c for c in diagnosis.candidates if c.heldout_rms}
     first = [known[effect] for effect in named if effect in known]
     shown = (first + [c for c in scores if c not in first])[:_SHOWN]
     errors_of = [today, *(rung.errors for rung in history)]

@@ -124,7 +124,7 @@ class RobotWork:
             "calibration": None if state.found is None else _calibration(state.found),
             "proposed": list(state.proposed),
             "command": "winchkit calibrate "
-            + shlex.join([self.named(path) for path in (state.source, *state.files)])
+            + shlex.join([self.named(state.source), *map(self.named, state.files)])
             + f" -o {shlex.quote(extended_name(declared.name, 'calibrated'))}",
         }
 

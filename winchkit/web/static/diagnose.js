@@ -45,12 +45,13 @@ function render() {
     shown.output = focus;
     const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
     if (!candidates.some((row) => row.effect === shown.effect)) shown.effect = candidates.length && d.verdict !== "adequate" ? candidates[0].effect : null;
-    const open = d.patterns.length > 0;
+    const open = d.patterns.length > 0, next = () => el("section", { class: `panel w4 card next ${shown.effect ? "" : "tall"}`, id: "next", "aria-label": "What to do next" });
     root.append(head(d), el("div", { class: "grid" },
       el("section", { class: `panel ${shown.effect || open ? "w8" : "w12"}`, id: "ladder", "aria-label": "Held-out error of each candidate" }),
       shown.effect && el("section", { class: "panel w4 card", id: "card", "aria-label": "Candidate" }),
-      open && el("section", { class: `panel w4 card next ${shown.effect ? "" : "tall"}`, id: "next", "aria-label": "What to do next" }),
+      open && !shown.effect && next(),
       open && el("section", { class: "panel w8", id: "pattern", "aria-label": "The curve to explain" }),
+      open && shown.effect && next(),
       el("section", { class: "panel w7", id: "time", "aria-label": "Measured and predicted" }),
       el("section", { class: "panel w5", id: "over", "aria-label": "Residual against each variable" }),
       el("section", { class: "panel w12", id: "data" })));
@@ -243,7 +244,7 @@ async function drawPattern() {
     fill(next, el("h2", {}, "What to do next"), el("ol", { class: "ways" },
       found.curve ? way("Take the curve as it is", "The profile then predicts it, without a cause.", el("button", { class: "primary", disabled: busy, onclick: () => add(found.curve) }, "Add the curve")) : null,
       way("Look for the cause", "A new file has a formula with the shape of this curve. Put in the physics that you recognise.", el("button", { disabled: busy, onclick: ownEffect }, "Make an effect of my own")),
-      way("Record what isolates it", view.diagnosis.changes, el("button", { disabled: busy, onclick: planRun }, "Plan a run"))));
+      way("Record what isolates it", "Another speed, load or stroke shows what the curve follows.", el("button", { disabled: busy, onclick: planRun }, "Plan a run"))));
   });
 }
 
