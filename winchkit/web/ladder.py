@@ -61,7 +61,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "chip": VERDICT_WORDS[diagnosis.verdict],
         "headline": headline(diagnosis),
-        "sentence": " ".join(part for part in parts if part),
+        "sentence": page_text(" ".join(part for part in parts if part)),
         "steps": [
             {
                 "effect": step.effects[0],

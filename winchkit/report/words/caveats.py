@@ -10,7 +10,7 @@ from winchkit.runs.sanity.finding import Finding
 
 _CAVEATS = {
     "inverted-sign": "the sign of a channel looks inverted: no effect is looked for; import it "
-    "with a minus, or negate it",
+    "with a minus, --column CHANNEL=-COLUMN, or negate it",
     "wrong-factor": "the unit or factor of a channel looks wrong: no effect is looked for",
     "no-repeats": "no run repeats another: the noise is known between two bounds only",
     "repeats-are-copies": "a run is a copy of another one and shows no noise: it was left out",
@@ -49,7 +49,7 @@ def _alike(channel: str, texts: Mapping[str, list[str]]) -> Iterator[str]:
         yield f"{_place(names, channel)}: {text}"
     others = [name for text, names in texts.items() if text not in shown for name in names]
     if others:
-        yield f"{_place(others, channel)}: the same with other numbers"
+        yield f"{_place(others, channel)}: the same with other numbers, listed by --json"
 
 
 def used_text(used: Mapping[str, float]) -> str:

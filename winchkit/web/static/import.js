@@ -36,7 +36,7 @@ function show(file, found, given) {
   };
   const questions = found.questions.map((q) => el("p", { class: "question" }, icon("partly"), q.text, q.options.length ? el("select", { "aria-label": q.text, onchange: (event) => again({ ...given, options: [...(given.options || []), event.target.value] }) }, ["", ...q.options].map((own) => el("option", { value: own }, own.replace(/^--/, "").replaceAll(/[-"]/g, " ")))) : q.key ? el("input", { "aria-label": q.text, placeholder: q.key.replaceAll("_", " "), onchange: (event) => again({ ...given, [q.key]: event.target.value }) }) : null));
   const mass = el("input", { size: 8, placeholder: "10 kg", value: given.load_mass || "", "aria-label": "Mass on the cable", onchange: () => { given.load_mass = mass.value; } });
-  dialog(`Import ${file}`, el("p", { class: "note" }, `${found.layout}; ${found.columns.length} columns, ${found.rows} rows. Factor: multiply this column by a number, or by a constant of the file.`),
+  dialog(`Import ${file.split("/").at(-1)}`, el("p", { class: "note" }, `${found.layout}; ${found.columns.length} columns, ${found.rows} rows. Factor: multiply this column by a number, or by a constant of the file.`),
     el("div", { class: "scroll" }, el("table", { class: "rows" }, el("thead", {}, el("tr", {}, ["Column", "Channel", "Factor", "Unit", "First values", "Plot", "Why"].map((text) => el("th", {}, text)))), el("tbody", {}, found.columns.map((row) => el("tr", {}, cells(row)))))),
     ...questions, found.notes.map((text) => el("p", { class: "note" }, text)),
     el("div", { class: "row", style: { marginTop: "12px" } }, el("label", { class: "row" }, "Mass on the cable", mass),
