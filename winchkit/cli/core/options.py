@@ -20,7 +20,7 @@ from winchkit.cli.core.completion import (
     complete_winch,
     files_of_kind,
 )
-from winchkit.cli.core.early_checks import check_bench, check_folder, check_new_file
+from winchkit.cli.core.early_checks import check_folder, check_new_file
 from winchkit.cli.core.messages import note
 from winchkit.cli.core.standard_input import Readable
 from winchkit.errors import UsageError
@@ -44,9 +44,8 @@ Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 def bench_by_default(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
     """The bench that was given, else the one bench file of this folder.
 
-    Raises UsageError where the folder has none or several, FileError where the given one is
-    missing. A file that the command line does not name is reported on stderr, since a command may
-    move what it describes.
+    Raises UsageError where the folder has none or several. A file that the command line does not
+    name is reported on stderr, since a command may move what it describes.
     """
     if ctx.resilient_parsing:
         return value
@@ -56,8 +55,6 @@ def bench_by_default(ctx: click.Context, param: click.Parameter, value: str | No
             names = [param.envvar] if isinstance(param.envvar, str) else param.envvar or ()
             variable = next((name for name in names if os.environ.get(name)), "environment")
             note(f"bench: {value} ({variable})")
-        if value != "-":  # which is refused in words of its own
-            check_bench(value)
         return value
     if (only := _only_bench()) is not None:
         return only
