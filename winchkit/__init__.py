@@ -82,6 +82,7 @@ if TYPE_CHECKING:
     from winchkit.profile_edit.history import ladder
     from winchkit.profile_edit.ledger import undo
     from winchkit.profile_edit.naming import extended_name
+    from winchkit.profile_edit.new_profile import new_profile
     from winchkit.runs.export import export
     from winchkit.runs.info import info_of
     from winchkit.runs.read import read_log, read_run
@@ -164,6 +165,7 @@ __all__ = [
     "lss_list",
     "lss_set",
     "new_effect",
+    "new_profile",
     "open_bench",
     "open_replay",
     "open_writer",
@@ -263,6 +265,7 @@ _NAMES = {
     "winchkit.profile_edit.history": ("ladder",),
     "winchkit.profile_edit.ledger": ("undo",),
     "winchkit.profile_edit.naming": ("extended_name",),
+    "winchkit.profile_edit.new_profile": ("new_profile",),
     "winchkit.runs.export": ("export",),
     "winchkit.runs.info": ("info_of",),
     "winchkit.runs.read": ("read_log", "read_run"),

@@ -73,7 +73,7 @@ def find(kind: Kind, name: str, beside: str | Path | None = None) -> Path:
         return shipped
     if Path(name).exists() and (special := file_kind(Path(name).stat().st_mode)):
         raise FileError(f"{name}: is {special}, not a regular file")
-    known = names(kind)
+    known = [own for own in names(kind) if not own.startswith("programme-")]
     listed = f" ({', '.join(known)})" if known else ""
     other = next((_SINGULAR[each] for each in _SINGULAR if name in names(each)), None)
     raise FileError(

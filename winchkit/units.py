@@ -105,8 +105,10 @@ def parse(text: object, dimension: str) -> float:
     if not isinstance(text, str):
         raise UsageError(f"expected {article(dimension)} with its unit, not {type(text).__name__}")
     found = number_and_unit(text)
-    if found is None:
-        raise UsageError(f"'{text}' is not a number with its unit")
+    if found is None or found[1].startswith(","):
+        is_comma = "," in text and "." not in text
+        hint = f"; write the decimal point: {text.replace(',', '.')}" if is_comma else ""
+        raise UsageError(f"'{text}' is not a number with its unit{hint}")
     value, unit = found
     if not unit and dimension != "ratio":
         raise UsageError(f"'{text}' has no unit; use one of {', '.join(UNITS[dimension])}")

@@ -65,7 +65,7 @@ def test_an_interrupt_in_the_search_gives_errors_and_candidates(runs: list[Run])
 
 def test_an_interrupt_before_the_scores_gives_nothing(runs: list[Run]) -> None:
     def pressed(what: str, share: float) -> None:
-        if what == "computing the signatures of the candidates":
+        if what == "testing which effects fit":
             raise KeyboardInterrupt
 
     known: list[WinchAnswer] = []

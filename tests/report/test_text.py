@@ -219,11 +219,33 @@ def test_a_comparison_has_errors_and_their_attribution() -> None:
     error = OutputError(
         "m", 100, None, 2.5, 1.6e-3, 4e-3, -3e-19, None, (("load", 0.82), ("time", 0.1))
     )
-    lines = compare_text(Comparison({"cable_length": error}, 2.39e-3, ("a note",))).splitlines()
-    assert lines[1].split()[2:] == ["1.60", "mm", "0", "mm", "4.00", "mm", "unknown", "2.50", "m"]
+    found = Comparison({"cable_length": error}, 2.39e-3, ("a note",))
+    lines = compare_text(found, verbose=True).splitlines()
+    assert lines[3].split()[2:] == ["1.60", "mm", "0", "mm", "4.00", "mm", "unknown", "2.50", "m"]
     assert "  cable length: load 82 % and time 10 %" in lines
     assert "offset of the length instrument, fitted: 2.39 mm" in lines
     assert lines[-1] == "  a note"
+
+
+def test_a_comparison_says_first_how_large_the_errors_are_and_where_they_fail() -> None:
+    sizes = {"cable_length": 1.6e-3, "tension": 4.0, "motor_torque": 0.1, "force": 9.0, "x": 8.0}
+    errors = {
+        name: OutputError(
+            "N", 9, None, 150.0, rms, 9.0, bias, 0.5, (("load", 0.8),), variation=50.0
+        )
+        for (name, rms), bias in zip(sizes.items(), (0.0, 3.9, 0.0, 0.0, 0.0), strict=True)
+    }
+    lines = compare_text(Comparison(errors, None)).splitlines()
+    assert lines[0] == "The force error is 18 times its noise."
+    (tension,) = (line.split() for line in lines if line.startswith("  tension  "))
+    assert tension == ["tension", "4.00", "N", "0.500", "N", "8.0", "%"]
+    assert not any("%" in line for line in lines if line.startswith("  cable length  "))
+    told = lines[lines.index("where it fails") + 1 :]
+    assert told == [
+        "  force follows the load 80 %",
+        "  x follows the load 80 %",
+        "  tension follows the load 80 %; mean +3.9 N",
+    ]
 
 
 def test_a_comparison_of_real_runs_fits_a_terminal() -> None:
@@ -231,13 +253,14 @@ def test_a_comparison_of_real_runs_fits_a_terminal() -> None:
     lines = compare_text(compare(recorded("demo-elastic-rope"), profile)).splitlines()
     assert len(lines) <= 70
     assert max(map(len, lines)) <= 80
-    assert any(line.startswith("  cable length: load") for line in lines)
+    assert any(line.startswith("  cable length follows the load") for line in lines)
 
 
 def test_a_comparison_without_outputs_has_nothing_to_follow() -> None:
     assert "variance" not in compare_text(Comparison({}, None))
     quiet = OutputError("N", 10, None, 150.0, 0.7, 2.0, 0.1, 0.7, ())
-    assert "  tension: no measured variable" in compare_text(Comparison({"tension": quiet}, None))
+    text = compare_text(Comparison({"tension": quiet}, None), verbose=True)
+    assert "  tension: no measured variable" in text
 
 
 def test_an_addition_is_reported_with_value_and_gain() -> None:

@@ -231,7 +231,7 @@ def reset(wired: Wired, spec: BenchSpec, clock: Clock) -> list[str]:
         await_cycles(loop, clock, 3)
         still = [trip for trip in loop.snapshot.blocked if trip.blocks is Direction.BOTH]
         if still:
-            raise LimitTripped("still not free to move: " + "; ".join(map(str, still)))
+            raise LimitTripped("reset done, but still blocked: " + "; ".join(map(str, still)))
         loop.clear_latch()
     finally:
         loop.supervisor.withdraw()

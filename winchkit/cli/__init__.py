@@ -52,6 +52,7 @@ SECTIONS: dict[str, dict[str, At]] = {
             "winchkit.cli.web.serve",
             "Serve the page in the browser: all of this, with figures.",
         ),
+        "profile": At("winchkit.cli.model.profile", "Write the profile of a winch of your own."),
         "plan": At("winchkit.cli.model.plan", "Propose the next motion programme."),
         "effects": At("winchkit.cli.model.effects", "List the physical effects, or describe one."),
         "size": At(

@@ -137,6 +137,7 @@ def compared(
             rms_with_run_offsets=_rms_within_runs(regression, residual, output)
             if output in offsets
             else None,
+            variation=regression.variation(output),
         )
     maps = tuple(residual_maps(regression, residual))
     dataset = regression.dataset

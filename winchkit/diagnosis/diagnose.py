@@ -243,7 +243,7 @@ def diagnose_prepared(
     interrupted: Callable[[WinchAnswer], None] | None = None,
 ) -> WinchAnswer:
     """The same as :func:`diagnose` on a prepared data set."""
-    progress("computing the signatures of the candidates", 0.1)
+    progress("testing which effects fit", 0.1)
     catalogue = catalogue_of(dataset.profile, catalogue)
     engine = selection_engine(dataset, catalogue)
     if caveats(dataset.sanity) and not as_recorded:

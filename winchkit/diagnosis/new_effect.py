@@ -68,8 +68,13 @@ def new_effect(
     name = effect_id or file.stem.replace("_", "-")
     check_own(name, file, catalogue)
     if curve is None:
-        found = _unexplained(runs, profile, catalogue, band, progress)
-        order = _order_of_drum(found)
+        found = diagnose(runs, profile, catalogue, band, progress=progress).diagnosis
+        if not found.empirical:
+            raise UsageError(
+                f"the verdict is '{found.verdict}' and nothing unexplained was located; name the "
+                "curve to begin from with --curve, e.g. empirical-motor-torque-speed"
+            )
+        order = order_of_drum(found)
         if order is not None:
             write_wave_on_drum(order, name, file)
             return f"a wave of {order} periods per drum turn"
@@ -82,24 +87,7 @@ def new_effect(
     return curve
 
 
-def _unexplained(
-    runs: Sequence[Run],
-    profile: WinchProfile,
-    catalogue: Catalogue,
-    band: float | None,
-    progress: ProgressCallback,
-) -> Diagnosis:
-    """A diagnosis with a located residual."""
-    found = diagnose(runs, profile, catalogue, band, progress=progress).diagnosis
-    if not found.empirical:
-        raise UsageError(
-            f"the verdict is '{found.verdict}' and nothing unexplained was located; name the "
-            "curve to begin from with --curve, e.g. empirical-motor-torque-speed"
-        )
-    return found
-
-
-def _order_of_drum(found: Diagnosis) -> int | None:
+def order_of_drum(found: Diagnosis) -> int | None:
     """Order per drum turn that several outputs share: then the drum's own path has it."""
     orders = [w.order for w in found.where if w.variable == "drum_angle" and w.order is not None]
     return next((order for order in orders if orders.count(order) > 1), None)

@@ -41,6 +41,8 @@ class OutputError:
     """Angles, periods per turn, and the share of the error variance that this sine explains."""
     rms_with_run_offsets: float | None = None
     """With a fitted offset in every run, where the means of runs without repeats differ."""
+    variation: float = float("nan")
+    """Standard deviation of the measured output over all runs; NaN where it is not computed."""
 
     def to_json(self) -> dict[str, Any]:
         """Dictionary that the command prints."""

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from winchkit.diagnosis.results import Comparison, OutputError
 from winchkit.quantity_text import percent, quantity, scale_for
-from winchkit.report.figures.maps import map_text
+from winchkit.report.figures.maps import largest_text, map_text, signed
+from winchkit.report.words.headline import at_noise, worst_outputs
 from winchkit.report.words.sentence import CLEAR_ORDER, often_per_turn
 from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
 
 HEAD = ("error", "rms", "bias", "largest", "noise", "measured, rms")
 _FOLLOWED = 3
 """Variables of an attribution that a row has room for; ``--json`` has all."""
+_FAILING = 3
+"""Outputs that the short text says where they fail."""
+_BIASED = 0.1
+"""Share of the mean square of an error from which its mean is said."""
+_LENGTHS = ("cable_length", "platform_position")
 
 
 def size_rows(comparison: Comparison) -> list[list[str]]:
@@ -25,11 +31,44 @@ def size_rows(comparison: Comparison) -> list[list[str]]:
     return rows
 
 
-def followed(error: OutputError) -> str:
-    """``load 82 % and time 10 %; 5 periods per drum turn 47 %``."""
+def short_rows(comparison: Comparison) -> list[list[str]]:
+    """Per output its error and noise, and its share of what the output varies.
+
+    The length of a cable varies by metres: a share of it says nothing and is left out.
+    """
+    rows = [["error, rms", "", "noise", "of what it varies"]]
+    for name in worst_outputs(comparison.outputs):
+        error = comparison.outputs[name]
+        scale = scale_for(error.rms, error.unit)
+        noise = "unknown" if error.noise_rms is None else scale.text(error.noise_rms)
+        is_known = name not in _LENGTHS and error.variation > 0.0
+        share = percent(error.rms / error.variation) if is_known else ""
+        rows.append([OUTPUT_NAMES.get(name, name), scale.text(error.rms), noise, share])
+    return rows
+
+
+def failing(comparison: Comparison) -> list[str]:
+    """At most three outputs above their noise: what each error follows, and where it is largest."""
+    drawn = {one.output: one for one in reversed(comparison.maps)}
+    lines = []
+    for name in worst_outputs(comparison.outputs):
+        error = comparison.outputs[name]
+        if at_noise(error):
+            continue
+        scale, parts = scale_for(3 * error.rms, error.unit), [f"follows the {followed(error, 1)}"]
+        if error.bias**2 > _BIASED * error.rms**2:
+            parts.append(f"mean {signed(error.bias, scale)}")
+        if name in drawn:
+            parts.append(largest_text(drawn[name], scale))
+        lines.append(f"{OUTPUT_NAMES.get(name, name)} {'; '.join(parts)}")
+    return lines[:_FAILING]
+
+
+def followed(error: OutputError, most: int = _FOLLOWED) -> str:
+    """``load 82 % and time 10 %; 5 periods per drum turn 47 %``; ``most`` variables."""
     shares = [
         f"{VARIABLE_NAMES.get(variable, variable)} {percent(share)}"
-        for variable, share in error.follows[:_FOLLOWED]
+        for variable, share in error.follows[:most]
     ]
     texts = [listed(shares)] if shares else []
     texts += [f"{often_per_turn(a, order)} {percent(s)}" for a, order, s in _clear(error)]

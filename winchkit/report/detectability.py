@@ -8,6 +8,7 @@ from math import ceil, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
 from winchkit.diagnosis.results import CandidateScore, Detectable, Diagnosis
+from winchkit.diagnosis.verdict.decision import excess
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.quantity_text import quantity
@@ -15,8 +16,9 @@ from winchkit.report.words.vocabulary import parameter_name, parameter_unit
 
 _FEW = 4
 """Effects that a sentence lists; the table has all."""
-_LOWERED = 0.99
-"""Ratio of the errors with a candidate and without it below which it lowers an error."""
+_LOWERED = 0.9
+"""Ratio of the excess over the noise with a candidate and without it below which it is useful: less
+than the tenth that a verdict may leave is nothing to add."""
 
 
 @dataclass(frozen=True)
@@ -90,16 +92,18 @@ def untestable(answer: Answer) -> list[tuple[str, list[str]]]:
 
 
 def useful_candidates(diagnosis: Diagnosis) -> list[CandidateScore]:
-    """Candidates with evidence that lower an error by 1 % where they were fitted, best first."""
+    """Candidates with evidence that lower the errors above the noise by a tenth, best first.
+
+    One that was not fitted is judged by its evidence alone.
+    """
+    noise = {name: output.noise_rms for name, output in diagnosis.outputs.items()}
     before = {name: output.heldout_rms_before for name, output in diagnosis.outputs.items()}
+    most = _LOWERED * excess(before, noise)
     return [
         one
         for one in diagnosis.candidates
         if one.score > 0
-        and (
-            not one.heldout_rms
-            or any(rms < _LOWERED * before[name] for name, rms in one.heldout_rms.items())
-        )
+        and (not one.heldout_rms or excess({**before, **one.heldout_rms}, noise) < most)
     ]
 
 

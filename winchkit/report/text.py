@@ -19,9 +19,11 @@ from winchkit.profile_edit.history import LADDER_UNITS
 from winchkit.quantity_text import grouped, percent, scale_for, significant, with_std
 from winchkit.report.comparison_rows import (
     HEAD,
+    failing,
     followed,
     map_lines,
     offset_text,
+    short_rows,
     size_rows,
 )
 from winchkit.report.detectability import untestable, useful_candidates, visible
@@ -29,7 +31,7 @@ from winchkit.report.figures.unexplained import unexplained_curve
 from winchkit.report.figures.waterfall import errors_without, waterfall_of
 from winchkit.report.words.caveats import caveat_text, finding_texts, used_text
 from winchkit.report.words.columns import aligned, hanging, paragraph
-from winchkit.report.words.headline import noise_text
+from winchkit.report.words.headline import comparison_headline, noise_text
 from winchkit.report.words.sentence import (
     changes_text,
     error_text,
@@ -38,6 +40,7 @@ from winchkit.report.words.sentence import (
     remaining_patterns,
     remaining_text,
     where_text,
+    wrong_channels,
 )
 from winchkit.report.words.steps import alike, doubt_texts, step_text
 from winchkit.report.words.vocabulary import (
@@ -87,7 +90,7 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
             offsets=diagnosis.run_offsets,
         ),
         _remaining(answer, verbose=verbose),
-        paragraph(changes_text(diagnosis)) if not diagnosis.interrupted else [],
+        _changes(diagnosis),
         *_data(diagnosis, all_shares=verbose),
         _notes(notes),
     ]
@@ -108,6 +111,14 @@ def report_text(answer: Answer, *, verbose: bool = False) -> str:
     if not isinstance(answer, WinchAnswer):
         return text
     return in_units_of(answer.engine.regression.dataset.profile, text)
+
+
+def _changes(diagnosis: Diagnosis) -> list[str]:
+    """What to record or to do next."""
+    if diagnosis.interrupted:
+        return []
+    option = " (--as-recorded)" if wrong_channels(diagnosis) else ""
+    return paragraph(f"{changes_text(diagnosis).removesuffix('.')}{option}.")
 
 
 def _limits(answer: Answer) -> list[str]:
@@ -144,11 +155,23 @@ def step_lines(
     return lines
 
 
-def compare_text(comparison: Comparison) -> str:
-    """A comparison as text: errors per output, and their attribution to variables.
+def compare_text(comparison: Comparison, *, verbose: bool = False) -> str:
+    """A comparison as text: errors per output beside their noise, and where they fail.
 
-    Returns: text of at most 80 columns.
+    Returns: text of at most 80 columns; with all tables where it is ``verbose``.
     """
+    blocks = [paragraph(f"{comparison_headline(comparison)}.")]
+    if comparison.outputs and not verbose:
+        lines = [line for text in failing(comparison) for line in paragraph(text, "  ", "    ")]
+        blocks += [aligned(short_rows(comparison)), ["where it fails", *lines] if lines else []]
+    elif comparison.outputs:
+        blocks += _tables(comparison)
+    blocks += [*_data(comparison, all_shares=verbose), _notes(comparison.notes)]
+    return _joined(blocks)
+
+
+def _tables(comparison: Comparison) -> list[list[str]]:
+    """All figures of a comparison, with the attribution of its errors to variables."""
     attributed: list[str] = []
     for name, error in comparison.outputs.items():
         text = f"{OUTPUT_NAMES.get(name, name)}: {followed(error)}"
@@ -161,8 +184,7 @@ def compare_text(comparison: Comparison) -> str:
         blocks.append(["mean error over two variables", *maps])
     if comparison.offset is not None:
         blocks.append([offset_text(comparison.offset)])
-    blocks += [*_data(comparison, all_shares=True), _notes(comparison.notes)]
-    return _joined(blocks)
+    return blocks
 
 
 def addition_text(addition: Addition | Removal) -> str:

@@ -21,6 +21,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from winchkit.catalog import names
 from winchkit.errors import UsageError, WinchkitError
+from winchkit.profile_edit.new_profile import drawing
 from winchkit.version import __version__
 from winchkit.web.foreign import is_run, preview
 from winchkit.web.guard import Guard
@@ -68,9 +69,10 @@ def application(
         routes=routes,
         middleware=[Middleware(Guard, token=token)],
         exception_handlers={
-            WinchkitError: _refused,
+            WinchkitError: partial(_refused, workspace),
             ValueError: _malformed,
             KeyError: _malformed,
+            TypeError: _malformed,
         },
         lifespan=lifespan,
     )
@@ -136,6 +138,7 @@ class _Work:
             "profiles": [name for name in known if self._view_of(name) is None],
             "examples": names("sim"),
             "effects": effects,
+            "drawing": drawing(),
         }
         for view in self.views:
             choices |= view.choices(known)
@@ -143,7 +146,7 @@ class _Work:
 
     async def _drop(self, request: Request) -> Response:
         name = unquote(request.headers.get("x-file-name", ""))
-        path = self.workspace.keep(name, await _body(request, _LARGEST_FILE))
+        path = self.workspace.keep(name, await _body(request, _LARGEST_FILE)).resolve()
         if path.suffix == ".toml":
             self._open_profile(str(path))
         elif await asyncio.to_thread(is_run, path):
@@ -152,14 +155,18 @@ class _Work:
             opens.open([path])
         else:
             found = await asyncio.to_thread(preview, path)
-            return JSONResponse({"import": found, "file": path.name})
+            return JSONResponse({"import": found, "file": self._place(path)})
         return _accepted()
 
     async def _guess(self, request: Request) -> Response:
         asked = await _object(request)
         path = self.workspace.dropped(str(asked["file"]))
         found = await asyncio.to_thread(preview, path, dict(asked["answers"]))
-        return JSONResponse({"import": found, "file": path.name})
+        return JSONResponse({"import": found, "file": self._place(path)})
+
+    def _place(self, path: Path) -> str:
+        """A dropped file as further requests name it."""
+        return path.relative_to(self.workspace.folder.resolve()).as_posix()
 
     async def _order(self, request: Request) -> Response:
         asked, work = await _object(request), self.workspace
@@ -170,7 +177,11 @@ class _Work:
             "use": lambda: work.use(str(asked["name"]), used=bool(asked["used"])),
             "remove": lambda: work.remove(str(asked["name"])),
             "import": lambda: work.take(str(asked["file"]), dict(asked["answers"])),
+            "new-profile": lambda: work.new_profile(
+                str(asked["name"]), dict(asked["values"]), list(asked["pulleys"])
+            ),
             "diagnose": work.diagnose,
+            "use-effect": lambda: work.use_effect(str(asked["file"])),
             "add": lambda: work.add(str(asked["effect"])),
             "undo": work.undo,
             "compare": lambda: work.compare(_version(asked["profile"]), list(asked["runs"])),
@@ -213,7 +224,7 @@ class _Work:
 
 
 class _Drawings:
-    """Routes that read: curves, cards, and files to save."""
+    """Routes that read or write files: curves, cards, plans, an effect of the user's."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
@@ -224,6 +235,9 @@ class _Drawings:
             Route("/api/curve", self._curve),
             Route("/api/multiples", self._multiples),
             Route("/api/card", self._card),
+            Route("/api/pattern", self._pattern),
+            Route("/api/plan", self._plan, methods=["POST"]),
+            Route("/api/effect", self._effect, methods=["POST"]),
             Route("/api/truth", self._truth),
             Route("/api/profile", self._profile),
             Route("/api/report", self._report),
@@ -246,6 +260,16 @@ class _Drawings:
     async def _card(self, request: Request) -> Response:
         effect = request.query_params.get("effect", "")
         return JSONResponse(await asyncio.to_thread(self.workspace.card, effect))
+
+    async def _pattern(self, request: Request) -> Response:
+        number = int(request.query_params.get("number", "0"))
+        return JSONResponse(await asyncio.to_thread(self.workspace.pattern, number))
+
+    async def _plan(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self.workspace.plan))
+
+    async def _effect(self, request: Request) -> Response:
+        return JSONResponse(await asyncio.to_thread(self.workspace.new_effect))
 
     async def _truth(self, request: Request) -> Response:
         return JSONResponse({"truth": self.workspace.truth()})
@@ -276,12 +300,13 @@ async def _object(request: Request) -> dict[str, Any]:
     return asked
 
 
-async def _refused(request: Request, error: Exception) -> Response:
-    return JSONResponse({"error": str(error)}, 400)
+async def _refused(workspace: Workspace, request: Request, error: Exception) -> Response:
+    return JSONResponse({"error": workspace.words(str(error))}, 400)
 
 
 async def _malformed(request: Request, error: Exception) -> Response:
-    return JSONResponse({"error": f"the request is malformed: {error}"}, 400)
+    lacks = f" lacks {error}" if isinstance(error, KeyError) else " has a value of a wrong kind"
+    return JSONResponse({"error": f"The request of the page{lacks}; reload the page."}, 400)
 
 
 async def _body(request: Request, largest: int) -> bytes:

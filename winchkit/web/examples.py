@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 from winchkit.catalog import find
 from winchkit.errors import UsageError
@@ -27,6 +29,12 @@ class Simulated:
     def profile(self) -> str:
         """Name of the declared profile."""
         return next(iter(self.bench.bench.winch.values())).profile
+
+    def command(self, name: str) -> str:
+        """Command that writes the runs into a folder of the bench's name."""
+        folder = shlex.quote(Path(name).stem)
+        made = f"winchkit sim record {shlex.quote(name)} {' '.join(_PROGRAMMES)}"
+        return f"{made} --seed {self.seed} -o {folder}"
 
     @property
     def truth(self) -> str:

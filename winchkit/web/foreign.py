@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,6 +28,7 @@ from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.schema.mapping import CHANNELS
 from winchkit.units import parse
+from winchkit.web.words import page_text
 
 _FIRST = 5
 _POINTS = 120
@@ -65,7 +67,7 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
                 "channel": item.channel,
                 "unit": item.unit,
                 "confidence": item.confidence if item.channel else "",
-                "reason": item.reason,
+                "reason": page_text(item.reason),
                 "first": texts or values,
                 "plot": drawn,
             }
@@ -77,13 +79,13 @@ def preview(path: Path, answers: Mapping[str, Any] | None = None) -> dict[str, A
         "channels": list(CHANNELS),
         "questions": [
             {
-                "text": question.text,
+                "text": page_text(question.text),
                 "key": question.key,
                 "options": question.options if question.key in STORAGE else (),
             }
             for question in guess.questions
         ],
-        "notes": [*guess.table.notes, *guess.notes],
+        "notes": [page_text(note) for note in (*guess.table.notes, *guess.notes)],
         "certain": guess.is_certain and not guess.questions,
     }
 
@@ -102,6 +104,20 @@ def imported(path: Path, answers: Mapping[str, Any]) -> Run:
     if mass := str(answers.get("load_mass", "")).strip():
         metadata["load_mass"] = f"{parse(mass, 'mass'):.12g} kg"
     return replace(whole_run(streams_of(guess), metadata), name=path.stem)
+
+
+def import_command(file: str, answers: Mapping[str, Any], folder: str) -> str:
+    """Command that imports a file as the page did.
+
+    ``answers``: as for :func:`imported`. ``folder``: of the run.
+    """
+    words = ["winchkit", "import", file, "-y", "--replace", "-o", folder]
+    for column in answers.get("columns", ()):
+        words += ["--column", str(column)]
+    for key in (*CONSTANTS, "load_mass"):
+        if text := str(answers.get(key, "")).strip():
+            words += [f"--{key.replace('_', '-')}", text]
+    return " ".join([shlex.join(words), *map(str, answers.get("options", ()))])
 
 
 def _answers(given: Mapping[str, Any]) -> Answers:

@@ -8,20 +8,29 @@ from math import isfinite
 from typing import Any
 
 from winchkit.diagnosis.diagnose import WinchAnswer
+from winchkit.diagnosis.residuals.attribution import Attribution
 from winchkit.diagnosis.results import Diagnosis, Estimate
 from winchkit.effects.effect import Effect
 from winchkit.quantity_text import Scale, between, scale_for, significant, with_std
-from winchkit.report.detectability import effects_of, useful_candidates
+from winchkit.report.detectability import useful_candidates
 from winchkit.report.words.sentence import (
     capital,
     changes_text,
     error_text,
     headline,
+    remaining_patterns,
     remaining_text,
     where_text,
 )
-from winchkit.report.words.steps import alike, doubt_texts, step_text
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, parameter_name
+from winchkit.report.words.steps import (
+    alike,
+    doubt_texts,
+    has_other_law,
+    step_text,
+    step_title,
+)
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, effect_name, parameter_name
+from winchkit.web.words import page_text
 
 _SHOWN = 8
 """Candidates in the ladder; the others have less evidence."""
@@ -52,7 +61,7 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": diagnosis.verdict,
         "chip": VERDICT_WORDS[diagnosis.verdict],
         "headline": headline(diagnosis),
-        "sentence": " ".join(part for part in parts if part),
+        "sentence": page_text(" ".join(part for part in parts if part)),
         "steps": [
             {
                 "effect": step.effects[0],
@@ -63,18 +72,32 @@ def verdict(diagnosis: Diagnosis) -> dict[str, Any]:
             for step in diagnosis.steps
         ],
         "changes": changes_text(diagnosis),
+        "patterns": [title for title, _ in patterns_of(diagnosis)],
         "unexplained": [where_text(where) for where in diagnosis.where],
         "empirical": list(diagnosis.empirical),
-        "notes": list(diagnosis.notes),
+        "notes": [page_text(note) for note in diagnosis.notes],
         "caveats": list(diagnosis.caveats),
         "sanity": [finding.to_json() for finding in diagnosis.sanity],
         "used_share": dict(diagnosis.used_share),
     }
 
 
+def patterns_of(diagnosis: Diagnosis) -> list[tuple[str, int | Attribution]]:
+    """Titles of the open laws, each with the index of its step, and of the remaining patterns."""
+    found: list[tuple[str, int | Attribution]] = [
+        (capital(step_title(step)), index)
+        for index, step in enumerate(diagnosis.steps)
+        if has_other_law(step) and not step.refitted
+    ]
+    if not found and diagnosis.verdict in {"partly", "unknown", "undecided"}:
+        places = [w for w in remaining_patterns(diagnosis) if w.frequency is None]
+        found += [(capital(where_text(where)), where) for where in places[:1]]
+    return found
+
+
 def refitted(said: str) -> dict[str, Any]:
     """Chip and headline in place of a verdict while a refitted profile is diagnosed."""
-    lists = ("steps", "unexplained", "empirical", "notes", "caveats", "sanity")
+    lists = ("patterns", "steps", "unexplained", "empirical", "notes", "caveats", "sanity")
     return {
         "verdict": "refitted",
         "chip": "Refitted",
@@ -101,7 +124,7 @@ def ladder(
     same = {effect for step in diagnosis.steps[:1] for effect in alike(step)}
     equal = {*named[:1], *same} if same else set()
     scores = [c for c in useful_candidates(diagnosis) if c.heldout_rms]
-    known = {c.effect: c for c in scores}
+    known = {c.effect: c for c in diagnosis.candidates if c.heldout_rms}
     first = [known[effect] for effect in named if effect in known]
     shown = (first + [c for c in scores if c not in first])[:_SHOWN]
     errors_of = [today, *(rung.errors for rung in history)]
@@ -112,7 +135,6 @@ def ladder(
         for name, out in diagnosis.outputs.items()
     }
     floors = {name: out.noise_rms for name, out in diagnosis.outputs.items()}
-    effects = effects_of(answer)
 
     def row(kind: str, label: str, errors: Mapping[str, float], **more: Any) -> dict[str, Any]:
         cells = {name: _cell(errors.get(name), floors[name], scales[name]) for name in scales}
@@ -132,11 +154,10 @@ def ladder(
             for name, value in fitted.get(item.effect, item.heldout_rms).items()
             if abs(value - today.get(name, value)) > _CHANGE * today.get(name, 1.0)
         }
-        effect = effects.get(item.effect)
         rows.append(
             row(
                 "candidate",
-                _name(effect, item.effect),
+                capital(effect_name(item.effect)),
                 errors,
                 effect=item.effect,
                 equal=item.effect in equal,
@@ -172,7 +193,7 @@ def card(
     ]
     return {
         "effect": effect.id,
-        "name": _name(effect, effect.id),
+        "name": capital(effect_name(effect.id)),
         "what": effect.what,
         "formula": effect.formula,
         "source": effect.source,
@@ -217,8 +238,3 @@ def _cell(value: float | None, floor: float | None, scale: Scale) -> dict[str, A
         "text": significant(value / scale.worth, 3),
         "ratio": value / floor if floor else None,
     }
-
-
-def _name(effect: Effect | None, effect_id: str) -> str:
-    """Name of an effect for people: its id in words."""
-    return capital((effect.id if effect is not None else effect_id).replace("-", " "))

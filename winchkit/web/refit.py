@@ -14,7 +14,7 @@ from winchkit.diagnosis.write import write_addition
 from winchkit.effects.catalogue import Catalogue
 from winchkit.errors import UsageError
 from winchkit.quantity_text import quantity
-from winchkit.report.words.vocabulary import OUTPUT_NAMES
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, effect_name
 from winchkit.web.curves import curves_of
 from winchkit.web.ladder import Rung
 from winchkit.web.state import PageState, Version
@@ -41,7 +41,7 @@ def refit(
     label = (
         "Profile as loaded"
         if len(state.versions) == 1
-        else f"+ {state.versions[-1].added.replace('-', ' ')}"
+        else f"+ {effect_name(state.versions[-1].added)}"
     )
     now = {
         name: replace(out, heldout_rms_before=out.heldout_rms_after)

@@ -84,7 +84,7 @@ def serve(
     with ExitStack() as stack:
         own_folder = TemporaryDirectory(prefix="winchkit-page-", ignore_cleanup_errors=True)
         own = Path(stack.enter_context(own_folder))
-        workspace = Workspace(own, effects)
+        workspace = Workspace(own, effects, work=folder)
         stack.callback(workspace.close)
         view = None
         if bench is not None or sim is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,6 +15,7 @@ from winchkit.diagnosis.steps import place_text
 from winchkit.errors import UsageError
 from winchkit.model.variables import ANGLES
 from winchkit.profile_edit.naming import extended_name
+from winchkit.report.words.vocabulary import effect_name
 from winchkit.runs.run import Run
 from winchkit.web.curves import OutputCurves
 from winchkit.web.ladder import VERDICT_WORDS, Rung, ladder, refitted, verdict
@@ -56,6 +58,10 @@ class LoadedRun:
     used: bool = True
     folder: str = ""
     """Name of its folder, where another file has the same name."""
+    file: str = ""
+    """As the user's commands name it."""
+    origin: str = ""
+    """Command that writes the file; empty for one of the user's."""
 
     @property
     def name(self) -> str:
@@ -82,6 +88,8 @@ class Version:
 
     path: Path
     added: str = ""
+    own: tuple[str, ...] = ()
+    """Files of effects of the user's own that were made for it."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +117,8 @@ class PageState:
     """What a simulated bench hides; None for measured runs."""
     faults: tuple[str, ...] = ()
     """Why files were not loaded, or the last request was refused."""
+    made: tuple[str, ...] = ()
+    """Command that writes the profile; none for one of the user's."""
     beside: PageState | None = None
     """Another profile or other runs, shown beside these."""
 
@@ -154,15 +164,26 @@ class PageState:
                 return where.variable, where.order
         return None
 
+    def selection(self) -> tuple[str, str]:
+        """The used runs and the present profile, as commands name them."""
+        runs = shlex.join(item.file or item.name for item in self.used)
+        return runs, shlex.quote([self.source, *self.names[1:]][-1])
+
     def commands(self) -> list[str]:
         """The user's actions as commands."""
-        runs = " ".join(item.name for item in self.used)
-        lines = [f"winchkit diagnose {runs} -p {self.source}"]
-        profile = self.source
-        for version, name in zip(self.versions[1:], self.names[1:], strict=True):
-            lines.append(f"winchkit add {version.added} --fit {runs} -p {profile} -o {name}")
-            lines.append(f"winchkit diagnose {runs} -p {name}")
-            profile = name
+        runs = self.selection()[0]
+        origins = dict.fromkeys([*(item.origin for item in self.used), *self.made])
+        lines, effects, before = [line for line in origins if line], "", ""
+        for version, named in zip(self.versions, [self.source, *self.names[1:]], strict=True):
+            profile = shlex.quote(named)
+            if version.added:
+                fitted = f"--fit {runs} -p {before}{effects} -o {profile}"
+                lines.append(f"winchkit add {version.added} {fitted}")
+            lines.append(f"winchkit diagnose {runs} -p {profile}{effects}")
+            for file in version.own:
+                effects += f" --effects {shlex.quote(file)}"
+                lines.append(f"winchkit diagnose {runs} -p {profile}{effects}")
+            before = profile
         return lines
 
     def winch_runs(self) -> tuple[str, list[Run]]:
@@ -193,7 +214,8 @@ class PageState:
         }
         if self.versions:
             added = [version.added for version in self.versions[1:]]
-            out["profile"] = {"name": self.source, "added": added}
+            names = [effect_name(effect) for effect in added]
+            out["profile"] = {"name": self.source, "added": added, "names": names}
         if self.answer is not None:
             known = None if other is None else other.answer
             beside = None if known is None else known.diagnosis
@@ -201,10 +223,6 @@ class PageState:
             words = in_units_of(self.answer.engine.regression.dataset.profile, words)
             out["diagnosis"] = words | {
                 "ladder": ladder(self.answer, self.rungs, beside),
-                "next": [
-                    {"separates": list(run.separates), "programme": run.programme}
-                    for run in self.answer.diagnosis.next_runs
-                ],
             }
             out["commands"] = self.commands()
         return out

@@ -1,38 +1,48 @@
 """State of the Diagnose view: run files, a profile with its history, and the last diagnosis.
 
 All work runs in one thread, in the order of the requests; a cancelled request leaves the state as
-it was. Files are kept in a folder of the server's own: nothing of the user's is written to.
+it was. Dropped files are kept in a folder of the server's own. Files that the page makes and its
+commands name are in the user's: imported runs, runs of a hidden effect, a new profile.
 """
 
 from __future__ import annotations
 
 import logging
 import re
+import shlex
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any, Protocol
 
 from winchkit.catalog import find
 from winchkit.diagnosis.compare import initial_residual
 from winchkit.diagnosis.data.dataset import Dataset, prepare
 from winchkit.diagnosis.diagnose import WinchAnswer, diagnose_prepared
+from winchkit.diagnosis.new_effect import new_effect, order_of_drum
+from winchkit.diagnosis.plan import plan
 from winchkit.diagnosis.regression.time_series import TimeSeriesRegression
 from winchkit.effects.catalogue import Catalogue, load_catalogue
-from winchkit.errors import FileError, UsageError, WinchkitError
+from winchkit.effects.effect_template import write_wave_on_drum
+from winchkit.errors import Fault, FileError, UsageError, WinchkitError
+from winchkit.profile_edit.new_profile import new_profile, profile_command
 from winchkit.runs.read import read_run
 from winchkit.runs.run import Run
 from winchkit.runs.writer import write_run
 from winchkit.schema.profiles.winch import WinchProfile
+from winchkit.schema.programme import write_programme
 from winchkit.schema.read import read_profile
 from winchkit.web.candidate import candidate_card
 from winchkit.web.curves import OutputCurves, curves_of, recorded_curves
 from winchkit.web.examples import Simulated, example_runs, mystery_runs
-from winchkit.web.foreign import imported
+from winchkit.web.foreign import import_command, imported
+from winchkit.web.pattern import pattern
 from winchkit.web.refit import refit
 from winchkit.web.state import Judgement, LoadedRun, PageState, Version
+from winchkit.web.words import page_text
 
 Diagnosed = tuple[WinchAnswer, Mapping[str, OutputCurves]]
 """A diagnosis and the curves of its outputs."""
@@ -40,8 +50,11 @@ _READERS = 2
 """Files that are read at once: a parser of large files runs beside the interpreter."""
 _LONG = 200_000
 """Samples above which runs are drawn before they are compared, which takes seconds."""
+INTERNAL = "failed by a fault of winchkit; the terminal that serves this page has the details"
+"""In place of what an exception of Python says."""
 _LOGGER = logging.getLogger(__name__)
-_NO_NAME = re.compile(r"[^\w.-]+")
+_NO_NAME = re.compile(r'[\x00-\x1f<>:"/\\|?*]+')
+"""Characters that a name of a file lacks on one of the systems."""
 
 
 def _read(path: str | Path) -> Run | FileError:
@@ -76,13 +89,19 @@ class StoredRun(Protocol):
 class Workspace:
     """State of the Diagnose view and the one thread that changes it.
 
-    ``changed``: called, from the working thread, whenever there is something new to show.
+    ``folder``: of the server's own. ``changed``: called, from the working thread, whenever there is
+    something new to show. ``work``: the user's folder, by default one within ``folder``.
     """
 
     def __init__(
-        self, folder: Path, effects: Sequence[str] = (), changed: Callable[[], None] = lambda: None
+        self,
+        folder: Path,
+        effects: Sequence[str] = (),
+        changed: Callable[[], None] = lambda: None,
+        work: Path | None = None,
     ) -> None:
         self.folder = folder
+        self.work = folder / "work" if work is None else work
         self.effects = tuple(effects)
         self.changed = changed
         self.catalogue: Catalogue = load_catalogue(effects)
@@ -91,6 +110,9 @@ class Workspace:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="workspace")
         self._cards: dict[str, dict[str, Any]] = {}
         self._prepared: Dataset | None = None
+        self._written: set[Path] = set()
+        self._refusals = 0
+        """Number of refusals so far: the same words twice are two of them."""
         self.judged: dict[Path, Judgement] = {}
         """Latest verdict on each run."""
 
@@ -138,15 +160,29 @@ class Workspace:
 
     def example(self, name: str) -> Future[None]:
         """Simulate runs of a bench of the catalogue, and open them with its profile."""
-        return self.task("simulating runs", lambda: self._simulate(name, example_runs(name)))
+        return self.task("simulating runs", lambda: self._example(name))
 
     def mystery(self, seed: int) -> Future[None]:
-        """Simulate runs of a bench whose hidden effect is shown on request only."""
-        return self.task("simulating runs", lambda: self._simulate("mystery", mystery_runs(seed)))
+        """Simulate runs of a bench whose hidden effect is shown on request only.
+
+        No command makes them without its name: they are written into the user's folder.
+        """
+        return self.task("simulating runs", lambda: self._mystery(seed))
 
     def take(self, file: str, answers: Mapping[str, Any]) -> Future[None]:
         """Import a dropped file of another program with the answers to its questions."""
         return self.task("importing", lambda: self._take(file, answers))
+
+    def new_profile(self, name: str, values: Mapping[str, str], pulleys: Sequence[str]) -> None:
+        """Write the profile of a winch into the user's folder, and open it; raises UsageError."""
+        plain = f"{_NO_NAME.sub('-', name.strip()).removesuffix('.toml').strip('. ')}.toml"
+        if plain == ".toml":
+            raise UsageError("the profile has no name; type one, for example my-winch")
+        self._made(self.work)
+        path = self.work / plain
+        new_profile(path, values, pulleys)
+        origin = profile_command(self.named(path), values, pulleys)
+        self.task("reading files", lambda: self._opened_new(str(path), origin))
 
     def undo(self) -> Future[None]:
         """Take the last addition back, and diagnose again."""
@@ -170,7 +206,7 @@ class Workspace:
         """The state as the page shows it."""
         work = self._work
         busy = None if work is None else {"what": work.what, "share": work.share}
-        return self._state.to_json() | {"busy": busy}
+        return self._state.to_json() | {"busy": busy, "refusals": self._refusals}
 
     def side(self, beside: bool = False) -> PageState:
         """The present state or that beside it; raises UsageError without one."""
@@ -198,6 +234,50 @@ class Workspace:
             self._cards[effect] = candidate_card(self._state, effect)
         return self._cards[effect]
 
+    def pattern(self, number: int) -> dict[str, Any]:
+        """An open law or unexplained pattern with its curve."""
+        return pattern(self._state, number)
+
+    def plan(self) -> dict[str, str]:
+        """Write the best programme for the next run; its file, text and purpose.
+
+        Raises UsageError without a diagnosis.
+        """
+        found = plan(self._state.diagnosed, self.catalogue)
+        path = self._free("next.toml")
+        write_programme(found.programme(path.stem), path)
+        best = found.offers[0]
+        shows = ", ".join(best.shows) or "no further effect"
+        runs, profile = self._state.selection()
+        return {
+            "file": self.named(path),
+            "text": path.read_text(encoding="utf-8"),
+            "words": f"{best.kind.name}, {best.minutes:.1f} minutes; it would show {shows}",
+            "command": f"winchkit plan {runs} -p {profile} -o {shlex.quote(self.named(path))}",
+        }
+
+    def new_effect(self) -> dict[str, str]:
+        """Write an effect of the user's from the main pattern; its file and text.
+
+        Raises UsageError where nothing unexplained was located.
+        """
+        state, path = self._state, self._free("my-effect.py")
+        found = state.diagnosed.diagnosis
+        name = path.stem
+        if not found.empirical:
+            raise UsageError("nothing unexplained was located that an effect could begin from")
+        order = order_of_drum(found)
+        if order is not None:
+            write_wave_on_drum(order, name, path)
+        else:
+            profile, runs = read_profile(state.profile), state.winch_runs()[1]
+            new_effect(path, runs, profile, self.catalogue, curve=found.empirical[0])
+        return {"file": self.named(path), "text": path.read_text(encoding="utf-8")}
+
+    def use_effect(self, file: str) -> Future[None]:
+        """Read an effect of the user's, and diagnose with it."""
+        return self.task("diagnosing", lambda: self._use_effect(file))
+
     def profile_text(self) -> tuple[str, str]:
         """File name and text of the present profile."""
         text = self._state.profile.read_text(encoding="utf-8")
@@ -218,20 +298,32 @@ class Workspace:
 
     def dropped(self, name: str) -> Path:
         """A file in the server's folder; raises UsageError for another name."""
-        path = self.folder / Path(name).name
-        if not path.is_file():
+        path = (self.folder / name).resolve()
+        if not (path.is_file() and path.is_relative_to(self.folder.resolve())):
             raise UsageError(f"there is no file '{name}'; drop it again")
         return path
 
     def keep(self, name: str, content: bytes) -> Path:
-        """Write a dropped file into the server's folder, under a harmless name."""
-        plain = _NO_NAME.sub("-", Path(name).name).lstrip(".-") or "run.csv"
-        target, number = self.folder / plain, 2
-        while target.exists():
-            target = self.folder / f"{Path(plain).stem}-{number}{Path(plain).suffix}"
-            number += 1
+        """Write a dropped file under its name into a folder of its own within the server's."""
+        plain = _NO_NAME.sub("-", name.replace("\\", "/").rpartition("/")[2]).strip(". ")
+        target = Path(mkdtemp(prefix="", dir=self.folder)) / (plain or "run.csv")
         target.write_bytes(content)
         return target
+
+    def named(self, path: str | Path) -> str:
+        """A file as the user's commands name it: a dropped one by name, others by their place."""
+        file = Path(path).resolve()
+        if not file.is_file() and not file.is_dir():
+            return str(path)  # a shipped profile
+        if file.is_relative_to(self.folder.resolve()):
+            return file.name
+        here = Path.cwd().resolve()
+        return str(file.relative_to(here) if file.is_relative_to(here) else file)
+
+    def words(self, text: str) -> str:
+        """A message of the command line without the paths of the server's folder, and options."""
+        own = {re.escape(str(folder)) for folder in (self.folder, self.folder.resolve())}
+        return page_text(re.sub(rf"(?:{'|'.join(own)})/(?:[^/\s]+/)?", "", text))
 
     # The work.
 
@@ -245,14 +337,14 @@ class Workspace:
         try:
             call()
         except Cancelled:
-            self._set(faults=(f"{what}: cancelled",))
+            self._refuse(f"{what}: cancelled")
         except FileError as error:
-            self._set(faults=tuple(str(fault) for fault in error.faults))
+            self._refuse(*map(str, error.faults))
         except WinchkitError as error:
-            self._set(faults=(str(error),))
-        except Exception as error:
+            self._refuse(str(error))
+        except Exception:
             _LOGGER.exception("%s failed", what)
-            self._set(faults=(f"{what}: internal error: {type(error).__name__}: {error}",))
+            self._refuse(f"{what}: {INTERNAL}")
         finally:
             self._work = None
             self.changed()
@@ -268,15 +360,22 @@ class Workspace:
             work.what, work.share = what, share
             self.changed()
 
+    def _refuse(self, *faults: str) -> None:
+        self._refusals += 1
+        self._set(faults=faults)
+
     def _set(self, **changes: Any) -> None:
         if changes.keys() & {"answer", "runs", "versions"}:
             self._cards = {}
         if changes.keys() & {"runs", "source"}:
             changes = {"before": None, **changes}
             self._prepared = None
-        self._state = replace(self._state, **{"faults": (), **changes})
+        faults = tuple(map(self.words, changes.get("faults", ())))
+        self._state = replace(self._state, **{**changes, "faults": faults})
 
-    def _open(self, paths: Sequence[str | Path], profile: str | None) -> None:
+    def _open(
+        self, paths: Sequence[str | Path], profile: str | None = None, origin: str = ""
+    ) -> None:
         if profile is not None:
             self._open_profile(profile)
         runs, faults = [*self._state.runs], []
@@ -289,7 +388,8 @@ class Workspace:
             file = Path(path).resolve()
             runs = [item for item in runs if item.path != file]
             twin = any(item.path.name == file.name for item in runs)
-            runs.append(LoadedRun(file, run, folder=file.parent.name if twin else ""))
+            folder = file.parent.name if twin else ""
+            runs.append(LoadedRun(file, run, folder=folder, file=self.named(file), origin=origin))
         self._loaded(runs, faults)
 
     def _show(self, chosen: Sequence[StoredRun], profile: str | None) -> None:
@@ -299,11 +399,13 @@ class Workspace:
         for item in chosen:
             twin = any(run.path.name == item.path.name for run in runs)
             folder = item.path.parent.name if twin else ""
-            runs.append(LoadedRun(item.path, item.read(), folder=folder))
+            file = self.named(item.path)
+            runs.append(LoadedRun(item.path, item.read(), folder=folder, file=file))
         self._set(winch="", truth=None, beside=None)
         self._loaded(runs, [])
 
     def _loaded(self, runs: Sequence[LoadedRun], faults: Sequence[str]) -> None:
+        self._refusals += bool(faults)
         self._set(runs=tuple(runs), answer=None, curves={}, faults=tuple(faults))
         if runs and self._state.versions:
             if sum(len(item.run.time) for item in runs) > _LONG:
@@ -312,27 +414,75 @@ class Workspace:
                 self.changed()
             self._diagnose(faults)
 
-    def _open_profile(self, profile: str) -> None:
+    def _opened_new(self, path: str, origin: str) -> None:
+        self._open_profile(path, origin)
+        self._loaded(self._state.runs, ())
+
+    def _open_profile(self, profile: str, origin: str = "") -> None:
         path = find("profiles", profile)
         read_profile(path)
         copy = self.keep(path.name, path.read_bytes())
-        self._set(source=profile, versions=(Version(copy),), rungs=(), answer=None, curves={})
+        named = self.named(profile)
+        made = (origin,) if origin else ()
+        self._set(source=named, made=made, versions=(Version(copy),), rungs=())
+        self._set(answer=None, curves={})
 
-    def _simulate(self, name: str, simulated: Simulated) -> None:
+    def _simulate(self, simulated: Simulated, folder: Path, place: str, origin: str) -> None:
         runs = []
         for run in simulated.runs:
-            path = self.keep(f"{run.name}.csv", b"")
+            path = folder / f"{run.name}.csv"
             write_run(run, path)
-            runs.append(LoadedRun(path, read_run(path)))
+            file = f"{place}/{path.name}"
+            runs.append(LoadedRun(path, read_run(path), file=file, origin=origin))
         self._open_profile(simulated.profile)
         self._set(runs=tuple(runs), winch="", truth=simulated.truth, beside=None)
         self._diagnose()
 
+    def _example(self, name: str) -> None:
+        found = example_runs(name)
+        folder = Path(mkdtemp(dir=self.folder))
+        self._simulate(found, folder, Path(name).stem, found.command(name))
+
+    def _mystery(self, seed: int) -> None:
+        folder = self._made(self.work / f"mystery-{seed}")
+        self._simulate(mystery_runs(seed), folder, self.named(folder), "")
+
     def _take(self, file: str, answers: Mapping[str, Any]) -> None:
-        run = imported(self.dropped(file), answers)
-        path = self.keep(f"{Path(file).stem}-imported.csv", b"")
+        source = self.dropped(file)
+        run = imported(source, answers)
+        path, number = self.work / "imported" / f"{source.stem}.csv", 2
+        while path.exists() and path not in self._written:
+            path, number = self.work / f"imported-{number}" / path.name, number + 1
+        folder = self._made(path.parent)
         write_run(run, path)
-        self._open([path], None)
+        self._written.add(path)
+        self._open([path], origin=import_command(source.name, answers, self.named(folder)))
+
+    def _use_effect(self, file: str) -> None:
+        path = (Path.cwd() / file).resolve()
+        if not (path.is_file() and path.is_relative_to(self.work.resolve())):
+            raise UsageError(f"there is no file '{file}' with an effect in the folder of this page")
+        self.effects = tuple(dict.fromkeys([*self.effects, str(path)]))
+        self.catalogue, self._prepared = load_catalogue(self.effects), None
+        *earlier, last = self._state.versions
+        own = tuple(dict.fromkeys([*last.own, self.named(path)]))
+        self._set(versions=(*earlier, replace(last, own=own)))
+        self._diagnose()
+
+    def _free(self, name: str) -> Path:
+        """A new file in the user's folder."""
+        path, number = self._made(self.work) / name, 2
+        while path.exists():
+            path, number = path.with_stem(f"{Path(name).stem}-{number}"), number + 1
+        return path
+
+    @staticmethod
+    def _made(folder: Path) -> Path:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise FileError(Fault(f"cannot be made: {error.strerror}", str(folder))) from None
+        return folder
 
     def _use(self, name: str, *, used: bool) -> None:
         runs = tuple(

@@ -169,7 +169,7 @@ def test_a_master_that_goes_on_keeps_a_reset_from_succeeding(tmp_path: Path) -> 
     with rig.opened() as bench:
         send()
         rig.wait(0.3)
-        with pytest.raises(LimitTripped, match=r"still not free to move.*somebody else"):
+        with pytest.raises(LimitTripped, match=r"still blocked.*somebody else"):
             bench.reset()
         goes_on = False
         rig.wait(0.2)

@@ -83,7 +83,7 @@ def test_another_residual_is_drawn_in_the_same_cells() -> None:
 
 def test_the_maps_are_in_the_text_the_json_and_the_page() -> None:
     known = held("demo-elastic-rope")
-    assert "cable length over free length and load" in compare_text(known.comparison)
+    assert "cable length over free length and load" in compare_text(known.comparison, verbose=True)
     first = known.comparison.to_json()["maps"][0]
     assert first["over"] == ["cable_length", "load"]
     assert first["units"] == ["m", "N"]

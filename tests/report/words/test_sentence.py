@@ -158,7 +158,7 @@ def test_a_wrong_channel_precedes_everything() -> None:
     assert sentence(told) == (
         "A channel looks wrong: no effect was looked for. tension of run: its sign is inverted."
     )
-    assert "--as-recorded" in changes_text(told)
+    assert "confirm that it is right" in changes_text(told)
 
 
 def test_no_outputs_at_all_still_make_a_sentence() -> None:

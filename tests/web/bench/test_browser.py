@@ -20,7 +20,6 @@ from browsing import Served, opened, texts, until
 from chromium import NEEDS_CHROMIUM
 from recordings_of_others import lay_out
 from robot_poses.truth import Truth, csv, poses
-from winchkit.catalog import find
 from winchkit.runs.writer import write_run
 from winchkit.web.examples import example_runs
 
@@ -101,28 +100,6 @@ def test_files_that_are_no_runs_are_one_line_of_the_library(browser: Any, tmp_pa
         page.click("#faults")
         until(page, lambda: "figure-3.csv" in page.inner_text("main"))
         assert page.get_attribute("#faults", "aria-expanded") == "true"
-        assert complaints == []
-        page.context.close()
-    finally:
-        served.end()
-
-
-def test_a_refused_file_is_said_also_where_nothing_else_changes(
-    browser: Any, tmp_path: Path
-) -> None:
-    profile = tmp_path / "winch.toml"
-    profile.write_text('schema = 1\nkind = "winch"\nname = "mine"\ncolour = "red"\n')
-    served = Served("--folder", str(tmp_path))
-    try:
-        page, complaints = opened(browser, served.url)
-        until(page, lambda: page.locator("#files").count() == 1)
-        page.set_input_files("#files", str(profile))
-        until(page, lambda: "winch.toml" in page.inner_text("#faults"))
-        assert "colour" in page.inner_text("#faults")
-        profile.write_bytes(find("profiles", "bench-spiral").read_bytes())
-        page.set_input_files("#files", str(profile))
-        until(page, lambda: page.inner_text("#faults") == "")
-        assert "winch" in page.inner_text(".context")
         assert complaints == []
         page.context.close()
     finally:

@@ -17,6 +17,7 @@ from winchkit.cli.bench.direction_option import (
 )
 from winchkit.cli.bench.holding import hold_on
 from winchkit.cli.core.command import Command
+from winchkit.cli.core.early_checks import check_bench
 from winchkit.cli.core.options import (
     bench_option,
     dry_run_option,
@@ -87,6 +88,7 @@ def command(
     """
     from winchkit.cli.core.dry_run import station_for
 
+    check_bench(bench)
     asked = _read(pay_out, wind_in, duration, speed)
     if asked.direction is None and (dry_run or not sys.stdin.isatty()):
         raise UsageError(f"there is no terminal to hold a key on: {_HOW}")

@@ -72,6 +72,17 @@ def check_file(path: str | Path) -> None:
         raise FileError(Fault("is a folder; name the files in it", str(path)))
 
 
+def check_bench(path: str | Path) -> None:
+    """Raise FileError for a bench file that is missing, with the benches of its folder."""
+    if Path(path).exists():
+        return
+    from winchkit.cli.core.completion import files_of_kind
+
+    known = ", ".join(str(own) for own in files_of_kind(Path(path).parent, ("bench",)))
+    there = f"the benches there are {known}" if known else "its folder has no bench file"
+    raise FileError(Fault(f"there is no such file; {there}", str(path)))
+
+
 def check_winches(programme: Programme, bench: BenchSpec) -> None:
     """Raise UsageError for a step of a winch that the bench lacks."""
     for step in programme.step:

@@ -9,6 +9,7 @@ import click
 
 from winchkit import wings
 from winchkit.cli.core.command import Command
+from winchkit.cli.core.messages import is_verbose
 from winchkit.cli.core.output import is_json, json_flag, tell
 from winchkit.cli.core.terminal import progress_bar
 from winchkit.cli.model.options import (
@@ -83,7 +84,7 @@ def command(
             progress("simulating the motion", None)
             errors = simulated_errors(own, declared, asked.catalogue)
     simulated = {"simulated": [error.to_json() for error in errors]} if errors else {}
-    lines = [compare_text(answer.comparison)]
+    lines = [compare_text(answer.comparison, verbose=is_verbose())]
     if errors:
         lines.append("\n" + simulated_text(errors))
     tell({**answer.comparison.to_json(), **simulated}, lines)

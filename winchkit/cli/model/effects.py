@@ -28,6 +28,7 @@ from winchkit.cli.model.options import (
 
 if TYPE_CHECKING:
     from winchkit.effects.catalogue import Catalogue
+    from winchkit.effects.effect import Effect
 
 _OUTPUTS = ("cable_length", "tension", "motor_torque")
 
@@ -54,12 +55,13 @@ class _Effects(LazyGroup):
     examples=(
         "winchkit effects",
         "winchkit effects cable-creep",
+        "winchkit effects friction speed",
     ),
 )
 def command() -> None:
     """List the effects that a model may lack, describe one, or write a new one.
 
-    'winchkit effects' and 'winchkit effects ID' are short for 'winchkit effects show [ID]'.
+    'winchkit effects ID' and 'winchkit effects WORD...' are short for 'winchkit effects show …'.
     """
 
 
@@ -68,10 +70,11 @@ def command() -> None:
     cls=Command,
     examples=(
         "winchkit effects show cable-creep",
+        "winchkit effects show runout",
         "winchkit effects show --html effects.html",
     ),
 )
-@click.argument("effect_id", metavar="[ID]", required=False, shell_complete=complete_effect)
+@click.argument("words", metavar="[ID|WORD]...", nargs=-1, shell_complete=complete_effect)
 @click.option(
     "--effects",
     "files",
@@ -82,30 +85,41 @@ def command() -> None:
 )
 @json_flag("Print JSON, complete, in SI units.")
 @html_option
-def show(effect_id: str | None, files: Sequence[str], html: str | None) -> None:
-    """List the effects that a model may lack, or describe one.
+def show(words: Sequence[str], files: Sequence[str], html: str | None) -> None:
+    """List the effects that a model may lack, describe one, or find those with all WORDs.
 
-    The page of --html holds the card, or all cards, with the signatures drawn.
+    The page of --html holds the cards, with the signatures drawn.
     """
     from winchkit.effects.card import card, card_data
     from winchkit.effects.catalogue import load_catalogue
 
     catalogue = load_catalogue(files)
-    if effect_id is not None:
-        effect = catalogue[effect_id]
+    shown, title = list(catalogue), " ".join(words)
+    if words:
+        shown = [catalogue[title]] if title in catalogue else _found(catalogue, words)
+        shown = shown or [catalogue[title]]  # which refuses it with the effects of similar names
+    if words and len(shown) == 1:
+        (effect,) = shown
         tell(card_data(effect), [card(effect)])
     elif is_json():
-        echo_json({"schema": 1, "effects": [card_data(effect) for effect in catalogue]})
+        echo_json({"schema": 1, "effects": [card_data(effect) for effect in shown]})
     else:
-        click.echo(_listing(catalogue))
+        click.echo(_listing(shown))
     if html:
         from winchkit.report.pages.effects import effects_html
 
-        shown = list(catalogue) if effect_id is None else [catalogue[effect_id]]
-        write_page(html, effects_html(shown, effect_id or "The catalogue of effects"))
+        write_page(html, effects_html(shown, title or "The catalogue of effects"))
 
 
-def _listing(catalogue: Catalogue) -> str:
+def _found(catalogue: Catalogue, words: Sequence[str]) -> list[Effect]:
+    """Effects with all words in id, name or description."""
+    from winchkit.report.words.vocabulary import clause, effect_name
+
+    texts = {e.id: f"{e.id} {effect_name(e.id)} {clause(e.id)} {e.what}" for e in catalogue}
+    return [e for e in catalogue if all(word.lower() in texts[e.id].lower() for word in words)]
+
+
+def _listing(effects: Sequence[Effect]) -> str:
     """Effects by the first output that they change; those that only a robot has by themselves."""
     from winchkit.report.words.columns import hanging
 
@@ -113,11 +127,12 @@ def _listing(catalogue: Catalogue) -> str:
     for place in (*_OUTPUTS, ""):
         own = [
             [effect.id, effect.what]
-            for effect in catalogue
+            for effect in effects
             if ("" if effect.of_robots else effect.outputs[0]) == place
         ]
-        lines += [f"On the way to {place}" if place else "On a robot", *hanging(own), ""]
-    return "\n".join([*lines, f"{len(catalogue)} effects; 'winchkit effects ID' shows one."])
+        if own:
+            lines += [f"On the way to {place}" if place else "On a robot", *hanging(own), ""]
+    return "\n".join([*lines, f"{len(effects)} effects; 'winchkit effects ID' shows one."])
 
 
 @click.command(

@@ -25,8 +25,6 @@ _RECORDING_SECONDS = 62.0
 _BEFORE_THE_END = 0.98
 """Largest share that the bar shows, since the diagnosis follows the recording."""
 _LONG = "takes half a minute; .ci/run executes it"
-_SHARES_SHOWN = 2
-"""Variables of an attribution in one sentence."""
 _OPENING = (
     "A simulated bench with seed {seed}: a winch, a CiA 402 drive on CAN, a load cell, a length "
     "and a temperature instrument on Modbus. It has at most one effect that its profile lacks."
@@ -61,6 +59,7 @@ def command(ctx: click.Context, seed: int, output: Path) -> None:
     from winchkit.catalog import find
     from winchkit.cli.sim import demo_loop
     from winchkit.diagnosis.compare import compare
+    from winchkit.report.words.sentence import sentence
     from winchkit.runs import read_run
     from winchkit.schema.read import read_profile
     from winchkit.sim import choose_bench
@@ -69,22 +68,24 @@ def command(ctx: click.Context, seed: int, output: Path) -> None:
     story = _Story(quiet=is_json())
     bench = choose_bench(seed)
     profile_name = next(iter(bench.bench.winch.values())).profile
-    story.add(_OPENING.format(seed=seed))
     with _progress(_RECORDING_SECONDS) as progress:
         paths = demo_loop.record(bench, seed, out / "runs", progress)
         progress("diagnosing", _RECORDING_SECONDS)
         runs = [read_run(path) for path in paths]
         comparison = compare(runs, read_profile(find("profiles", profile_name)))
         findings = demo_loop.learn(runs, profile_name, out)
-    story.add(
-        f"{len(runs)} runs were recorded, each motion twice under two loads: "
-        f"{sum(len(run) for run in runs)} rows in {out / 'runs'}."
-    )
-    _add_findings(story, comparison, findings)
     truth = demo_loop.truth_of(bench)
     right = findings.right(truth)
     hidden = ", ".join(truth) or "nothing"
+    story.add(sentence(findings.answer.diagnosis))
     story.add(f"Hidden effect: {hidden}. {'Found.' if right else 'Not found.'}")
+    story.print("")
+    story.add(_OPENING.format(seed=seed))
+    story.add(
+        f"It recorded {len(runs)} runs, each motion twice under two loads: "
+        f"{sum(len(run) for run in runs)} rows in {out / 'runs'}."
+    )
+    _add_errors(story, comparison, findings)
     report = _write_report(out, story, findings, profile_name, hidden)
     seconds = time.monotonic() - started
     story.print(f"Report: {report}   ({seconds:.0f} s)")
@@ -115,23 +116,16 @@ class _Story:
         click.echo(textwrap.fill(text, 80, subsequent_indent="  "), err=self._quiet)
 
 
-def _add_findings(story: _Story, comparison: Comparison, findings: Findings) -> None:
-    from winchkit.quantity_text import percent, quantity
-    from winchkit.report.words.sentence import sentence
-    from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
+def _add_errors(story: _Story, comparison: Comparison, findings: Findings) -> None:
+    from winchkit.report.words.headline import size_texts
+    from winchkit.report.words.sentence import capital
+    from winchkit.report.words.vocabulary import OUTPUT_NAMES
 
-    for name, error in comparison.outputs.items():
-        text = f"Nominal model, {OUTPUT_NAMES[name]}: error {quantity(error.rms, error.unit)} rms"
-        if error.noise_rms is not None:
-            text += f", noise {quantity(error.noise_rms, error.unit)}"
-        shares = [f"{VARIABLE_NAMES.get(v, v)} {percent(s)}" for v, s in error.follows]
-        if shares:
-            text += f"; variance explained by {', '.join(shares[:_SHARES_SHOWN])}"
-        story.add(text + ".")
-    story.add(sentence(findings.answer.diagnosis))
+    for name, text in size_texts(comparison.outputs).items():
+        story.add(f"{capital(OUTPUT_NAMES[name])} error of the profile: {text}.")
     if findings.addition is not None:
         added = findings.addition.added[0].effect.id
-        story.add(f"Added {added} to a copy of the profile: improved.toml beside nominal.toml.")
+        story.add(f"improved.toml is the profile with {added}, beside nominal.toml.")
 
 
 def _write_report(

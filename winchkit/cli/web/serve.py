@@ -10,7 +10,7 @@ import click
 from winchkit.catalog import find
 from winchkit.cli.core.command import Command, Example
 from winchkit.cli.core.completion import complete_bench, complete_sim_bench
-from winchkit.cli.core.early_checks import check_file
+from winchkit.cli.core.early_checks import check_bench, check_file
 from winchkit.cli.core.options import PROFILE, RUN
 from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.model.options import declared_profile
@@ -107,6 +107,7 @@ def _check_files(
     if profile is not None:
         declared_profile(find("profiles", profile))
     if bench is not None:
+        check_bench(bench)
         read_bench(bench).require_winches()
     if simulated is not None:
         read_simbench(find("sim", simulated))

@@ -183,9 +183,16 @@ class TimeSeriesRegression(Regression):
 
     def signal_rms(self, output: str) -> float:
         """Rms of a measured output within the band of the comparison, SI."""
-        known = [signal[valid] for signal, valid in self.measured_samples(output)]
-        squares, count = sum(float(x @ x) for x in known), sum(map(len, known))
-        return float(np.sqrt(squares / count)) if count else float("nan")
+        known = self._known(output)
+        return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+    def variation(self, output: str) -> float:
+        """Standard deviation of the same over all runs, SI."""
+        known = self._known(output)
+        return float(np.std(known)) if len(known) else float("nan")
+
+    def _known(self, output: str) -> Array:
+        return np.concatenate([signal[valid] for signal, valid in self.measured_samples(output)])
 
     def change(self, hypothesis: Hypothesis, outputs: Container[str] | None = None) -> Array:
         """Change of the prediction by the effects; see :meth:`Regression.change`."""

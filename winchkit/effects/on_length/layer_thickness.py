@@ -38,7 +38,7 @@ EFFECT = Effect(
     source="CABTIVE paper, Eq. 2 with d_c as a parameter (Table 4: 0.42 to 0.54 mm)",
     looks_like="A parabola of the length error over the drum angle; torque follows the radius.",
     confused_with=("guide-offset", "drum-radius"),
-    told_apart="The torque at constant weight over the full stroke: the guide moves it far less.",
+    told_apart="A constant weight over the whole stroke: layers change the torque, a guide hardly.",
     needs=("layers",),
     on_robot=frozenset({"all"}),
 )

@@ -3,9 +3,10 @@
 import numpy as np
 
 from winchkit.arrays import Array
-from winchkit.effects.effect import Effect, Parameter, Plausible, Values
+from winchkit.effects.effect import Dynamics, Effect, Parameter, Plausible, Values
 from winchkit.effects.presliding import START
 from winchkit.model.friction import dahl
+from winchkit.model.recurrence import share
 from winchkit.model.stages import At, Stage
 
 
@@ -18,11 +19,20 @@ def apply(torque: Array, at: At, values: Values) -> Array:
     return np.asarray(torque * values["efficiency"] ** -state)
 
 
-def carry(after: Array, before: Array, at: At, values: Values) -> float:
+def carry(after: Array, before: Array, at: At, values: Values) -> Array:
     """State z at the last sample, the ``start`` of the next ones."""
-    if values["efficiency"] == 1.0 or before[-1] == 0.0:
-        return 0.0
-    return float(-np.log(after[-1] / before[-1]) / np.log(values["efficiency"]))
+    ratio = share(after[-1], before[-1], 1.0)
+    return share(-np.log(ratio), np.log(values["efficiency"]))
+
+
+def _at_state(torque: Array, at: At, values: Values) -> Array:
+    return np.asarray(torque * values["efficiency"] ** -values["start"])
+
+
+def _rate(torque: Array, at: At, values: Values) -> Array:
+    """(1 − s z) θ'/δ, θ the motor's angle winding in."""
+    speed = np.gradient(at.wound_angle, at.time) * at.profile.gearbox.ratio
+    return np.asarray(speed * (1.0 - np.sign(speed) * values["start"]) / values["distance"])
 
 
 EFFECT = Effect(
@@ -66,4 +76,5 @@ EFFECT = Effect(
     needs=("cable_force", "gearing"),
     memory=True,
     carry=carry,
+    dynamics=Dynamics(_at_state, _rate),
 )

@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from winchkit.cli.core.messages import note
+from winchkit.cli.core.messages import is_verbose, note
 from winchkit.cli.core.outcome import threads_abandoned
 from winchkit.cli.core.output import echo_each, echo_json
 from winchkit.cli.core.terminal import progress_bar
@@ -114,7 +114,7 @@ def tell_comparisons(
         outputs = {name: one.to_json() for name, one in shared.items()}
         echo_json({"schema": 1, "winches": said, "shared": {"outputs": outputs}})
     else:
-        texts = {name: compare_text(one) for name, one in found.items()}
+        texts = {name: compare_text(one, verbose=is_verbose()) for name, one in found.items()}
         echo_each(texts, shared_errors_text(found, shared))
     if html:
         from winchkit.fleet.report.comparison import shared_errors_html

@@ -18,15 +18,19 @@ from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES
 
 def map_text(drawn: ResidualMap, scale: Scale) -> str:
     """``over free length and load 93 %, most +1.2 mm at 3 m, 196 N``."""
+    names = " and ".join(_name(name) for name in drawn.over)
+    return f"over {names} {percent(drawn.share)}, {largest_text(drawn, scale)}"
+
+
+def largest_text(drawn: ResidualMap, scale: Scale) -> str:
+    """``most +1.2 mm at 3 m, 196 N``."""
     across, up = drawn.largest
     mean = float(drawn.mean[across, up])
     places = [
         _place(map_reading(name), float(np.mean(edges[at : at + 2])))
         for name, edges, at in zip(drawn.over, drawn.edges, (across, up), strict=True)
     ]
-    names = " and ".join(_name(name) for name in drawn.over)
-    share = percent(drawn.share)
-    return f"over {names} {share}, most {signed(mean, scale)} at {', '.join(places)}"
+    return f"most {signed(mean, scale)} at {', '.join(places)}"
 
 
 def map_reading(variable: str) -> AxisLabel:

@@ -12,7 +12,7 @@ from winchkit.quantity_text import percent, quantity, scale_for, significant
 from winchkit.report.words.caveats import finding_texts
 from winchkit.report.words.headline import AT_NOISE, noise_text, size_texts, worst_outputs
 from winchkit.report.words.steps import cause
-from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, listed
+from winchkit.report.words.vocabulary import OUTPUT_NAMES, VARIABLE_NAMES, clause, listed
 
 _MOVED = 1.05
 """Ratio of held-out errors before and after above which a sentence names the output: 5 % is seen in
@@ -39,7 +39,7 @@ def headline(diagnosis: Diagnosis) -> str:
     verdict, steps = diagnosis.verdict, diagnosis.steps
     if diagnosis.interrupted:
         return "The search was interrupted before a verdict"
-    if _wrong_channels(diagnosis):
+    if wrong_channels(diagnosis):
         return "A channel looks wrong: no effect was looked for"
     if verdict == "adequate":
         return f"{'No' if _noise_is_known(diagnosis) else 'No known'} effect is missing"
@@ -63,7 +63,7 @@ def error_text(diagnosis: Diagnosis) -> str:
     outputs = diagnosis.outputs
     if diagnosis.interrupted:
         return ""
-    if wrong := _wrong_channels(diagnosis):
+    if wrong := wrong_channels(diagnosis):
         return f"{'; '.join(wrong)}."
     if not diagnosis.steps:
         name = next(iter(worst_outputs(outputs)), "")
@@ -71,14 +71,21 @@ def error_text(diagnosis: Diagnosis) -> str:
     first, *others = diagnosis.steps
     either = len(first.effects) > 1 and not first.whole
     opening = "With them" if others else "With either" if either else "With it"
+    if not others and all(is_wrong_value(effect) for effect in first.effects):
+        opening = "With either corrected" if either else "Corrected"
     if all(step.refitted for step in diagnosis.steps):
         opening = "Corrected"
     return gain_text(outputs, opening, most=1) or _NO_GAIN
 
 
+def is_wrong_value(effect: str) -> bool:
+    """Whether an effect is another value of something that the profile has already."""
+    return clause(effect).endswith("is wrong")
+
+
 def remaining_text(diagnosis: Diagnosis) -> str:
     """What remains unexplained, and where; empty where nothing is missing any more."""
-    if diagnosis.verdict == "adequate" or diagnosis.interrupted or _wrong_channels(diagnosis):
+    if diagnosis.verdict == "adequate" or diagnosis.interrupted or wrong_channels(diagnosis):
         return ""
     if diagnosis.verdict == "explained":
         return still_text(diagnosis.outputs)
@@ -95,8 +102,8 @@ def remaining_text(diagnosis: Diagnosis) -> str:
 def changes_text(diagnosis: Diagnosis) -> str:
     """What to record or to do so that the result is confirmed, refuted or decided."""
     other, beyond = _CHANGES[diagnosis.data]
-    if _wrong_channels(diagnosis):
-        return "Correct the channel by an import, or confirm it with --as-recorded."
+    if wrong_channels(diagnosis):
+        return "Correct the channel by an import, or confirm that it is right."
     if diagnosis.verdict == "adequate":
         return f"To check: record {other}. An error above the noise there refutes this result."
     if diagnosis.next_runs:
@@ -228,7 +235,7 @@ def still_text(outputs: Mapping[str, OutputFit]) -> str:
     return f"Still above the noise: {listed(texts)}." if texts else ""
 
 
-def _wrong_channels(diagnosis: Diagnosis) -> list[str]:
+def wrong_channels(diagnosis: Diagnosis) -> list[str]:
     """Wrong signs and units, with which no effect is looked for; empty without any."""
     if diagnosis.verdict != "unknown" or diagnosis.steps:
         return []

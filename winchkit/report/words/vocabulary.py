@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from math import isfinite
 
 from winchkit.diagnosis.results import Combination, Estimate, series_orders
 from winchkit.effects.series import fundamentals
 from winchkit.quantity_text import between, with_std
+from winchkit.report.words.effect_names import EFFECTS
 
 VERDICT_NAMES = {
     "adequate": "Adequate",
@@ -46,74 +48,6 @@ VARIABLE_NAMES = {
     "platform_pitch": "platform pitch",
     "platform_yaw": "platform yaw",
 }
-_CLAUSES = {
-    "anchor-point": "the anchor point of the cable differs from the profile",
-    "cable-creep": "the cable creeps under load",
-    "cable-elongation-exponential": "the cable is elastic and stiffens with its tension",
-    "cable-elongation-linear": "the cable is elastic",
-    "cable-elongation-quartic": "the cable is elastic with a nonlinear law",
-    "cable-hysteresis": "the cable is elastic with hysteresis",
-    "cable-sag": "the cable sags under its own weight",
-    "cable-thermal": "the cable expands with its temperature",
-    "cable-weight": "the weight of the cable is not negligible",
-    "cell-clipping": "the reading of the load cell saturates",
-    "cell-creep": "the load cell creeps",
-    "cell-crosstalk": "the load cell reads a share of the motor torque",
-    "cell-drift": "the zero of the load cell drifts with time",
-    "cell-gain": "the span of the load cell is wrong",
-    "cell-hysteresis": "the load cell has hysteresis",
-    "cell-lag": "the reading of the load cell is delayed",
-    "cell-nonlinearity": "the sensitivity of the load cell depends on the load",
-    "cell-offset": "the zero of the load cell is wrong",
-    "cell-thermal": "the zero of the load cell depends on the temperature",
-    "drum-eccentricity": "the drum has runout",
-    "drum-unbalance": "the drum is unbalanced",
-    "drum-radius": "the winding radius of the drum is wrong",
-    "exit-point": "the exit point of the cable differs from the profile",
-    "home-length": "the cable length at home differs from the profile",
-    "tracker-delay": "the tracker is delayed against the bench",
-    "imu-mounting": "the axes of the target or IMU are turned on the platform",
-    "payload-centre": "the centre of mass of the platform is wrong",
-    "payload-mass": "the mass of the platform is wrong",
-    "swivel-radius": "the radius of the swivel pulley is wrong",
-    "drum-winding-tension": "the cable on the drum keeps the strain of its winding",
-    "encoder-slip": "the drum slipped against its encoder",
-    "friction-at-place": "the motor side has more friction at one position",
-    "friction-of-load": "the motor side has friction in proportion to the load",
-    "friction-of-torque": "the motor side has friction in proportion to the motor torque",
-    "friction-growth": "the Coulomb friction of the motor side changes with time",
-    "frame-compliance": "the frame is compliant",
-    "gear-backlash": "the gearbox has backlash",
-    "gear-dahl": "the gearbox has presliding friction in proportion to the load (Dahl)",
-    "gear-efficiency": "the gearbox loses torque by friction",
-    "gear-ratio": "the gear ratio is wrong",
-    "gear-transmission-error": "the gearbox has a periodic transmission error",
-    "guide-offset": "the guide is mounted with an offset",
-    "joint-gravity": "the axis carries an eccentric weight",
-    "layer-thickness": "the growth of the cable layers is wrong",
-    "length-time-offset": "the length instrument is delayed",
-    "load-lever": "the load acts through a lever",
-    "motor-cogging": "the motor has cogging torque",
-    "motor-coulomb": "the motor side has Coulomb friction",
-    "motor-coulomb-asymmetry": "the torque signal has an offset",
-    "motor-dahl": "the motor side has presliding friction (Dahl)",
-    "motor-stribeck": "the motor side has Coulomb friction with a Stribeck curve",
-    "motor-viscous": "the motor side has viscous friction",
-    "motor-viscous-asymmetry": "the viscous friction of the motor side depends on the direction",
-    "pulley-capstan": "the cable slides around a blocked pulley (capstan friction)",
-    "pulley-coulomb": "the pulleys have Coulomb friction",
-    "pulley-dahl": "the pulleys have presliding friction (Dahl)",
-    "pulley-inertia": "the inertia of the pulleys is not negligible",
-    "pulley-stribeck": "the pulleys have Coulomb friction with a Stribeck curve",
-    "pulley-viscous": "the pulleys have viscous friction",
-    "rotor-inertia": "the inertia on the motor side is not negligible",
-    "spring-balancer": "the torque is linear in the position (a spring or a weight)",
-    "stribeck-of-load": "the friction in proportion to the load is higher at low speed",
-    "torque-constant": "the torque constant of the drive is wrong",
-    "torque-lag": "the torque signal of the drive is delayed",
-    "torque-ripple": "the torque constant depends on the rotor position",
-    "torque-lead": "the torque signal is the command, ahead of the torque",
-}
 _ORDERS_SHOWN = 8
 """Amplitudes of a series in one line."""
 _MAIN_ORDERS = 0.1
@@ -135,14 +69,25 @@ def clause(effect: str) -> str:
 def meaning(effect: str) -> str:
     """Clause on an effect of the catalogue, with its line; empty for a user effect."""
     own, _, line = effect.partition("/")
-    words = _CLAUSES.get(own, "")
+    words = EFFECTS[own][1] if own in EFFECTS else ""
     return f"{words} (line {line})" if words and line else words
 
 
 def kind(effect: str) -> str:
     """The clause that an effect shares with its variants, such as the laws of elongation."""
     words = clause(effect)
-    return min((c for c in (*_CLAUSES.values(), words) if words.startswith(c)), key=len)
+    clauses = [own for _, own in EFFECTS.values()]
+    return min((c for c in (*clauses, words) if words.startswith(c)), key=len)
+
+
+def effect_name(effect: str) -> str:
+    """Name of an effect in lists: ``runout of the drum``; a user effect by its id in words."""
+    own, _, line = effect.partition("/")
+    curve = re.fullmatch(r"empirical-(cable-length|tension|motor-torque|force)-(.+)", own)
+    words = EFFECTS[own][0] if own in EFFECTS else own.replace("-", " ")
+    if curve is not None:
+        words = f"curve of the {curve[1].replace('-', ' ')} over the {curve[2].replace('-', ' ')}"
+    return f"{words} (line {line})" if line else words
 
 
 def parameter_name(parameter: str) -> str:

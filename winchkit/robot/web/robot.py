@@ -6,7 +6,8 @@ positions are in m, forces in N, in the base frame.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shlex
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -59,8 +60,9 @@ class _State:
 class RobotWork:
     """State of the Robot view."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, named: Callable[[str | Path], str] = str) -> None:
         self.folder = folder
+        self.named = named
         self._state = _State()
 
     @property
@@ -121,9 +123,9 @@ class RobotWork:
             "limits": list(self._limits(robot)),
             "calibration": None if state.found is None else _calibration(state.found),
             "proposed": list(state.proposed),
-            "command": f"winchkit calibrate {state.source} "
-            + " ".join(path.name for path in state.files)
-            + f" -o {extended_name(declared.name, 'calibrated')}",
+            "command": "winchkit calibrate "
+            + shlex.join([self.named(state.source), *map(self.named, state.files)])
+            + f" -o {shlex.quote(extended_name(declared.name, 'calibrated'))}",
         }
 
     def picture(self, row: int, limits: tuple[float, float] | None = None) -> dict[str, Any]:

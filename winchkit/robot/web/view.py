@@ -27,7 +27,7 @@ class RobotView(View):
 
     def __init__(self, workspace: Workspace, folder: Path) -> None:
         super().__init__(workspace, folder)
-        self.work = RobotWork(workspace.folder)
+        self.work = RobotWork(workspace.folder, workspace.named)
 
     def routes(self) -> list[Route]:
         """Data, pictures and files."""

@@ -7,6 +7,7 @@ import csv
 import json
 import math
 import re
+import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from io import StringIO
@@ -325,8 +326,8 @@ def _header(path: str, line: str, number: int) -> list[tuple[str, str]]:
     for mark, called in ((";", "semicolons"), ("\t", "tabs")):
         if line.count(mark) > line.count(","):
             message = (
-                f"columns are separated by {called}; `winchkit import` reads such files, or save "
-                "it with commas between columns and points in numbers"
+                f"columns are separated by {called}: 'winchkit import {shlex.quote(path)} -o runs' "
+                "reads it; or save it with commas between columns and points in numbers"
             )
             raise RunError(Fault(message, path, number))
     try:

@@ -255,9 +255,7 @@ class BenchView:
     def _write_setting(self, winch: str, setting: str, value: str) -> dict[str, Any]:
         """Write a setting of a drive while no page commands."""
         if not self.allow_motion:
-            raise UsageError(
-                "this page only watches: start 'winchkit serve' with --allow-motion to write"
-            )
+            raise UsageError("this page only watches: it was started without permission to move")
         if self._commander is not None:
             raise UsageError(
                 f"{self._commander.name} commands; it must release the bench first: the drives are "
@@ -432,9 +430,7 @@ class BenchView:
 
     def _give_command(self, browser: Browser) -> None:
         if not self.allow_motion:
-            raise UsageError(
-                "this page only watches: start 'winchkit serve' with --allow-motion to move"
-            )
+            raise UsageError("this page only watches: it was started without permission to move")
         if self._commander is not None and self._commander is not browser:
             raise UsageError(f"{self._commander.name} commands; it must release the bench first")
         browser.take(attach(self.file, self.effects, name=browser.name))

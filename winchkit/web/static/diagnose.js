@@ -1,9 +1,10 @@
 // The Diagnose view: verdict, ladder, candidate card, curves over time, residual over variables.
-import { alarm, ask, attempt, colour, dialog, download, el, filesOf, fill, icon, number, order, say, sourceOf, svg } from "./page.js";
+import { ask, attempt, closeDialog, dialog, download, el, filesOf, fill, icon, number, order, say, sourceOf } from "./page.js";
 import { exporter } from "./figures.js";
 import { importFile } from "./import.js";
 import { counted, ladderFigure, ladderGrid, place, presentName, reach } from "./ladder.js";
 import { morph, slideRails } from "./motion.js";
+import { newProfile } from "./profile.js";
 import { both, drawSides } from "./sides.js";
 import { dots, legend, line, plot, sorted, sym, unitOf } from "./plots.js";
 
@@ -17,7 +18,7 @@ export function update(state) {
   const same = root.dataset.signature === signature && root.firstChild;
   if (!same) earlier = view && comparable(view, state) ? { diagnosis: view.diagnosis, curve: drawnCurve } : null;
   view = state;
-  if (same) { busy(); faults(); return; }
+  if (same) { busy(); return; }
   root.dataset.signature = signature;
   cards = {}; span = null;
   if (state.said) say(state.said);
@@ -34,7 +35,7 @@ const source = () => sourceOf(`profile ${[view.profile.name, ...view.profile.add
 
 function render() {
   const d = view.diagnosis;
-  fill(root, context(), el("div", { id: "busy" }), el("div", { id: "faults" }));
+  fill(root, context(), el("div", { id: "busy" }));
   if (!view.runs.length) root.append(empty());
   else if (d && view.beside) {
     if (!both(view).includes(shown.output)) shown.output = both(view).includes(d.ladder.focus) ? d.ladder.focus : both(view)[0];
@@ -44,30 +45,35 @@ function render() {
     shown.output = focus;
     const candidates = d.ladder.rows.filter((row) => row.kind === "candidate");
     if (!candidates.some((row) => row.effect === shown.effect)) shown.effect = candidates.length && d.verdict !== "adequate" ? candidates[0].effect : null;
+    const open = d.patterns.length > 0, next = () => el("section", { class: `panel w4 card next ${shown.effect ? "" : "tall"}`, id: "next", "aria-label": "What to do next" });
     root.append(head(d), el("div", { class: "grid" },
-      el("section", { class: `panel ${shown.effect ? "w8" : "w12"}`, id: "ladder", "aria-label": "Held-out error of each candidate" }),
+      el("section", { class: `panel ${shown.effect || open ? "w8" : "w12"}`, id: "ladder", "aria-label": "Held-out error of each candidate" }),
       shown.effect && el("section", { class: "panel w4 card", id: "card", "aria-label": "Candidate" }),
+      open && !shown.effect && next(),
+      open && el("section", { class: "panel w8", id: "pattern", "aria-label": "The curve to explain" }),
+      open && shown.effect && next(),
       el("section", { class: "panel w7", id: "time", "aria-label": "Measured and predicted" }),
       el("section", { class: "panel w5", id: "over", "aria-label": "Residual against each variable" }),
       el("section", { class: "panel w12", id: "data" })));
     drawLadder(); drawTime(); drawMultiples(); drawData();
     if (earlier) slideRails(root.querySelector("#ladder"), earlierRails());
     if (shown.effect) drawCard();
+    if (open) drawPattern();
   } else if (view.outputs.length) {
     if (!view.outputs.includes(shown.output)) shown.output = view.outputs[0];
     const heads = view.outputs.map((output) => el("button", { "aria-pressed": String(output === shown.output), onclick: () => { shown.output = output; shown.chosen = true; span = null; render(); } }, output.replaceAll("_", " ")));
     root.append(el("h1", { class: "visually-hidden" }, "Measured and predicted"), el("div", { class: "row", style: { paddingBottom: "12px" } }, el("span", { class: "row segments" }, heads), view.busy ? null : el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")), el("div", { class: "grid" }, el("section", { class: "panel w12", id: "time", "aria-label": "Measured and predicted" })));
     drawTime();
-  } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with.")));
+  } else if (!view.profile) root.append(el("div", { class: "drop" }, el("h1", {}, "Choose a profile"), el("p", { class: "note" }, "The profile is the model that the runs are compared with: drum, gearbox, cable and pulleys."),
+    el("div", { class: "row" }, el("button", { class: "primary", onclick: () => newProfile() }, "New profile…"), el("button", { onclick: chooseProfile }, "Choose a profile…"))));
   else if (!view.busy) root.append(el("div", { class: "panel" }, el("button", { class: "primary", onclick: () => attempt(() => order("diagnose")) }, "Diagnose")));
   busy();
-  faults();
 }
 
 function context() {
   const used = view.runs.filter((run) => run.used), loads = [...new Set(used.map((run) => run.load).filter(Boolean))];
   const profile = el("button", { onclick: chooseProfile }, el("b", {}, view.profile ? view.profile.name : "choose…"),
-    view.profile && view.profile.added.length ? el("span", { class: "note" }, `+ ${view.profile.added.join(", ")}`) : null);
+    view.profile && view.profile.added.length ? el("span", { class: "note" }, `+ ${view.profile.names.join(", ")}`) : null);
   return el("div", { class: "row context of-runs" },
     el("span", { class: "label" }, "Runs"), el("button", { onclick: chooseRuns }, el("b", {}, `${used.length} run${used.length === 1 ? "" : "s"}`), el("span", { class: "note" }, loads.join(", "))),
     el("span", { class: "label" }, "Profile"), profile,
@@ -92,21 +98,13 @@ function busy() {
     el("span", { class: "label" }, view.busy.what), el("button", { class: "plain", onclick: () => attempt(() => order("cancel")) }, "Cancel")));
 }
 
-// Refused files and requests change nothing else of the state.
-function faults() {
-  const box = root.querySelector("#faults"), text = view.faults.join("\n");
-  if (box.dataset.text === text) return;
-  box.dataset.text = text;
-  fill(box, text ? el("div", { class: "alert", role: "alert" }, el("div", {}, view.faults.slice(0, 8).map((words) => el("p", {}, words)),
-    view.faults.length > 8 ? el("p", { class: "note" }, `and ${view.faults.length - 8} more`) : null)) : null);
-}
-
 function empty() {
   const input = el("input", { type: "file", multiple: true, class: "visually-hidden", id: "files", "aria-label": "Run files", tabindex: -1, onchange: (event) => drop(filesOf(event.target)) });
-  return el("div", { class: "drop" }, el("h1", {}, "Drop run files here"),
-    el("p", { class: "note" }, "CSV, MCAP, Parquet, MF4 of winchkit, or a file of another program: it opens a table of its columns."),
-    el("div", { class: "row" }, input, el("button", { class: "primary", onclick: () => input.click() }, "Choose files"),
-      el("button", { onclick: openExample }, "Open an example")));
+  const way = (title, words, ...buttons) => el("section", { class: "w4 way" }, el("h2", {}, title), el("p", { class: "note" }, words), el("div", { class: "row" }, buttons));
+  return el("div", { class: "drop" }, el("h1", {}, view.profile ? `Runs to compare with ${view.profile.name}` : "Which effect does the model of your winch lack?"), el("div", { class: "grid" },
+    way("Open the demo", "Simulated runs with an effect that the profile lacks: see it found, add it, see the error fall.", el("button", { class: view.profile ? "" : "primary", onclick: () => attempt(() => order("example", { name: DEMO })) }, "Open the demo"), el("button", { onclick: openExample }, "Open an example…")),
+    way("Drop runs", "Recordings of your winch, dropped anywhere on this page: files of winchkit, or of another program (CSV, XLSX, MAT, HDF5 …), whose columns are then shown.", input, el("button", { class: view.profile ? "primary" : "", onclick: () => input.click() }, "Choose files"), el("button", { onclick: () => newProfile() }, "New profile…")),
+    way("Connect a bench", "Move a winch, record runs, watch the model live.", el("a", { class: "button", href: "#bench" }, "Connect a bench"))));
 }
 
 export async function drop(files) {
@@ -118,33 +116,35 @@ export async function drop(files) {
   }
 }
 
-async function openExample() {
+const DEMO = "demo-eccentric-drum";
+const openExample = () => attempt(async () => {
   const choices = await ask("/api/choices");
   const list = el("select", { "aria-label": "Example" }, choices.examples.filter((name) => !name.startsWith("programme")).map((name) => el("option", {}, name)));
   list.value = "demo-fat-drum";
   dialog("Open an example", el("p", { class: "note" }, "Two programmes under two loads, each twice, are simulated with the effect that the name says."),
-    el("div", { class: "row", style: { marginTop: "12px" } }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("example", { name: list.value }); document.getElementById("dialog").close(); }) }, "Open"),
-      el("button", { onclick: () => attempt(async () => { await order("mystery", { seed: 1 + Math.floor(Math.random() * 1e6) }); document.getElementById("dialog").close(); }) }, "Hide the effect")));
-}
+    el("div", { class: "row", style: { marginTop: "12px" } }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("example", { name: list.value }); closeDialog(); }) }, "Open"),
+      el("button", { onclick: () => attempt(async () => { await order("mystery", { seed: 1 + Math.floor(Math.random() * 1e6) }); closeDialog(); }) }, "Hide the effect")));
+});
 
-async function chooseProfile() {
+const chooseProfile = () => attempt(async () => {
   const choices = await ask("/api/choices");
   const list = el("select", { "aria-label": "Profile" }, choices.profiles.map((name) => el("option", {}, name)));
-  const file = el("input", { type: "file", accept: ".toml", "aria-label": "Profile file", onchange: () => attempt(async () => { await drop(filesOf(file)); document.getElementById("dialog").close(); }) });
-  dialog("Profile", el("div", { class: "row" }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("profile", { name: list.value }); document.getElementById("dialog").close(); }) }, "Use")),
-    el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or a file"), file);
-}
+  const file = el("input", { type: "file", accept: ".toml", "aria-label": "Profile file", onchange: () => attempt(async () => { await drop(filesOf(file)); closeDialog(); }) });
+  dialog("Profile", el("div", { class: "row" }, list, el("button", { class: "primary", onclick: () => attempt(async () => { await order("profile", { name: list.value }); closeDialog(); }) }, "Use")),
+    el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or a file"), file,
+    el("p", { class: "note", style: { margin: "12px 0 4px" } }, "or from the drawing of your winch"), el("button", { onclick: () => newProfile() }, "New profile…"));
+});
 
 function chooseRuns() {
-  const input = el("input", { type: "file", multiple: true, "aria-label": "Run files", onchange: () => { document.getElementById("dialog").close(); drop(input.files); } });
+  const input = el("input", { type: "file", multiple: true, "aria-label": "Run files", onchange: () => { closeDialog(); drop(input.files); } });
   dialog("Runs", el("div", { class: "runs" }, view.runs.map((run) => el("label", {},
     el("input", { type: "checkbox", checked: run.used, style: { minHeight: "auto" }, onchange: (event) => attempt(() => order("use", { name: run.name, used: event.target.checked })) }),
     el("span", {}, run.name), el("span", { class: "note" }, `${run.load} · ${number(run.seconds, 3)} s · ${run.samples} samples`),
-    el("button", { class: "plain", "aria-label": `Remove ${run.name}`, onclick: () => attempt(async () => { await order("remove", { name: run.name }); document.getElementById("dialog").close(); }) }, "Remove")))),
+    el("button", { class: "plain", "aria-label": `Remove ${run.name}`, onclick: () => attempt(async () => { await order("remove", { name: run.name }); closeDialog(); }) }, "Remove")))),
   el("p", { class: "note", style: { margin: "12px 0 4px" } }, "Add files"), input);
 }
 
-async function chooseBeside() {
+const chooseBeside = () => attempt(async () => {
   const choices = await ask("/api/choices"), { name, added } = view.profile;
   const versions = ["", ...added].map((effect, i) => el("option", { value: i, selected: i === Math.max(0, added.length - 1) }, i ? `${name} + ${added.slice(0, i).join(" + ")}` : `${name} as loaded`));
   const list = el("select", { "aria-label": "Profile beside" }, el("optgroup", { label: "This profile" }, versions), el("optgroup", { label: "Others" }, choices.profiles.map((own) => el("option", {}, own))));
@@ -154,9 +154,9 @@ async function chooseBeside() {
     el("button", { class: "primary", onclick: () => attempt(async () => {
       const version = list.selectedIndex <= added.length ? Number(list.value) : list.value;
       await order("compare", { profile: version, runs: boxes.filter(([, box]) => box.checked).map(([own]) => own) });
-      document.getElementById("dialog").close();
+      closeDialog();
     }) }, "Show beside"));
-}
+});
 
 function showCommands() {
   const text = view.commands.join("\n");
@@ -215,17 +215,49 @@ async function drawCard() {
     const card = cards[effect] || (cards[effect] = await ask(`/api/card?effect=${encodeURIComponent(effect)}`));
     if (effect !== shown.effect || !box.isConnected) return;
     const host = el("div", { class: "plot" });
-    const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}.`) : el("p", { class: "note" }, "✓ Distinguishable from every other candidate.");
+    const equal = card.equal.length ? el("p", { class: "note" }, `= With these runs it cannot be distinguished from ${card.equal.join(", ")}. To decide: ${card.told_apart}`) : null;
     fill(box, el("header", { style: { margin: 0 } }, el("h2", { style: { fontSize: "16px" } }, card.name), el("code", { class: "note" }, card.effect)),
       host, card.signature ? el("div", { class: "row" }, legend(["today", "residual, mean"], ["with", "signature"], ["band", "±1σ", true]), exporter(`signature-${card.effect}`, () => signatureFigure(card))) : null,
       el("p", { class: "note" }, card.what), el("div", { class: "formula" }, subscripted(card.formula)),
       el("dl", {}, card.parameters.flatMap((p) => [el("dt", {}, p.name), el("dd", {}, p.text, p.interval ? el("small", {}, `95 %: ${p.interval}`) : null)])),
       equal, card.next ? el("p", { class: "note" }, card.next) : null,
       el("div", { class: "buttons" }, el("button", { class: "primary", disabled: Boolean(view.busy), onclick: () => add(effect) }, "Add to profile ", el("kbd", {}, "A")),
-        el("button", { onclick: () => dialog(`How to tell ${card.name} apart`, el("p", {}, card.told_apart), view.diagnosis.next.map((n) => el("p", { class: "note" }, `${n.programme}: separates ${n.separates.join(" and ")}`))) }, "Plan a run")));
+        el("button", { onclick: planRun }, "Plan a run")));
     if (card.signature) drawSignature(host, card.signature);
   });
 }
+
+// The curve that no law explains, large, with the closest law on it, and what can be done about it.
+async function drawPattern() {
+  const box = root.querySelector("#pattern"), next = root.querySelector("#next"), [title] = view.diagnosis.patterns;
+  fill(box, el("header", {}, el("h2", {}, title)));
+  fill(next, el("h2", {}, "What to do next"));
+  await attempt(async () => {
+    const found = await ask("/api/pattern?number=0");
+    if (!box.isConnected) return;
+    const host = el("div", { class: "plot" }), law = found.signature ? { name: `closest law: ${found.closest}`, values: found.signature } : null;
+    fill(box, el("header", {}, el("h2", {}, found.title), legend(["today", "to explain, mean"], ...(law ? [["with", law.name]] : []), ["band", "±1σ", true]), exporter("pattern", () => signatureFigure({ name: found.title, signature: { ...found, signature: found.signature || [] } }))), host);
+    const { columns } = sorted(found.x, found.residual);
+    plot(host, columns, [{ paths: dots("today", 0.28, 2), points: { show: false } }], { height: 260, left: 58, noise: found.noise, xLabel: unitOf(found.label), range: sym(found.residual), logarithmic: found.logarithmic,
+      traces: [{ x: found.bins, y: found.means, tone: "today", width: 2 }, ...(law ? [{ x: found.bins, y: law.values, tone: "with", width: 3 }] : [])], label: `${found.title}: residual over ${found.label}` });
+    const way = (head, words, button) => el("li", {}, el("b", {}, head), el("p", { class: "note" }, words), button), busy = Boolean(view.busy);
+    fill(next, el("h2", {}, "What to do next"), el("ol", { class: "ways" },
+      found.curve ? way("Take the curve as it is", "The profile then predicts it, without a cause.", el("button", { class: "primary", disabled: busy, onclick: () => add(found.curve) }, "Add the curve")) : null,
+      way("Look for the cause", "A new file has a formula with the shape of this curve. Put in the physics that you recognise.", el("button", { disabled: busy, onclick: ownEffect }, "Make an effect of my own")),
+      way("Record what isolates it", "Another speed, load or stroke shows what the curve follows.", el("button", { disabled: busy, onclick: planRun }, "Plan a run"))));
+  });
+}
+
+const ownEffect = () => attempt(async () => {
+  const { file, text } = await ask("/api/effect", "{}");
+  dialog(`An effect of your own: ${file}`, el("p", { class: "note" }, "The file is in the folder of this page. Edit it there; the page reads it again at every diagnosis with it."), el("pre", { tabindex: 0 }, text),
+    el("button", { class: "primary", onclick: () => attempt(async () => { await order("use-effect", { file }); closeDialog(); }) }, "Diagnose with it"));
+});
+
+const planRun = () => attempt(async () => {
+  const { file, text, words, command } = await ask("/api/plan", "{}");
+  dialog(`A programme for the next run: ${file}`, el("p", {}, `${words[0].toUpperCase()}${words.slice(1)}.`), el("pre", { tabindex: 0 }, text), el("p", { class: "note" }, "As a command:"), el("pre", { tabindex: 0 }, command));
+});
 
 // Two sets of points over one x, sorted.
 function mixed(x, y, others, marks) {

@@ -37,7 +37,7 @@ const many = (count, word) => `${count} ${word}${count === 1 ? "" : word.endsWit
 function render() {
   if (!root.isConnected) return;
   const fitted = found.fitted;
-  fill(root, context(), el("div", { id: "busy" }), state.faults.length ? el("div", { class: "alert", role: "alert" }, state.faults.map((text) => el("p", {}, text))) : null);
+  fill(root, context(), el("div", { id: "busy" }));
   busy();
   if (!fitted) { root.append(start()); return; }
   if (!picked) picked = first(fitted);

@@ -9,7 +9,7 @@ export const reach = ({ columns, rows }) => Math.max(1.2, ...rows.flatMap((row) 
 // Place of a ratio in its drawing, in percent.
 export const place = (ratio, most) => 10 + (LOG(ratio) / most) * 84;
 
-export const presentName = (profile) => (profile && profile.added.length ? `+ ${profile.added.at(-1).replaceAll("-", " ")}` : null);
+export const presentName = (profile) => (profile && profile.added.length ? `+ ${profile.names.at(-1)}` : null);
 
 export function counted({ rows, candidates }) {
   const shown = rows.filter((row) => row.kind === "candidate").length;
@@ -20,7 +20,7 @@ export function counted({ rows, candidates }) {
 // without `choose` the candidates are names, without `focus` the heads.
 export function ladderGrid({ columns, rows }, { output, effect, only, most, present, focus, choose }) {
   const seen = only ? columns.filter((c) => c.output === output) : columns;
-  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, 190px) ${seen.map((c) => c.output === output && !only ? "2fr" : "1fr").join(" ")}` } });
+  const grid = el("div", { class: "ladder", style: { gridTemplateColumns: `minmax(96px, 270px) ${seen.map((c) => c.output === output && !only ? "2fr" : "1fr").join(" ")}` } });
   grid.append(el("span", {}));
   for (const c of seen) grid.append(el("button", { class: `head ${c.output === output ? "focus" : ""}`, "aria-pressed": String(c.output === output), onclick: () => focus(c.output) }, c.name, el("span", {}, c.unit)));
   const today = rows.find((row) => row.kind === "today"), joined = rows.filter((row) => row.equal);
@@ -29,8 +29,8 @@ export function ladderGrid({ columns, rows }, { output, effect, only, most, pres
     const chosen = row.kind === "candidate" && row.effect === effect ? "chosen" : "";
     const bracket = row.equal ? el("b", { class: `bracket ${row === joined[0] ? "first" : ""} ${row === joined.at(-1) ? "last" : ""}`, title: "cannot be distinguished with these runs" }, el("span", { class: "visually-hidden" }, "cannot be distinguished"), row === joined[Math.floor((joined.length - 1) / 2)] ? "=" : "") : null;
     grid.append(row.kind === "candidate" && choose
-      ? el("button", { class: `name ${chosen}`, "aria-pressed": String(Boolean(chosen)), title: row.effect, onclick: () => choose(row.effect) }, el("span", {}, row.label), bracket)
-      : el("div", { class: `name ${row.kind}` }, el("span", {}, row.kind === "today" && present ? present : row.label), bracket, row.kind === "today" ? el("i", {}, "today") : null));
+      ? el("button", { class: `name ${chosen}`, "aria-pressed": String(Boolean(chosen)), onclick: () => choose(row.effect) }, el("span", {}, row.label, el("small", {}, row.effect)), bracket)
+      : el("div", { class: `name ${row.kind}` }, el("span", {}, row.kind === "today" && present ? present : row.label, row.kind === "candidate" ? el("small", {}, row.effect) : null), bracket, row.kind === "today" ? el("i", {}, "today") : null));
     for (const c of seen) {
       const cell = row.cells[c.output];
       grid.append(el("div", { class: `cell ${row.kind} ${chosen} ${c.output === output && !chosen ? "focus" : ""}` }, rung(row, cell, today.cells[c.output], most, c.output, Boolean(chosen), earlier && earlier.cells[c.output]), el("span", { class: "value" }, cell ? cell.text : "–")));

@@ -61,7 +61,7 @@ const matches = (run) => (!verdict || (run.verdict && run.verdict.verdict === ve
 
 function rows() {
   const seen = sets().map(([key, runs]) => [key, runs.filter(matches)]).filter(([, runs]) => runs.length), faults = found.runs.filter((run) => run.fault && !verdict && run.name.toLowerCase().includes(filter.toLowerCase()));
-  if (!seen.length && !faults.length) return [el("tr", {}, el("td", { colspan: 7 }, found.runs.length ? "No run fits the filter." : "There are no runs in this folder; start with --folder DIR."))];
+  if (!seen.length && !faults.length) return [el("tr", {}, el("td", { colspan: 7 }, found.runs.length ? "No run fits the filter." : `There are no runs in the folder ${found.folder}. Serve the folder of your runs, or drop runs in the Diagnose view.`))];
   const all = seen.length <= 3, out = [];
   for (const [key, runs] of seen.slice(0, MOST)) {
     const open = all !== opened.has(key);

@@ -3,10 +3,11 @@ import * as bench from "./bench.js";
 import * as diagnose from "./diagnose.js";
 import * as library from "./library.js";
 import * as robot from "./robot.js";
-import { alarm, closeDialog, dialog, el, socket, version } from "./page.js";
+import { alarm, closeDialog, dialog, el, place, socket, version } from "./page.js";
 
 const views = { diagnose, bench, robot, library };
 const main = document.getElementById("main");
+const MOST = 8;
 let state = null, name = null;
 
 function route() {
@@ -22,6 +23,14 @@ function route() {
   main.removeAttribute("data-signature");
   main.replaceChildren();
   views[name].enter(main, state);
+  place();
+}
+
+// Refusals of work under way, in every view; each is shown once.
+let refusal = 0;
+function refused({ refusals, faults }) {
+  if (refusals !== refusal || !faults.length) alarm([...faults.slice(0, MOST), ...(faults.length > MOST ? [`and ${faults.length - MOST} more`] : [])].join("\n"), "work");
+  refusal = refusals;
 }
 
 socket("/live", (fresh) => {
@@ -29,7 +38,8 @@ socket("/live", (fresh) => {
   alarm("", "server");
   state = fresh;
   version.text = fresh.version;
-  if (first) bench.station(state).finally(route); else if (name) views[name].update(state);
+  refused(state);
+  if (first) bench.station(state).finally(route); else if (name) { views[name].update(state); place(); }
 }, () => { if (!state || !state.bench) alarm("The server does not answer. Trying again; if it was ended, start 'winchkit serve' anew.", "server"); });
 
 // Messages stand above a dialog, and a dialog below them.

@@ -4,12 +4,19 @@ const token = new URLSearchParams(location.search).get("token") || "";
 export async function ask(path, body, headers = {}) {
   const options = { headers: { "x-winchkit-token": token, ...headers } };
   if (body !== undefined) { options.method = "POST"; options.body = body; }
-  const response = await fetch(path, options);
+  const text = await (await answered(path, options)).text();
+  return text ? JSON.parse(text) : {};
+}
+
+// The answer to a request; where it is refused, the sentence of the server as an error.
+async function answered(path, options) {
+  let response;
+  try { response = await fetch(path, options); } catch { throw new Error("The server does not answer; nothing is changed."); }
+  if (response.ok) return response;
   const text = await response.text();
-  let data;
-  try { data = JSON.parse(text); } catch { data = { error: text }; }
-  if (!response.ok) throw new Error(data.error || `the server answered ${response.status}`);
-  return data;
+  let said = text;
+  try { said = JSON.parse(text).error; } catch { /* a plain text */ }
+  throw new Error(said || `The server answered ${response.status}; nothing is changed.`);
 }
 
 // An order that is carried out ends the message of one that was refused.
@@ -31,8 +38,7 @@ export function socket(path, receive, lost) {
 }
 
 export async function download(path) {
-  const response = await fetch(path, { headers: { "x-winchkit-token": token } });
-  if (!response.ok) throw new Error((await response.json()).error);
+  const response = await answered(path, { headers: { "x-winchkit-token": token } });
   const name = /filename="([^"]+)"/.exec(response.headers.get("content-disposition") || "");
   keep(await response.blob(), name ? name[1] : "winchkit.txt");
 }
@@ -119,7 +125,8 @@ export const version = { text: "" };
 
 export function say(text) { document.getElementById("live").textContent = text; }
 
-// Messages below the top bar, one of each cause: until it is closed, replaced, or no longer true.
+// Messages, one of each cause: until it is closed, replaced, or no longer true. They are in the open
+// dialog, else in the view's place for files, else below the top bar.
 const messages = new Map(), AT_ONCE = 1000;
 
 // `holds` says whether the message is still true. A message that repeats is shown anew, with its time;
@@ -129,9 +136,15 @@ export function alarm(text, cause = "order", holds = () => true) {
   if (before && before.text === text && now - before.at < AT_ONCE) return;
   if (before) { before.node.remove(); messages.delete(cause); }
   if (!text) return;
-  const node = el("div", { class: "alert" }, el("div", {}, text), el("span", { class: "note" }, new Date().toTimeString().slice(0, 8)), el("button", { class: "plain", onclick: () => alarm("", cause) }, "Close"));
+  const node = el("div", { class: "alert", role: "alert" }, el("div", {}, text), el("span", { class: "note" }, new Date().toTimeString().slice(0, 8)), el("button", { class: "plain", onclick: () => alarm("", cause) }, "Close"));
   messages.set(cause, { text, node, holds, at: now });
-  document.getElementById("banner").append(node);
+  place();
+}
+
+// Puts messages whose place is gone where they are seen.
+export function place() {
+  const box = document.getElementById("dialog"), host = box.open ? box : document.querySelector("main .drop") || document.getElementById("banner");
+  for (const { node } of messages.values()) if (!node.isConnected || (box.contains(node) && !box.open)) host.prepend(node);
 }
 
 // Removes the messages that are no longer true.
@@ -143,8 +156,9 @@ export function dialog(title, ...content) {
   fill(box, el("div", { class: "row", style: { marginBottom: "12px" } }, el("h2", {}, title),
     el("button", { class: "plain", style: { marginLeft: "auto" }, onclick: () => box.close() }, "Close")), ...content);
   box.setAttribute("aria-label", title);
-  box.onclose = () => before && before.focus && before.focus();
+  box.onclose = () => { place(); if (before && before.focus) before.focus(); };
   if (!box.open) box.show();
+  place();
   (box.querySelector("select, input, .primary") || box.querySelector("button")).focus();
   return box;
 }

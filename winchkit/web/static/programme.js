@@ -26,7 +26,7 @@ export function choose(start) {
       try {
         const plan = await ask(`/api/bench/programme?name=${encodeURIComponent(name)}`);
         if (mine !== asked) return;
-        fill(shown, el("p", {}, plan.description || plan.name), curves(plan), el("p", { class: "note" }, `${plan.repeats} repeat${plan.repeats === 1 ? "" : "s"} of ${number(plan.duration, 3)} s${plan.asks.length ? `, ${plan.asks.length} question${plan.asks.length === 1 ? "" : "s"}` : ""}; all within the limits. It ends where this page is hidden or closed.`),
+        fill(shown, el("p", {}, plan.description || plan.name), curves(plan), el("p", { class: "note" }, `${plan.repeats} run${plan.repeats === 1 ? "" : "s"} of ${number(plan.duration, 3)} s${plan.asks.length ? `, ${plan.asks.length} pause${plan.asks.length === 1 ? "" : "s"} for you` : ""}. It stops if you hide or close this page.`),
           el("details", {}, el("summary", {}, `${plan.steps.length} step${plan.steps.length === 1 ? "" : "s"}`), el("ol", {}, plan.steps.map((words) => el("li", {}, words)))), held("Hold to start", () => { closeDialog(); start(name, folder.value.trim() || "."); }));
       } catch (error) { if (mine === asked) fill(shown, el("p", {}, error.message)); }
     }

@@ -9,11 +9,11 @@ export function leave() { root = null; }
 
 export function update(state) {
   newest = state;
-  const now = JSON.stringify([state.robot, state.busy, state.faults]);
+  const now = JSON.stringify([state.robot, state.busy]);
   if (now === signature && root.firstChild) return;
   const fresh = !signature || !state.robot || JSON.parse(signature)[0]?.number !== state.robot.number;
   signature = now;
-  if (!state.robot) { view = null; fill(root, faults(state), empty()); return; }
+  if (!state.robot) { view = null; fill(root, empty()); return; }
   if (!fresh && view) { render(state); return; }
   read();
 }
@@ -78,8 +78,6 @@ function fetchSlice() {
   });
 }
 
-const faults = (state) => state.faults.length ? el("div", { class: "alert", role: "alert", style: { marginTop: "12px" } }, el("div", {}, state.faults.slice(0, 8).map((text) => el("p", {}, text)))) : null;
-
 function empty() {
   return el("div", { class: "drop" }, el("h1", {}, "No robot is open"), el("p", { class: "note" }, "Choose the profile of a robot, then drop a recording of its poses."),
     el("div", { class: "row" }, el("button", { class: "primary", onclick: chooseProfile }, "Choose a robot…")));
@@ -105,7 +103,7 @@ export { drop };
 function render(state) {
   const found = view.calibration;
   fill(root, context(state), state.busy ? el("div", { class: "row", style: { paddingBottom: "12px" } }, el("progress", { "aria-label": "Progress" }), el("span", { class: "label" }, state.busy.what)) : null,
-    faults(state), found ? head(found) : el("div", { class: "verdict" }, el("h1", {}, view.poses ? `${view.poses} poses` : now ? "Platform and cables" : "No poses yet"), view.poses ? null : el("p", {}, "Drop a recording of poses to calibrate the robot.")),
+    found ? head(found) : el("div", { class: "verdict" }, el("h1", {}, view.poses ? `${view.poses} poses` : now ? "Platform and cables" : "No poses yet"), view.poses ? null : el("p", {}, "Drop a recording of poses to calibrate the robot.")),
     el("div", { class: "grid" },
       el("section", { class: "panel w7", id: "picture", "aria-label": "Cables and platform" }),
       el("div", { class: "w5 stack" }, found ? [error(found), el("section", { class: "panel", id: "details", "aria-label": "Errors of poses and cables" }), warnings(found)] : null, platform(), proposals())));

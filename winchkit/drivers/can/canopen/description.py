@@ -207,9 +207,9 @@ def _reaction(dictionary: Any) -> tuple[str, tuple[str, ...]]:
     if lost is not None:
         row = OPTIONS["connection_lost"]
         if lost.writable:
-            return "as 6007h says, which can be set to 3 (quick stop) or 1 (fault)", ("6007h",)
+            return "reacts as set in 6007h (3 quick stop, 1 fault)", ("6007h",)
         words = row.meanings.get(lost.default or 0, "of the maker's own")
-        return f"as 6007h says, which cannot be written: {lost.default} ({words})", ("6007h",)
+        return f"reacts as fixed in 6007h: {lost.default} ({words})", ("6007h",)
     if declared(dictionary, 0x1029, 1) is not None:
         return (
             "it leaves the state operational (1029h:1), there is no 6007h: whether the motor "

@@ -1,0 +1,93 @@
+"""A profile from the values of a drawing: each is read back, and nothing is invented."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from winchkit import find
+from winchkit.cli import main
+from winchkit.errors import UsageError
+from winchkit.profile_edit.drawing import DRUMS, FIELDS
+from winchkit.profile_edit.new_profile import new_profile
+from winchkit.schema.read import read_profile
+
+SPIRAL = {"drum.kind": "spiral", "drum.winding_radius": "60 mm", "gearbox.ratio": "20.4"}
+PULLEYS = ["40 mm, 90 deg", "40 mm, 60 deg"]
+
+
+def test_the_drawing_of_a_shipped_winch_gives_its_profile(tmp_path: Path) -> None:
+    values = {
+        **SPIRAL,
+        "drum.layer_growth": "0.08 mm",
+        "cable.diameter": "4 mm",
+        "cable.dead_length": "1500 mm",
+        "path.inclination": "0.25 turn",
+        "reference.cable_length": "400 cm",
+        "reference.wound_turns": "4",
+    }
+    path = tmp_path / "bench-spiral.toml"
+    unknown = new_profile(path, values, PULLEYS)
+    shipped, own = read_profile(find("profiles", "bench-spiral")), read_profile(path)
+    for part in ("drum", "cable", "path", "gearbox", "motor", "guide", "pulley", "reference"):
+        assert getattr(own, part) == getattr(shipped, part), part
+    text = path.read_text()
+    for key, words in unknown.items():
+        assert f"# {key.partition('.')[2]}: unknown; {words}" in text
+    with pytest.raises(UsageError, match="exists already"):
+        new_profile(path, values)
+
+
+@pytest.mark.parametrize("kind", DRUMS)
+def test_every_example_is_read_and_what_is_needed_is_required(kind: str, tmp_path: Path) -> None:
+    own = [field for field in FIELDS if kind in field.drums]
+    values = {field.key: field.example for field in own} | {"drum.kind": kind}
+    assert new_profile(tmp_path / "all.toml", values, PULLEYS) == {}
+    read_profile(tmp_path / "all.toml")
+    needed = {field.key: values[field.key] for field in own if not field.without}
+    for key in needed:
+        if key != "drum.kind":
+            rest = {other: text for other, text in values.items() if other != key}
+            with pytest.raises(UsageError, match=f"{key}: missing"):
+                new_profile(tmp_path / "less.toml", rest)
+    assert not (tmp_path / "less.toml").exists()
+
+
+@pytest.mark.parametrize(
+    ("values", "fault"),
+    [
+        ({"drum.winding_radius": "60"}, "drum.winding_radius: '60' has no unit"),
+        ({"drum.winding_radius": "60,5 mm"}, "write the decimal point: 60.5 mm"),
+        ({"drum.winding_radius": "-60 mm"}, "must be above 0 m"),
+        ({"drum.kind": "spirl"}, "did you mean 'spiral'?"),
+        ({"drum.groove_pitch": "5 mm"}, "drum.groove_pitch: a spiral drum has none"),
+        ({"guide.distance": "1 m"}, "guide.distance: give guide.screw_lead too"),
+        ({"drum.radius": "1 m"}, "drum.radius: unknown key"),
+        ({}, "drum.layer_growth: missing; a spiral drum needs it, or cable.diameter"),
+    ],
+)
+def test_a_wrong_value_names_its_key_and_writes_nothing(
+    values: dict[str, str], fault: str, tmp_path: Path
+) -> None:
+    with pytest.raises(UsageError) as refused:
+        new_profile(tmp_path / "own.toml", SPIRAL | values)
+    assert fault in str(refused.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_terminal_asks_until_the_answer_can_be_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("winchkit.cli.model.profile._may_ask", lambda _: True)
+    answers = ["grooved", "60", "60 mm", "5 mm", "", "20.4", *[""] * 9, "4 m", "", "40 mm", ""]
+    target = tmp_path / "asked.toml"
+    typed = "\n".join([*answers, ""])
+    found = CliRunner().invoke(main, ["profile", "new", str(target)], input=typed)
+    assert found.exit_code == 0, found.output
+    assert "'60' has no unit" in found.output
+    own = read_profile(target)
+    values = own.drum.kind, own.drum.groove_pitch, own.reference.cable_length
+    assert values == ("grooved", 5e-3, 4.0)
+    assert [pulley.radius for pulley in own.pulley] == [0.04]
