@@ -26,6 +26,11 @@ from winchkit.robot.identification.variance_components import START
 from winchkit.runs.run import Run
 from winchkit.schema.profiles.robot import RobotProfile
 
+_WITHOUT_POSITION = (
+    "platform_position is not compared: these cables alone do not determine the pose of the "
+    "platform; its measured positions take part in the error of the cable lengths"
+)
+
 
 @dataclass(frozen=True)
 class RobotCompared(Compared):
@@ -68,7 +73,10 @@ def compared(
     for followed in follows:
         most.setdefault(followed.output, followed)
     traces = pose_traces(column_names(dataset, errors), UNITS, errors)
-    comparison = Comparison(outputs, None, dataset.notes, traces=traces)
+    notes = dataset.notes
+    if "platform_position" not in errors and np.isfinite(dataset.measured.position).any():
+        notes = (*notes, _WITHOUT_POSITION)
+    comparison = Comparison(outputs, None, notes, traces=traces)
     return RobotCompared(regression, comparison, errors, most)
 
 
