@@ -257,7 +257,7 @@ def test_motor_angles_alone_are_not_enough_for_four_cables() -> None:
         angles=np.full_like(measured.angles, np.nan),
     )
     with pytest.raises(UsageError, match="measure more at each"):
-        calibrate(believed, blind, blind)
+        calibrate(believed, blind)
 
 
 @pytest.mark.slow
