@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from math import ceil, isinf, isnan, log10
 
 from winchkit.diagnosis.diagnose import Answer, WinchAnswer
+from winchkit.diagnosis.regression.cross_validation import excess
 from winchkit.diagnosis.results import CandidateScore, Detectable, Diagnosis
-from winchkit.diagnosis.verdict.decision import excess
 from winchkit.effects.catalogue import load_catalogue
 from winchkit.effects.effect import Effect, Parameter
 from winchkit.quantity_text import quantity
